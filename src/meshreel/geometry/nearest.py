@@ -1,0 +1,49 @@
+"""Closest points on a surface: Open3D's ray-casting scene behind one small class (the extra `encode`).
+
+Queries run in float32 inside Open3D: give coordinates near the origin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from ..types import Mesh
+from .topology import face_normals
+
+
+@dataclass(frozen=True, slots=True)
+class Hits:
+    """Closest surface points of N queries."""
+
+    points: Float64[np.ndarray, "N 3"]
+    faces: Int64[np.ndarray, " N"]
+    barycentric: Float64[np.ndarray, "N 3"]  # weights of the face's three vertices
+
+
+class Surface:
+    """A mesh prepared for closest-point queries; the mesh must have at least one face."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        import open3d as o3d
+
+        assert not mesh.is_empty, "closest points need a surface"
+        self.mesh = mesh
+        self.normals, self.areas = face_normals(mesh)
+        self._scene = o3d.t.geometry.RaycastingScene()
+        self._scene.add_triangles(
+            o3d.core.Tensor(mesh.vertices.astype(np.float32)), o3d.core.Tensor(mesh.faces.astype(np.uint32))
+        )
+
+    def closest(self, queries: Float64[np.ndarray, "N 3"]) -> Hits:
+        """The closest point of the surface to each query, its face and its barycentric weights."""
+        import open3d as o3d
+
+        answer = self._scene.compute_closest_points(o3d.core.Tensor(queries.astype(np.float32)))
+        faces = answer["primitive_ids"].numpy().astype(np.int64)
+        uv = answer["primitive_uvs"].numpy().astype(np.float64)
+        barycentric = np.stack([1 - uv[:, 0] - uv[:, 1], uv[:, 0], uv[:, 1]], axis=1)
+        corners = self.mesh.vertices[self.mesh.faces[faces]]  # float64 again
+        return Hits(np.einsum("nk,nkd->nd", barycentric, corners), faces, barycentric)

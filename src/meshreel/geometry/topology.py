@@ -1,0 +1,114 @@
+"""Connectivity: edges, components, welding, normals and midpoint subdivision of triangle meshes.
+
+Pure array functions on vertices (V x 3) and faces (F x 3); no I/O, no heavy imports: the decoder uses this file.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64
+
+from ..types import Mesh
+
+
+def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]:
+    """Undirected edges (i < j, sorted) and, per face, the edges opposite to none: (01, 12, 20)."""
+    f = faces.astype(np.int64)
+    pairs = np.sort(np.stack([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
+    count = int(pairs.max()) + 1 if len(pairs) else 1
+    keys, inverse = np.unique(pairs[:, 0] * count + pairs[:, 1], return_inverse=True)
+    return np.stack([keys // count, keys % count], axis=1), inverse.reshape(-1, 3)
+
+
+def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
+    """The mesh with each triangle cut in four at its edge midpoints, `levels` times (paper, section 3.3.2).
+
+    Old vertices come first and in order; new ones follow in the order of their sorted edges.
+    """
+    for _ in range(levels):
+        edges, face_edges = unique_edges(mesh.faces)
+        e = (face_edges + len(mesh.vertices)).astype(np.int32)
+        a, b, c = mesh.faces.T
+        faces = np.stack(
+            [
+                np.stack([a, e[:, 0], e[:, 2]], axis=1),
+                np.stack([e[:, 0], b, e[:, 1]], axis=1),
+                np.stack([e[:, 2], e[:, 1], c], axis=1),
+                np.stack([e[:, 0], e[:, 1], e[:, 2]], axis=1),
+            ],
+            axis=1,
+        ).reshape(-1, 3)
+        midpoints = (mesh.vertices[edges[:, 0]] + mesh.vertices[edges[:, 1]]) / 2
+        mesh = Mesh.of(np.concatenate([mesh.vertices, midpoints]), faces)
+    return mesh
+
+
+def face_normals(mesh: Mesh) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]:
+    """Unit normals and areas (squared units of the vertices) of the faces; zero normals for zero areas."""
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1)
+    return cross / np.where(length > 0, length, 1.0)[:, None], length / 2
+
+
+def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
+    """Area-weighted unit normals of the vertices; zero where a vertex has no face of positive area."""
+    normals, areas = face_normals(mesh)
+    weighted = normals * areas[:, None]
+    total = np.zeros((len(mesh.vertices), 3))
+    for corner in range(3):
+        for axis in range(3):
+            total[:, axis] += np.bincount(mesh.faces[:, corner], weighted[:, axis], len(mesh.vertices))
+    length = np.linalg.norm(total, axis=1)
+    return total / np.where(length > 0, length, 1.0)[:, None]
+
+
+def weld(mesh: Mesh) -> Mesh:
+    """The mesh with vertices at exactly equal positions merged; faces that collapse are dropped.
+
+    UV seams duplicate positions; codecs and normals need them to be one vertex.
+    """
+    if len(mesh.vertices) == 0:
+        return mesh
+    _, first, inverse = np.unique(mesh.vertices, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # keep the order of first appearance
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    faces = rank[inverse.reshape(-1)][mesh.faces]
+    return Mesh.of(mesh.vertices[first[order]], faces[~_collapsed(faces)])
+
+
+def clean(mesh: Mesh) -> Mesh:
+    """The mesh without collapsed, zero-area and repeated faces and without vertices that no face uses."""
+    faces = mesh.faces[~_collapsed(mesh.faces)]
+    faces = faces[face_normals(Mesh.of(mesh.vertices, faces))[1] > 0]
+    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    return drop_unreferenced(Mesh.of(mesh.vertices, faces[np.sort(first)]))
+
+
+def drop_unreferenced(mesh: Mesh) -> Mesh:
+    """The mesh without vertices that no face uses, the others in their order."""
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.faces.reshape(-1)] = True
+    return Mesh.of(mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces])
+
+
+def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:
+    """A label 0, 1, ... for each of `count` vertices: the connected component, in order of its first vertex."""
+    labels = np.arange(count)
+    f = faces.astype(np.int64)
+    while True:  # label propagation with pointer jumping: O(log V) rounds
+        low = labels[f].min(axis=1) if len(f) else np.zeros(0, np.int64)
+        new = labels.copy()
+        for corner in range(3):
+            np.minimum.at(new, f[:, corner], low)
+            np.minimum.at(new, labels[f[:, corner]], low)
+        new = new[new]
+        if np.array_equal(new, labels):
+            return np.unique(labels, return_inverse=True)[1].reshape(-1)
+        labels = new
+
+
+def _collapsed(faces: Int32[np.ndarray, "F 3"] | Int64[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
+    a, b, c = faces.T
+    return (a == b) | (b == c) | (c == a)
