@@ -1,0 +1,61 @@
+"""A static mesh and its Draco bytes, on a lattice that all meshes of a stream share.
+
+In -> out: Mesh <-> bytes. Draco reorders vertices, drops degenerate faces and splits non-manifold vertices, so an
+encoder goes on from its own decoded bytes. The empty mesh is the empty string. Source: paper, section 3.3.3.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..errors import FormatError, InputError
+from ..types import Mesh
+
+MAX_BITS = 21  # float32 positions inside Draco hold no more
+COMPRESSION_LEVEL = 7  # the paper's
+
+
+def encode_mesh(mesh: Mesh, step: float) -> bytes:
+    """Draco bytes of the mesh with its vertices rounded to multiples of `step` (the unit of the vertices).
+
+    Raises InputError where the extent needs more than 21 bits at that step.
+    """
+    if mesh.is_empty:
+        return b""
+    import DracoPy
+
+    low = np.floor(mesh.vertices.min(axis=0) / step) * step
+    cells = float((mesh.vertices.max(axis=0) - low).max()) / step
+    bits = max(1, math.ceil(math.log2(cells + 2)))
+    if bits > MAX_BITS:
+        raise InputError(f"a mesh {cells * step:g} wide needs {bits} bits at step {step:g}; at most {MAX_BITS}: raise the step")
+    return bytes(
+        DracoPy.encode(
+            mesh.vertices,
+            mesh.faces,
+            quantization_bits=bits,
+            compression_level=COMPRESSION_LEVEL,
+            quantization_range=float((2**bits - 1) * step),
+            quantization_origin=low,
+        )
+    )
+
+
+def decode_mesh(data: bytes) -> Mesh:
+    """The mesh of Draco bytes. Raises FormatError where they are not a valid Draco mesh."""
+    if not data:
+        return Mesh.empty()
+    import DracoPy
+
+    try:
+        decoded = DracoPy.decode(bytes(data))
+        mesh = Mesh.of(decoded.points, decoded.faces)
+    except Exception as error:  # DracoPy raises its own types, and others, on damaged bytes
+        raise FormatError(f"damaged Draco data ({len(data)} bytes): {error}") from error
+    if not np.isfinite(mesh.vertices).all():
+        raise FormatError(f"damaged Draco data ({len(data)} bytes): positions are not finite")
+    if len(mesh.faces) and (mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices)):
+        raise FormatError(f"damaged Draco data ({len(data)} bytes): a face names vertex {mesh.faces.max()}")
+    return mesh
