@@ -15,6 +15,7 @@ from ..types import Mesh
 
 MAX_BITS = 21  # float32 positions inside Draco hold no more
 COMPRESSION_LEVEL = 7  # the paper's
+MAX_FACES = 64_000_000
 
 
 def encode_mesh(mesh: Mesh, step: float) -> bytes:
@@ -43,15 +44,18 @@ def encode_mesh(mesh: Mesh, step: float) -> bytes:
     )
 
 
-def decode_mesh(data: bytes) -> Mesh:
-    """The mesh of Draco bytes. Raises FormatError where they are not a valid Draco mesh."""
+def decode_mesh(data: bytes, step: float) -> Mesh:
+    """The mesh of Draco bytes, its vertices exact multiples of `step`. Raises FormatError where the bytes are damaged.
+
+    Draco gives float32 positions whose last bits depend on its build; the lattice does not.
+    """
     if not data:
         return Mesh.empty()
     import DracoPy
 
     try:
         decoded = DracoPy.decode(bytes(data))
-        mesh = Mesh.of(decoded.points, decoded.faces)
+        mesh = Mesh.of(np.round(np.asarray(decoded.points, dtype=np.float64) / step) * step, decoded.faces)
     except Exception as error:  # DracoPy raises its own types, and others, on damaged bytes
         raise FormatError(f"damaged Draco data ({len(data)} bytes): {error}") from error
     if not np.isfinite(mesh.vertices).all():
@@ -59,3 +63,9 @@ def decode_mesh(data: bytes) -> Mesh:
     if len(mesh.faces) and (mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices)):
         raise FormatError(f"damaged Draco data ({len(data)} bytes): a face names vertex {mesh.faces.max()}")
     return mesh
+
+
+def check_growth(mesh: Mesh, levels: int) -> None:
+    """Raises FormatError where subdividing `levels` times would make an absurd mesh (over 64 million faces)."""
+    if len(mesh.faces) * 4**levels > MAX_FACES:
+        raise FormatError(f"{len(mesh.faces)} faces subdivided {levels} times exceed {MAX_FACES} faces")

@@ -1,0 +1,62 @@
+"""One pass over a sequence before anything is coded: its bounding box, its empty frames, its windows.
+
+In -> out: MeshSequence -> Survey. Errors of any frame surface here, before minutes are spent on the first ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import InputError
+from ..types import Mesh, MeshSequence
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """What the encoder must know of the whole sequence."""
+
+    low: Float64[np.ndarray, "3"]  # corner of the sequence's bounding box, m
+    high: Float64[np.ndarray, "3"]  # the opposite corner, m
+    empty: tuple[bool, ...]  # which frames have no surface
+
+    @property
+    def center(self) -> Float64[np.ndarray, "3"]:
+        """Center of the bounding box, m: the origin of normalised coordinates."""
+        return (self.low + self.high) / 2
+
+    @property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal, m: the unit of normalised coordinates."""
+        return float(np.linalg.norm(self.high - self.low)) or 1.0
+
+    def normalise(self, mesh: Mesh) -> Mesh:
+        """The mesh in normalised coordinates: centered, the sequence's diagonal as the unit."""
+        return Mesh.of((mesh.vertices - self.center) / self.diagonal, mesh.faces)
+
+    def windows(self, size: int) -> list[range]:
+        """Runs of at most `size` frames, each all empty or all with a surface, of even lengths."""
+        edges = [0, *(i for i in range(1, len(self.empty)) if self.empty[i] != self.empty[i - 1]), len(self.empty)]
+        windows = []
+        for start, stop in zip(edges, edges[1:], strict=False):
+            parts = -(-(stop - start) // size)
+            cuts = [start + (stop - start) * k // parts for k in range(parts + 1)]
+            windows += [range(a, b) for a, b in zip(cuts, cuts[1:], strict=False)]
+        return windows
+
+
+def survey(sequence: MeshSequence) -> Survey:
+    """The survey of a sequence, one frame in memory at a time. Raises InputError where there are no frames."""
+    if len(sequence) == 0:
+        raise InputError("the sequence has no frames; give at least one mesh")
+    low, high, empty = np.full(3, np.inf), np.full(3, -np.inf), []
+    for mesh in sequence:
+        empty.append(mesh.is_empty)
+        if not mesh.is_empty:
+            used = mesh.vertices[np.unique(mesh.faces)]
+            low, high = np.minimum(low, used.min(axis=0)), np.maximum(high, used.max(axis=0))
+    if all(empty):
+        low, high = np.zeros(3), np.zeros(3)
+    return Survey(low, high, tuple(empty))

@@ -1,0 +1,93 @@
+"""What a coded group is worth, and the cheapest per-frame Draco form that is worth as much.
+
+In -> out: originals and decoded frames -> Quality; originals and a Quality to reach -> a payload of the `draco` form or
+nothing. Decisions use the symmetric distance: the one-way form does not see left-over surface.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from .coding.intra import decode_intra, encode_intra
+from .geometry.decimate import decimate
+from .metrics.distance import surface_errors
+from .types import Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How far decoded frames are from the originals; smaller is better."""
+
+    distance: float  # RMS over the frames of the symmetric surface distance, normalised units
+    angle: float  # mean normal error over the frames, degrees
+    worst: float  # the largest symmetric distance of a frame, normalised units
+
+    def reaches(self, other: Quality) -> bool:
+        """True where neither distance nor normals are worse than the other's."""
+        return self.distance <= other.distance and self.angle <= other.angle
+
+
+@dataclass(frozen=True, slots=True)
+class IntraOptions:
+    """What is tried for the `draco` form."""
+
+    fractions: tuple[float, ...] = (0.04, 0.08, 0.15, 0.25, 0.5, 1.0)  # of the vertices kept
+    steps: tuple[float, ...] = (2.0, 1.4, 1.0, 0.7, 0.5, 0.35)  # lattice steps, in units of the distance to reach
+    levels: tuple[int, ...] = (1, 0)  # midpoint subdivisions in the decoder
+
+
+def measure(originals: Sequence[Mesh], decoded: Sequence[Mesh]) -> Quality:
+    """The quality of decoded frames; a frame without surface on one side only counts as infinitely far."""
+    errors = [surface_errors(a, b) for a, b in zip(originals, decoded, strict=True)]
+    distances = [e.symmetric_rms for e in errors]
+    mean_square = sum(d * d for d in distances) / len(errors)
+    return Quality(math.sqrt(mean_square), sum(e.angle for e in errors) / len(errors), max(distances))
+
+
+def cheapest_intra(
+    frames: Sequence[Mesh], target: Quality, most_bytes: float, options: IntraOptions
+) -> tuple[bytes, Quality] | None:
+    """The smallest `draco` payload under `most_bytes` that reaches the target, with its quality.
+
+    Candidates are tried on the middle frame, cheapest first; the first that also holds on all frames is taken.
+    """
+    middle = frames[len(frames) // 2]
+    budget = most_bytes / len(frames)
+    for size, fraction, step, levels in sorted(_on_one_frame(middle, target, budget, options)):
+        del size
+        meshes = [_reduced(frame, fraction) for frame in frames]
+        payload = encode_intra(meshes, step, levels)
+        if len(payload) >= most_bytes:
+            return None
+        quality = measure(frames, decode_intra(payload))
+        if quality.reaches(target):
+            return payload, quality
+    return None
+
+
+def finest_intra(frames: Sequence[Mesh], step: float) -> tuple[bytes, Quality]:
+    """The `draco` payload with every vertex kept: what remains when nothing cheaper reaches a target."""
+    payload = encode_intra(frames, step, 0)
+    return payload, measure(frames, decode_intra(payload))
+
+
+def _on_one_frame(
+    frame: Mesh, target: Quality, budget: float, options: IntraOptions
+) -> Iterator[tuple[int, float, float, int]]:
+    """Bytes, fraction, step and levels of what reaches the target on one frame and is below the budget."""
+    for levels in options.levels:
+        for fraction in options.fractions:
+            reduced = _reduced(frame, fraction)
+            for step in options.steps:
+                payload = encode_intra([reduced], step * target.distance, levels)
+                if len(payload) > budget:
+                    break  # finer steps cost more
+                if measure([frame], decode_intra(payload)).reaches(target):
+                    yield len(payload), fraction, step * target.distance, levels
+                    break
+
+
+def _reduced(frame: Mesh, fraction: float) -> Mesh:
+    return frame if fraction >= 1 else decimate(frame, max(4, round(fraction * len(frame.vertices))))

@@ -1,0 +1,71 @@
+"""The terminal: one-line errors, progress by stage with time left, results as text or JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from cyclopts import Parameter
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Common:
+    """What every command takes."""
+
+    quiet: Annotated[bool, Parameter(negative="")] = False
+    """Say nothing but errors."""
+    json: Annotated[bool, Parameter(negative="")] = False
+    """Print one JSON object instead of text."""
+    debug: Annotated[bool, Parameter(negative="")] = False
+    """Show the traceback of an error."""
+
+    def warn(self, text: str) -> None:
+        """One line of warning on standard error."""
+        if not self.quiet:
+            print(f"meshreel: warning: {text}", file=sys.stderr)
+
+    def result(self, row: dict[str, Any], *texts: object) -> None:
+        """The result: `row` as JSON, or the texts and tables."""
+        if self.json:
+            print(json.dumps(row, allow_nan=False, default=str))
+        elif not self.quiet:
+            console = Console(highlight=False, soft_wrap=True)
+            for text in texts:
+                console.print(text)
+
+    @contextmanager
+    def stages(self, total: int) -> Iterator[StageBars]:
+        """Progress bars, one a stage, on standard error; nothing where quiet, JSON or not a terminal."""
+        console = Console(stderr=True)
+        disable = self.quiet or self.json or not console.is_terminal
+        columns = (
+            SpinnerColumn(),
+            TextColumn("{task.description:<10}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(elapsed_when_finished=True),
+        )
+        with Progress(*columns, console=console, disable=disable) as bars:
+            yield StageBars(bars, total)
+
+
+class StageBars:
+    """A progress callback that opens a bar for each stage as it first reports."""
+
+    def __init__(self, bars: Progress, total: int) -> None:
+        self.bars = bars
+        self.total = total
+        self.tasks: dict[str, Any] = {}
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """`done` of `total` frames have passed `stage`."""
+        if stage not in self.tasks:
+            self.tasks[stage] = self.bars.add_task(stage, total=total)
+        self.bars.update(self.tasks[stage], completed=done, total=total)

@@ -1,0 +1,32 @@
+"""The protocol of everything that is compared: a sequence becomes bytes, and bytes a sequence; nothing else passes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from ..types import Mesh, MeshSequence
+
+Progress = Callable[[str, int, int], None]  # stage, frames done, frames of the sequence
+
+
+class Codec(Protocol):
+    """A codec at one operating point."""
+
+    @property
+    def name(self) -> str:
+        """What rows and plots call it."""
+        ...
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The operating point, ready for JSON."""
+        ...
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+        """All that a decoder needs; its length is the rate."""
+        ...
+
+    def decode(self, data: bytes) -> Sequence[Mesh]:
+        """The frames, from the bytes alone; may decode lazily, frame by frame."""
+        ...

@@ -1,0 +1,27 @@
+"""Every codec that can be compared, by name, made at an operating point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from ...errors import InputError
+from ..codec import Codec
+from .draco import DecimatedDracoCodec, DracoCodec
+from .meshreel import MeshreelCodec
+
+CODECS: dict[str, Callable[..., Codec]] = {
+    "draco": DracoCodec,
+    "decimated_draco": DecimatedDracoCodec,
+    "meshreel": MeshreelCodec,
+}
+
+
+def make_codec(kind: str, options: dict[str, Any]) -> Codec:
+    """The codec of that kind at the operating point `options`. Raises InputError for a kind or option it lacks."""
+    if kind not in CODECS:
+        raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted(CODECS))}")
+    try:
+        return CODECS[kind](**options)
+    except TypeError as error:
+        raise InputError(f"codec {kind!r} does not take {options}: {error}") from error

@@ -1,0 +1,87 @@
+"""The anchors: Draco on every frame, and decimation + Draco on every frame (A2), with free subdivision (A2s).
+
+Both write .reel files whose groups are single `draco` frames, so their rate counts the same kind of container.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ...analysis.survey import survey
+from ...coding.intra import encode_intra
+from ...container.writer import ReelWriter
+from ...decoder import open as open_video
+from ...encoder import make_header
+from ...geometry.decimate import decimate
+from ...types import Mesh, MeshSequence
+from ..codec import Progress
+
+
+@dataclass(frozen=True, slots=True)
+class DracoCodec:
+    """Draco per frame, compression level 7, `qp` bits along each frame's longest side."""
+
+    qp: int = 10
+
+    @property
+    def name(self) -> str:
+        return "draco"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        return asdict(self)
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+        return _encode_frames(sequence, self.qp, 1.0, 0)
+
+    def decode(self, data: bytes) -> Sequence[Mesh]:
+        return open_video(data)
+
+
+@dataclass(frozen=True, slots=True)
+class DecimatedDracoCodec:
+    """QEM to `fraction` of the vertices, Draco at `qp` bits, then `levels` midpoint subdivisions in the decoder.
+
+    levels = 0 is anchor A2 and levels = 1 anchor A2s. QEM runs scale-normalised and keeps open borders.
+    """
+
+    fraction: float = 0.25
+    qp: int = 10
+    levels: int = 0
+
+    @property
+    def name(self) -> str:
+        return "decimated_draco" if self.levels == 0 else "decimated_draco_subdivided"
+
+    @property
+    def options(self) -> dict[str, Any]:
+        return asdict(self)
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+        return _encode_frames(sequence, self.qp, self.fraction, self.levels)
+
+    def decode(self, data: bytes) -> Sequence[Mesh]:
+        return open_video(data)
+
+
+def _encode_frames(sequence: MeshSequence, qp: int, fraction: float, levels: int) -> bytes:
+    seen = survey(sequence)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "anchor.reel"
+        with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
+            for frame in sequence:
+                writer.add_group(1, _encode_frame(seen.normalise(frame), qp, fraction, levels))
+        return path.read_bytes()
+
+
+def _encode_frame(mesh: Mesh, qp: int, fraction: float, levels: int) -> bytes:
+    if mesh.is_empty:
+        return encode_intra([mesh], 1.0, 0)
+    if fraction < 1:
+        mesh = decimate(mesh, max(4, round(fraction * len(mesh.vertices))))
+    extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
+    return encode_intra([mesh], max(extent, 1e-12) / (2**qp - 1), levels)

@@ -1,0 +1,25 @@
+"""Sequences by name: the captured performers where they are present, the procedural demo, or any folder.
+
+A sequence is cut to its first `frames` frames where that is asked for; every loader welds duplicate positions.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..capture.procedural import soft_bodies
+from ..errors import InputError
+from ..io.sequence import SequenceOptions, open_sequence
+from ..types import MeshSequence
+
+PERFORMERS = ("dancer", "basketball_player", "mitch", "collision")
+
+
+def open_dataset(name: str, data: Path, frames: int | None = None) -> MeshSequence:
+    """The sequence called `name` below `data`, or a path, at 30 frames a second. Raises InputError where it is missing."""
+    if name == "demo":
+        return soft_bodies()
+    path = next((p for p in (data / name, data / f"{name}.npz", Path(name)) if p.exists()), None)
+    if path is None:
+        raise InputError(f"no sequence {name!r} below {data}; give the folder of the benchmark data with --data")
+    return open_sequence(path, SequenceOptions(frames="" if frames is None else f":{frames}"))
