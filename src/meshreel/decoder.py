@@ -13,7 +13,7 @@ from typing import overload
 import numpy as np
 
 from .coding.group import decode_group
-from .container.reader import ReelReader
+from .container.reader import Chunk, ReelReader
 from .container.sources import BytesSource, FileSource, Source
 from .errors import FormatError
 from .types import Mesh
@@ -46,15 +46,15 @@ class Video(Sequence[Mesh]):
     @property
     def frame_rate(self) -> float:
         """Frames per second, 1/s."""
-        return self.reader.header.frame_rate
+        return self.reader.frame_rate
 
     @property
     def timestamps(self) -> list[float]:
         """When each frame is shown, s from the start."""
-        return [float(time) for time in self.reader.timestamps]
+        return [self.reader.timestamp(frame) for frame in range(len(self))]
 
     def __len__(self) -> int:
-        return self.reader.header.frame_count
+        return self.reader.frame_count
 
     @overload
     def __getitem__(self, index: int) -> Mesh: ...
@@ -68,20 +68,21 @@ class Video(Sequence[Mesh]):
         if not 0 <= frame < len(self):
             raise IndexError(f"frame {index} of a video of {len(self)} frames")
         chunk = self.reader.chunk_of_frame(frame)
-        return self._frames(chunk)[frame - self.reader.index[chunk].first_frame]
+        return self._frames(chunk)[frame - chunk.first_frame]
 
     def __iter__(self) -> Iterator[Mesh]:
         return (self[i] for i in range(len(self)))
 
-    def _frames(self, chunk: int) -> list[Mesh]:
+    def _frames(self, chunk: Chunk) -> list[Mesh]:
         """The decoded frames of a group, from the last call where it is the same group."""
-        if self._group[0] != chunk:
-            entry = self.reader.index[chunk]
-            layers = None if self.components is None else min(self.components, max(len(entry.layers) - 1, 0))
-            meshes = decode_group(self.reader.read_chunk(chunk, layers), self.components)
-            if len(meshes) != entry.frame_count:
-                raise FormatError(f"group at frame {entry.first_frame} has {len(meshes)} frames, not {entry.frame_count}")
-            self._group = (chunk, [self._place(mesh) for mesh in meshes])
+        if self._group[0] != chunk.number:
+            layers = None if self.components is None else self.components + 1
+            payload = self.reader.read_chunk(chunk.number, layers)
+            try:
+                meshes = decode_group(payload, chunk.frame_count, self.components)
+            except FormatError as error:
+                raise FormatError(f"{chunk}: {error}") from error
+            self._group = (chunk.number, [self._place(mesh) for mesh in meshes])
         return self._group[1]
 
     def _place(self, mesh: Mesh) -> Mesh:

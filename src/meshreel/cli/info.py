@@ -9,7 +9,7 @@ from typing import Any
 from rich.table import Table
 
 from ..coding.group import payload_parts
-from ..container.reader import ReelReader
+from ..container.reader import Chunk, ReelReader
 from ..container.sources import FileSource
 from ..errors import FormatError
 from .console import Common
@@ -38,30 +38,28 @@ def command(file: Path, *, common: Common = Common()) -> None:
 
 def describe_file(file: Path) -> dict[str, Any]:
     """Everything `info` shows, ready for JSON. A damaged group is reported with its error; the others are read."""
-    reader = ReelReader(FileSource(file))
-    size = file.stat().st_size
-    groups = [_describe_group(reader, number) for number in range(len(reader.index))]
-    parts: dict[str, int] = {"header and index": size - sum(group["bytes"] for group in groups)}
+    with FileSource(file) as source:
+        reader = ReelReader(source)
+        groups = [_describe_group(reader, chunk) for chunk in reader.groups]
+    parts = {"header and index": reader.head_size}
     for group in groups:
         for name, count in group["parts"].items():
             parts[name] = parts.get(name, 0) + count
-    frames = reader.frame_count
     return {
-        "frames": frames,
-        "frame_rate": reader.header.frame_rate,
-        "bytes": size,
-        "mbps": size * 8 * reader.header.frame_rate / max(frames, 1) / 1e6,
+        "frames": reader.frame_count,
+        "frame_rate": reader.frame_rate,
+        "bytes": reader.size,
+        "mbps": reader.size * 8 * reader.frame_rate / reader.frame_count / 1e6,
         "parts": parts,
         "groups": groups,
         "metadata": reader.metadata,
     }
 
 
-def _describe_group(reader: ReelReader, number: int) -> dict[str, Any]:
-    entry = reader.index[number]
-    row = {"first_frame": entry.first_frame, "frames": entry.frame_count, "form": entry.form.name.lower()}
-    row |= {"bytes": entry.size, "components": max(len(entry.layers) - 1, 0)}
+def _describe_group(reader: ReelReader, chunk: Chunk) -> dict[str, Any]:
+    row = {"first_frame": chunk.first_frame, "frames": chunk.frame_count, "form": chunk.form.name.lower()}
+    row |= {"bytes": chunk.size, "components": len(chunk.layers) - 1}
     try:
-        return row | {"parts": payload_parts(reader.read_chunk(number))}
+        return row | {"parts": payload_parts(reader.read_chunk(chunk.number))}
     except FormatError as error:
-        return row | {"parts": {"damaged": entry.size}, "error": str(error)}
+        return row | {"parts": {"damaged": chunk.size}, "error": str(error)}

@@ -12,13 +12,13 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import FormatError
-from ..format.layout import Form, LaplacianGroup
-from ..format.records import pack, unpack
+from ..format.layout import DracoGroup, Form, LaplacianGroup
+from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh
-from .displacements import DisplacementOptions, decode_displacements, encode_displacements, layer_ends
-from .intra import decode_intra
-from .mesh import check_growth, decode_mesh, encode_mesh
+from .displacements import DisplacementOptions, decode_displacements, displacement_parts, encode_displacements, layer_ends
+from .intra import decode_empty, decode_intra
+from .mesh import check_growth, check_step, decode_mesh, encode_mesh
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,29 +42,50 @@ def code_reference(mesh: Mesh, bits: int, levels: int) -> CodedReference:
 def encode_group(
     reference: CodedReference, field: Float64[np.ndarray, "V T 3"], options: DisplacementOptions
 ) -> tuple[bytes, tuple[int, ...]]:
-    """The payload of a `laplacian` group and its layer ends: a prefix of that length decodes with k components."""
+    """The payload of a `laplacian` group and its layer ends: k + 1 layers decode with k components."""
     displacements = encode_displacements(field, reference.base, options)
-    head = pack(
-        LaplacianGroup(form=Form.LAPLACIAN, levels=reference.levels, step=reference.step, reference=reference.data)
-    )
-    return head + displacements, tuple(len(head) + end for end in layer_ends(displacements))
+    record = LaplacianGroup(Form.LAPLACIAN, reference.levels, reference.step, reference.data, displacements)
+    payload = pack(record)
+    start = len(payload) - len(displacements)
+    return payload, tuple(start + end for end in layer_ends(displacements))
 
 
-def decode_group(data: bytes, components: int | None = None) -> list[Mesh]:
-    """The frames of a group in normalised units, of whatever form, from a whole payload or a prefix of its layers."""
-    if not data:
-        raise FormatError("a group of 0 bytes")
-    if data[0] == Form.DRACO:
-        return decode_intra(data)
-    if data[0] == Form.LAPLACIAN:
-        return _decode_laplacian(data, components)
-    raise FormatError(f"group form {data[0]} is not known to this reader")
+def decode_group(data: bytes, frame_count: int, components: int | None = None) -> list[Mesh]:
+    """The frames of a group in normalised units, of whatever form, from a whole payload or a prefix of its layers.
+
+    Raises FormatError where the bytes are damaged or hold another number of frames.
+    """
+    form = data[0] if data else None
+    if form == Form.EMPTY:
+        meshes = decode_empty(data, frame_count)
+    elif form == Form.DRACO:
+        meshes = decode_intra(data)
+    elif form == Form.LAPLACIAN:
+        meshes = _decode_laplacian(unpack_all(LaplacianGroup, data), components)
+    else:
+        raise FormatError(f"group form {form} is not known to this reader")
+    if len(meshes) != frame_count:
+        raise FormatError(f"a group of {len(meshes)} frames where the index says {frame_count}")
+    return meshes
 
 
-def _decode_laplacian(data: bytes, components: int | None) -> list[Mesh]:
-    record, end = unpack(LaplacianGroup, data)
+def _decode_laplacian(record: LaplacianGroup, components: int | None) -> list[Mesh]:
+    check_step(record.step)
     reference = decode_mesh(record.reference, record.step)
     check_growth(reference, record.levels)
     base = subdivide_midpoint(reference, record.levels)
-    field = decode_displacements(data[end:], base, components)
+    field = decode_displacements(record.displacements, base, components)
     return [Mesh(np.ascontiguousarray(base.vertices + field[:, t]), base.faces) for t in range(field.shape[1])]
+
+
+def payload_parts(data: bytes) -> dict[str, int]:
+    """Bytes of a payload by what they are for. Raises FormatError on damaged bytes."""
+    form = data[0] if data else None
+    if form == Form.LAPLACIAN:
+        record = unpack_all(LaplacianGroup, data)
+        parts = {"reference": len(record.reference)} | displacement_parts(record.displacements)
+    elif form == Form.DRACO:
+        parts = {"draco": sum(len(mesh) for mesh in unpack_all(DracoGroup, data).meshes)}
+    else:
+        parts = {}
+    return parts | {"group head": len(data) - sum(parts.values())}

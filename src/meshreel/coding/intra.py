@@ -9,27 +9,37 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..errors import FormatError
-from ..format.layout import DracoGroup, Form
-from ..format.records import pack, unpack
+from ..format.layout import DracoGroup, EmptyGroup, Form
+from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh
-from .mesh import check_growth, decode_mesh, encode_mesh
+from .mesh import check_growth, check_step, decode_mesh, encode_mesh
 
 
 def encode_intra(meshes: Sequence[Mesh], step: float, levels: int) -> bytes:
     """The payload of a group whose frames are Draco meshes on the lattice of `step` (normalised units)."""
-    frames = tuple(encode_mesh(mesh, step) for mesh in meshes)
-    return pack(DracoGroup(form=Form.DRACO, levels=levels, step=step, frames=frames))
+    return pack(DracoGroup(Form.DRACO, levels, step, tuple(encode_mesh(mesh, step) for mesh in meshes)))
 
 
 def decode_intra(data: bytes) -> list[Mesh]:
     """The frames of a group, in normalised units. Raises FormatError on anything but a payload of this form."""
-    record, end = unpack(DracoGroup, data)
-    if end != len(data):
-        raise FormatError(f"draco group: {len(data) - end} bytes too many")
+    record = unpack_all(DracoGroup, data)
+    check_step(record.step)
     meshes = []
-    for frame in record.frames:
+    for frame in record.meshes:
         mesh = decode_mesh(frame, record.step)
         check_growth(mesh, record.levels)
         meshes.append(subdivide_midpoint(mesh, record.levels))
     return meshes
+
+
+def encode_empty() -> bytes:
+    """The payload of a group whose frames have no surface; their number is in the index."""
+    return pack(EmptyGroup(Form.EMPTY))
+
+
+def decode_empty(data: bytes, frame_count: int) -> list[Mesh]:
+    """As many empty meshes. Raises FormatError on anything but a payload of this form."""
+    if unpack_all(EmptyGroup, data).form != Form.EMPTY:
+        raise FormatError("an empty group that is none")
+    return [Mesh.empty()] * frame_count

@@ -69,3 +69,9 @@ def check_growth(mesh: Mesh, levels: int) -> None:
     """Raises FormatError where subdividing `levels` times would make an absurd mesh (over 64 million faces)."""
     if len(mesh.faces) * 4**levels > MAX_FACES:
         raise FormatError(f"{len(mesh.faces)} faces subdivided {levels} times exceed {MAX_FACES} faces")
+
+
+def check_step(step: float) -> None:
+    """Raises FormatError where a lattice's spacing is not above 0."""
+    if not step > 0:
+        raise FormatError(f"lattice spacing {step:g} is not above 0")

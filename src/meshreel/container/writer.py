@@ -32,14 +32,14 @@ class ReelWriter:
 
     def __init__(self, target: str | Path | BinaryIO, header: Header) -> None:
         self._target = Path(target) if isinstance(target, str | Path) else target
-        self._header = header
+        self.header = header  # may be replaced until the block ends: what was measured goes into its metadata
         self._entries: list[IndexEntry] = []
         self.frame_count = 0  # so far
 
     def __enter__(self) -> ReelWriter:
         with _as_input_error(self._target):
-            pack(self._header)
-            parse_metadata(self._header.metadata)
+            pack(self.header)
+            parse_metadata(self.header.metadata)
             self._spool = _open_spool(self._target)
         return self
 
@@ -89,8 +89,8 @@ class ReelWriter:
     def _finish(self) -> None:
         index = Index(tuple(self._entries))
         check_index(index)
-        check_header(self._header, self.frame_count)
-        head = pack_head(self._header, index)
+        check_header(self.header, self.frame_count)
+        head = pack_head(self.header, index)
         self._spool.seek(0)
         if not isinstance(self._target, Path):
             _copy(head, self._spool, self._target)

@@ -108,6 +108,7 @@ class LaplacianGroup:
 
     form: Annotated[Form, Choice(U8, Form), "LAPLACIAN"]
     levels: Annotated[int, U8, "midpoint subdivisions of the decoded reference mesh"]
+    step: Annotated[float, F64, "spacing of the reference's lattice, above 0: decoded vertices are rounded to multiples"]
     reference: Annotated[bytes, Blob(U32), "the reference mesh, Draco"]
     displacements: Annotated[bytes, Rest(), "a DisplacementHead and its streams"]
 
@@ -135,6 +136,7 @@ class DracoGroup:
 
     form: Annotated[Form, Choice(U8, Form), "DRACO"]
     levels: Annotated[int, U8, "midpoint subdivisions of every decoded mesh"]
+    step: Annotated[float, F64, "spacing of the frames' lattice, above 0: decoded vertices are rounded to multiples"]
     meshes: Annotated[tuple[bytes, ...], List(U16, Blob(U32)), "one Draco mesh a frame; no bytes: an empty frame"]
 
 
