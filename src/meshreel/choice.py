@@ -24,6 +24,10 @@ class Quality:
     angle: float  # mean normal error over the frames, degrees
     worst: float  # the largest symmetric distance of a frame, normalised units
 
+    def scaled(self, factor: float) -> Quality:
+        """The same with its distances multiplied by `factor`."""
+        return Quality(self.distance * factor, self.angle, self.worst * factor)
+
     def reaches(self, other: Quality) -> bool:
         """True where neither distance nor normals are worse than the other's."""
         return self.distance <= other.distance and self.angle <= other.angle

@@ -12,12 +12,14 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float64
 
 from .analysis.fit import Fit, FitOptions, fit_frames
 from .analysis.groups import GroupOptions, cut_at
-from .analysis.reference import Reference, ReferenceOptions, extract_reference, predict
+from .analysis.reference import ReferenceOptions, extract_reference, predict
 from .analysis.survey import Survey, survey
 from .analysis.track import TrackOptions, track_centers
 from .choice import IntraOptions, Quality, cheapest_intra, finest_intra, measure
@@ -26,21 +28,23 @@ from .coding.group import CodedReference, code_reference, decode_group, encode_g
 from .coding.intra import encode_empty
 from .container.writer import ReelWriter
 from .errors import InputError, NoReferenceError
-from .format.layout import Form
+from .format.layout import Form, Header
 from .types import Centers, Mesh, MeshSequence
 
 Progress = Callable[[str, int, int], None]  # stage, frames done in it, frames of the sequence
+MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it
 
 
 @dataclass(frozen=True, slots=True)
 class EncoderOptions:
-    """How to encode; `preset_options` fills it from a preset's name and a quality."""
+    """How to encode; `presets.preset_options` fills it from a preset's name and a quality."""
 
     preset: str = "paper"
-    quality: float = 50.0  # 0 to 100
+    quality: float = 50.0  # 0 to 100; what the other fields were made from, recorded in the file
     group_size: int = 10  # most frames in a group, the paper's GoF
     reference_bits: int = 14  # of the reference's lattice (paper: qp = 14)
     levels: int = 1  # midpoint subdivisions of the decoded reference
+    target: Quality = Quality(0.0005, 6.0, 0.001)  # what frames are worth that no reference follows
     track: TrackOptions = TrackOptions()
     reference: ReferenceOptions = ReferenceOptions()
     fit: FitOptions = FitOptions()
@@ -55,9 +59,6 @@ class EncoderOptions:
             raise InputError(f"group size must be in 1 to {MOST_FRAMES}, got {self.group_size}")
 
 
-MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it
-
-
 @dataclass(frozen=True, slots=True)
 class EncodedGroup:
     """The payload of a group and what was measured on it."""
@@ -65,72 +66,201 @@ class EncodedGroup:
     form: Form
     frame_count: int
     payload: bytes
-    layers: tuple[int, ...]  # a prefix of this length decodes with 0, 1, ... components
+    layers: tuple[int, ...]  # k + 1 layers decode with k components
+    quality: Quality
+
+
+@dataclass(frozen=True, slots=True)
+class GroupSummary:
+    """What is left of a group once it is written; distances in metres."""
+
+    form: Form
+    frame_count: int
+    size: int  # bytes
     quality: Quality
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What an encode made; distances in metres."""
+    """What an encode made."""
 
     size: int  # bytes of the file
-    frame_count: int
-    groups: tuple[EncodedGroup, ...]
+    groups: tuple[GroupSummary, ...]
+
+    @property
+    def frame_count(self) -> int:
+        """Frames in all groups."""
+        return sum(group.frame_count for group in self.groups)
 
 
 def encode(
     sequence: MeshSequence,
     path: str | Path,
-    options: EncoderOptions,
+    options: EncoderOptions = EncoderOptions(),
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Summary:
     """Writes `sequence` to a .reel file at `path`, which appears only when it is complete.
 
     With an executor, windows are encoded side by side; the bytes are the same. Raises InputError for frames that
-    cannot be used, before anything is written.
+    cannot be used, before anything is coded.
     """
-    stages = _Stages(progress or _silent, len(sequence))
-    seen = survey(_Watched(sequence, stages))
-    header = _header(sequence, seen, options)
-    groups: list[EncodedGroup] = []
-    with ReelWriter(path, header) as writer:
+    stages = Stages(progress, len(sequence))
+    seen = survey(sequence, stages)
+    groups: list[GroupSummary] = []
+    with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
         for encoded in _encoded_windows(sequence, seen, options, (executor, stages)):
             for group in encoded:
-                writer.add_group(group.frame_count, group.payload, group.layers)
-                groups.append(replace(group, payload=b""))
+                writer.add_group(writer.frame_count, group.frame_count, group.payload, group.layers)
+                quality = group.quality.scaled(seen.diagonal)
+                groups.append(GroupSummary(group.form, group.frame_count, len(group.payload), quality))
+        writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups))
+    return Summary(Path(path).stat().st_size, tuple(groups))
 
-def encode_window(frames: Sequence[Mesh], options: EncoderOptions, stages: _Stages | None = None) -> list[EncodedGroup]:
-    """The groups that a window of frames in normalised coordinates becomes: one, or more where a reference does not
-    follow all of them. Frames are all empty or all with a surface."""
-    stages = stages or _Stages(_silent, len(frames))
+
+def encode_window(frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> list[EncodedGroup]:
+    """The groups of a window of frames in normalised coordinates: one, or more where one reference cannot follow.
+
+    Frames are all empty or all with a surface.
+    """
+    stages = stages or Stages(None, len(frames))
     if frames[0].is_empty:
+        stages.add("code", len(frames))
         return [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), Quality(0.0, 0.0, 0.0))]
     if len(frames) == 1:
-        return [_intra_only(frames, options)]
+        return [_intra_only(frames, options, stages)]
     centers = track_centers(frames, options.track)
     stages.add("track", len(frames))
     return _encode_span(frames, centers, options, stages)
 
 
+def analyze(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions) -> tuple[CodedReference, Fit]:
+    """The reference of a group as decoded, and its fit to every frame (paper, sections 3.3.1 and 3.3.2).
+
+    Raises NoReferenceError where no surface can be made of the frames.
+    """
+    reference = extract_reference(frames, centers, options.reference)
+    coded = code_reference(reference.mesh, options.reference_bits, options.levels)
+    if coded.base.is_empty:
+        raise NoReferenceError("the reference mesh has no faces left after Draco")
+    predictions = predict(reference, centers, coded.base, options.reference)
+    return coded, fit_frames(coded.base.faces, predictions, frames, options.fit)
+
+
+def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
+    """The header of a file whose coordinates are normalised by `seen`."""
+    low, high = ((corner - seen.center) / seen.diagonal for corner in (seen.low, seen.high))
+    return Header(
+        frame_rate=frame_rate,
+        origin=tuple(map(float, seen.center)),
+        scale=seen.diagonal,
+        minimum=tuple(map(float, low)),
+        maximum=tuple(map(float, high)),
+        metadata=json.dumps(metadata, separators=(",", ":")),
+    )
+
+
+class Stages:
+    """Counts frames through the stages for a progress callback."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress = progress
+        self._total = total
+        self._done: dict[str, int] = {}
+
+    def add(self, stage: str, count: int) -> None:
+        """`count` more frames have passed `stage`."""
+        self._done[stage] = self._done.get(stage, 0) + count
+        if self._progress is not None:
+            self._progress(stage, self._done[stage], self._total)
+
+
 def _encode_span(
-    frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, stages: _Stages
+    frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, stages: Stages
 ) -> list[EncodedGroup]:
     """Groups of a run of frames: cut where the fit fails, then the cheaper of both forms."""
     if len(frames) == 1:
-        return [_intra_only(frames, options)]
+        return [_intra_only(frames, options, stages)]
     try:
         reference, fit = analyze(frames, centers, options)
     except NoReferenceError:
-        return [_intra_only(frames, options)]
-    cut = cut_at(fit, options.groups)
+        return [_intra_only(frames, options, stages)]
+    cut = cut_at(fit.residuals, options.groups)
     if cut is not None:
-        first, second = _slice(centers, slice(None, cut)), _slice(centers, slice(cut, None))
-        return _encode_span(frames[:cut], first, options, stages) + _encode_span(frames[cut:], second, options, stages)
+        halves = (slice(None, cut), slice(cut, None))
+        return [g for h in halves for g in _encode_span(frames[h], _part(centers, h), options, stages)]
     stages.add("fit", len(frames))
-    payload, layers = encode_group(reference, _field(fit, reference), options.displacements)
-    quality = measure(frames, decode_group(payload))
-    group = EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, quality)
-    cheaper = cheapest_intra(frames, quality, len(payload), options.intra)
+    field = np.moveaxis(fit.positions, 0, 1) - reference.base.vertices[:, None]
+    group = _cheaper(frames, _laplacian(frames, reference, field, options.displacements), options)
     stages.add("code", len(frames))
-    return [group if cheaper is None else EncodedGroup(Form.DRACO, len(frames), cheaper[0], (), cheaper[1])]
+    return [group]
+
+
+def _laplacian(
+    frames: Sequence[Mesh],
+    reference: CodedReference,
+    field: Float64[np.ndarray, "V T 3"],
+    options: DisplacementOptions,
+) -> EncodedGroup:
+    payload, layers = encode_group(reference, field, options)
+    quality = measure(frames, decode_group(payload, len(frames)))
+    return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, quality)
+
+
+def _cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions) -> EncodedGroup:
+    """The group, or its `draco` form where that is as good and smaller."""
+    found = cheapest_intra(frames, group.quality, len(group.payload), options.intra)
+    return group if found is None else EncodedGroup(Form.DRACO, len(frames), found[0], (), found[1])
+
+
+def _intra_only(frames: Sequence[Mesh], options: EncoderOptions, stages: Stages) -> EncodedGroup:
+    """The `draco` form at the target's quality, relative to the size of these frames."""
+    scale = float(np.median([frame.diagonal for frame in frames]))
+    target = options.target.scaled(scale or 1.0)
+    payload, quality = cheapest_intra(frames, target, np.inf, options.intra) or finest_intra(frames, target.distance)
+    stages.add("code", len(frames))
+    return EncodedGroup(Form.DRACO, len(frames), payload, (), quality)
+
+
+def _part(centers: Centers, frames: slice) -> Centers:
+    return replace(centers, positions=centers.positions[frames])
+
+
+def _encoded_windows(
+    sequence: MeshSequence, seen: Survey, options: EncoderOptions, run: tuple[Executor | None, Stages]
+) -> Iterator[list[EncodedGroup]]:
+    """The groups of each window in order; a few windows ahead where an executor has workers for them."""
+    executor, stages = run
+    windows = ([seen.normalise(sequence[i]) for i in window] for window in seen.windows(options.group_size))
+    if executor is None:
+        for frames in windows:
+            yield encode_window(frames, options, stages)
+        return
+    ahead = 2 * getattr(executor, "_max_workers", 8)
+    waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()
+    for frames in windows:
+        waiting.append((len(frames), executor.submit(encode_window, frames, options)))
+        if len(waiting) > ahead:
+            yield _arrived(waiting, stages)
+    while waiting:
+        yield _arrived(waiting, stages)
+
+
+def _arrived(waiting: deque[tuple[int, Future[list[EncodedGroup]]]], stages: Stages) -> list[EncodedGroup]:
+    count, future = waiting.popleft()
+    groups = future.result()
+    stages.add("code", count)
+    return groups
+
+
+def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:
+    """What `info` shows of the encoding: not needed to decode, but counted in the rate."""
+    frames = sum(group.frame_count for group in groups)
+    mean_square = sum(group.frame_count * group.quality.distance**2 for group in groups) / frames
+    return {
+        "preset": options.preset,
+        "quality": options.quality,
+        "rms_m": float(f"{mean_square**0.5:.4g}"),
+        "worst_rms_m": float(f"{max(group.quality.worst for group in groups):.4g}"),
+        "normal_error_deg": float(f"{sum(g.frame_count * g.quality.angle for g in groups) / frames:.3g}"),
+    }

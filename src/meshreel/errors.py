@@ -11,3 +11,7 @@ class InputError(MeshreelError):
 
 class FormatError(MeshreelError):
     """Bytes from outside are not a valid .reel stream, or are of a version this reader does not know."""
+
+
+class NoReferenceError(MeshreelError):
+    """No reference surface can be made of these frames; the encoder codes them one by one instead."""

@@ -6,6 +6,7 @@ In -> out: MeshSequence -> Survey. Errors of any frame surface here, before minu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float64
@@ -47,7 +48,13 @@ class Survey:
         return windows
 
 
-def survey(sequence: MeshSequence) -> Survey:
+class Counter(Protocol):
+    """Counts frames through stages."""
+
+    def add(self, stage: str, count: int) -> None: ...
+
+
+def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     """The survey of a sequence, one frame in memory at a time. Raises InputError where there are no frames."""
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
@@ -57,6 +64,8 @@ def survey(sequence: MeshSequence) -> Survey:
         if not mesh.is_empty:
             used = mesh.vertices[np.unique(mesh.faces)]
             low, high = np.minimum(low, used.min(axis=0)), np.maximum(high, used.max(axis=0))
+        if stages is not None:
+            stages.add("survey", 1)
     if all(empty):
         low, high = np.zeros(3), np.zeros(3)
     return Survey(low, high, tuple(empty))
