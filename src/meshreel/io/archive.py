@@ -1,0 +1,90 @@
+"""An .npz of one body: `vertices` T x V x 3 and `faces` F x 3, read a frame at a time.
+
+Stored or deflated, the stream is read forward: memory holds one frame; going back starts the stream again.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from ..errors import InputError
+from .meshes import Loaded, checked
+from .polygons import Polygons, Unreadable
+
+_DAMAGED = (OSError, ValueError, EOFError, zipfile.BadZipFile, NotImplementedError)  # what NumPy and zipfile raise
+
+
+class Archive:
+    """The frames of an .npz file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._stream: IO[bytes] | None = None
+        try:
+            with zipfile.ZipFile(path) as archive:
+                names = sorted(Path(name).stem for name in archive.namelist())
+                if not {"vertices", "faces"} <= set(names):
+                    raise InputError(f"{path}: has {', '.join(names) or 'nothing'}; save it as 'vertices' and 'faces'")
+                self._shape, self._dtype, self._begin = _head(archive, "vertices")
+                faces = np.load(path, allow_pickle=False)["faces"]
+        except _DAMAGED as error:
+            raise InputError(f"{path}: cannot be read as .npz ({error}); write it again with numpy.savez") from None
+        if len(self._shape) != 3 or self._shape[2] != 3 or self._dtype.kind not in "fiu":
+            raise InputError(f"{path}: 'vertices' is {self._dtype} {self._shape}; it must be numbers T x V x 3")
+        if faces.ndim != 2 or (faces.shape[1] < 3 and len(faces)) or faces.dtype.kind not in "iu":
+            raise InputError(f"{path}: 'faces' is {faces.dtype} {faces.shape}; it must be integers F x 3")
+        self._corners: Int64[np.ndarray, " C"] = faces.astype(np.int64).reshape(-1)
+        self._sizes: Int64[np.ndarray, " P"] = np.full(len(faces), faces.shape[1], dtype=np.int64)
+
+    def __reduce__(self) -> tuple[type[Archive], tuple[Path]]:
+        """Another process opens the file itself."""
+        return Archive, (self.path,)
+
+    def __len__(self) -> int:
+        return int(self._shape[0])
+
+    def name(self, index: int) -> str:
+        """What an error calls a frame."""
+        return f"{self.path}[{index}]"
+
+    def load(self, index: int, where: str) -> Loaded:
+        """One frame, checked."""
+        try:
+            return checked(Polygons(self._vertices(index), self._corners, self._sizes))
+        except Unreadable as error:
+            raise InputError(f"{where}: {error}; mend the .npz, or leave the frame out with --frames") from None
+        except _DAMAGED as error:
+            raise InputError(f"{where}: cannot be read ({error}); write it again with numpy.savez") from None
+
+    def _vertices(self, index: int) -> Float64[np.ndarray, "V 3"]:
+        size = self._shape[1] * 3 * self._dtype.itemsize
+        if self._stream is None:
+            self._stream = zipfile.ZipFile(self.path).open("vertices.npy")  # noqa: SIM115 (open while the sequence lives)
+        self._stream.seek(self._begin + index * size)
+        data = self._stream.read(size)
+        if len(data) < size:
+            raise Unreadable(f"'vertices' has {len(data)} of {size} bytes (truncated?)")
+        return np.frombuffer(data, dtype=self._dtype).astype(np.float64).reshape(-1, 3)
+
+
+def _head(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtype, int]:
+    """Shape, dtype and first byte of an array in the archive, without reading it."""
+    member = f"{name}.npy"
+    with archive.open(member) as stream:
+        version = np.lib.format.read_magic(stream)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, fortran, dtype = read(stream)
+        begin = stream.tell()
+    if fortran and len(shape) > 1:
+        raise ValueError(f"'{name}' is in Fortran order; save numpy.ascontiguousarray of it")
+    if (
+        dtype.hasobject
+        or begin + int(np.prod(shape, dtype=object)) * dtype.itemsize > archive.getinfo(member).file_size
+    ):
+        raise ValueError(f"'{name}' announces {dtype} {shape}, more than the file holds")
+    return shape, dtype, begin

@@ -1,0 +1,67 @@
+"""GLB (binary glTF 2): every triangle mesh of the scene, placed by its nodes, through trimesh."""
+
+from __future__ import annotations
+
+import io
+import json
+from typing import Any
+
+import numpy as np
+
+from .polygons import Dropped, Polygons, Unreadable
+
+_DROPS = {"NORMAL": "normals", "TEXCOORD": "texture coordinates", "COLOR": "colors", "JOINTS": "skinning"}
+
+
+def parse_glb(data: bytes) -> Polygons:
+    """The surface of a GLB scene at rest, vertices in the world frame."""
+    tree = _json_chunk(data)
+    if not tree.get("meshes"):
+        return _joined([], _dropped(tree))
+    import trimesh
+
+    try:
+        scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
+        parts = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
+    except Exception as error:  # whatever a foreign parser raises, the file is what is wrong
+        raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
+    return _joined([part for part in parts if isinstance(part[1], trimesh.Trimesh)], _dropped(tree))
+
+
+def _json_chunk(data: bytes) -> dict[str, Any]:
+    """The scene description; the container's own lengths must fit the file."""
+    head = np.frombuffer(data[:20].ljust(20, b"\0"), dtype="<u4")
+    magic, version, total, length = data[:4], int(head[1]), int(head[2]), int(head[3])
+    if magic != b"glTF" or version != 2:
+        raise Unreadable(f"GLB 2 header expected, found {magic!r} version {version}")
+    if total > len(data) or 20 + length > len(data):
+        raise Unreadable(f"GLB announces {total} bytes but has {len(data)} (truncated?)")
+    try:
+        tree = json.loads(data[20 : 20 + length])
+    except ValueError as error:
+        raise Unreadable(f"GLB scene description is no JSON ({error})") from None
+    if not isinstance(tree, dict):
+        raise Unreadable("GLB scene description is no JSON object")
+    return tree
+
+
+def _dropped(tree: dict[str, Any]) -> Dropped:
+    text = json.dumps([mesh.get("primitives", []) for mesh in tree.get("meshes", []) if isinstance(mesh, dict)])
+    dropped = {words for mark, words in _DROPS.items() if f'"{mark}' in text}
+    dropped |= {key for key in ("materials", "animations", "textures") if tree.get(key)}
+    return frozenset(dropped)
+
+
+def _joined(parts: list[tuple[np.ndarray, Any]], dropped: Dropped) -> Polygons:
+    """The parts as one surface. A node that is only moved keeps every bit of its vertices before the sum."""
+    vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
+    for matrix, part in parts:
+        local = np.asarray(part.vertices, dtype=np.float64)
+        turned = local if np.array_equal(matrix[:3, :3], np.eye(3)) else local @ matrix[:3, :3].T
+        vertices.append(turned + matrix[:3, 3])
+        triangles = np.asarray(part.faces, dtype=np.int64)
+        mirrored = np.linalg.det(matrix[:3, :3]) < 0
+        faces.append((triangles[:, ::-1] if mirrored else triangles) + count)
+        count += len(local)
+    corners = np.concatenate(faces).reshape(-1)
+    return Polygons(np.concatenate(vertices), corners, np.full(len(corners) // 3, 3, np.int64), dropped)

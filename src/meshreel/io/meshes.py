@@ -1,0 +1,81 @@
+"""One mesh file, of any format we read, as a checked Mesh.
+
+In: a path. Out: the mesh and, in words, what the file has besides geometry. What is wrong with it is an InputError.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..types import Mesh
+from .glb import parse_glb
+from .obj import parse_obj
+from .off import parse_off
+from .ply import parse_ply
+from .polygons import Dropped, Polygons, Unreadable, triangulate
+from .stl import parse_stl
+
+_PARSERS: dict[str, Callable[[bytes], Polygons]] = {
+    ".obj": parse_obj,
+    ".ply": parse_ply,
+    ".glb": parse_glb,
+    ".stl": parse_stl,
+    ".off": parse_off,
+}
+EXTENSIONS = tuple(_PARSERS)
+
+
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """A mesh from a file, and what was in the file besides."""
+
+    mesh: Mesh
+    dropped: Dropped
+
+
+def read_mesh(path: Path, where: str | None = None) -> Loaded:
+    """The mesh in a file; vertices and faces as they stand, polygons cut into triangles.
+
+    No faces is legal: an empty frame (its loose vertices are dropped and named). `where` begins every error's text.
+    """
+    where = where or str(path)
+    parse = _PARSERS.get(path.suffix.lower())
+    if parse is None:
+        raise InputError(f"{where}: {path.suffix or 'no'} extension is not one of {', '.join(EXTENSIONS)}; convert it")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{where}: cannot be read ({error.strerror or error}); check the path and its rights"
+        ) from None
+    if not data:
+        raise InputError(f"{where}: the file has 0 bytes; write it again, or leave it out with --frames")
+    try:
+        return checked(parse(data))
+    except Unreadable as error:
+        kind = path.suffix[1:].upper()
+        raise InputError(f"{where}: {error}; re-export the {kind} file, or leave it out with --frames") from None
+
+
+def checked(polygons: Polygons) -> Loaded:
+    """The mesh of polygons whose every number is legal; raises Unreadable for the first that is not."""
+    vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
+    bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+    if len(bad):
+        x, y, z = vertices[bad[0]]
+        raise Unreadable(f"vertex {bad[0]} is at ({x:g}, {y:g}, {z:g}), and {len(bad)} in all are not finite")
+    if (sizes < 3).any():
+        raise Unreadable(f"face {int(np.argmax(sizes < 3))} has {sizes[sizes < 3][0]} corners instead of 3 or more")
+    wrong = np.flatnonzero((corners < 0) | (corners >= len(vertices)))
+    if len(wrong):
+        face = int(np.searchsorted(np.cumsum(sizes), wrong[0], side="right"))
+        raise Unreadable(f"face {face} refers to vertex {corners[wrong[0]]}, but there are {len(vertices)} (from 0)")
+    if len(sizes) == 0:
+        loose = frozenset({"vertices without faces"} if len(vertices) else ())
+        return Loaded(Mesh.empty(), polygons.dropped | loose)
+    return Loaded(Mesh.of(vertices, triangulate(polygons)), polygons.dropped)

@@ -1,0 +1,87 @@
+"""Which files are the frames of a sequence, and in what order.
+
+In: a folder, a glob pattern, a file or a list of files. Out: paths in the order of their frame numbers, and remarks.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable
+from itertools import pairwise
+from pathlib import Path
+
+from ..errors import InputError
+from .meshes import EXTENSIONS
+
+_MAGIC = re.compile(r"[*?\[]")
+
+
+def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    """The frame files of a source and remarks about their order. A list keeps its own order."""
+    if not isinstance(source, str | Path):
+        return tuple(Path(path) for path in source), ()
+    path = Path(source)
+    if path.is_dir():
+        return _ordered(path, _of_one_kind(path))
+    if path.exists():
+        return (path,), ()
+    if _MAGIC.search(str(source)):
+        root, found = _globbed(path)
+        if not found:
+            raise InputError(f"{source}: no mesh file fits this pattern; check it, or name the folder")
+        return _ordered(root, found)
+    raise InputError(f"{source}: no such file or folder; check the path")
+
+
+def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
+    fixed = next(k for k, part in enumerate(pattern.parts) if _MAGIC.search(part))
+    root = Path(*pattern.parts[:fixed])
+    found = [path for path in root.glob(str(Path(*pattern.parts[fixed:]))) if _is_mesh(path)]
+    return root, found
+
+
+def _is_mesh(path: Path) -> bool:
+    return path.suffix.lower() in EXTENSIONS and not path.name.startswith(".") and path.is_file()
+
+
+def _of_one_kind(folder: Path) -> list[Path]:
+    try:
+        found = [path for path in folder.iterdir() if _is_mesh(path)]
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); check its rights") from None
+    kinds = Counter(path.suffix.lower() for path in found)
+    if not found:
+        raise InputError(f"{folder}: holds 0 mesh files; give a folder with {', '.join(EXTENSIONS)} files")
+    if len(kinds) > 1:
+        counts = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
+        raise InputError(f"{folder}: holds several kinds of files ({counts}); choose one, as '{folder}/*{min(kinds)}'")
+    return found
+
+
+def _ordered(root: Path, paths: list[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+    """The paths by frame number: the last number that varies in names that are otherwise alike."""
+    names = {path: path.relative_to(root).with_suffix("").as_posix() for path in sorted(paths)}
+    if len(paths) == 1:
+        return tuple(paths), ()
+    numbers = {path: tuple(int(n) for n in re.findall(r"\d+", name)) for path, name in names.items()}
+    patterns = {re.sub(r"\d+", "#", name): name for name in names.values()}
+    if not any(numbers.values()):
+        return tuple(names), (f"{root}: the {len(paths)} file names have no numbers; taken in alphabetical order",)
+    if len(patterns) > 1:
+        first, second = sorted(patterns.values())[:2]
+        raise InputError(
+            f"{root}: names follow {len(patterns)} patterns, as {first!r} and {second!r}; "
+            "give a glob that fits one of them"
+        )
+    columns = list(zip(*numbers.values(), strict=True))
+    varying = next((k for k in reversed(range(len(columns))) if len(set(columns[k])) > 1), 0)
+    key = {path: number[varying] for path, number in numbers.items()}
+    order = sorted(names, key=lambda path: key[path])
+    for before, after in pairwise(order):
+        if key[before] == key[after]:
+            raise InputError(
+                f"{root}: {names[before]!r} and {names[after]!r} both have frame number {key[before]}; "
+                "give a glob that fits only one of them"
+            )
+    return tuple(order), ()

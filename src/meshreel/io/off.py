@@ -1,0 +1,51 @@
+"""OFF and its variants (COFF, NOFF, STOFF ...): vertices and polygons in text."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from .polygons import Polygons, Unreadable
+from .rows import Lines
+
+_DROPS = {"ST": "texture coordinates", "C": "vertex colors", "N": "normals"}
+
+
+def parse_off(data: bytes) -> Polygons:
+    """The surface that an OFF file describes."""
+    found = re.match(rb"\s*(?:#[^\n]*\n\s*)*(ST)?(C)?(N)?OFF\b", data)
+    if found is None:
+        raise Unreadable(f"OFF header expected, found {data[:12]!r}")
+    dropped = {_DROPS[mark.decode()] for mark in found.groups() if mark}
+    lines = Lines.of(b" " * found.end() + data[found.end() :])
+    filled = np.flatnonzero(lines.ends > lines.starts)
+    if len(filled) == 0:
+        raise Unreadable("OFF file ends before its counts (truncated?)")
+    head, _ = lines.values(filled[:1], lines.block(filled[:1]))
+    if len(head) < 2 or (head < 0).any():
+        raise Unreadable(f"OFF counts expected, found {lines.line(int(filled[0]))!r}")
+    vertex_count, face_count = int(head[0]), int(head[1])
+    if len(filled) < 1 + vertex_count + face_count:
+        raise Unreadable(
+            f"OFF announces {vertex_count} vertices and {face_count} faces but has {len(filled) - 1} lines"
+        )
+    chosen = filled[1 : 1 + vertex_count]
+    values, counts = lines.values(chosen, lines.block(chosen))
+    if (counts < 3).any():
+        raise Unreadable(f"OFF vertex {int(np.argmax(counts < 3))} has fewer than 3 coordinates")
+    vertices = values[(np.cumsum(counts) - counts)[:, None] + np.arange(3)]
+    corners, sizes, colored = _faces(lines, filled[1 + vertex_count : 1 + vertex_count + face_count])
+    return Polygons(vertices, corners, sizes, frozenset(dropped | ({"face colors"} if colored else set())))
+
+
+def _faces(lines: Lines, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    values, counts = lines.values(chosen, lines.block(chosen))
+    begins = np.cumsum(counts) - counts
+    sizes = values[begins].astype(np.int64)
+    if (sizes + 1 > counts).any():
+        face = int(np.argmax(sizes + 1 > counts))
+        raise Unreadable(f"OFF face {face} announces {sizes[face]} corners but has {counts[face] - 1} (truncated?)")
+    place = np.arange(len(values)) - np.repeat(begins, counts)  # within its line
+    corners = values[(place > 0) & (place <= np.repeat(sizes, counts))]
+    return corners.astype(np.int64), sizes, bool((counts > sizes + 1).any())

@@ -1,0 +1,224 @@
+"""PLY in its three encodings: vertices and polygons, whatever other properties and elements stand beside them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from .polygons import Dropped, Polygons, Unreadable
+from .rows import Lines
+
+_TYPES = {
+    **dict.fromkeys(("char", "int8"), "i1"),
+    **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"),
+    **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"),
+    **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"),
+    **dict.fromkeys(("double", "float64"), "f8"),
+}
+_INDICES = ("vertex_indices", "vertex_index")
+_DROPS = {
+    "normals": {"nx", "ny", "nz"},
+    "colors": {"red", "green", "blue", "alpha", "diffuse_red", "r", "g", "b"},
+    "texture coordinates": {"s", "t", "u", "v", "texture_u", "texture_v", "texcoord"},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Property:
+    name: str
+    dtype: np.dtype
+    count: np.dtype | None  # of a list's length; None where it is a single value
+
+
+@dataclass(frozen=True, slots=True)
+class _Element:
+    name: str
+    rows: int
+    properties: tuple[_Property, ...]
+
+    @property
+    def least_bytes(self) -> int:
+        return self.rows * sum((p.count or p.dtype).itemsize for p in self.properties)
+
+
+def parse_ply(data: bytes) -> Polygons:
+    """The surface that a PLY file describes."""
+    found = re.search(rb"end_header[ \t]*(\r\n|\n|\r)", data)
+    if not re.match(rb"ply\s", data) or found is None:
+        raise Unreadable("PLY header does not run from 'ply' to 'end_header' (truncated?)")
+    encoding, elements = _header(data[: found.start()].decode("utf-8", "replace").splitlines()[1:])
+    body = _Text(data[found.end() :]) if encoding == "ascii" else _Binary(data[found.end() :])
+    vertices, corners, sizes = np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64)
+    for element in elements:
+        if element.name == "vertex":
+            columns, _, _ = body.read(element, None)
+            if not {"x", "y", "z"} <= columns.keys():
+                raise Unreadable("PLY vertices have no x, y, z")
+            vertices = np.stack([columns[axis] for axis in "xyz"], axis=1).astype(np.float64)
+        elif element.name == "face":
+            name = next((p.name for p in element.properties if p.name in _INDICES and p.count), None)
+            if name is None and element.rows:
+                raise Unreadable(f"PLY faces have no list called {' or '.join(_INDICES)}")
+            _, corners, sizes = body.read(element, name)
+        else:
+            body.read(element, None)
+    return Polygons(vertices, corners, sizes, _dropped(elements))
+
+
+def _header(lines: list[str]) -> tuple[str, list[_Element]]:
+    encoding, elements = "", list[_Element]()
+    for words in (line.split() for line in lines):
+        match words:
+            case ["format", ("ascii" | "binary_little_endian" | "binary_big_endian") as encoding, _]:
+                pass
+            case ["element", name, rows] if rows.isdecimal():
+                elements.append(_Element(name, int(rows), ()))
+            case ["property", "list", count, kind, name] if count in _TYPES and kind in _TYPES and elements:
+                elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), _dtype(count, encoding)))
+            case ["property", kind, name] if kind in _TYPES and elements:
+                elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), None))
+            case [] | ["comment", *_] | ["obj_info", *_]:
+                pass
+            case _:
+                raise Unreadable(f"PLY header has {' '.join(words)[:60]!r}")
+    if not encoding:
+        raise Unreadable("PLY header names no format")
+    return encoding, elements
+
+
+def _with(element: _Element, new: _Property) -> _Element:
+    return _Element(element.name, element.rows, (*element.properties, new))
+
+
+def _dtype(kind: str, encoding: str) -> np.dtype:
+    return np.dtype((">" if encoding == "binary_big_endian" else "<") + _TYPES[kind])
+
+
+def _dropped(elements: list[_Element]) -> Dropped:
+    names = {p.name for e in elements if e.rows for p in e.properties}
+    others = {f"element {e.name!r}" for e in elements if e.rows and e.name not in ("vertex", "face")}
+    return frozenset({words for words, fields in _DROPS.items() if fields & names} | others)
+
+
+Columns = dict[str, np.ndarray]
+
+
+class _Text:
+    """The body of an ASCII file; elements are read in their order."""
+
+    def __init__(self, data: bytes) -> None:
+        self._lines = Lines.of(data, comment=b"\0")  # PLY has comments in its header only
+        self._filled = np.flatnonzero(self._lines.ends > self._lines.starts)
+
+    def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
+        """The element's single values by name, and the wanted list's items (flat) and lengths."""
+        chosen, self._filled = self._filled[: element.rows], self._filled[element.rows :]
+        if len(chosen) < element.rows:
+            raise Unreadable(f"PLY announces {element.rows} {element.name} rows but has {len(chosen)} (truncated?)")
+        values, counts = self._lines.values(chosen, self._lines.block(chosen))
+        ends = np.cumsum(counts)
+        place, padded = ends - counts, np.append(values, 0.0)  # place: the next unread value of each row
+        columns, items, sizes = Columns(), np.zeros(0, np.int64), np.zeros(0, np.int64)
+        for field in element.properties:
+            if (place >= ends).any():
+                raise _short(element, int(np.argmax(place >= ends)))
+            here = padded[place]
+            place = place + 1
+            if field.count is None:
+                columns[field.name] = here
+                continue
+            length = here.astype(np.int64)
+            if ((length < 0) | (place + length > ends)).any():
+                raise _short(element, int(np.argmax((length < 0) | (place + length > ends))))
+            if field.name == wanted:
+                items, sizes = padded[_ranges(place, length)].astype(np.int64), length
+            place = place + length
+        return columns, items, sizes
+
+
+class _Binary:
+    """The body of a binary file; elements are read in their order."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data, self._at = data, 0
+
+    def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
+        """The element's single values by name, and the wanted list's items (flat) and lengths."""
+        if self._at + element.least_bytes > len(self._data):
+            raise Unreadable(f"PLY announces {element.rows} {element.name} rows but the file is too short (truncated?)")
+        if element.rows == 0:
+            return {p.name: np.zeros(0) for p in element.properties}, np.zeros(0, np.int64), np.zeros(0, np.int64)
+        lengths = self._lengths_of_first_row(element)
+        fields = [(f"{k}", p.dtype, (n,)) for k, (p, n) in enumerate(zip(element.properties, lengths, strict=True))]
+        counts = [(f"n{k}", p.count or np.dtype("V0")) for k, p in enumerate(element.properties)]
+        row = np.dtype([part for pair in zip(counts, fields, strict=True) for part in pair])
+        if self._at + row.itemsize * element.rows <= len(self._data):
+            rows = np.frombuffer(self._data, dtype=row, count=element.rows, offset=self._at)
+            even = all((rows[f"n{k}"] == n).all() for k, n in enumerate(lengths) if element.properties[k].count)
+            if even:
+                self._at += row.itemsize * element.rows
+                return _even_rows(element, rows, wanted)
+        return self._uneven_rows(element, wanted)
+
+    def _lengths_of_first_row(self, element: _Element) -> list[int]:
+        at, lengths = self._at, []
+        for field in element.properties:
+            length, at = self._length(field, at)
+            lengths.append(length)
+            at += length * field.dtype.itemsize
+            if at > len(self._data):
+                raise _short(element, 0)
+        return lengths
+
+    def _length(self, field: _Property, at: int) -> tuple[int, int]:
+        """How many items the field has in the row at hand, and where they begin."""
+        if field.count is None:
+            return 1, at
+        end = at + field.count.itemsize
+        order = "big" if field.count.byteorder == ">" else "little"
+        return int.from_bytes(self._data[at:end], order), end  # type: ignore[arg-type]
+
+    def _uneven_rows(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
+        """Rows of different lengths: one after another, because each tells where the next begins."""
+        begins, sizes, dtype = list[int](), list[int](), np.dtype("<i4")
+        if wanted is None and element.name == "vertex":
+            raise Unreadable("PLY vertices with lists of different lengths are not read")
+        for row in range(element.rows):
+            for field in element.properties:
+                length, self._at = self._length(field, self._at)
+                if field.name == wanted:
+                    begins.append(self._at)
+                    sizes.append(length)
+                    dtype = field.dtype
+                self._at += length * field.dtype.itemsize
+            if self._at > len(self._data):
+                raise _short(element, row)
+        lengths = np.array(sizes, dtype=np.int64)
+        picked = _ranges(np.array(begins, dtype=np.int64), lengths * dtype.itemsize)
+        items = np.frombuffer(self._data, dtype=np.uint8)[picked].view(dtype)
+        return {}, items.astype(np.int64), lengths
+
+
+def _even_rows(element: _Element, rows: np.ndarray, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
+    columns, items, sizes = Columns(), np.zeros(0, np.int64), np.zeros(0, np.int64)
+    for k, field in enumerate(element.properties):
+        if field.count is None:
+            columns[field.name] = rows[f"{k}"][:, 0]
+        elif field.name == wanted:
+            block = rows[f"{k}"]
+            items, sizes = block.astype(np.int64).reshape(-1), np.full(len(block), block.shape[1], dtype=np.int64)
+    return columns, items, sizes
+
+
+def _ranges(begins: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """begin, begin + 1, ... of each range, one range after another."""
+    return np.repeat(begins - (np.cumsum(lengths) - lengths), lengths) + np.arange(int(lengths.sum()))
+
+
+def _short(element: _Element, row: int) -> Unreadable:
+    return Unreadable(f"PLY {element.name} {row} is too short (truncated?)")

@@ -1,0 +1,109 @@
+"""Polygons as a file has them, and their triangles.
+
+In: vertices and the corners of every polygon in turn. Out: faces F x 3 in the file's order, orientation kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+Dropped = frozenset[str]  # what a file has besides geometry, in words
+
+
+class Unreadable(ValueError):
+    """A file's content is not what its format allows; the caller adds the file, the frame and the remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Polygons:
+    """What a file says about its surface, before anything is checked."""
+
+    vertices: Float64[np.ndarray, "V 3"]  # m
+    corners: Int64[np.ndarray, " C"]  # vertex of each corner of each polygon, from 0
+    sizes: Int64[np.ndarray, " P"]  # corners of each polygon
+    dropped: Dropped = frozenset()
+
+
+def triangulate(polygons: Polygons) -> Int64[np.ndarray, "F 3"]:
+    """The polygons cut into triangles: quads along the diagonal that does not fold, others as fans or by ear clipping.
+
+    Indices and sizes must have been checked.
+    """
+    vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
+    if (sizes == 3).all():
+        return corners.reshape(-1, 3)
+    first_corner = np.cumsum(sizes) - sizes
+    first_face = np.cumsum(sizes - 2) - (sizes - 2)
+    faces = np.empty((int((sizes - 2).sum()), 3), dtype=np.int64)
+    for size in np.unique(sizes):
+        chosen = np.flatnonzero(sizes == size)
+        same = corners[first_corner[chosen, None] + np.arange(size)]
+        faces[first_face[chosen, None] + np.arange(size - 2)] = _cut(vertices, same)
+    return faces
+
+
+def _cut(vertices: Float64[np.ndarray, "V 3"], polygons: Int64[np.ndarray, "P N"]) -> Int64[np.ndarray, "P N-2 3"]:
+    """Triangles of polygons that have N corners each."""
+    fans = _fans(polygons)
+    folded = _folds(vertices, polygons, fans)
+    if polygons.shape[1] == 4:
+        other = _fans(np.roll(polygons, -1, axis=1))
+        better = folded & ~_folds(vertices, polygons, other)
+        fans[better] = other[better]
+    else:
+        for row in np.flatnonzero(folded):
+            fans[row] = _clip_ears(vertices[polygons[row]], polygons[row])
+    return fans
+
+
+def _fans(polygons: Int64[np.ndarray, "P N"]) -> Int64[np.ndarray, "P N-2 3"]:
+    hub = np.repeat(polygons[:, :1], polygons.shape[1] - 2, axis=1)
+    return np.stack([hub, polygons[:, 1:-1], polygons[:, 2:]], axis=2)
+
+
+def _folds(
+    vertices: Float64[np.ndarray, "V 3"],
+    polygons: Int64[np.ndarray, "P N"],
+    fans: Int64[np.ndarray, "P N-2 3"],
+) -> np.ndarray:
+    """Where a triangle of the fan looks away from its polygon, bool P."""
+    normals = _newell(vertices[polygons])
+    a, b, c = (vertices[fans[:, :, k]] for k in range(3))
+    return (np.einsum("pnd,pd->pn", np.cross(b - a, c - a), normals) < 0).any(axis=1)
+
+
+def _newell(points: Float64[np.ndarray, "P N 3"]) -> Float64[np.ndarray, "P 3"]:
+    """Twice the vector area of each polygon; about its first corner, so that far coordinates lose nothing."""
+    local = points - points[:, :1]
+    return np.cross(local, np.roll(local, -1, axis=1)).sum(axis=1)
+
+
+def _clip_ears(points: Float64[np.ndarray, "N 3"], names: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, "N-2 3"]:
+    """Triangles of one concave polygon; what no ear can be cut from becomes a fan."""
+    normal = _newell(points[None])[0]
+    drop = int(np.argmax(np.abs(normal)))  # project along the largest axis, orientation kept
+    flat = np.delete(points - points[0], drop, axis=1) * np.array([1.0, -1.0 if drop == 1 else 1.0])
+    flat = flat if normal[drop] > 0 else flat * np.array([1.0, -1.0])
+    ring, faces = list(range(len(names))), []
+    while len(ring) > 3:
+        ear = next((k for k in range(len(ring)) if _is_ear(flat, ring, k)), 1)
+        faces.append((ring[ear - 1], ring[ear], ring[(ear + 1) % len(ring)]))
+        ring.pop(ear)
+    return names[np.array([*faces, tuple(ring)])]
+
+
+def _is_ear(flat: Float64[np.ndarray, "N 2"], ring: list[int], k: int) -> bool:
+    a, b, c = ring[k - 1], ring[k], ring[(k + 1) % len(ring)]
+    corners = flat[[a, b, c]]
+    if _turn(corners[0], corners[1], corners[2]) <= 0:
+        return False
+    others = flat[[i for i in ring if i not in (a, b, c)]]
+    sides = [_turn(corners[i], corners[(i + 1) % 3], others) >= 0 for i in range(3)]
+    return not (sides[0] & sides[1] & sides[2]).any()
+
+
+def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    return (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])

@@ -1,0 +1,87 @@
+"""Numbers of a text file, line by line, without a Python loop over the lines.
+
+In: a file's bytes. Out: flat values and how many of them each line has; junk raises with its line number.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from .polygons import Unreadable
+
+_BLANKS = np.frombuffer(b" \t\n\v\f", dtype=np.uint8)
+
+
+@dataclass(frozen=True, slots=True)
+class Lines:
+    """Where each line of a text begins and ends."""
+
+    text: np.ndarray  # uint8, every line ended by a newline
+    starts: Int64[np.ndarray, " L"]
+    ends: Int64[np.ndarray, " L"]  # position of the newline
+
+    @staticmethod
+    def of(data: bytes, comment: bytes = b"#") -> Lines:
+        """The lines of a text in any newline convention, without comments and leading blanks; numbering is kept."""
+        if b"\r" in data:
+            data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+        if comment in data:
+            data = re.sub(re.escape(comment) + rb"[^\n]*", b"", data)
+        data = re.sub(rb"(?m)^[ \t\v\f]+", b"", data)
+        text = np.frombuffer(data + b"\n", dtype=np.uint8)
+        ends = np.flatnonzero(text == ord("\n"))
+        return Lines(text, np.concatenate([[0], ends[:-1] + 1]), ends)
+
+    def __len__(self) -> int:
+        return len(self.starts)
+
+    def line(self, number: int) -> str:
+        """One line as text, shortened so that it fits in a message."""
+        shown = self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
+        return shown if len(shown) <= 60 else shown[:57] + "..."
+
+    def block(self, chosen: Int64[np.ndarray, " N"], skip: int = 0) -> np.ndarray:
+        """The chosen lines' bytes with their newlines, `skip` bytes left out at the start of each; uint8."""
+        step = np.zeros(len(self.text) + 1, dtype=np.int8)
+        step[self.starts[chosen] + skip] = 1
+        step[self.ends[chosen] + 1] -= 1
+        return self.text[np.cumsum(step[:-1], dtype=np.int8).astype(bool)]
+
+    def values(
+        self, chosen: Int64[np.ndarray, " N"], block: np.ndarray
+    ) -> tuple[Float64[np.ndarray, " M"], Int64[np.ndarray, " N"]]:
+        """All numbers of a block of the chosen lines, and how many each line has."""
+        counts = count_words(block)
+        try:
+            values = np.fromstring(block.tobytes(), dtype=np.float64, sep=" ")
+        except ValueError:
+            values = np.zeros(0)
+        if len(values) != counts.sum():
+            raise self._junk(chosen, block)
+        return values, counts
+
+    def _junk(self, chosen: Int64[np.ndarray, " N"], block: np.ndarray) -> Unreadable:
+        for number, line in zip(chosen, block.tobytes().split(b"\n"), strict=False):
+            for word in line.split():
+                try:
+                    float(word)
+                except ValueError:
+                    shown = word[:20].decode("utf-8", "replace")
+                    return Unreadable(f"line {number + 1} ({self.line(number)!r}) has {shown!r} where a number must be")
+        return Unreadable("a number is written in a way that cannot be read")
+
+
+def count_words(block: np.ndarray) -> Int64[np.ndarray, " N"]:
+    """How many words each line of a block (uint8, newline-ended lines) has."""
+    if len(block) == 0:
+        return np.zeros(0, dtype=np.int64)
+    blank = np.isin(block, _BLANKS)
+    begins = ~blank
+    begins[1:] &= blank[:-1]
+    ends = np.flatnonzero(block == ord("\n"))
+    totals = np.cumsum(begins)[ends]
+    return np.diff(totals, prepend=0)

@@ -1,0 +1,178 @@
+"""A sequence of meshes from files: lazy, one frame in memory at a time.
+
+In: a folder, a glob, a list of files, one file or an .npz, and SequenceOptions. Out: FileSequence (a MeshSequence).
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import InputError
+from ..types import Mesh
+from .archive import Archive
+from .meshes import Loaded, read_mesh
+from .names import find_frames
+
+_FRAMES = re.compile(r"(-?\d+)?:(-?\d+)?")
+_SUSPICIOUS_RATIO = (
+    20.0  # between the diagonals of two frames: more than a person who crouches or a second one who enters
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SequenceOptions:
+    """How files become a sequence."""
+
+    frame_rate: float = 30.0  # 1/s
+    frames: str = ":"  # which frames, "a:b" as Python slices
+    scale: float = 1.0  # multiplies every coordinate: 0.001 for files in millimetres
+    weld: Callable[[Mesh], Mesh] | None = None  # merges equal positions (geometry.topology.weld); None keeps them
+
+    def __post_init__(self) -> None:
+        """Refuses values that no sequence can have."""
+        for name, value in (("frame rate", self.frame_rate), ("scale", self.scale)):
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name} {value} is not a positive number; give one, as 30 or 0.001")
+        if not _FRAMES.fullmatch(self.frames):
+            raise InputError(f"frames {self.frames!r} is not a range; give A:B, A: or :B, as 0:10")
+
+    def chosen(self, count: int) -> range:
+        """The frames that are wanted out of `count`."""
+        begin, end = (int(part) if part else None for part in self.frames.split(":"))
+        return range(count)[begin:end]
+
+
+class Frames(Protocol):
+    """Where frames come from."""
+
+    def __len__(self) -> int: ...
+
+    def name(self, index: int) -> str:
+        """What an error calls a frame."""
+        ...
+
+    def load(self, index: int, where: str) -> Loaded:
+        """One frame, checked; `where` begins every error's text."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """One file a frame."""
+
+    paths: tuple[Path, ...]
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def name(self, index: int) -> str:
+        """What an error calls a frame."""
+        return str(self.paths[index])
+
+    def load(self, index: int, where: str) -> Loaded:
+        """One frame, checked."""
+        return read_mesh(self.paths[index], where)
+
+
+@dataclass(slots=True)
+class _Seen:
+    """What reading has shown so far; a frame that is read twice counts once."""
+
+    merged: dict[int, tuple[int, int, int]] = field(default_factory=dict)  # frame: merged, of positions, faces lost
+    dropped: dict[str, int] = field(default_factory=dict)  # what: first frame that has it
+    smallest: tuple[float, int] | None = None  # diagonal, frame
+    largest: tuple[float, int] | None = None
+
+
+class FileSequence:
+    """Frames read from files when they are asked for; nothing of them is kept but counts."""
+
+    def __init__(self, frames: Frames, options: SequenceOptions, remarks: Sequence[str] = ()) -> None:
+        self._frames, self._options, self._remarks, self._seen = frames, options, tuple(remarks), _Seen()
+        self._chosen = options.chosen(len(frames))
+        if len(self._chosen) == 0:
+            raise InputError(f"frames {options.frames!r} of {len(frames)} frames leave 0; choose at least one")
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second, 1/s."""
+        return self._options.frame_rate
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user must know about the frames read so far, a line each; complete after the last frame."""
+        return tuple(_warnings(self._seen, self._remarks))
+
+    def __len__(self) -> int:
+        return len(self._chosen)
+
+    def __iter__(self) -> Iterator[Mesh]:
+        return (self[index] for index in range(len(self)))
+
+    def __getitem__(self, index: int) -> Mesh:
+        number = self._chosen[operator.index(index)]
+        loaded = self._frames.load(number, self.name(index))
+        mesh = loaded.mesh
+        if self._options.scale != 1:
+            mesh = Mesh.of(mesh.vertices * self._options.scale, mesh.faces)
+        if self._options.weld is not None:
+            whole, mesh = mesh, self._options.weld(mesh)
+            merged = len(whole.vertices) - len(mesh.vertices)
+            self._seen.merged[number] = (merged, len(whole.vertices), len(whole.faces) - len(mesh.faces))
+        self._note(number, mesh, loaded)
+        return mesh
+
+    def name(self, index: int) -> str:
+        """What an error calls a frame: its number in the source and its file."""
+        number = self._chosen[operator.index(index)]
+        return f"frame {number} ({self._frames.name(number)})"
+
+    def _note(self, number: int, mesh: Mesh, loaded: Loaded) -> None:
+        seen = self._seen
+        for what in loaded.dropped:
+            seen.dropped[what] = min(number, seen.dropped.get(what, number))
+        size = mesh.diagonal
+        if size > 0:
+            seen.smallest = min(seen.smallest or (np.inf, 0), (size, number))
+            seen.largest = max(seen.largest or (0.0, 0), (size, number))
+
+
+def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
+    """The frames of a folder, a glob pattern, a list of files, one file or an .npz, none of them read yet."""
+    options = options or SequenceOptions()
+    if isinstance(source, str | Path) and Path(source).suffix.lower() == ".npz" and Path(source).is_file():
+        archive = Archive(Path(source))
+        if len(archive) == 0:
+            raise InputError(f"{source}: has 0 frames; save at least one")
+        return FileSequence(archive, options)
+    paths, remarks = find_frames(source)
+    if not paths:
+        raise InputError("the list of files has 0 frames; give at least one")
+    return FileSequence(Files(paths), options, remarks)
+
+
+def _warnings(seen: _Seen, remarks: tuple[str, ...]) -> Iterator[str]:
+    yield from remarks
+    loose = "vertices without faces"
+    if loose in seen.dropped:
+        yield f"frame {seen.dropped[loose]} has vertices but no faces: it counts as empty (a point cloud is no surface)"
+    extras = {what: first for what, first in seen.dropped.items() if what != loose}
+    if extras:
+        yield f"only geometry is kept; dropped: {', '.join(sorted(extras))} (first in frame {min(extras.values())})"
+    merged, positions, faces = np.array([*seen.merged.values()], dtype=np.int64).reshape(-1, 3).sum(axis=0).tolist()
+    if merged:
+        lost = f", and {faces} faces that collapsed with them" if faces else ""
+        yield f"welded {merged} of {positions} vertices that repeat a position{lost}, in {len(seen.merged)} frames"
+    if seen.smallest and seen.largest and seen.largest[0] > _SUSPICIOUS_RATIO * seen.smallest[0]:
+        yield (
+            f"frame {seen.largest[1]} is {seen.largest[0] / seen.smallest[0]:.3g} times as large as frame "
+            f"{seen.smallest[1]}: are they in the same unit?"
+        )
