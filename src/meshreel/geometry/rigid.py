@@ -1,0 +1,108 @@
+"""Rigid motions: weighted least-squares fits, and unit dual quaternions that blend them (paper, section 3.3.2).
+
+Batched array functions. A dual quaternion is a row of 8: real part (w, x, y, z), then dual part (w, x, y, z).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float64
+
+DEGENERATE = 1e-10  # a singular value below this share of the largest one tells nothing about the rotation
+
+
+def fit_rigid(
+    source: Float64[np.ndarray, "N n 3"], target: Float64[np.ndarray, "N n 3"], weights: Float64[np.ndarray, "N n"]
+) -> tuple[Float64[np.ndarray, "N 3 3"], Float64[np.ndarray, "N 3"]]:
+    """Rotations R and translations t that minimise sum w |R source + t - target|^2 in each of N rows (Kabsch).
+
+    Points on a line, or a single one, leave part of the rotation open: it is then the one nearest to no rotation.
+    """
+    share = weights / np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    middle_s = np.einsum("ni,nid->nd", share, source)
+    middle_t = np.einsum("ni,nid->nd", share, target)
+    s, t = source - middle_s[:, None], target - middle_t[:, None]
+    rotations = _nearest_rotations(np.swapaxes(share[..., None] * t, 1, 2) @ s)
+    return rotations, middle_t - np.einsum("nij,nj->ni", rotations, middle_s)
+
+
+def from_rigid(
+    rotations: Float64[np.ndarray, "N 3 3"], translations: Float64[np.ndarray, "N 3"]
+) -> Float64[np.ndarray, "N 8"]:
+    """Unit dual quaternions of the motions x -> R x + t."""
+    real = _quaternions(rotations)
+    pure = np.concatenate([np.zeros((len(real), 1)), translations], axis=1)
+    return np.concatenate([real, multiply(pure, real) / 2], axis=1)
+
+
+def blend(motions: Float64[np.ndarray, "N n 8"], weights: Float64[np.ndarray, "N n"]) -> Float64[np.ndarray, "N 8"]:
+    """The weighted mean of each row's n motions as a unit dual quaternion.
+
+    q and -q are one rotation: each motion is first flipped to the hemisphere of its row's first one.
+    """
+    real = motions[..., :4]
+    sign = np.where(np.einsum("nik,nk->ni", real, real[:, 0]) < 0, -1.0, 1.0)
+    return normalize(np.matmul((weights * sign)[:, None, :], motions)[:, 0])
+
+
+def normalize(motions: Float64[np.ndarray, "N 8"]) -> Float64[np.ndarray, "N 8"]:
+    """The nearest unit dual quaternions: |real| = 1 and real . dual = 0."""
+    length = np.linalg.norm(motions[:, :4], axis=1, keepdims=True)
+    real, dual = motions[:, :4] / length, motions[:, 4:] / length
+    return np.concatenate([real, dual - np.sum(real * dual, axis=1, keepdims=True) * real], axis=1)
+
+
+def apply(motions: Float64[np.ndarray, "N 8"], points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+    """Each point moved by its unit dual quaternion."""
+    real, dual = motions[:, :4], motions[:, 4:]
+    translation = 2 * (real[:, :1] * dual[:, 1:] - dual[:, :1] * real[:, 1:] + np.cross(real[:, 1:], dual[:, 1:]))
+    return rotate(motions, points) + translation
+
+
+def rotate(motions: Float64[np.ndarray, "N 8"], vectors: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+    """Each vector (a normal, say) turned by its unit dual quaternion, not shifted."""
+    w, axis = motions[:, :1], motions[:, 1:4]
+    return vectors + 2 * np.cross(axis, np.cross(axis, vectors) + w * vectors)
+
+
+def inverse(motions: Float64[np.ndarray, "N 8"]) -> Float64[np.ndarray, "N 8"]:
+    """The motions that undo the given ones: the conjugate of a unit dual quaternion."""
+    return motions * np.array([1.0, -1, -1, -1, 1, -1, -1, -1])
+
+
+def multiply(a: Float64[np.ndarray, "N 4"], b: Float64[np.ndarray, "N 4"]) -> Float64[np.ndarray, "N 4"]:
+    """Hamilton products of quaternions (w, x, y, z), row by row."""
+    scalar = a[:, 0] * b[:, 0] - np.sum(a[:, 1:] * b[:, 1:], axis=1)
+    vector = a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:] + np.cross(a[:, 1:], b[:, 1:])
+    return np.concatenate([scalar[:, None], vector], axis=1)
+
+
+def _nearest_rotations(covariances: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 3 3"]:
+    u, size, vt = np.linalg.svd(covariances)
+    open_axis = size[:, 1] <= DEGENERATE * size[:, 0]  # rank 1 or 0: pull the open part towards no rotation
+    if open_axis.any():
+        pull = np.maximum(size[open_axis, 0], np.finfo(float).tiny)[:, None, None] * 1e-6 * np.eye(3)
+        u[open_axis], _, vt[open_axis] = np.linalg.svd(covariances[open_axis] + pull)
+    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
+    return u @ vt
+
+
+def _quaternions(rotations: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 4"]:
+    """Unit quaternions of rotations, from the largest of w, x, y, z so that none is divided by a small one."""
+    r = rotations
+    trace = np.trace(r, axis1=1, axis2=2)
+    d0, d1, d2 = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
+    xw, yw, zw = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    xy, xz, yz = r[:, 1, 0] + r[:, 0, 1], r[:, 0, 2] + r[:, 2, 0], r[:, 2, 1] + r[:, 1, 2]
+    rows = np.stack(  # 4 q q^T: each row is q times one of its own components
+        [
+            np.stack([1 + trace, xw, yw, zw], axis=1),
+            np.stack([xw, 1 + d0 - d1 - d2, xy, xz], axis=1),
+            np.stack([yw, xy, 1 - d0 + d1 - d2, yz], axis=1),
+            np.stack([zw, xz, yz, 1 - d0 - d1 + d2], axis=1),
+        ],
+        axis=1,
+    )
+    best = np.argmax(np.stack([1 + trace, rows[:, 1, 1], rows[:, 2, 2], rows[:, 3, 3]], axis=1), axis=1)
+    q = rows[np.arange(len(r)), best]
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
