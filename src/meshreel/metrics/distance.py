@@ -1,0 +1,149 @@
+"""Distances between two surfaces, the PSNRs and the normal errors, all from one round of closest-point queries.
+
+An original and a decoded mesh in the same unit -> SurfaceErrors. Conventions: two empty meshes are equal (distances 0,
+PSNR inf, angle 0); one empty mesh is the worst case (distances inf, PSNR 0 dB, angle 180 degrees). Distances under
+2^-22 of the diagonal, the resolution of the float32 queries, count as 0, and a PSNR over PSNR_CEILING as infinite.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..types import Mesh
+from .normals import WORST_ANGLE, angles
+from .samples import RESOLUTION, Matches, Samples, match, sample_pair, used_surface
+
+PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; a mean over frames counts an infinite PSNR as this
+
+
+@dataclass(frozen=True, slots=True)
+class OneWayErrors:
+    """Errors from the samples of one mesh to the surface of the other."""
+
+    point_mse: float  # m^2, mean over the vertices of the squared distance (D1)
+    plane_mse: float  # m^2, the same along the normal of the matched point (D2)
+    rms: float  # m, over the area
+    hausdorff95: float  # m, 95 % of the area is at most this far away
+    maximum: float  # m, over all samples
+    angle: float  # degrees, mean over the area, between interpolated vertex normals
+    vertex_angle: float  # degrees, the same at the vertices only, where quantisation turns normals most
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceErrors:
+    """All distances and normal errors of one frame; PSNRs in dB, larger is better."""
+
+    diagonal: float  # m, of the original frame's bounding box: the peak p of every PSNR
+    forward: OneWayErrors  # original to decoded: what was lost
+    backward: OneWayErrors  # decoded to original: what was invented
+
+    @property
+    def d2_psnr_paper(self) -> float:
+        """10 log10(p^2 / MSE) from the original vertices to the decoded surface, one way, as TSMC's authors have it."""
+        return _psnr(self.forward.point_mse, self.diagonal)
+
+    @property
+    def d1_psnr(self) -> float:
+        """10 log10(3 p^2 / MSE), point to point, the worse of both directions (MPEG PCC common test conditions)."""
+        return _psnr(max(self.forward.point_mse, self.backward.point_mse) / 3, self.diagonal)
+
+    @property
+    def d2_psnr(self) -> float:
+        """10 log10(3 p^2 / MSE), point to plane, the worse of both directions (MPEG PCC common test conditions)."""
+        return _psnr(max(self.forward.plane_mse, self.backward.plane_mse) / 3, self.diagonal)
+
+    @property
+    def symmetric_rms(self) -> float:
+        """The larger of both directions' RMS over the area, m: what decisions inside the encoder use.
+
+        The larger, not the mean: neither lost nor invented surface can be traded for precision elsewhere.
+        """
+        return max(self.forward.rms, self.backward.rms)
+
+    @property
+    def symmetric_psnr(self) -> float:
+        """20 log10(p / symmetric_rms)."""
+        return _psnr(self.symmetric_rms**2, self.diagonal)
+
+    @property
+    def hausdorff95(self) -> float:
+        """The larger of both directions' 95 % Hausdorff distance, m."""
+        return max(self.forward.hausdorff95, self.backward.hausdorff95)
+
+    @property
+    def angle(self) -> float:
+        """Mean of both directions' normal error, degrees."""
+        return (self.forward.angle + self.backward.angle) / 2
+
+    @property
+    def vertex_angle(self) -> float:
+        """Mean of both directions' normal error at the vertices, degrees."""
+        return (self.forward.vertex_angle + self.backward.vertex_angle) / 2
+
+    def percent(self, distance: float) -> float:
+        """A distance in m as % of the diagonal."""
+        if distance == 0:
+            return 0.0
+        return 100 * distance / self.diagonal if self.diagonal > 0 else math.inf
+
+
+def surface_errors(original: Mesh, decoded: Mesh) -> SurfaceErrors:
+    """Everything that closest points tell about two meshes of one frame.
+
+    Faces without area and vertices without faces are not surface and are ignored; so are they in the diagonal.
+    """
+    original, decoded = used_surface(original), used_surface(decoded)
+    if original.is_empty or decoded.is_empty:
+        both = _PERFECT if original.is_empty and decoded.is_empty else _WORST
+        return SurfaceErrors(original.diagonal, both, both)
+    diagonal = original.diagonal
+    a, b = sample_pair(original, decoded)
+    resolution = RESOLUTION * diagonal
+    return SurfaceErrors(diagonal, _one_way(a, match(a, b, resolution)), _one_way(b, match(b, a, resolution)))
+
+
+def symmetric_distance(original: Mesh, decoded: Mesh) -> float:
+    """`SurfaceErrors.symmetric_rms` of two meshes, m; inf where one is empty."""
+    return surface_errors(original, decoded).symmetric_rms
+
+
+_PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE)
+
+
+def _one_way(source: Samples, found: Matches) -> OneWayErrors:
+    vertices = len(source.mesh.vertices)
+    squared = found.distances**2
+    turned = angles(source.normals, found.normals)
+    return OneWayErrors(
+        point_mse=float(squared[:vertices].mean()),
+        plane_mse=float(_plane_squared(found, squared)[:vertices].mean()),
+        rms=float(np.sqrt(source.weights @ squared)),
+        hausdorff95=_quantile(found.distances, source.weights, 0.95),
+        maximum=float(found.distances.max()),
+        angle=float(source.weights @ turned),
+        vertex_angle=float(turned[:vertices].mean()),
+    )
+
+
+def _plane_squared(found: Matches, squared: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+    along = np.einsum("nd,nd->n", found.offsets, found.normals) ** 2
+    return np.where(found.normals.any(axis=1), along, squared)  # without a normal there is no plane that forgives
+
+
+def _quantile(values: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"], share: float) -> float:
+    order = np.argsort(values)
+    reached = np.cumsum(weights[order])
+    return float(values[order[min(np.searchsorted(reached, share * reached[-1]), len(values) - 1)]])
+
+
+def _psnr(mse: float, peak: float) -> float:
+    if mse <= (RESOLUTION * peak) ** 2:
+        return math.inf
+    if math.isinf(mse) or peak == 0:
+        return 0.0
+    return 10 * math.log10(peak**2 / mse)

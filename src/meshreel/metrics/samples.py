@@ -1,0 +1,105 @@
+"""Two meshes made comparable: the same origin, sample points on each surface, closest points on the other.
+
+Samples of a mesh are its vertices (first, in order) and then a quadrature of its area, so that one round of queries
+serves both the vertex-based metrics and the area-weighted ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from ..geometry.nearest import Surface
+from ..geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint
+from ..types import Mesh
+from .normals import interpolate, unit, welded_normals
+
+RESOLUTION = 2.0**-22  # of the diagonal; below it a distance is rounding of the float32 queries and counts as 0
+_ENOUGH_FACES = 12_000  # a coarser mesh is subdivided before it is sampled, so few vertices hide nothing
+_MOST_LEVELS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Points on one mesh, weights that integrate over its area (they sum to 1), and the mesh's normals."""
+
+    mesh: Mesh  # centered, without zero-area faces and unreferenced vertices
+    vertex_normals: Float64[np.ndarray, "V 3"]
+    points: Float64[np.ndarray, "N 3"]  # the V vertices of the mesh first
+    normals: Float64[np.ndarray, "N 3"]  # interpolated at the points
+    weights: Float64[np.ndarray, " N"]
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """What the samples of one mesh meet on the other."""
+
+    distances: Float64[np.ndarray, " N"]  # m, to the closest point
+    offsets: Float64[np.ndarray, "N 3"]  # m, from the sample to its closest point
+    normals: Float64[np.ndarray, "N 3"]  # interpolated at the closest point
+
+
+def sample_pair(original: Mesh, decoded: Mesh) -> tuple[Samples, Samples]:
+    """Samples of two meshes that both have a surface, moved so that the original's bounding box is around 0.
+
+    Zero-area faces and vertices that no face uses are no surface and are left out.
+    """
+    original, decoded = used_surface(original), used_surface(decoded)
+    center = box_center(original)
+    return _sample(_moved(original, -center)), _sample(_moved(decoded, -center))
+
+
+def match(source: Samples, target: Samples, resolution: float) -> Matches:
+    """The closest points of the target's surface to the source's samples; distances under `resolution` (m) are 0."""
+    hits = Surface(target.mesh).closest(source.points)
+    offsets = hits.points - source.points
+    distances = np.sqrt(np.einsum("nd,nd->n", offsets, offsets))
+    noise = distances < resolution
+    offsets[noise] = 0
+    distances[noise] = 0
+    corners = target.mesh.faces[hits.faces]
+    return Matches(distances, offsets, interpolate(target.vertex_normals, corners, hits.barycentric))
+
+
+def used_surface(mesh: Mesh) -> Mesh:
+    """The mesh without zero-area faces and without vertices that no face uses; possibly empty."""
+    areas = face_normals(mesh)[1]
+    return drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[areas > 0]))
+
+
+def box_center(mesh: Mesh) -> Float64[np.ndarray, " 3"]:
+    """The middle of the bounding box, 0 for a mesh without vertices."""
+    if len(mesh.vertices) == 0:
+        return np.zeros(3)
+    return (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+
+
+def _moved(mesh: Mesh, offset: Float64[np.ndarray, " 3"]) -> Mesh:
+    return Mesh.of(mesh.vertices + offset, mesh.faces)
+
+
+def _sample(mesh: Mesh) -> Samples:
+    normals = welded_normals(mesh)
+    levels = _levels(len(mesh.faces))
+    fine = subdivide_midpoint(mesh, levels)  # the same surface; old vertices stay first
+    fine_normals = subdivide_midpoint(Mesh.of(normals, mesh.faces), levels).vertices
+    areas = face_normals(fine)[1]
+    # 1/12 for each corner and 3/4 for the centroid integrate quadratics over a triangle exactly
+    shares = np.bincount(fine.faces.reshape(-1), np.repeat(areas / 12, 3), len(fine.vertices))
+    weights = np.concatenate([shares, areas * 0.75])
+    points = np.concatenate([fine.vertices, _centroids(fine.vertices, fine.faces)])
+    directions = np.concatenate([fine_normals, _centroids(fine_normals, fine.faces)])
+    return Samples(mesh, normals, points, unit(directions), weights / weights.sum())
+
+
+def _centroids(values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, "F 3"]:
+    return (values[faces[:, 0]] + values[faces[:, 1]] + values[faces[:, 2]]) / 3
+
+
+def _levels(faces: int) -> int:
+    levels = 0
+    while faces * 4**levels < _ENOUGH_FACES and levels < _MOST_LEVELS:
+        levels += 1
+    return levels
