@@ -22,7 +22,7 @@ def command(
     decoded: Path,
     *,
     fps: float = 30.0,
-    frames: str = "",
+    frames: str = ":",
     scale: float = 1.0,
     cameras: Path | None = None,
     ssim: bool = True,

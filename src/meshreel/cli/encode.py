@@ -14,7 +14,6 @@ from ..encoder import Summary, encode
 from ..errors import InputError
 from ..io.sequence import SequenceOptions, open_sequence
 from ..presets import preset_options
-from ..types import MeshSequence
 from .console import Common
 
 
@@ -25,7 +24,7 @@ def command(
     preset: Literal["paper"] = "paper",
     quality: float = 50.0,
     fps: float = 30.0,
-    frames: str = "",
+    frames: str = ":",
     scale: float = 1.0,
     basis_size: int | None = None,
     centers: int = 2000,
@@ -71,13 +70,13 @@ def command(
         summary = encode(sequence, output, options, executor, progress)
     for warning in sequence.warnings:
         common.warn(warning)
-    row = summary_row(summary, sequence)
+    row = summary_row(summary, sequence.frame_rate)
     common.result({"output": str(output)} | row, f"{output}: {describe(row)}")
 
 
-def summary_row(summary: Summary, sequence: MeshSequence) -> dict[str, Any]:
+def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
     """Rate, quality and forms of an encode, ready for JSON."""
-    seconds = summary.frame_count / sequence.frame_rate
+    seconds = summary.frame_count / frame_rate
     return {
         "bytes": summary.size,
         "frames": summary.frame_count,
