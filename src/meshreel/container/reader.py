@@ -1,0 +1,146 @@
+"""Reading a .reel file: the head once, then any chunk by its byte range. In: a Source. Out: payloads, checked by CRC.
+
+A damaged head makes the file unreadable (FormatError at once); damage behind it costs only the chunks it lies in.
+"""
+
+from __future__ import annotations
+
+import zlib
+from bisect import bisect_right
+from dataclasses import dataclass
+from itertools import accumulate
+
+from ..errors import FormatError
+from ..format.checks import check_header, check_index, parse_metadata
+from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
+from ..format.records import least_size, unpack, unpack_all
+from .sources import Source
+
+FIRST_REQUEST = 16384  # bytes; the head of some minutes of video
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Where a chunk lies and what it holds."""
+
+    number: int
+    kind: ChunkKind
+    form: Form
+    first_frame: int  # 0 for STATIC
+    frame_count: int  # 0 for STATIC
+    depends_on: tuple[int, ...]  # numbers of STATIC chunks
+    offset: int  # bytes from the start of the file
+    layers: tuple[Layer, ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes of the whole chunk."""
+        return sum(layer.size for layer in self.layers)
+
+    @property
+    def end(self) -> int:
+        """Offset of the byte behind it."""
+        return self.offset + self.size
+
+    def __str__(self) -> str:
+        if self.kind == ChunkKind.STATIC:
+            return f"chunk {self.number} (static)"
+        return f"chunk {self.number} (frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"
+
+
+class ReelReader:
+    """The head of a file, checked, and its chunks on demand. Does not close the source."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.header, index, self.head_size = _read_head(source)
+        check_index(index)
+        self.chunks = _chunks(index, self.head_size)
+        self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
+        self.frame_count = self.groups[-1].first_frame + self.groups[-1].frame_count
+        check_header(self.header, self.frame_count)
+        self.metadata = parse_metadata(self.header.metadata)
+        self.size = self.chunks[-1].end  # bytes of the whole file, whether they are there or not
+        if source.size > self.size:
+            raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
+        self._first_frames = [group.first_frame for group in self.groups]
+        self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second, 1/s."""
+        return self.header.frame_rate
+
+    @property
+    def missing(self) -> tuple[Chunk, ...]:
+        """The chunks that a truncated file has lost, whole or in part; none in a whole file."""
+        return tuple(chunk for chunk in self.chunks if chunk.end > self._source.size)
+
+    def timestamp(self, frame: int) -> float:
+        """The time of a frame, s. IndexError as chunk_of_frame."""
+        self.chunk_of_frame(frame)
+        if self.header.intervals:
+            return self._times[frame] / 1e6
+        return self.header.first_time / 1e6 + frame / self.header.frame_rate
+
+    def chunk_of_frame(self, frame: int) -> Chunk:
+        """The GROUP chunk that holds a frame. IndexError outside 0 .. frame_count - 1."""
+        if not 0 <= frame < self.frame_count:
+            raise IndexError(f"frame {frame}: the file has frames 0 to {self.frame_count - 1}")
+        return self.groups[bisect_right(self._first_frames, frame) - 1]
+
+    def read_chunk(self, number: int, layers: int | None = None) -> bytes:
+        """The payload of a chunk, or its first `layers` (at least one). FormatError names chunk and frames."""
+        chunk = self.chunks[number]
+        wanted = chunk.layers if layers is None else chunk.layers[: max(layers, 1)]
+        size = sum(layer.size for layer in wanted)
+        if chunk.offset + size > self._source.size:
+            raise FormatError(f"{chunk}: truncated, the file ends at byte {self._source.size} of {self.size}")
+        payload = self._source.get_bytes(chunk.offset, size)
+        if len(payload) != size:
+            raise FormatError(f"{chunk}: truncated, {len(payload)} of {size} bytes")
+        _check_payload(chunk, payload, wanted)
+        return payload
+
+
+def _read_head(source: Source) -> tuple[Header, Index, int]:
+    """Header, index and size of the head, in one request where it is short; never more than the source has."""
+    data = source.get_bytes(0, min(FIRST_REQUEST, source.size))
+    if data[: len(MAGIC)] != MAGIC:
+        raise FormatError("not a .reel file: the signature is missing")
+    preamble, start = unpack(Preamble, data)
+    if preamble.version != VERSION:
+        raise FormatError(f"format version {preamble.version}: this reader knows version {VERSION}, update meshreel")
+    if preamble.flags != 0:
+        raise FormatError(f"flags {preamble.flags}: version {VERSION} has none")
+    size = preamble.head_size
+    end = size - least_size(Checksum)
+    if not start <= end or size > source.size:
+        raise FormatError(f"head of {size} bytes in a file of {source.size}: truncated or damaged")
+    data = data[:size] + (source.get_bytes(len(data), size - len(data)) if size > len(data) else b"")
+    if len(data) != size or unpack_all(Checksum, data[end:]).crc != zlib.crc32(data[:end]):
+        raise FormatError("the head is damaged: its checksum does not match")
+    header, start = unpack(Header, data[:end], start)
+    return header, unpack_all(Index, data[start:end]), size
+
+
+def _chunks(index: Index, offset: int) -> tuple[Chunk, ...]:
+    chunks: list[Chunk] = []
+    frame = 0
+    for number, entry in enumerate(index.chunks):
+        first = frame if entry.kind == ChunkKind.GROUP else 0
+        chunk = Chunk(number, entry.kind, entry.form, first, entry.frames, entry.depends_on, offset, entry.layers)
+        chunks.append(chunk)
+        offset = chunk.end
+        frame += entry.frames
+    return tuple(chunks)
+
+
+def _check_payload(chunk: Chunk, payload: bytes, layers: tuple[Layer, ...]) -> None:
+    offset = 0
+    for number, layer in enumerate(layers):
+        if zlib.crc32(memoryview(payload)[offset : offset + layer.size]) != layer.crc:
+            raise FormatError(f"{chunk}: layer {number} is damaged, its checksum does not match")
+        offset += layer.size
+    if payload[0] != chunk.form:
+        raise FormatError(f"{chunk}: its form is {payload[0]}, the index says {chunk.form.value}")

@@ -1,0 +1,155 @@
+"""Writing a .reel file, chunk by chunk, whole or not at all. In: a header and payloads. Out: a file, or its bytes.
+
+The head names every chunk and comes first, so chunks wait in an unnamed temporary file beside the target: memory stays
+flat, and a process that is killed leaves nothing under the final name.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import uuid
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import IO, BinaryIO
+
+from ..errors import FormatError, InputError
+from ..format.checks import check_header, check_index, parse_metadata
+from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, IndexEntry, Layer, Preamble
+from ..format.records import least_size, pack
+
+
+class ReelWriter:
+    """A context manager: chunks go in by `add_*`, and the file appears when the block ends without an exception.
+
+    The target is a path, or a binary file object such as io.BytesIO that is given the bytes. InputError where it cannot
+    be written (no such folder, disk full), where no frame was added, or where a value cannot be stored.
+    """
+
+    def __init__(self, target: str | Path | BinaryIO, header: Header) -> None:
+        self._target = Path(target) if isinstance(target, str | Path) else target
+        self._header = header
+        self._entries: list[IndexEntry] = []
+        self.frame_count = 0  # so far
+
+    def __enter__(self) -> ReelWriter:
+        with _as_input_error(self._target):
+            pack(self._header)
+            parse_metadata(self._header.metadata)
+            self._spool = _open_spool(self._target)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
+        try:
+            if kind is None:
+                with _as_input_error(self._target):
+                    self._finish()
+        finally:
+            with suppress(OSError):
+                self._spool.close()
+
+    def add_static(self, payload: bytes, layers: Sequence[int] = ()) -> int:
+        """The number of a new chunk that belongs to no frame; `layers` as for a group."""
+        return self._add(IndexEntry(ChunkKind.STATIC, _form(payload), 0, (), _layers(payload, layers)), payload)
+
+    def add_group(
+        self,
+        first_frame: int,
+        frame_count: int,
+        payload: bytes,
+        layers: Sequence[int] = (),
+        depends_on: Sequence[int] = (),
+    ) -> int:
+        """The number of a new chunk of frames; the first comes right behind those of the group before.
+
+        `layers` are the ends of the payload's layers, bytes, rising to its length; none: it is one layer. `depends_on`
+        are numbers of static chunks.
+        """
+        if first_frame != self.frame_count:
+            raise InputError(f"group at frame {first_frame}: frame {self.frame_count} comes next, add groups in order")
+        if frame_count < 1:
+            raise InputError(f"group at frame {first_frame}: {frame_count} frames, add at least one")
+        if any(not 0 <= chunk < len(self._entries) or self._entries[chunk].frames for chunk in depends_on):
+            raise InputError(f"group at frame {first_frame}: depends on {tuple(depends_on)}, name static chunks only")
+        layered = _layers(payload, layers)
+        return self._add(IndexEntry(ChunkKind.GROUP, _form(payload), frame_count, tuple(depends_on), layered), payload)
+
+    def _add(self, entry: IndexEntry, payload: bytes) -> int:
+        pack(entry)  # refuses what does not fit its field
+        with _as_input_error(self._target):
+            self._spool.write(payload)
+        self._entries.append(entry)
+        self.frame_count += entry.frames
+        return len(self._entries) - 1
+
+    def _finish(self) -> None:
+        index = Index(tuple(self._entries))
+        check_index(index)
+        check_header(self._header, self.frame_count)
+        head = pack_head(self._header, index)
+        self._spool.seek(0)
+        if not isinstance(self._target, Path):
+            _copy(head, self._spool, self._target)
+            return
+        partial = self._target.with_name(f".{self._target.name}.{uuid.uuid4().hex}.tmp")
+        try:
+            with partial.open("xb") as file:
+                _copy(head, self._spool, file)
+                os.fsync(file.fileno())
+            partial.replace(self._target)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def pack_head(header: Header, index: Index) -> bytes:
+    """Everything before the chunks."""
+    body = pack(header) + pack(index)
+    size = least_size(Preamble) + len(body) + least_size(Checksum)
+    data = pack(Preamble(MAGIC, VERSION, 0, size)) + body
+    return data + pack(Checksum(zlib.crc32(data)))
+
+
+def _open_spool(target: Path | BinaryIO) -> IO[bytes]:
+    if not isinstance(target, Path):
+        return tempfile.TemporaryFile()
+    if target.is_dir():
+        raise IsADirectoryError(None, "is a folder, name a file")
+    return tempfile.TemporaryFile(dir=target.parent)
+
+
+def _copy(head: bytes, spool: IO[bytes], target: IO[bytes]) -> None:
+    target.write(head)
+    shutil.copyfileobj(spool, target)
+    target.flush()
+
+
+def _form(payload: bytes) -> Form:
+    try:
+        return Form(payload[0])
+    except (IndexError, ValueError) as error:
+        raise InputError(f"payload starting {payload[:4]!r}: its first byte must be a Form") from error
+
+
+def _layers(payload: bytes, ends: Sequence[int]) -> tuple[Layer, ...]:
+    ends = [int(end) for end in ends] or [len(payload)]
+    starts = [0, *ends[:-1]]
+    if ends[-1] != len(payload) or any(start >= end for start, end in zip(starts, ends, strict=True)):
+        raise InputError(f"layers ending at {list(ends)}: must rise from above 0 to the payload's {len(payload)} bytes")
+    view = memoryview(payload)
+    return tuple(Layer(end - start, zlib.crc32(view[start:end])) for start, end in zip(starts, ends, strict=True))
+
+
+@contextmanager
+def _as_input_error(target: Path | BinaryIO) -> Iterator[None]:
+    """What goes wrong inside is the caller's to mend: an InputError that names the target."""
+    name = target if isinstance(target, Path) else "the output"
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{name}: cannot be written: {error.strerror or error}") from error
+    except FormatError as error:
+        raise InputError(f"{name}: cannot be stored: {error}") from error

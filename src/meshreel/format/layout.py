@@ -1,0 +1,149 @@
+"""The one definition of the bytes of a .reel file and of the payloads in it.
+
+A file is `Preamble | Header | Index | Checksum | chunks`; everything before the chunks is the head. Chunks lie one
+behind the other in the order of the index, so their offsets, like the numbers of their frames, follow from sums and
+cannot contradict each other. FORMAT.md's tables are made from this module by scripts/generate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated
+
+from .kinds import F32, F64, I16, I64, U8, U16, U32, Array, Blob, Bytes, Choice, List, Rest, Text, Varint
+from .records import Nested
+
+MAGIC = b"REEL\r\n\x1a\n"  # the line ends betray a transfer in text mode
+VERSION = 1
+
+
+class ChunkKind(IntEnum):
+    """What a chunk is for."""
+
+    STATIC = 1  # belongs to no frame; groups refer to it
+    GROUP = 2  # a group of consecutive frames
+
+
+class Form(IntEnum):
+    """How a chunk is coded; its first byte."""
+
+    LAPLACIAN = 1  # reference mesh and displacements
+    LAYERS = 2  # reserved
+    DRACO = 3  # one Draco mesh a frame
+    EMPTY = 4  # frames without a surface
+
+
+class AnchorRule(IntEnum):
+    """How the anchors of the Laplacian coordinates are chosen on both sides."""
+
+    SPREAD = 1  # the rule of coding/laplacian
+
+
+@dataclass(frozen=True, slots=True)
+class Preamble:
+    """The first bytes of a file: what it is, and how much of it to read before anything else."""
+
+    magic: Annotated[bytes, Bytes(8), "`52 45 45 4c 0d 0a 1a 0a`"]
+    version: Annotated[int, U8, "version of the format, 1; a reader refuses any other"]
+    flags: Annotated[int, U8, "reserved, 0"]
+    head_size: Annotated[int, U32, "size of the head, bytes: offset of the first chunk"]
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What holds for all frames. Coordinates y in chunks are normalised: x = origin + scale * y is in metres."""
+
+    frame_rate: Annotated[float, F64, "1/s, above 0"]
+    origin: Annotated[tuple[float, ...], Array(3, F64), "m"]
+    scale: Annotated[float, F64, "m, above 0"]
+    minimum: Annotated[tuple[float, ...], Array(3, F32), "lower corner of the sequence's bounding box, normalised"]
+    maximum: Annotated[tuple[float, ...], Array(3, F32), "upper corner of it"]
+    metadata: Annotated[str, Text(U16), "a JSON object about the encoding (preset, quality ...); not needed to decode"]
+    first_time: Annotated[int, I64, "time of frame 0, microseconds"] = 0
+    intervals: Annotated[
+        tuple[int, ...],
+        List(Varint(), Varint()),
+        "microseconds from each frame but the last to the next, each above 0; "
+        "none: frame i is at first_time + 10^6 * i / frame_rate",
+    ] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """A range of a chunk: its first k layers are its first bytes. Which k are enough to decode depends on the form."""
+
+    size: Annotated[int, Varint(), "bytes, above 0"]
+    crc: Annotated[int, U32, "CRC-32 (ISO-HDLC, as in zlib) of these bytes"]
+
+
+@dataclass(frozen=True, slots=True)
+class IndexEntry:
+    """One chunk."""
+
+    kind: Annotated[ChunkKind, Choice(U8, ChunkKind), "what it is for"]
+    form: Annotated[Form, Choice(U8, Form), "how it is coded; equal to its first byte"]
+    frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC"]
+    depends_on: Annotated[tuple[int, ...], List(U8, Varint()), "numbers of the STATIC chunks before it that it needs"]
+    layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]
+
+
+@dataclass(frozen=True, slots=True)
+class Index:
+    """All chunks in the order of their bytes; the frames of GROUP chunks follow one another from 0."""
+
+    chunks: Annotated[tuple[IndexEntry, ...], List(U32, Nested(IndexEntry)), "chunk 0, 1 ..."]
+
+
+@dataclass(frozen=True, slots=True)
+class Checksum:
+    """The end of the head."""
+
+    crc: Annotated[int, U32, "CRC-32 of the head up to here"]
+
+
+@dataclass(frozen=True, slots=True)
+class LaplacianGroup:
+    """The payload of a group of form LAPLACIAN."""
+
+    form: Annotated[Form, Choice(U8, Form), "LAPLACIAN"]
+    levels: Annotated[int, U8, "midpoint subdivisions of the decoded reference mesh"]
+    reference: Annotated[bytes, Blob(U32), "the reference mesh, Draco"]
+    displacements: Annotated[bytes, Rest(), "a DisplacementHead and its streams"]
+
+
+@dataclass(frozen=True, slots=True)
+class DisplacementHead:
+    """The start of coded displacements: T frames, M components; the components' streams follow, strongest first."""
+
+    frames: Annotated[int, U16, "T, above 0"]
+    anchor_rule: Annotated[AnchorRule, Choice(U8, AnchorRule), "how anchors are chosen"]
+    anchor_count: Annotated[int, U32, "number of anchors"]
+    anchor_weight: Annotated[float, F32, "weight of an anchor in the least squares"]
+    basis_step: Annotated[float, F32, "quantiser step of the basis"]
+    mean_step: Annotated[float, F32, "quantiser step of the mean"]
+    base_step: Annotated[float, F32, "quantiser step of level 0"]
+    step_levels: Annotated[
+        tuple[int, ...], List(U16, I16), "M; level of each component's quantiser step, above base_step"
+    ]
+    stream_sizes: Annotated[tuple[int, ...], List(U16, U32), "bytes of each component's stream"]
+
+
+@dataclass(frozen=True, slots=True)
+class DracoGroup:
+    """The payload of a group of form DRACO."""
+
+    form: Annotated[Form, Choice(U8, Form), "DRACO"]
+    levels: Annotated[int, U8, "midpoint subdivisions of every decoded mesh"]
+    meshes: Annotated[tuple[bytes, ...], List(U16, Blob(U32)), "one Draco mesh a frame; no bytes: an empty frame"]
+
+
+@dataclass(frozen=True, slots=True)
+class EmptyGroup:
+    """The payload of a group of form EMPTY."""
+
+    form: Annotated[Form, Choice(U8, Form), "EMPTY"]
+
+
+RECORDS = (Preamble, Header, Index, IndexEntry, Layer, Checksum)
+PAYLOADS = (LaplacianGroup, DisplacementHead, DracoGroup, EmptyGroup)
