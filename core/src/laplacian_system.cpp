@@ -1,0 +1,129 @@
+#include "laplacian_system.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "meshreel/laplacian.h"
+
+using Sparse = Eigen::SparseMatrix<double>;  // by columns, 32-bit indices
+
+namespace {
+
+// (L*)^T by columns: column i is row i of L*, so both Gram matrices are plain sparse products.
+Sparse transposed_system(const mr_laplacian& system) {
+    const int64_t n = system.vertices, l = static_cast<int64_t>(system.anchors.size());
+    const SparseRows& r = system.rows;
+    Sparse t(n, n + l);
+    t.reserve(static_cast<Eigen::Index>(r.columns.size()) + n + l);
+    for (int64_t i = 0; i < n; ++i) {
+        t.startVec(i);
+        bool placed = false;
+        for (int64_t p = r.starts[i]; p < r.starts[i + 1]; ++p) {
+            if (!placed && r.columns[p] > i) t.insertBack(i, i) = 1.0, placed = true;
+            t.insertBack(r.columns[p], i) = -r.values[p];
+        }
+        if (!placed) t.insertBack(i, i) = 1.0;
+    }
+    for (int64_t a = 0; a < l; ++a) {
+        t.startVec(n + a);
+        t.insertBack(system.anchors[a], n + a) = system.anchor_weight;
+    }
+    t.finalize();
+    return t;
+}
+
+}  // namespace
+
+bool Factor::compute(const Sparse& lower) {
+    Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>> ldlt;
+    ldlt.compute(lower);
+    if (ldlt.info() != Eigen::Success) return false;
+    const Eigen::Index n = lower.rows();
+    const auto& l = ldlt.matrixL().nestedExpression();
+    starts.assign(l.outerIndexPtr(), l.outerIndexPtr() + n + 1);
+    rows.assign(l.innerIndexPtr(), l.innerIndexPtr() + l.nonZeros());
+    values.assign(l.valuePtr(), l.valuePtr() + l.nonZeros());
+    pivots.resize(n);
+    order.resize(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+        pivots[k] = ldlt.vectorD()[k];
+        if (!(pivots[k] > 1e-14)) return false;
+        order[ldlt.permutationP().indices()[k]] = static_cast<int32_t>(k);
+    }
+    return true;
+}
+
+void Factor::solve(const double* right, int64_t columns, double* out) const {
+    const int64_t n = static_cast<int64_t>(order.size());
+    std::vector<double> x(static_cast<size_t>(n * columns));
+    for (int64_t k = 0; k < n; ++k) std::copy_n(right + order[k] * columns, columns, x.data() + k * columns);
+    for (int64_t k = 0; k < n; ++k) {
+        const double* from = x.data() + k * columns;
+        for (int32_t p = starts[k]; p < starts[k + 1]; ++p) {
+            double* to = x.data() + rows[p] * columns;
+            for (int64_t c = 0; c < columns; ++c) to[c] -= values[p] * from[c];
+        }
+    }
+    for (int64_t k = n - 1; k >= 0; --k) {
+        double* to = x.data() + k * columns;
+        for (int64_t c = 0; c < columns; ++c) to[c] /= pivots[k];
+        for (int32_t p = starts[k]; p < starts[k + 1]; ++p) {
+            const double* from = x.data() + rows[p] * columns;
+            for (int64_t c = 0; c < columns; ++c) to[c] -= values[p] * from[c];
+        }
+        std::copy_n(to, columns, out + order[k] * columns);
+    }
+}
+
+bool factor_normal(mr_laplacian& system) {
+    if (system.normal) return true;
+    const Sparse t = transposed_system(system);
+    const Sparse gram = (t * Sparse(t.transpose())).triangularView<Eigen::Lower>();
+    auto factor = std::make_unique<Factor>();
+    if (!factor->compute(gram)) return false;
+    system.normal = std::move(factor);
+    return true;
+}
+
+// The error that symbols' rounding e leaves in the weights is the least g with L* g = e, of squared length
+// e^T (L* L*^T)^-1 e. A small multiple of the identity stands for the few directions that the least squares ignore.
+bool factor_shaping(mr_laplacian& system) {
+    if (system.shaping) return true;
+    const Sparse t = transposed_system(system);
+    Sparse gram = (Sparse(t.transpose()) * t).triangularView<Eigen::Lower>();
+    for (Eigen::Index k = 0; k < gram.cols(); ++k) gram.coeffRef(k, k) += system.loading;
+    auto factor = std::make_unique<Factor>();
+    if (!factor->compute(gram)) return false;
+    system.shaping = std::move(factor);
+    return true;
+}
+
+// With P L* L*^T P^T = L D L^T and e = L u the squared error is sum u_k^2 / D_k: it splits into one term a symbol, in
+// elimination order, and u_k = e_k - sum_{j<k} L_kj u_j is what rounding k has to make small.
+void shape(const Factor& factor, const double* deltas, int64_t columns, const double* steps, const double* slopes,
+           double lambda, int32_t* symbols) {
+    const int64_t n = static_cast<int64_t>(factor.order.size());
+    std::vector<double> debt(static_cast<size_t>(n * columns), 0.0);  // sum_{j<k} L_kj u_j, in steps
+    std::vector<double> u(static_cast<size_t>(columns));
+    for (int64_t k = 0; k < n; ++k) {
+        const int64_t i = factor.order[k];
+        const double price = lambda * factor.pivots[k];
+        for (int64_t c = 0; c < columns; ++c) {
+            const double wanted = deltas[i * columns + c] / steps[c] + debt[k * columns + c];
+            double q = std::floor(wanted + 0.5);
+            double best = (q - wanted) * (q - wanted) + price * slopes[i * columns + c] * std::fabs(q);
+            const double toward = q > 0.0 ? q - 1.0 : q + 1.0;
+            if (q != 0.0) {
+                const double cost = (toward - wanted) * (toward - wanted) + price * slopes[i * columns + c] * std::fabs(toward);
+                if (cost < best) q = toward;
+            }
+            q = std::min(std::max(q, -1.0e9), 1.0e9);
+            symbols[i * columns + c] = static_cast<int32_t>(q);
+            u[c] = q - wanted;
+        }
+        for (int32_t p = factor.starts[k]; p < factor.starts[k + 1]; ++p) {
+            double* to = debt.data() + static_cast<int64_t>(factor.rows[p]) * columns;
+            for (int64_t c = 0; c < columns; ++c) to[c] += factor.values[p] * u[c];
+        }
+    }
+}

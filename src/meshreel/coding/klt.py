@@ -1,0 +1,93 @@
+"""Karhunen-Loeve transform of displacement trajectories (paper, section 3.3.3, eqs. 8-10).
+
+In: a field of V trajectories of T displacements. Out: V x M weights in a basis whose numbers are integers over a power
+of two, so that the stream holds exactly the basis that both sides use.
+
+Differs from the paper: `forward` is the least-squares projection on the basis as transmitted, which is orthonormal only
+up to its rounding; for an orthonormal basis both are eq. 8.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from .. import _core
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """Mean and directions of a group's trajectories, strongest first."""
+
+    mean: Float64[np.ndarray, " C"]  # C = 3 T numbers, frame by frame; units of the field
+    vectors: Float64[np.ndarray, "C M"]  # columns of unit length
+    energies: Float64[np.ndarray, " M"]  # mean square of each weight, units of the field squared
+
+
+def fit(field: Float64[np.ndarray, "V T 3"]) -> Basis:
+    """The full basis of a field, M = 3 T, by decreasing energy; each vector's largest entry is positive."""
+    vertices, frames, _ = field.shape
+    trajectories = field.reshape(vertices, 3 * frames)
+    mean = trajectories.mean(axis=0) if vertices else np.zeros(3 * frames)
+    centered = trajectories - mean
+    energies, vectors = np.linalg.eigh(centered.T @ centered / max(vertices, 1))
+    energies, vectors = np.maximum(energies[::-1], 0.0), vectors[:, ::-1]
+    largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(3 * frames)] if frames else np.zeros(0)
+    return Basis(mean, np.ascontiguousarray(vectors * np.where(largest < 0, -1.0, 1.0)), energies.copy())
+
+
+def forward(field: Float64[np.ndarray, "V T 3"], basis: Basis) -> Float64[np.ndarray, "V M"]:
+    """Weights of each vertex's trajectory in the basis, by least squares (eqs. 8 and 10)."""
+    centered = field.reshape(len(field), len(basis.mean)) - basis.mean
+    gram = basis.vectors.T @ basis.vectors
+    return np.ascontiguousarray(np.linalg.solve(gram, basis.vectors.T @ centered.T).T)
+
+
+def inverse(weights: Float64[np.ndarray, "V M"], basis: Basis) -> Float64[np.ndarray, "V T 3"]:
+    """The field that the weights stand for (eq. 9), summed in the order of the components."""
+    vectors = np.ascontiguousarray(basis.vectors.T)
+    field = _core.klt_inverse(np.ascontiguousarray(weights), vectors, np.ascontiguousarray(basis.mean))
+    return field.reshape(len(weights), len(basis.mean) // 3, 3)
+
+
+@dataclass(frozen=True, slots=True)
+class BasisSymbols:
+    """A basis in integers: `value = symbol * 2^-bits`, with its own bits for the mean and for each vector."""
+
+    mean: Int64[np.ndarray, " C"]
+    vectors: Int64[np.ndarray, "M C"]
+    bits: Int64[np.ndarray, " M+1"]  # of the mean, then of each vector; 0 to 30
+
+
+def quantize(basis: Basis, count: int, step: float) -> BasisSymbols:
+    """The first `count` vectors and the mean, each as fine as a weight's quantiser `step` (field's units) can show.
+
+    A vector's rounding is made good by those after it: each is made orthogonal to the rounded ones before.
+    """
+    width = len(basis.mean)
+    bits, rows = [_bits_for(1.0, step)], np.zeros((count, width), dtype=np.int64)
+    rounded = np.zeros((width, 0))
+    for k in range(count):
+        bits.append(_bits_for(float(np.sqrt(basis.energies[k])), step))
+        direction = basis.vectors[:, k]
+        if k:
+            direction = direction - rounded @ np.linalg.lstsq(rounded, direction, rcond=None)[0]
+        length = float(np.linalg.norm(direction))
+        rows[k] = np.rint(direction / (length if length > 0.5 else 1.0) * 2.0 ** bits[-1]).astype(np.int64)
+        rounded = np.concatenate([rounded, np.ldexp(rows[k].astype(np.float64), -bits[-1])[:, None]], axis=1)
+    mean = np.rint(basis.mean * 2.0 ** bits[0]).astype(np.int64)
+    return BasisSymbols(mean, rows, np.array(bits, dtype=np.int64))
+
+
+def dequantize(symbols: BasisSymbols) -> Basis:
+    """The basis that the symbols stand for, exactly; energies do not travel and are zero."""
+    mean = np.ldexp(symbols.mean.astype(np.float64), -int(symbols.bits[0]))
+    vectors = np.ldexp(symbols.vectors.astype(np.float64), -symbols.bits[1:].astype(np.int32)[:, None])
+    return Basis(mean, np.ascontiguousarray(vectors.T), np.zeros(len(vectors)))
+
+
+def _bits_for(amplitude: float, step: float) -> int:
+    """Fraction bits at which rounding moves `amplitude` by a thirty-second of a step at most; at least 5, at most 24."""
+    return int(np.clip(np.ceil(np.log2(max(16.0 * amplitude / step, 1.0))), 5, 24))

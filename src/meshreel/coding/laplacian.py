@@ -1,0 +1,90 @@
+"""Laplacian coordinates on the decoded base mesh (paper, section 3.3.3, eqs. 11-13).
+
+In: V x M weights. Out: (V + l) x M deltas, the mean-value Laplacian of the weights and below it the weights of l anchor
+vertices; back by least squares with a sparse Cholesky factorisation that all columns share.
+
+Differs from the paper: mean-value weights are bounded so that degenerate faces cannot spoil a row; a vertex without
+faces has the identity for its row; the anchors' rows may weigh more than 1, which buys them a finer step.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from .. import _core
+from ..geometry.topology import components
+from ..types import Mesh
+
+
+class AnchorRule(IntEnum):
+    """How the anchors are found from the connectivity; the value travels in the stream."""
+
+    SPREAD = 0  # every k-th vertex, and the first of each component that would have none
+    FARTHEST = 1  # farthest points by edge hops, starting from the first vertex of each component
+
+
+def anchors(rule: AnchorRule, count: int, faces: Int32[np.ndarray, "F 3"], vertices: int) -> Int32[np.ndarray, " l"]:
+    """Ascending anchor vertices: `count`, or more where the mesh has more connected components of faces.
+
+    Vertices that no face uses need no anchor: their own row of the Laplacian determines them.
+    """
+    if rule is AnchorRule.FARTHEST:
+        return _core.farthest_anchors(np.ascontiguousarray(faces), vertices, count)
+    chosen = np.zeros(vertices, dtype=bool)
+    if vertices:
+        chosen[np.arange(count, dtype=np.int64) * vertices // max(count, 1)] = True
+    used = np.zeros(vertices, dtype=bool)
+    used[faces.reshape(-1)] = True
+    labels = components(faces, vertices)
+    served = np.zeros(vertices, dtype=bool)
+    served[labels[chosen]] = True
+    firsts = np.unique(labels, return_index=True)[1]
+    chosen[firsts[~served[labels[firsts]]]] = True
+    return np.flatnonzero(chosen & used).astype(np.int32)
+
+
+class System:
+    """The extended Laplacian of one base mesh, factorised once and used for any number of columns."""
+
+    def __init__(self, base: Mesh, anchors: Int32[np.ndarray, " l"], weight: float = 1.0) -> None:
+        self._core = _core.Laplacian(base.vertices, base.faces, anchors, weight)
+
+    def forward(self, weights: Float64[np.ndarray, "V M"]) -> Float64[np.ndarray, "R M"]:
+        """Deltas, anchors last (eq. 12)."""
+        return self._core.forward(np.ascontiguousarray(weights))
+
+    def inverse(self, deltas: Float64[np.ndarray, "R M"]) -> Float64[np.ndarray, "V M"]:
+        """The weights that fit the deltas best in the least-squares sense (eq. 13)."""
+        return self._core.inverse(np.ascontiguousarray(deltas))
+
+    def quantize(
+        self,
+        deltas: Float64[np.ndarray, "R M"],
+        steps: Float64[np.ndarray, " M"],
+        slopes: Float64[np.ndarray, "R M"],
+        price: float,
+    ) -> Int32[np.ndarray, "R M"]:
+        """Symbols chosen so that `inverse(symbols * steps)` is near the weights the deltas came from.
+
+        The inverse amplifies smooth errors of the deltas by orders of magnitude; each rounding here takes up what the
+        earlier ones left in the weights, so that the error that remains is white in the weights. `slopes` are the
+        bits that a symbol's magnitude costs a unit, `price` what a bit is worth in squared steps.
+        """
+        return self._core.quantize(deltas, steps, slopes, price)
+
+
+def forward(
+    weights: Float64[np.ndarray, "V M"], base: Mesh, anchors: Int32[np.ndarray, " l"]
+) -> Float64[np.ndarray, "R M"]:
+    """Deltas of the weights: Laplacian rows, then the anchors' own weights (eq. 12)."""
+    return System(base, anchors).forward(weights)
+
+
+def inverse(
+    deltas: Float64[np.ndarray, "R M"], base: Mesh, anchors: Int32[np.ndarray, " l"]
+) -> Float64[np.ndarray, "V M"]:
+    """The weights that fit the deltas best (eq. 13)."""
+    return System(base, anchors).inverse(deltas)
