@@ -1,0 +1,240 @@
+"""The fixed views that renders and SSIM use, and their file (Open3D's pinhole camera JSON).
+
+Cameras look along +z of their own frame, x right and y down, as Open3D's and OpenCV's do. Pixel (column i, row j)
+covers [i, i + 1) x [j, j + 1); its ray goes through the middle.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import InputError
+from ..types import Mesh
+
+VIEW_NAMES = ("front", "right", "back", "left")
+_MARGIN = 1.05  # of the box, so that nothing touches the border
+
+
+@runtime_checkable
+class Camera(Protocol):
+    """What a renderer needs to know of a camera."""
+
+    @property
+    def width(self) -> int:
+        """Of the picture, pixels."""
+        ...
+
+    @property
+    def height(self) -> int:
+        """Of the picture, pixels."""
+        ...
+
+    @property
+    def extrinsic(self) -> Float64[np.ndarray, "4 4"]:
+        """World to camera."""
+        ...
+
+    def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
+        """Origins and unit directions (N x 3 each, camera frame) through image positions (column, row)."""
+        ...
+
+    def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
+        """Image positions of points in the camera frame; not finite where a point is not in front of the camera."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PinholeCamera:
+    """A perspective camera."""
+
+    width: int
+    height: int
+    intrinsic: Float64[np.ndarray, "3 3"]  # pixels
+    extrinsic: Float64[np.ndarray, "4 4"]
+
+    def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
+        """Rays from the eye; directions have unit length."""
+        homogeneous = np.column_stack([pixels, np.ones(len(pixels))])
+        directions = homogeneous @ np.linalg.inv(self.intrinsic).T
+        return np.zeros_like(directions), directions / np.linalg.norm(directions, axis=1)[:, None]
+
+    def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
+        """Perspective projection."""
+        depth = np.where(points[:, 2:] > 0, points[:, 2:], np.nan)
+        return (points @ self.intrinsic.T)[:, :2] / depth
+
+
+@dataclass(frozen=True, slots=True)
+class OrthographicCamera:
+    """Parallel rays; what is behind the camera's plane is seen too."""
+
+    width: int
+    height: int
+    pixel: float  # m, side of a pixel
+    extrinsic: Float64[np.ndarray, "4 4"]
+    back: float = 0.0  # m, how far behind the camera's plane rays start
+
+    def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
+        """Parallel rays along +z."""
+        plane = (pixels - np.array([self.width, self.height]) / 2) * self.pixel
+        origins = np.column_stack([plane, np.full(len(pixels), -self.back)])
+        return origins, np.broadcast_to(np.array([0.0, 0.0, 1.0]), origins.shape)
+
+    def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
+        """Parallel projection."""
+        return points[:, :2] / self.pixel + np.array([self.width, self.height]) / 2
+
+
+@dataclass(frozen=True, slots=True)
+class ViewOptions:
+    """How four views stand around a bounding box."""
+
+    width: int = 1920  # pixels
+    height: int = 1080  # pixels
+    fov: float = 60.0  # degrees, vertical
+    up: str = "y"  # the axis that points up: y or z
+
+    def __post_init__(self) -> None:
+        if self.width < 8 or self.height < 8:
+            raise InputError(f"view size {self.width} x {self.height}: give at least 8 x 8 pixels")
+        if not 1 <= self.fov <= 170:
+            raise InputError(f"field of view {self.fov}: give 1 to 170 degrees")
+        if self.up not in ("y", "z"):
+            raise InputError(f"up axis {self.up!r}: give y or z")
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """An axis-aligned bounding box, m."""
+
+    low: Float64[np.ndarray, " 3"]
+    high: Float64[np.ndarray, " 3"]
+
+    @staticmethod
+    def of(sequence: Iterable[Mesh]) -> Box:
+        """The box around all frames, read one at a time; a unit box around 0 where no frame has a vertex."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for mesh in sequence:
+            if len(mesh.vertices):
+                low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
+        if not np.isfinite(low).all():
+            return Box(np.full(3, -0.5), np.full(3, 0.5))
+        return Box(low, high)
+
+    @property
+    def center(self) -> Float64[np.ndarray, " 3"]:
+        """The middle."""
+        return (self.low + self.high) / 2
+
+    @property
+    def size(self) -> Float64[np.ndarray, " 3"]:
+        """Side lengths, m."""
+        return self.high - self.low
+
+
+def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[PinholeCamera]:
+    """Perspective views of the box from its front, right, back and left (of the viewer), all at one distance.
+
+    The front is seen from +z where y is up and from -y where z is up. The distance lets the box fit in every view.
+    """
+    across, height = _extent(box, options.up)
+    tangent = math.tan(math.radians(options.fov) / 2)
+    distance = across / 2 + _MARGIN * max(height, across * options.height / options.width) / 2 / tangent
+    focal = options.height / 2 / tangent
+    intrinsic = np.array([[focal, 0, options.width / 2], [0, focal, options.height / 2], [0, 0, 1]])
+    return [
+        PinholeCamera(options.width, options.height, intrinsic, _looking(box.center, axes, distance))
+        for axes in _axes(options.up)
+    ]
+
+
+def parallel_views_around(box: Box, size: int = 512, up: str = "y") -> list[OrthographicCamera]:
+    """Orthographic views of the box from the same four sides, size x size pixels: small and quick."""
+    ViewOptions(size, size, up=up)
+    across, height = _extent(box, up)
+    pixel = _MARGIN * max(across, height) / size
+    return [
+        OrthographicCamera(size, size, pixel, _looking(box.center, axes, 0.0), back=2 * (across + height))
+        for axes in _axes(up)
+    ]
+
+
+def read_cameras(path: Path) -> list[PinholeCamera]:
+    """The cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory JSON file."""
+    try:
+        record = json.loads(path.read_text())
+        return [_parse(entry) for entry in record.get("parameters", [record])]
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
+    except (KeyError, TypeError, ValueError, AttributeError, np.linalg.LinAlgError) as error:
+        raise InputError(f"{path}: not Open3D pinhole camera JSON ({error!r})") from error
+
+
+def write_cameras(path: Path, cameras: list[PinholeCamera]) -> None:
+    """The cameras as an Open3D PinholeCameraTrajectory JSON file."""
+    record = {
+        "class_name": "PinholeCameraTrajectory",
+        "parameters": [camera_record(camera) for camera in cameras],
+        "version_major": 1,
+        "version_minor": 0,
+    }
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(json.dumps(record, indent=1) + "\n")
+    temporary.replace(path)
+
+
+def camera_record(camera: PinholeCamera) -> dict[str, Any]:
+    """The camera as Open3D's JSON has it: matrices column by column."""
+    return {
+        "class_name": "PinholeCameraParameters",
+        "extrinsic": camera.extrinsic.T.reshape(-1).tolist(),
+        "intrinsic": {
+            "height": camera.height,
+            "intrinsic_matrix": camera.intrinsic.T.reshape(-1).tolist(),
+            "width": camera.width,
+        },
+        "version_major": 1,
+        "version_minor": 0,
+    }
+
+
+def _parse(entry: dict[str, Any]) -> PinholeCamera:
+    intrinsic = np.array(entry["intrinsic"]["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T
+    extrinsic = np.array(entry["extrinsic"], dtype=np.float64).reshape(4, 4).T
+    width, height = int(entry["intrinsic"]["width"]), int(entry["intrinsic"]["height"])
+    if not (np.isfinite(intrinsic).all() and np.isfinite(extrinsic).all()):
+        raise ValueError("a matrix is not finite")
+    if not (8 <= width <= 16384 and 8 <= height <= 16384):
+        raise ValueError(f"image size {width} x {height}")
+    np.linalg.inv(intrinsic), np.linalg.inv(extrinsic)  # raises where singular
+    return PinholeCamera(width, height, intrinsic, extrinsic)
+
+
+def _extent(box: Box, up: str) -> tuple[float, float]:
+    """The larger horizontal side and the height; never 0."""
+    vertical = "xyz".index(up)
+    least = float(box.size.max()) * 1e-3 or 1.0
+    return max(float(np.delete(box.size, vertical).max()), least), max(float(box.size[vertical]), least)
+
+
+def _axes(up: str) -> list[np.ndarray]:
+    """Per view the rows right, down, forward."""
+    above = np.array([0.0, 1, 0]) if up == "y" else np.array([0.0, 0, 1])
+    front = np.array([0.0, 0, 1]) if up == "y" else np.array([0.0, -1, 0])
+    side = np.cross(above, front)
+    return [np.stack([np.cross(-to, above), -above, -to]) for to in (front, side, -front, -side)]
+
+
+def _looking(target: np.ndarray, axes: np.ndarray, distance: float) -> Float64[np.ndarray, "4 4"]:
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3] = axes
+    extrinsic[:3, 3] = -axes @ (target - distance * axes[2])
+    return extrinsic

@@ -1,0 +1,118 @@
+"""Pictures of surface normals by ray casting: no GL, no window, no lighting.
+
+A pixel that a mesh covers has the color (n + 1) / 2 of the interpolated vertex normal n in world axes, the same
+coloring as in the paper (section 4.1); all others are white, the default
+background of Open3D's viewer. Faces are seen from both sides, each with the mesh's own normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float32, Float64, Int32
+
+from ..types import Mesh
+from .cameras import Camera
+from .normals import interpolate, welded_normals
+from .samples import used_surface
+
+BACKGROUND = 1.0  # white
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """A rectangle of pixels: rows top to bottom, columns left to right, ends excluded."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width."""
+        return self.bottom - self.top, self.right - self.left
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What one camera sees in one window."""
+
+    window: Window
+    covered: Bool[np.ndarray, "H W"]
+    points: Float64[np.ndarray, "N 3"]  # m, world: where the rays of the covered pixels end, row by row
+    normals: Float64[np.ndarray, "N 3"]
+
+    @property
+    def colors(self) -> Float32[np.ndarray, "H W 3"]:
+        """The normal-colored picture of the window, 0 to 1."""
+        image = np.full((*self.covered.shape, 3), BACKGROUND, dtype=np.float32)
+        image[self.covered] = (self.normals + 1) / 2
+        return image
+
+
+def render_normals(mesh: Mesh, camera: Camera) -> Float32[np.ndarray, "H W 3"]:
+    """The whole normal-colored picture, RGB 0 to 1."""
+    image = np.full((camera.height, camera.width, 3), BACKGROUND, dtype=np.float32)
+    view = look(mesh, camera, window_of([mesh], camera))
+    w = view.window
+    image[w.top : w.bottom, w.left : w.right] = view.colors
+    return image
+
+
+def window_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Window:
+    """The pixels that can see any of the meshes, `border` pixels more on each side, inside the image."""
+    full = Window(0, camera.height, 0, camera.width)
+    vertices = np.concatenate([m.vertices for m in meshes])
+    if len(vertices) == 0:
+        return Window(0, 0, 0, 0)
+    pixels = camera.project(_to_camera(vertices, camera))
+    if not np.isfinite(pixels).all():  # something reaches behind the eye: no rectangle bounds it
+        return full
+    limits = np.array([camera.width, camera.height])
+    low = np.clip(np.floor(pixels.min(axis=0)) - border, 0, limits).astype(int)
+    high = np.clip(np.ceil(pixels.max(axis=0)) + border, 0, limits).astype(int)
+    return Window(int(low[1]), int(high[1]), int(low[0]), int(high[0]))
+
+
+def look(mesh: Mesh, camera: Camera, window: Window) -> View:
+    """What the camera sees of the mesh in the window."""
+    mesh = used_surface(mesh)
+    height, width = window.shape
+    nothing = np.zeros((0, 3))
+    if mesh.is_empty or height == 0 or width == 0:
+        return View(window, np.zeros((height, width), dtype=bool), nothing, nothing)
+    rows, columns = np.mgrid[window.top : window.bottom, window.left : window.right]
+    origins, directions = camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
+    hit, faces, weights = _cast(_to_camera(mesh.vertices, camera), mesh.faces, origins, directions)
+    corners = mesh.faces[faces]
+    points = np.einsum("nk,nkd->nd", weights, mesh.vertices[corners])
+    return View(window, hit.reshape(height, width), points, interpolate(welded_normals(mesh), corners, weights))
+
+
+def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: Camera) -> Float64[np.ndarray, "V 3"]:
+    """Camera coordinates; float64 here, so that far-away worlds are near the origin before they are float32."""
+    rotation = camera.extrinsic[:3, :3]
+    eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])
+    return (vertices - eye) @ rotation.T
+
+
+def _cast(
+    vertices: Float64[np.ndarray, "V 3"],
+    faces: Int32[np.ndarray, "F 3"],
+    origins: Float64[np.ndarray, "N 3"],
+    directions: Float64[np.ndarray, "N 3"],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which rays hit, and for those the face and the barycentric weights."""
+    import open3d as o3d
+
+    tensor = o3d.core.Tensor.from_numpy
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(tensor(vertices.astype(np.float32)), tensor(faces.astype(np.uint32)))
+    rays = np.concatenate([origins, directions], axis=1).astype(np.float32)
+    answer = scene.cast_rays(tensor(rays))
+    hit = np.isfinite(answer["t_hit"].numpy())
+    uv = answer["primitive_uvs"].numpy()[hit].astype(np.float64)
+    found = answer["primitive_ids"].numpy()[hit].astype(np.int64)
+    return hit, found, np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)

@@ -1,0 +1,68 @@
+"""SSIM of normal-colored renders, over the whole picture (the paper's form) and over covered pixels only.
+
+scikit-image's structural similarity: 7 x 7 uniform windows, three channels, data range 1, its 3-pixel border left out.
+The white background scores 1 and inflates the whole-picture form; the masked form is the mean over pixels that either
+mesh covers. Only the window around the meshes is rendered and filtered: outside, SSIM is 1 by definition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..types import Mesh
+from .cameras import Box, Camera, parallel_views_around
+from .render import look, window_of
+
+_SIDE = 7  # pixels, side of the SSIM window
+_BORDER = _SIDE // 2
+
+
+@dataclass(frozen=True, slots=True)
+class NormalSsim:
+    """SSIM of one frame, averaged over the views; 1 is identical."""
+
+    whole: float  # over the whole picture
+    masked: float  # over pixels that either mesh covers, views that see neither left out
+    whole_by_view: tuple[float, ...]
+    masked_by_view: tuple[float | None, ...]  # None where a view sees neither mesh
+
+
+def ssim_normals(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> NormalSsim:
+    """SSIM between the normal-colored renders of two meshes from every camera (paper, section 4: four views)."""
+    scores = [_ssim_view(original, decoded, camera) for camera in cameras]
+    whole = tuple(score[0] for score in scores)
+    masked = tuple(score[1] for score in scores)
+    seen = [value for value in masked if value is not None]
+    return NormalSsim(float(np.mean(whole)), float(np.mean(seen)) if seen else 1.0, whole, masked)
+
+
+def quick_ssim(original: Mesh, decoded: Mesh, size: int = 512) -> float:
+    """Masked SSIM in four orthographic views of size x size pixels around the original: for quick decisions."""
+    return ssim_normals(original, decoded, parallel_views_around(Box.of([original]), size)).masked
+
+
+def _ssim_view(original: Mesh, decoded: Mesh, camera: Camera) -> tuple[float, float | None]:
+    window = window_of([original, decoded], camera, border=2 * _SIDE)
+    a, b = look(original, camera, window), look(decoded, camera, window)
+    interior = np.zeros((camera.height, camera.width), dtype=bool)
+    interior[_BORDER:-_BORDER, _BORDER:-_BORDER] = True
+    inside = interior[window.top : window.bottom, window.left : window.right]
+    if min(window.shape) < _SIDE:  # the meshes are out of this picture or at its very edge
+        return 1.0, None
+    scores = ssim_map(a.colors.astype(np.float64), b.colors.astype(np.float64))
+    outside = int(interior.sum()) - int(inside.sum())
+    whole = (float(scores[inside].sum()) + outside) / int(interior.sum())
+    covered = (a.covered | b.covered) & inside
+    return whole, float(scores[covered].mean()) if covered.any() else None
+
+
+def ssim_map(a: Float64[np.ndarray, "H W 3"], b: Float64[np.ndarray, "H W 3"]) -> Float64[np.ndarray, "H W"]:
+    """SSIM of every pixel, the mean of the three channels."""
+    from skimage.metrics import structural_similarity
+
+    _, full = structural_similarity(a, b, win_size=_SIDE, channel_axis=-1, data_range=1.0, full=True)
+    return np.asarray(full, dtype=np.float64).mean(axis=-1)

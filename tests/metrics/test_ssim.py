@@ -1,0 +1,88 @@
+import numpy as np
+import pytest
+
+from meshreel.metrics.cameras import Box, ViewOptions, parallel_views_around, views_around
+from meshreel.metrics.render import Window, look, render_normals
+from meshreel.metrics.ssim import quick_ssim, ssim_map, ssim_normals
+from meshreel.types import Mesh
+
+from .shapes import moved, noisy, sphere
+
+SMALL = ViewOptions(160, 120)
+
+
+def _views(mesh: Mesh) -> list:
+    return views_around(Box.of([mesh]), SMALL)
+
+
+def test_the_whole_form_is_scikit_image_on_the_whole_picture():
+    skimage = pytest.importorskip("skimage.metrics")
+    a, b = moved(sphere(levels=3), (0.3, 0, 0)), noisy(sphere(levels=3), 0.02)
+    cameras = views_around(Box(np.full(3, -2.0), np.full(3, 2.0)), SMALL)
+    expected = [
+        skimage.structural_similarity(
+            *(render_normals(m, camera).astype(float) for m in (a, b)), win_size=7, channel_axis=-1, data_range=1.0
+        )
+        for camera in cameras
+    ]
+    result = ssim_normals(a, b, cameras)
+    assert result.whole_by_view == pytest.approx(expected, abs=1e-9)
+    assert result.whole == pytest.approx(np.mean(expected), abs=1e-9)
+
+
+def test_the_masked_form_is_the_mean_over_pixels_that_either_mesh_covers():
+    a, b = moved(sphere(levels=3), (0.1, 0, 0)), noisy(sphere(levels=3), 0.02)
+    cameras = _views(a)
+    expected = []
+    for camera in cameras:
+        views = [look(m, camera, Window(0, 120, 0, 160)) for m in (a, b)]
+        covered = np.pad((views[0].covered | views[1].covered)[3:-3, 3:-3], 3)
+        scores = ssim_map(*(v.colors.astype(float) for v in views))
+        expected.append(scores[covered].mean())
+    result = ssim_normals(a, b, cameras)
+    assert result.masked_by_view == pytest.approx(expected, abs=1e-9)
+    assert result.masked == pytest.approx(np.mean(expected), abs=1e-9)
+    assert result.masked < result.whole  # the background flatters
+
+
+def test_one_window_agrees_with_the_formula():
+    rng = np.random.default_rng(0)
+    a, b = rng.random((2, 7, 7, 3))
+    scores = []
+    for channel in range(3):
+        x, y = a[..., channel].ravel(), b[..., channel].ravel()
+        covariance = np.cov(x, y)  # the unbiased form
+        top = (2 * x.mean() * y.mean() + 1e-4) * (2 * covariance[0, 1] + 9e-4)
+        scores.append(top / ((x.mean() ** 2 + y.mean() ** 2 + 1e-4) * (covariance[0, 0] + covariance[1, 1] + 9e-4)))
+    assert ssim_map(a, b)[3, 3] == pytest.approx(np.mean(scores))
+
+
+def test_identical_meshes_score_one_and_more_noise_scores_less():
+    body = sphere(levels=4)
+    assert ssim_normals(body, body, _views(body)).masked == pytest.approx(1)
+    scores = [quick_ssim(body, noisy(body, sigma), 128) for sigma in (0.0, 0.005, 0.02, 0.05)]
+    assert scores[0] == pytest.approx(1) and scores == sorted(scores, reverse=True)
+
+
+def test_a_larger_background_flatters_the_whole_form_and_not_the_masked_one():
+    a, b = sphere(levels=4), noisy(sphere(levels=4), 0.01)
+    tight = ssim_normals(a, b, parallel_views_around(Box.of([a]), 200))
+    wide = ssim_normals(a, b, parallel_views_around(Box(np.full(3, -2.0), np.full(3, 2.0)), 400))
+    assert wide.whole > tight.whole + 0.03
+    assert wide.masked == pytest.approx(tight.masked, abs=0.02)
+
+
+def test_empty_frames():
+    body, nothing = sphere(), Mesh.empty()
+    cameras = _views(body)
+    assert ssim_normals(nothing, nothing, cameras).masked == ssim_normals(nothing, nothing, cameras).whole == 1
+    assert ssim_normals(body, nothing, cameras).masked < 0.5
+    assert quick_ssim(nothing, nothing, 64) == 1
+
+
+def test_views_that_see_neither_mesh_are_left_out_of_the_masked_mean():
+    body = sphere()
+    away = views_around(Box(np.full(3, 100.0), np.full(3, 101.0)), SMALL)
+    result = ssim_normals(body, noisy(body, 0.05), [*_views(body)[:1], away[0]])
+    assert result.masked_by_view[1] is None and result.whole_by_view[1] == 1
+    assert result.masked == result.masked_by_view[0]
