@@ -46,15 +46,25 @@ def run_point(name: str, sequence: MeshSequence, codec: Codec, options: Comparis
 
 
 def run_points(
-    name: str, sequence: MeshSequence, codecs: Sequence[Codec], options: ComparisonOptions, rows: Path
-) -> list[dict[str, Any]]:
-    """Rows of several operating points, each appended to the file `rows` (JSON lines) as soon as it is there."""
-    done = []
-    for codec in codecs:
-        done.append(run_point(name, sequence, codec, options))
-        with rows.open("a") as file:
-            file.write(json.dumps(done[-1]) + "\n")
-    return done
+    points: Iterable[Point], data: Path, rows: Path, options: ComparisonOptions, tell: Callable[[Row], None]
+) -> list[Row]:
+    """Rows of all points, each appended to the file `rows` (JSON lines) as soon as it is there.
+
+    Points that have a row already are not run again, so an interrupted sweep goes on where it was.
+    """
+    done = read_rows(rows) if rows.exists() else []
+    wanted = []
+    for point in points:
+        row = next((r for r in done if point_of(r) == point_key(point)), None)
+        if row is None:
+            sequence = open_dataset(point.sequence, data, point.frames)
+            row = run_point(point.sequence, sequence, make_codec(point.codec, point.options), options)
+            row |= {"point": point_key(point)}
+            with rows.open("a") as file:
+                file.write(json.dumps(row) + "\n")
+        tell(row)
+        wanted.append(row)
+    return wanted
 
 
 def decode_in_fresh_process(data: bytes) -> dict[str, Any]:
