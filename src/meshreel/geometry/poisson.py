@@ -1,0 +1,84 @@
+"""A surface through oriented points: screened Poisson reconstruction, trimmed (the extra `encode`; section 3.3.2).
+
+Poisson closes whatever is open; what it invents far from the points is cut away by density and by distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import InputError
+from ..types import Mesh
+from .topology import clean, components
+
+
+@dataclass(frozen=True, slots=True)
+class PoissonOptions:
+    """How finely to reconstruct and how much of the result to believe."""
+
+    depth: int = 9  # of the octree
+    trim: float = 2.0  # octree levels below the median density at which surface is cut away
+    reach: float = 0.01  # surface farther than this from all points is cut away, in units of the points
+    smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
+
+    def __post_init__(self) -> None:
+        if not 3 <= self.depth <= 12:
+            raise InputError(f"depth is {self.depth}: give 3 to 12 octree levels (the paper has 9)")
+        if self.trim < 0 or not self.reach > 0 or not 0 <= self.smallest < 1:
+            raise InputError(
+                f"trim {self.trim}, reach {self.reach}, smallest {self.smallest}: give >= 0, > 0 and 0 to below 1"
+            )
+
+
+def reconstruct(
+    points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], options: PoissonOptions
+) -> Mesh:
+    """The surface through points with outward normals, where there are points; the empty mesh for too few.
+
+    One thread, so that the same points give the same bits.
+    """
+    import open3d as o3d
+
+    if len(points) < 10:
+        return Mesh.empty()
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    cloud.normals = o3d.utility.Vector3dVector(normals)
+    solid, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=options.depth, n_threads=1)
+    mesh = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
+    levels = np.asarray(density)
+    trusted = (levels >= np.median(levels) - options.trim) & _near(mesh.vertices, points, options.reach)
+    return drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[trusted[mesh.faces].all(axis=1)])), options.smallest)
+
+
+def drop_small(mesh: Mesh, share: float) -> Mesh:
+    """The mesh without connected bits that have less than this share of the largest one's faces."""
+    if mesh.is_empty:
+        return mesh
+    label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
+    size = np.bincount(label)
+    return clean(Mesh.of(mesh.vertices, mesh.faces[size[label] >= share * size.max()]))
+
+
+def thin_out(
+    points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], cell: float
+) -> tuple[Float64[np.ndarray, "M 3"], Float64[np.ndarray, "M 3"]]:
+    """One mean point and unit mean normal for each cell of this size and each side of a thin sheet in it."""
+    grid = np.floor((points - points.min(axis=0)) / cell).astype(np.int64)
+    side = np.argmax(np.abs(normals), axis=1)
+    side = 2 * side + (normals[np.arange(len(normals)), side] < 0)  # opposite sides of a finger do not average out
+    size = grid.max(axis=0) + 1
+    key = ((grid[:, 0] * size[1] + grid[:, 1]) * size[2] + grid[:, 2]) * 6 + side
+    _, group, count = np.unique(key, return_inverse=True, return_counts=True)
+    group = group.reshape(-1)
+    mean = [np.stack([np.bincount(group, a[:, d], len(count)) for d in range(3)], axis=1) for a in (points, normals)]
+    length = np.linalg.norm(mean[1], axis=1, keepdims=True)
+    return mean[0] / count[:, None], mean[1] / np.where(length > 0, length, 1.0)
+
+
+def _near(queries: Float64[np.ndarray, "V 3"], points: Float64[np.ndarray, "N 3"], reach: float) -> np.ndarray:
+    from scipy.spatial import cKDTree
+
+    return np.isfinite(cKDTree(points).query(queries, distance_upper_bound=reach)[0])

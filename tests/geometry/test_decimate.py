@@ -1,0 +1,67 @@
+"""Quadric decimation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from meshreel.errors import InputError
+from meshreel.geometry.decimate import decimate, has_boundary
+from meshreel.geometry.nearest import Surface
+from meshreel.geometry.topology import clean, subdivide_midpoint
+from meshreel.types import Mesh
+
+
+def ball(levels: int = 5) -> Mesh:
+    octahedron = Mesh.of(
+        np.concatenate([np.eye(3), -np.eye(3)]),
+        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
+    )
+    mesh = subdivide_midpoint(octahedron, levels)
+    return Mesh(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces)
+
+
+def sheet(n: int = 40) -> Mesh:
+    x, y = np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij")
+    i = np.arange(n * n).reshape(n, n)
+    a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel(), i[:-1, 1:].ravel()
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return Mesh.of(np.stack([x.ravel(), y.ravel(), 0.05 * np.sin(6 * x.ravel())], axis=1), faces)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("target", [200, 1000])
+def test_a_closed_mesh_reaches_its_count_and_keeps_its_shape_at_any_scale(scale: float, target: int) -> None:
+    whole = ball()
+    small = decimate(Mesh(whole.vertices * scale + 5 * scale, whole.faces), target)
+    assert len(small.vertices) == pytest.approx(target, rel=0.02)
+    assert not has_boundary(small)
+    radius = np.linalg.norm(small.vertices / scale - 5, axis=1)
+    np.testing.assert_allclose(radius, 1, atol=3.0 / target)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_an_open_mesh_keeps_its_border(scale: float) -> None:
+    whole = sheet()
+    small = decimate(Mesh(whole.vertices * scale, whole.faces), 200)
+    assert len(small.vertices) == pytest.approx(200, rel=0.05)
+    border = whole.vertices[np.isin(whole.vertices[:, 1], (0, 1))]
+    gap = Surface(Mesh(small.vertices / scale, small.faces)).closest(border).points - border
+    assert np.linalg.norm(gap, axis=1).max() < 0.005
+
+
+def test_what_is_left_is_clean_and_the_same_each_time() -> None:
+    a, b = decimate(ball(), 300), decimate(ball(), 300)
+    assert np.array_equal(a.vertices, b.vertices)
+    assert np.array_equal(a.faces, b.faces)
+    assert len(clean(a).faces) == len(a.faces)
+
+
+def test_a_mesh_that_is_small_enough_stays_and_an_empty_one_stays_empty() -> None:
+    assert np.array_equal(decimate(ball(2), 1000).vertices, ball(2).vertices)
+    assert decimate(Mesh.empty(), 10).is_empty
+
+
+def test_an_impossible_count_is_refused() -> None:
+    with pytest.raises(InputError, match="at least 4"):
+        decimate(ball(1), 3)
