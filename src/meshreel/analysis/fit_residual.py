@@ -1,0 +1,62 @@
+"""How well a fitted template lies on a frame: symmetric distance, its 95 % quantile, normal error (docs: metrics).
+
+The encoder's own measure (it decides keys and cuts); both directions, since one way does not see left-over surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..geometry.nearest import Hits, Surface
+from ..geometry.topology import vertex_normals
+from ..types import Mesh
+from .fit_match import Target
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """Distances in units of the sequence's diagonal; infinite where there is nothing to compare."""
+
+    to_fit: float  # RMS over the frame's vertices to the fitted surface
+    to_frame: float  # RMS over the template's vertices to the frame's surface
+    quantile: float  # 95 % of all these distances are less; the worse direction
+    normals: float  # degrees, mean angle to the normal at the closest point; mean of both directions
+
+    @property
+    def rms(self) -> float:
+        """Symmetric RMS distance: the worse of the two directions."""
+        return max(self.to_fit, self.to_frame)
+
+
+NOTHING = Residual(np.inf, np.inf, np.inf, np.inf)
+
+
+def measure(fitted: Mesh, target: Target) -> Residual:
+    """The residual of one fitted frame."""
+    surface, normals = Surface(fitted), vertex_normals(fitted)
+    ahead, back = surface.closest(target.mesh.vertices), target.surface.closest(fitted.vertices)
+    to_fit = np.linalg.norm(ahead.points - target.mesh.vertices, axis=1)
+    to_frame = np.linalg.norm(back.points - fitted.vertices, axis=1)
+    angles = (
+        _mean_angle(target.normals, _normals_at(normals, fitted, ahead))
+        + _mean_angle(normals, _normals_at(target.normals, target.mesh, back))
+    ) / 2
+    quantile = max(float(np.quantile(to_fit, 0.95)), float(np.quantile(to_frame, 0.95)))
+    return Residual(_rms(to_fit), _rms(to_frame), quantile, angles)
+
+
+def _rms(distances: Float64[np.ndarray, " N"]) -> float:
+    return float(np.sqrt(np.mean(distances**2)))
+
+
+def _normals_at(normals: Float64[np.ndarray, "V 3"], mesh: Mesh, hits: Hits) -> Float64[np.ndarray, "N 3"]:
+    n = np.einsum("nk,nkd->nd", hits.barycentric, normals[mesh.faces[hits.faces]])
+    return n / np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
+
+
+def _mean_angle(one: Float64[np.ndarray, "N 3"], other: Float64[np.ndarray, "N 3"]) -> float:
+    cosine = np.clip(np.einsum("nd,nd->n", one, other), -1.0, 1.0)
+    return float(np.degrees(np.mean(np.arccos(cosine))))
