@@ -1,0 +1,182 @@
+"""Moving people from nothing: the demo's data, and small shapes whose motion is known exactly.
+
+In: options. Out: a MeshSequence whose connectivity changes every frame, each made when asked for.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..geometry.topology import subdivide_midpoint
+from ..types import Mesh, MeshList
+from .figure import Pose, figure
+from .implicit import Body, Grid, polygonize
+
+_TOUCH = 0.02  # m, over which two people's surfaces melt where they meet
+_FAR, _NEAR = 1.9, 0.66  # m between the two who meet
+_CYCLE = 0.9  # m walked in a step cycle
+
+
+@dataclass(frozen=True, slots=True)
+class SoftBodiesOptions:
+    """How long, how fine and how many."""
+
+    frames: int = 90
+    frame_rate: float = 30.0  # 1/s
+    spacing: float = 0.022  # m between grid points: 0.022 gives about 10k vertices for two people
+    people: int = 2  # 1 to 3
+    story: float = 3.0  # s to walk up, shake hands, part and wave; then it begins again
+    seed: int = 0  # of the grids
+
+    def __post_init__(self) -> None:
+        """Refuses what cannot be made."""
+        if self.frames < 1:
+            raise InputError(f"frames {self.frames} is below 1; ask for at least one")
+        if not 1 <= self.people <= 3:
+            raise InputError(f"people {self.people} is not 1, 2 or 3; choose one of these")
+        if not 0.008 <= self.spacing <= 0.1:
+            raise InputError(f"spacing {self.spacing} m is outside 0.008 to 0.1; 0.022 suits two people")
+        for name, value in (("frame rate", self.frame_rate), ("story", self.story)):
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"{name} {value} is not a positive number; give one, as 30 or 3")
+
+
+@dataclass(frozen=True, slots=True)
+class SoftBodies:
+    """The frames of `soft_bodies`: a MeshSequence."""
+
+    options: SoftBodiesOptions
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second, 1/s."""
+        return self.options.frame_rate
+
+    def __len__(self) -> int:
+        return self.options.frames
+
+    def __iter__(self) -> Iterator[Mesh]:
+        return (self[index] for index in range(len(self)))
+
+    def __getitem__(self, index: int) -> Mesh:
+        number = range(len(self))[operator.index(index)]
+        moment = number / self.options.frame_rate / self.options.story % 1.0
+        return polygonize(cast(moment, self.options), _TOUCH, _grid(number, self.options))
+
+
+def soft_bodies(options: SoftBodiesOptions | None = None) -> SoftBodies:
+    """People who walk up to each other, shake hands, part and wave; y up, metres, a new grid for each frame.
+
+    About 10k vertices and under 1.5 s a frame at the default spacing; the same options give the same frames.
+    """
+    return SoftBodies(options or SoftBodiesOptions())
+
+
+def deforming_sphere(frames: int, levels: int = 3) -> MeshList:
+    """A unit sphere that stretches along y by 1 + 0.3 sin: 8 x 4^levels faces, fixed connectivity."""
+    ball = _sphere(levels)
+    stretch = 1 + 0.3 * np.sin(2 * np.pi * np.arange(frames) / max(frames, 1))
+    return MeshList(tuple(Mesh.of(ball.vertices * [1.0, s, 1.0], ball.faces) for s in stretch))
+
+
+def sliding_sphere(frames: int, step: float = 0.05, levels: int = 3) -> MeshList:
+    """A unit sphere that moves along x by `step` (m) a frame: the rigid motion with a known answer."""
+    ball = _sphere(levels)
+    return MeshList(tuple(Mesh.of(ball.vertices + [t * step, 0.0, 0.0], ball.faces) for t in range(frames)))
+
+
+def cast(moment: float, options: SoftBodiesOptions) -> tuple[Body, ...]:
+    """The bodies at a moment (0 to 1) of the story."""
+    thinnest = 0.7 * options.spacing
+    poses = (_host(moment), _guest(moment), _child(moment))
+    return tuple(figure(pose, thinnest) for pose in poses[: options.people])
+
+
+def _host(moment: float) -> Pose:
+    """Walks to +x, waves before the meeting, pats the guest's arm during it."""
+    gap, step, stride = _walk(moment)
+    place = np.array([-gap / 2, 0.0, -0.12])
+    shake = _shake(moment)
+    hello = _during(moment, 0.02, 0.10, 0.17, 0.27)
+    wave = place + [0.12, 1.62, 0.42 + 0.10 * np.sin(2 * np.pi * 7 * moment)]
+    right = _mixed((wave, hello), (np.array([-0.10, 1.10 + shake, 0.0]), _meeting(moment)))
+    pat = np.array([_NEAR / 2 - 0.15, 1.34 + 0.02 * np.sin(2 * np.pi * 8 * moment), -0.20])
+    reach = (_during(moment, 0.36, 0.44, 0.56, 0.64), right[1])
+    return Pose(place, np.pi / 2, step, stride, (pat, right[0]), reach, _wobble(step, stride), 1.0, 1.0)
+
+
+def _guest(moment: float) -> Pose:
+    """Walks to -x, waves good-bye."""
+    gap, step, stride = _walk(moment)
+    place = np.array([gap / 2, 0.0, 0.12])
+    bye = _during(moment, 0.72, 0.80, 0.90, 0.98)
+    wave = place + [-0.12, 1.52, -0.42 + 0.10 * np.sin(2 * np.pi * 7 * moment)]
+    right = _mixed((wave, bye), (np.array([0.10, 1.10 + _shake(moment), 0.0]), _meeting(moment)))
+    pose = Pose(place, -np.pi / 2, step + 0.5, stride, (None, right[0]), (0.0, right[1]), _wobble(step, stride))
+    return Pose(pose.place, pose.heading, pose.step, pose.stride, pose.wrists, pose.reach, pose.softness, 0.95, 1.12)
+
+
+def _child(moment: float) -> Pose:
+    """Jumps and waves with both arms behind the two."""
+    jump = 0.16 * max(np.sin(2 * np.pi * 3 * moment), 0.0)
+    place = np.array([0.1, jump, -0.95])
+    sway = 0.08 * np.sin(2 * np.pi * 6 * moment)
+    wrists = (place + [0.26 + sway, 1.12, 0.06], place + [-0.26 + sway, 1.12, 0.06])
+    return Pose(place, 0.2, 0.0, 0.0, wrists, (1.0, 1.0), math.sin(6 * math.pi * moment), 0.66, 1.05)
+
+
+def _walk(moment: float) -> tuple[float, float, float]:
+    """Distance of the two, step cycles walked and stride: up to each other, a stay, and backwards apart."""
+    near = _during(moment, 0.0, 0.36, 0.62, 1.0)
+    speed = abs(_during(moment + 0.01, 0.0, 0.36, 0.62, 1.0) - near) / 0.01
+    walked = near * (_FAR - _NEAR) / 2
+    return _FAR - (_FAR - _NEAR) * near, walked / _CYCLE, 0.5 * min(speed / 2.5, 1.0)
+
+
+def _meeting(moment: float) -> float:
+    return _during(moment, 0.26, 0.37, 0.60, 0.70)
+
+
+def _shake(moment: float) -> float:
+    return 0.04 * math.sin(2 * math.pi * 9 * moment) * _during(moment, 0.36, 0.40, 0.54, 0.58)
+
+
+def _wobble(step: float, stride: float) -> float:
+    return math.sin(4 * math.pi * step) * min(stride / 0.3, 1.0)
+
+
+def _during(moment: float, rise: float, full: float, fade: float, end: float) -> float:
+    """0 outside rise to end, 1 from full to fade, smooth between."""
+    up = np.clip((moment - rise) / (full - rise), 0, 1)
+    down = np.clip((end - moment) / (end - fade), 0, 1)
+    return float(up * up * (3 - 2 * up) * down * down * (3 - 2 * down))
+
+
+def _mixed(*targets: tuple[np.ndarray, float]) -> tuple[np.ndarray, float]:
+    """The target that counts most and how much."""
+    return max(targets, key=lambda target: target[1])
+
+
+def _grid(number: int, options: SoftBodiesOptions) -> Grid:
+    """A lattice of its own for each frame, so that no two frames share connectivity."""
+    random = np.random.default_rng((options.seed, number))
+    a, b, c = random.uniform(-0.15, 0.15, 3)
+    skew = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+    turn = np.linalg.solve(np.eye(3) - skew, np.eye(3) + skew)  # Cayley: a rotation of up to 30 degrees
+    return Grid(turn, random.uniform(0, 1, 3), options.spacing)
+
+
+def _sphere(levels: int) -> Mesh:
+    tips = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
+    mesh = Mesh.of(tips, faces)
+    for _ in range(levels):
+        mesh = subdivide_midpoint(mesh)
+        mesh = Mesh.of(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1, keepdims=True), mesh.faces)
+    return mesh

@@ -1,0 +1,116 @@
+"""Meshes to PLY, OBJ and GLB files, whole or not at all.
+
+In: a mesh and a path whose extension picks the format. Out: a file that `open_sequence` reads back.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from ..errors import InputError
+from ..types import Mesh
+
+_TOLERANCE = 1e-6  # of the diagonal: what rounding a coordinate may cost
+
+
+def write_mesh(mesh: Mesh, path: Path) -> None:
+    """Write the mesh to a .ply, .obj or .glb file; the name appears once every byte is on the disk."""
+    pack = _FORMATS.get(path.suffix.lower())
+    if pack is None:
+        raise InputError(f"{path}: {path.suffix or 'no'} extension is not one of {', '.join(_FORMATS)}; choose one")
+    with replacing(path) as file:
+        file.write(pack(mesh))
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file that takes its final name at the end of the block; on any failure nothing is left behind."""
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        with temporary.open("wb") as file:
+            yield file
+        temporary.replace(path)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: cannot be written ({reason}); free space, or choose another folder") from None
+    finally:
+        with suppress(OSError):
+            temporary.unlink()
+
+
+def _pack_ply(mesh: Mesh) -> bytes:
+    kind, dtype = ("float", "<f4") if _fits_float32(mesh) else ("double", "<f8")
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\n"
+        f"property {kind} x\nproperty {kind} y\nproperty {kind} z\n"
+        f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    rows = np.empty(len(mesh.faces), dtype=[("size", "u1"), ("corners", "<i4", (3,))])
+    rows["size"], rows["corners"] = 3, mesh.faces
+    return header.encode() + mesh.vertices.astype(dtype).tobytes() + rows.tobytes()
+
+
+def _pack_obj(mesh: Mesh) -> bytes:
+    vertex = "v %.9g %.9g %.9g\n" if _fits_float32(mesh) else "v %.17g %.17g %.17g\n"
+    vertices = "".join(vertex % tuple(row) for row in mesh.vertices.tolist())
+    faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + 1).tolist())
+    return (vertices + faces).encode()
+
+
+def _pack_glb(mesh: Mesh) -> bytes:
+    """Vertices are float32 about an origin that the node holds in full, so that far coordinates keep their digits."""
+    if mesh.is_empty:
+        return _glb({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{}]}, b"")
+    origin = np.zeros(3) if _fits_float32(mesh) else np.round(mesh.vertices.mean(axis=0))
+    local = (mesh.vertices - origin).astype("<f4")
+    points, corners = local.tobytes(), mesh.faces.astype("<u4").tobytes()
+    low, high = local.min(axis=0).tolist(), local.max(axis=0).tolist()
+    tree = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "translation": origin.tolist()}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": 4}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": len(local), "type": "VEC3", "min": low, "max": high},
+            {"bufferView": 1, "componentType": 5125, "count": mesh.faces.size, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": len(points), "target": 34962},
+            {"buffer": 0, "byteOffset": len(points), "byteLength": len(corners), "target": 34963},
+        ],
+        "buffers": [{"byteLength": len(points) + len(corners)}],
+    }
+    return _glb(tree, points + corners)
+
+
+def _glb(tree: dict[str, object], binary: bytes) -> bytes:
+    """The container: header, JSON chunk, binary chunk; chunks are padded to 4 bytes."""
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    chunks = _chunk(b"JSON", text + b" " * (-len(text) % 4))
+    chunks += _chunk(b"BIN\0", binary) if binary else b""
+    return b"glTF" + _words(2, 12 + len(chunks)) + chunks
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return _words(len(data)) + kind + data
+
+
+def _words(*values: int) -> bytes:
+    return np.array(values, dtype="<u4").tobytes()
+
+
+def _fits_float32(mesh: Mesh) -> bool:
+    if len(mesh.vertices) == 0:
+        return True
+    lost = np.abs(mesh.vertices - mesh.vertices.astype(np.float32))
+    return bool(lost.max() <= _TOLERANCE * mesh.diagonal)
+
+
+_FORMATS: dict[str, Callable[[Mesh], bytes]] = {".ply": _pack_ply, ".obj": _pack_obj, ".glb": _pack_glb}
