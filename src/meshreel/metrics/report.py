@@ -1,0 +1,145 @@
+"""Every metric of a decoded sequence against its originals: a row a frame, aggregates, and the cameras used.
+
+Two iterables of meshes -> Comparison. Frames are read once and one at a time (once more before, for the bounding box,
+where the cameras are not given). Rate and times are not here: only who has the bytes and the clock knows them.
+
+How frames are put together: the mean of the frames' values (PSNR: mean of dB, an infinite one counted as
+`PSNR_CEILING`) and the worst frame. Frames that are empty on both sides say nothing and are left out of means.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..types import Mesh
+from .cameras import Box, PinholeCamera, ViewOptions, camera_record, read_cameras, views_around
+from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
+from .ssim import ssim_normals
+
+Row = dict[str, Any]
+_LARGER_IS_BETTER = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "ssim", "ssim_masked")
+_PSNRS = _LARGER_IS_BETTER[:4]
+
+
+@dataclass(frozen=True, slots=True)
+class ComparisonOptions:
+    """What is measured."""
+
+    cameras: Path | None = None  # Open3D pinhole JSON; None: four views around the originals
+    views: ViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
+    ssim: bool = True  # rendering and SSIM cost some 2 s a frame at 1920 x 1080
+    keys: Sequence[int] = ()  # key frames: aggregates are also given without them
+
+    def __post_init__(self) -> None:
+        if any(key < 0 for key in self.keys):
+            raise InputError(f"key frames {list(self.keys)}: frame numbers start at 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """The metrics of a sequence; values in m, % of the diagonal, dB and degrees, as their names say."""
+
+    frames: tuple[Row, ...]  # metrics of each frame; inf and nan are kept here
+    empty: tuple[bool, ...]  # frames that are empty on both sides
+    cameras: tuple[PinholeCamera, ...]
+    keys: tuple[int, ...]
+
+    def to_row(self) -> Row:
+        """A JSON-ready record: means under the metrics' names, `_worst`, `_without_keys`, and every frame.
+
+        A value that is not finite is None.
+        """
+        used = [i for i, empty in enumerate(self.empty) if not empty]
+        row: Row = aggregate([self.frames[i] for i in used])
+        if self.keys:
+            between = aggregate([self.frames[i] for i in used if i not in self.keys])
+            row |= {f"{name}_without_keys": value for name, value in between.items() if not name.endswith("_worst")}
+        row |= {
+            "frames_compared": len(self.frames),
+            "frames_empty": sum(self.empty),
+            "frames_missing": sum(math.isinf(frame["rms_forward_m"]) for frame in self.frames),
+            "key_frames": list(self.keys),
+            "per_frame": [_finite(frame) for frame in self.frames],
+            "cameras": [camera_record(camera) for camera in self.cameras],
+        }
+        return _finite(row)
+
+
+def compare_sequences(
+    originals: Iterable[Mesh], decoded: Iterable[Mesh], options: ComparisonOptions | None = None
+) -> Comparison:
+    """Every metric of `decoded` against `originals`, frame by frame (two MeshSequences of equal length)."""
+    options = options or ComparisonOptions()
+    cameras = _cameras(originals, options) if options.ssim else []
+    rows: list[Row] = []
+    empty: list[bool] = []
+    others = iter(decoded)
+    for mesh in originals:
+        other = next(others, None)
+        if other is None:
+            raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
+        rows.append(frame_row(mesh, other, cameras))
+        empty.append(mesh.is_empty and other.is_empty)
+    if next(others, None) is not None:
+        raise InputError(f"the original sequence ends after {len(rows)} frames and the decoded one does not")
+    if any(key >= len(rows) for key in options.keys):
+        raise InputError(f"key frames {list(options.keys)}: the sequence has {len(rows)} frames")
+    return Comparison(tuple(rows), tuple(empty), tuple(cameras), tuple(options.keys))
+
+
+def frame_row(original: Mesh, decoded: Mesh, cameras: Sequence[PinholeCamera]) -> Row:
+    """The metrics of one frame by name; SSIM where there are cameras."""
+    row = _distance_row(surface_errors(original, decoded))
+    if cameras:
+        ssim = ssim_normals(original, decoded, cameras)
+        row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}
+    return row
+
+
+def aggregate(frames: Sequence[Row]) -> Row:
+    """Mean and worst value of every metric over frames; empty for no frames."""
+    row: Row = {}
+    for name in frames[0] if frames else ():
+        values = np.array([frame[name] for frame in frames], dtype=np.float64)
+        if name in _PSNRS:
+            values = np.minimum(values, PSNR_CEILING)
+        row[name] = float(values.mean())
+        row[f"{name}_worst"] = float(values.min() if name in _LARGER_IS_BETTER else values.max())
+    row.pop("diagonal_m_worst", None)
+    return row
+
+
+def _distance_row(errors: SurfaceErrors) -> Row:
+    row: Row = {
+        "diagonal_m": errors.diagonal,
+        "d2_psnr_paper": errors.d2_psnr_paper,
+        "d1_psnr": errors.d1_psnr,
+        "d2_psnr": errors.d2_psnr,
+        "symmetric_psnr": errors.symmetric_psnr,
+        "normal_error_deg": errors.angle,
+        "normal_error_at_vertices_deg": errors.vertex_angle,
+    }
+    for name, one_way in (("forward", errors.forward), ("backward", errors.backward)):
+        row[f"rms_{name}_m"] = one_way.rms
+        row[f"rms_{name}_percent"] = errors.percent(one_way.rms)
+        row[f"hausdorff95_{name}_m"] = one_way.hausdorff95
+        row[f"hausdorff95_{name}_percent"] = errors.percent(one_way.hausdorff95)
+        row[f"normal_error_{name}_deg"] = one_way.angle
+    return row
+
+
+def _cameras(originals: Iterable[Mesh], options: ComparisonOptions) -> list[PinholeCamera]:
+    if options.cameras is not None:
+        return read_cameras(options.cameras)
+    return views_around(Box.of(originals), options.views)
+
+
+def _finite(row: Row) -> Row:
+    return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in row.items()}

@@ -1,0 +1,161 @@
+"""A picture to look at: original, decoded and error heat map of chosen frames, as a PNG.
+
+Colors of the first two columns are normals (see `render`). The heat map shows, where a ray meets the original, how far
+that point is from the decoded surface; pixels that only the decoded mesh covers (surface that was invented) are
+magenta. Drawn by matplotlib's Agg, without a display.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import InputError
+from ..geometry.nearest import Surface
+from ..types import Mesh
+from .cameras import Box, PinholeCamera, ViewOptions, views_around
+from .distance import surface_errors
+from .render import View, Window, look
+from .samples import box_center, used_surface
+
+_COLUMNS = ("original", "decoded", "error")
+_INVENTED = (1.0, 0.0, 1.0)  # magenta
+_LEAST_LIMIT = 1e-3  # % or mm; under it the color bar would show rounding
+
+
+@runtime_checkable
+class Frames(Protocol):
+    """What a sheet needs of a sequence: frames by number; any MeshSequence has that."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int) -> Mesh: ...
+
+
+@dataclass(frozen=True, slots=True)
+class SheetOptions:
+    """What the sheet shows."""
+
+    frames: tuple[int, ...] = ()  # none given: first, middle and last
+    views: tuple[int, ...] = (0,)  # 0 front, 1 right, 2 back, 3 left
+    height: int = 480  # pixels of one picture
+    unit: str = "percent"  # of the heat map: percent (of the diagonal) or mm
+    limit: float = 0.0  # where the color bar ends, in that unit; 0: the 99 % quantile of what is seen
+    up: str = "y"  # the axis that points up
+
+    def __post_init__(self) -> None:
+        if self.unit not in ("percent", "mm"):
+            raise InputError(f"unit {self.unit!r}: give percent or mm")
+        if not all(0 <= view < 4 for view in self.views) or not self.views:
+            raise InputError(f"views {self.views}: give some of 0 to 3")
+        if not 32 <= self.height <= 4096:
+            raise InputError(f"picture height {self.height}: give 32 to 4096 pixels")
+        if not self.limit >= 0:
+            raise InputError(f"limit {self.limit}: give 0 or more")
+
+
+@dataclass(frozen=True, slots=True)
+class SheetRow:
+    """One line of the sheet."""
+
+    label: str
+    original: View
+    decoded: View
+    errors: Float64[np.ndarray, " N"]  # in the sheet's unit, one for each covered pixel of the original
+
+
+def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOptions | None = None) -> None:
+    """Writes the PNG: a line for each chosen frame and view."""
+    options = options or SheetOptions()
+    rows = list(_rows(originals, decoded, options))
+    figure = _draw(rows, options)
+    temporary = path.with_name(path.name + ".part")
+    try:
+        figure.savefig(temporary, format="png", dpi=100)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def error_at_pixels(view: View, decoded: Mesh) -> Float64[np.ndarray, " N"]:
+    """Distance of the points that a view of the original sees to the decoded surface, m; inf where there is none."""
+    decoded = used_surface(decoded)
+    if decoded.is_empty:
+        return np.full(len(view.points), np.inf)
+    center = box_center(decoded)
+    points = view.points - center
+    if len(points) == 0:
+        return np.zeros(0)
+    hits = Surface(Mesh.of(decoded.vertices - center, decoded.faces)).closest(points)
+    return np.linalg.norm(hits.points - points, axis=1)
+
+
+def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator[SheetRow]:
+    count = len(originals)
+    if count != len(decoded) or count == 0:
+        raise InputError(f"a sheet needs as many decoded frames as originals: {len(decoded)} and {count}")
+    frames = options.frames or tuple(sorted({0, count // 2, count - 1}))
+    if not all(0 <= frame < count for frame in frames):
+        raise InputError(f"frames {frames}: the sequence has frames 0 to {count - 1}")
+    pairs = [(frame, originals[frame], decoded[frame]) for frame in frames]
+    cameras = _cameras([mesh for _, mesh, _ in pairs], options)
+    for frame, mesh, other in pairs:
+        measured = surface_errors(mesh, other)
+        factor = 1000.0 if options.unit == "mm" else 100 / (measured.diagonal or 1.0)
+        label = f"frame {frame}\nD2 {measured.d2_psnr_paper:.1f} dB\nnormals {measured.angle:.1f}°"
+        for camera in cameras:
+            whole = Window(0, camera.height, 0, camera.width)
+            seen = look(mesh, camera, whole)
+            yield SheetRow(label, seen, look(other, camera, whole), factor * error_at_pixels(seen, other))
+
+
+def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[PinholeCamera]:
+    box = Box.of(meshes)
+    vertical = "xyz".index(options.up) if options.up in "yz" else 1
+    aspect = float(np.delete(box.size, vertical).max()) / max(float(box.size[vertical]), 1e-9)
+    width = int(options.height * min(max(aspect, 0.5), 3.0))
+    cameras = views_around(box, ViewOptions(width, options.height, fov=30.0, up=options.up))
+    return [cameras[view] for view in options.views]
+
+
+def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    height, width = rows[0].original.window.shape
+    limit = options.limit or _limit(rows)
+    figure = Figure(figsize=((3 * width + 260) / 100, (len(rows) * (height + 8) + 40) / 100), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(len(rows), 3, squeeze=False)
+    image: Any = None
+    for line, row in zip(axes, rows, strict=True):
+        line[0].imshow(row.original.colors)
+        line[1].imshow(row.decoded.colors)
+        image = _heat_map(line[2], row, limit)
+        line[0].set_ylabel(row.label)
+        for axis in line:
+            axis.set(xticks=[], yticks=[])
+    for axis, title in zip(axes[0], _COLUMNS, strict=True):
+        axis.set_title(title)
+    unit = "mm" if options.unit == "mm" else "% of the diagonal"
+    figure.colorbar(image, ax=axes, label=f"distance to the decoded surface, {unit}", extend="max", shrink=0.8)
+    return figure
+
+
+def _heat_map(axis: Any, row: SheetRow, limit: float) -> Any:
+    backdrop = np.ones((*row.original.window.shape, 3))
+    backdrop[row.decoded.covered & ~row.original.covered] = _INVENTED
+    axis.imshow(backdrop)
+    errors = np.ma.masked_array(np.zeros(row.original.covered.shape), mask=~row.original.covered)
+    errors[row.original.covered] = np.minimum(row.errors, 2 * limit)
+    return axis.imshow(errors, cmap="viridis", vmin=0, vmax=limit, interpolation="nearest")
+
+
+def _limit(rows: list[SheetRow]) -> float:
+    errors = np.concatenate([row.errors[np.isfinite(row.errors)] for row in rows])
+    return max(float(np.quantile(errors, 0.99)), _LEAST_LIMIT) if len(errors) else 1.0

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from meshreel.errors import InputError
+from meshreel.metrics.bd_rate import Curve, bd_rate
+
+# The points of VCEG-M33's often reprinted example, and those in the README of FAU's `bjontegaard` package.
+VCEG = (
+    Curve("anchor", [686.76, 309.58, 157.11, 85.95], [40.28, 37.18, 34.24, 31.42]),
+    Curve("test", [893.34, 407.8, 204.93, 112.75], [40.39, 37.21, 34.17, 31.24]),
+)
+X265 = (
+    Curve("anchor", [9487.76, 4593.60, 2486.44, 1358.24], [40.037, 38.615, 36.845, 34.851]),
+    Curve("test", [9787.80, 4469.00, 2451.52, 1356.24], [40.121, 38.651, 36.970, 34.987]),
+)
+
+
+@pytest.mark.parametrize("pair", [VCEG, X265])
+def test_it_agrees_with_pchip_written_out_and_integrated_numerically(pair: tuple[Curve, Curve]):
+    low = max(min(c.qualities) for c in pair)
+    high = min(max(c.qualities) for c in pair)
+    q = np.linspace(low, high, 20_001)
+    anchor, test = (_pchip(np.array(c.qualities)[::-1], np.log(c.rates)[::-1], q) for c in pair)
+    expected = 100 * (np.exp(np.trapezoid(test - anchor, q) / (high - low)) - 1)
+    result = bd_rate(*pair)
+    assert result.percent == pytest.approx(expected, abs=1e-5)
+    assert (result.low, result.high) == (low, high)
+
+
+@pytest.mark.parametrize(("pair", "published"), [(VCEG, 31.397374), (X265, -4.420463)])
+def test_published_examples_are_met_as_far_as_cubic_and_pchip_agree(pair: tuple[Curve, Curve], published: float):
+    low = max(min(c.qualities) for c in pair)
+    high = min(max(c.qualities) for c in pair)
+    integrals = [np.polyint(np.polyfit(c.qualities, np.log(c.rates), 3)) for c in pair]
+    means = [(np.polyval(p, high) - np.polyval(p, low)) / (high - low) for p in integrals]
+    assert 100 * np.expm1(means[1] - means[0]) == pytest.approx(published, abs=1e-5)
+    assert bd_rate(*pair).percent == pytest.approx(published, abs=0.2)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.1, 10), st.lists(st.floats(0.1, 3), min_size=2, max_size=6))
+def test_a_constant_factor_of_rate_is_the_answer(factor: float, steps: list[float]):
+    qualities = list(50 + np.cumsum(steps))
+    rates = list(np.exp(np.cumsum(steps)))
+    result = bd_rate(Curve("a", rates, qualities), Curve("b", [factor * r for r in rates], qualities))
+    assert result.percent == pytest.approx(100 * (factor - 1), rel=1e-9, abs=1e-9)
+
+
+def test_only_the_overlap_counts():
+    anchor = _curve("a", [1, 2, 4, 8], [50, 53, 56, 59])
+    test = _curve("b", [1, 2, 4], [53, 56, 59])
+    result = bd_rate(anchor, test)
+    assert (result.low, result.high) == (53, 59)
+    assert result.percent == pytest.approx(-50)
+    assert str(result) == "b against a: -50.0 % over 53 to 59"
+
+
+def test_without_common_quality_there_is_no_number_and_a_reason():
+    result = bd_rate(_curve("a", [1, 2], [50, 53]), _curve("b", [1, 2], [60, 63]))
+    assert result.percent is None
+    assert "a 50 to 53" in result.reason and "b 60 to 63" in result.reason
+    assert "no BD-rate" in str(result)
+    touching = bd_rate(_curve("a", [1, 2], [50, 53]), _curve("b", [1, 2], [53, 63]))
+    assert touching.percent is None
+
+
+def test_too_few_points_give_no_number_and_a_reason():
+    assert "at least 2" in bd_rate(_curve("a", [1], [50]), _curve("b", [1, 2], [50, 53])).reason
+    assert bd_rate(_curve("a", [], []), _curve("b", [1, 2], [50, 53])).percent is None
+
+
+def test_points_that_another_beats_are_dropped_and_counted():
+    clean = _curve("a", [1, 2, 4], [50, 53, 56])
+    result = bd_rate(_curve("a", [4, 3, 1, 2, 2], [56, 52, 50, 53, 51]), _curve("b", [2, 4, 8], [50, 53, 56]))
+    assert result.points == (3, 3)
+    assert result.percent == pytest.approx(bd_rate(clean, _curve("b", [2, 4, 8], [50, 53, 56])).percent)
+    assert result.percent == pytest.approx(100)
+
+
+@pytest.mark.parametrize(
+    ("rates", "qualities"), [([1, 2], [3]), ([0, 1], [3, 4]), ([1, np.inf], [3, 4]), ([1, 2], [3, np.inf])]
+)
+def test_bad_points_are_refused(rates: list, qualities: list):
+    with pytest.raises(InputError, match="curve bad"):
+        _curve("bad", rates, qualities)
+
+
+def _curve(name: str, rates: list, qualities: list) -> Curve:
+    return Curve(name, [float(r) for r in rates], [float(q) for q in qualities])
+
+
+def _pchip(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Fritsch and Butland's monotone cubic: harmonic-mean slopes inside, three-point ends kept monotone."""
+    h, d = np.diff(x), np.diff(y) / np.diff(x)
+    slopes = np.zeros(len(x))
+    for k in range(1, len(x) - 1):
+        if d[k - 1] * d[k] > 0:
+            w1, w2 = 2 * h[k] + h[k - 1], h[k] + 2 * h[k - 1]
+            slopes[k] = (w1 + w2) / (w1 / d[k - 1] + w2 / d[k])
+    for end, near, far in ((0, 0, 1), (-1, -1, -2)):
+        slope = ((2 * h[near] + h[far]) * d[near] - h[near] * d[far]) / (h[near] + h[far])
+        if slope * d[near] <= 0:
+            slope = 0.0
+        elif d[near] * d[far] < 0 and abs(slope) > 3 * abs(d[near]):
+            slope = 3 * d[near]
+        slopes[end] = slope
+    k = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(h) - 1)
+    t = (at - x[k]) / h[k]
+    return (
+        y[k] * (1 + 2 * t) * (1 - t) ** 2
+        + h[k] * slopes[k] * t * (1 - t) ** 2
+        + y[k + 1] * t**2 * (3 - 2 * t)
+        + h[k] * slopes[k + 1] * t**2 * (t - 1)
+    )

@@ -1,0 +1,73 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from meshreel.errors import InputError
+from meshreel.metrics.cameras import Box, ViewOptions, views_around
+from meshreel.metrics.render import Window, look
+from meshreel.metrics.sheet import SheetOptions, error_at_pixels, write_sheet
+from meshreel.types import Mesh, MeshList
+
+from .shapes import moved, noisy, sphere
+
+BODY = sphere(levels=3)
+
+
+def test_the_error_of_a_pixel_is_the_distance_of_what_it_sees():
+    fine = sphere(levels=5)
+    camera = views_around(Box.of([fine]), ViewOptions(64, 64))[0]
+    view = look(fine, camera, Window(0, 64, 0, 64))
+    errors = error_at_pixels(view, moved(sphere(1.1, 5), (0, 0, 0)))
+    assert np.allclose(errors, 0.1, atol=3e-3) and len(errors) == view.covered.sum() > 500
+    offset = (1e6, 1e6, -1e6)
+    far = look(moved(fine, offset), views_around(Box.of([moved(fine, offset)]), ViewOptions(64, 64))[0], view.window)
+    assert np.allclose(error_at_pixels(far, moved(sphere(1.1, 5), offset)), 0.1, atol=3e-3)
+    assert np.isinf(error_at_pixels(view, Mesh.empty())).all()
+
+
+@pytest.mark.parametrize("unit", ["percent", "mm"])
+def test_a_sheet_is_a_png_with_a_line_for_each_frame_and_view(tmp_path: Path, unit: str):
+    image = pytest.importorskip("matplotlib.image")
+    decoded = MeshList(tuple(noisy(BODY, 0.02, i) for i in range(4)))
+    options = SheetOptions(frames=(1, 3), views=(0, 1), height=64, unit=unit)
+    path = tmp_path / "sheet.png"
+    write_sheet(MeshList((BODY,) * 4), decoded, path, options)
+    assert [p.name for p in tmp_path.iterdir()] == ["sheet.png"]
+    picture = image.imread(path)
+    assert picture.shape[0] > 4 * 64 and picture.shape[1] > 3 * 64
+    assert picture[..., :3].std() > 0.02
+
+
+@pytest.mark.parametrize(
+    "pair", [(BODY, Mesh.empty()), (Mesh.empty(), BODY), (Mesh.empty(), Mesh.empty()), (BODY, BODY)]
+)
+def test_empty_and_identical_frames_can_be_drawn(tmp_path: Path, pair: tuple[Mesh, Mesh]):
+    write_sheet(MeshList(pair[:1]), MeshList(pair[1:]), tmp_path / "sheet.png", SheetOptions(height=48))
+    assert (tmp_path / "sheet.png").stat().st_size > 1000
+
+
+def test_the_same_meshes_give_the_same_bytes(tmp_path: Path):
+    for name in ("a.png", "b.png"):
+        write_sheet(
+            MeshList((BODY,)), MeshList((noisy(BODY, 0.02),)), tmp_path / name, SheetOptions(height=48, limit=2.0)
+        )
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"unit": "inch"}, {"views": (4,)}, {"views": ()}, {"height": 3}, {"limit": -1.0}, {"limit": float("nan")}],
+)
+def test_bad_sheet_options_are_refused(options: dict):
+    with pytest.raises(InputError):
+        SheetOptions(**options)
+
+
+def test_frames_that_are_not_there_are_refused(tmp_path: Path):
+    one, two = MeshList((BODY,)), MeshList((BODY, BODY))
+    with pytest.raises(InputError, match="0 to 0"):
+        write_sheet(one, one, tmp_path / "sheet.png", SheetOptions(frames=(1,)))
+    with pytest.raises(InputError, match="1 and 2"):
+        write_sheet(two, one, tmp_path / "sheet.png")
+    assert not list(tmp_path.iterdir())
