@@ -64,16 +64,15 @@ class System:
         self,
         deltas: Float64[np.ndarray, "R M"],
         steps: Float64[np.ndarray, " M"],
-        slopes: Float64[np.ndarray, "R M"],
-        price: float,
+        prices: Float64[np.ndarray, " M"],
     ) -> Int32[np.ndarray, "R M"]:
         """Symbols chosen so that `inverse(symbols * steps)` is near the weights the deltas came from.
 
         The inverse amplifies smooth errors of the deltas by orders of magnitude; each rounding here takes up what the
-        earlier ones left in the weights, so that the error that remains is white in the weights. `slopes` are the
-        bits that a symbol's magnitude costs a unit, `price` what a bit is worth in squared steps.
+        earlier ones left in the weights, so that the error that remains is white in the weights. `prices` are the
+        squared error, in squared steps, that a symbol smaller by one is worth; 0 disregards the rate.
         """
-        return self._core.quantize(deltas, steps, slopes, price)
+        return self._core.quantize(deltas, steps, prices)
 
 
 def forward(
