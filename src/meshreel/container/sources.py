@@ -5,11 +5,12 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ..errors import InputError
 
 
+@runtime_checkable
 class Source(Protocol):
     """Bytes that can be read by ranges: a file, memory, an HTTP server."""
 

@@ -11,11 +11,12 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from ..errors import FormatError
 
 
+@runtime_checkable
 class Kind(Protocol):
     """How one field lies in bytes."""
 
@@ -45,14 +46,14 @@ class Number:
     def least(self) -> int:
         return struct.calcsize("<" + self.code)
 
-    def pack(self, value: float) -> bytes:
+    def pack(self, value: Any) -> bytes:
         return self.pack_many([value])
 
     def unpack(self, data: bytes, offset: int) -> tuple[Any, int]:
         values, offset = self.unpack_many(data, offset, 1)
         return values[0], offset
 
-    def pack_many(self, values: Sequence[float]) -> bytes:
+    def pack_many(self, values: Sequence[Any]) -> bytes:
         if not self._finite(values):
             raise ValueError("not finite")
         try:
@@ -67,7 +68,7 @@ class Number:
             raise FormatError("a number that is not finite")
         return values, end
 
-    def _finite(self, values: Sequence[float]) -> bool:
+    def _finite(self, values: Sequence[Any]) -> bool:
         return self.code not in "fd" or all(map(math.isfinite, values))
 
 

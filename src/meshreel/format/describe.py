@@ -1,0 +1,40 @@
+"""FORMAT.md's tables, made from the declarations of the records. In: a text with markers. Out: it, tables filled in.
+
+A marker is the pair `<!-- table NAME -->` and `<!-- end -->`; what stands between is replaced.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from ..errors import InputError
+from .kinds import Array, Bytes, Choice, Kind, Number
+from .records import record_fields
+
+MARKED = re.compile(r"(<!-- table (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def fill_tables(text: str, records: Sequence[type]) -> str:
+    """The text with every marked table made anew. InputError where a table or a record lacks its counterpart."""
+    by_name = {record.__name__: record for record in records}
+    marked = [name for _, name, _ in MARKED.findall(text)]
+    if sorted(marked) != sorted(by_name):
+        odd = sorted(set(marked) ^ set(by_name)) or "a marker twice"
+        raise InputError(f"tables and records differ: {odd}; give each record one marker")
+    return MARKED.sub(lambda match: match[1] + table(by_name[match[2]]) + match[3], text)
+
+
+def table(record_type: type) -> str:
+    """A markdown table of one record: offset (as long as it is fixed), field, kind, meaning."""
+    lines = ["| offset | field | kind | meaning |", "| ---: | --- | --- | --- |"]
+    offset: int | None = 0
+    for field in record_fields(record_type):
+        place = "" if offset is None else str(offset)
+        lines.append(f"| {place} | `{field.name}` | {field.kind.label} | {field.meaning} |")
+        offset = offset + field.kind.least if offset is not None and _is_fixed(field.kind) else None
+    return "\n".join(lines) + "\n"
+
+
+def _is_fixed(kind: Kind) -> bool:
+    return isinstance(kind, Number | Bytes | Choice) or (isinstance(kind, Array) and _is_fixed(kind.item))
