@@ -5,7 +5,7 @@ import pytest
 
 from meshreel import _core
 from meshreel.coding import laplacian
-from meshreel.coding.laplacian import AnchorRule
+from meshreel.format.layout import AnchorRule
 from meshreel.geometry.topology import components, subdivide_midpoint
 from meshreel.types import Mesh
 

@@ -9,21 +9,13 @@ faces has the identity for its row; the anchors' rows may weigh more than 1, whi
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 import numpy as np
 from jaxtyping import Float64, Int32
 
 from .. import _core
+from ..format.layout import AnchorRule
 from ..geometry.topology import components
 from ..types import Mesh
-
-
-class AnchorRule(IntEnum):
-    """How the anchors are found from the connectivity; the value travels in the stream."""
-
-    SPREAD = 0  # every k-th vertex, and the first of each component that would have none
-    FARTHEST = 1  # farthest points by edge hops, starting from the first vertex of each component
 
 
 def anchors(rule: AnchorRule, count: int, faces: Int32[np.ndarray, "F 3"], vertices: int) -> Int32[np.ndarray, " l"]:
