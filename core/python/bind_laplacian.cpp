@@ -83,12 +83,11 @@ class Laplacian {
         return weights.two(vertices_, columns);
     }
 
-    Out2<int32_t> quantize(In2<double> deltas, In1<double> steps, In2<double> slopes, double price) {
+    Out2<int32_t> quantize(In2<double> deltas, In1<double> steps, In1<double> prices) {
         const size_t columns = deltas.shape(1);
-        expect(deltas.shape(0) == rows_ && steps.shape(0) == columns && slopes.shape(0) == rows_ &&
-               slopes.shape(1) == columns);
+        expect(deltas.shape(0) == rows_ && steps.shape(0) == columns && prices.shape(0) == columns);
         Buffer<int32_t> symbols(rows_ * columns);
-        check(mr_laplacian_quantize(system_, deltas.data(), columns, steps.data(), slopes.data(), price, symbols.data()));
+        check(mr_laplacian_quantize(system_, deltas.data(), columns, steps.data(), prices.data(), symbols.data()));
         return symbols.two(rows_, columns);
     }
 
@@ -122,7 +121,7 @@ void bind_laplacian(nb::module_& m) {
         .def("weights", &Laplacian::weights)
         .def("forward", &Laplacian::forward, nb::arg("weights"))
         .def("inverse", &Laplacian::inverse, nb::arg("deltas"))
-        .def("quantize", &Laplacian::quantize, nb::arg("deltas"), nb::arg("steps"), nb::arg("slopes"), nb::arg("price"));
+        .def("quantize", &Laplacian::quantize, nb::arg("deltas"), nb::arg("steps"), nb::arg("prices"));
     m.def("farthest_anchors", &farthest_anchors, nb::arg("faces"), nb::arg("vertices"), nb::arg("count"));
     m.def("klt_inverse", &klt_inverse, nb::arg("weights"), nb::arg("vectors"), nb::arg("mean"));
 }

@@ -193,10 +193,10 @@ int mr_laplacian_inverse(mr_laplacian* system, const double* deltas, int64_t col
 }
 
 int mr_laplacian_quantize(mr_laplacian* system, const double* deltas, int64_t columns, const double* steps,
-                          const double* slopes, double lambda, int32_t* symbols) {
+                          const double* prices, int32_t* symbols) {
     return guarded([&] {
         if (!factor_shaping(*system)) return int(MR_LAPLACIAN_SINGULAR);
-        shape(*system->shaping, deltas, columns, steps, slopes, lambda, symbols);
+        shape(*system->shaping, deltas, columns, steps, prices, symbols);
         return int(MR_LAPLACIAN_OK);
     });
 }

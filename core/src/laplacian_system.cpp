@@ -9,6 +9,8 @@ using Sparse = Eigen::SparseMatrix<double>;  // by columns, 32-bit indices
 
 namespace {
 
+constexpr double kLoading = 1e-6;
+
 // (L*)^T by columns: column i is row i of L*, so both Gram matrices are plain sparse products.
 Sparse transposed_system(const mr_laplacian& system) {
     const int64_t n = system.vertices, l = static_cast<int64_t>(system.anchors.size());
@@ -91,7 +93,7 @@ bool factor_shaping(mr_laplacian& system) {
     if (system.shaping) return true;
     const Sparse t = transposed_system(system);
     Sparse gram = (Sparse(t.transpose()) * t).triangularView<Eigen::Lower>();
-    for (Eigen::Index k = 0; k < gram.cols(); ++k) gram.coeffRef(k, k) += system.loading;
+    for (Eigen::Index k = 0; k < gram.cols(); ++k) gram.coeffRef(k, k) += kLoading;
     auto factor = std::make_unique<Factor>();
     if (!factor->compute(gram)) return false;
     system.shaping = std::move(factor);
@@ -100,21 +102,21 @@ bool factor_shaping(mr_laplacian& system) {
 
 // With P L* L*^T P^T = L D L^T and e = L u the squared error is sum u_k^2 / D_k: it splits into one term a symbol, in
 // elimination order, and u_k = e_k - sum_{j<k} L_kj u_j is what rounding k has to make small.
-void shape(const Factor& factor, const double* deltas, int64_t columns, const double* steps, const double* slopes,
-           double lambda, int32_t* symbols) {
+void shape(const Factor& factor, const double* deltas, int64_t columns, const double* steps, const double* prices,
+           int32_t* symbols) {
     const int64_t n = static_cast<int64_t>(factor.order.size());
     std::vector<double> debt(static_cast<size_t>(n * columns), 0.0);  // sum_{j<k} L_kj u_j, in steps
     std::vector<double> u(static_cast<size_t>(columns));
     for (int64_t k = 0; k < n; ++k) {
         const int64_t i = factor.order[k];
-        const double price = lambda * factor.pivots[k];
+        const double pivot = factor.pivots[k];
         for (int64_t c = 0; c < columns; ++c) {
             const double wanted = deltas[i * columns + c] / steps[c] + debt[k * columns + c];
             double q = std::floor(wanted + 0.5);
-            double best = (q - wanted) * (q - wanted) + price * slopes[i * columns + c] * std::fabs(q);
+            double best = (q - wanted) * (q - wanted) + pivot * prices[c] * std::fabs(q);
             const double toward = q > 0.0 ? q - 1.0 : q + 1.0;
             if (q != 0.0) {
-                const double cost = (toward - wanted) * (toward - wanted) + price * slopes[i * columns + c] * std::fabs(toward);
+                const double cost = (toward - wanted) * (toward - wanted) + pivot * prices[c] * std::fabs(toward);
                 if (cost < best) q = toward;
             }
             q = std::min(std::max(q, -1.0e9), 1.0e9);

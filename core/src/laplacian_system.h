@@ -33,14 +33,13 @@ struct mr_laplacian {
     SparseRows rows;  // -L off the diagonal; the diagonal is 1
     std::vector<int32_t> anchors;
     double anchor_weight = 1.0;
-    double loading = 1e-6;
     std::unique_ptr<Factor> normal;   // (L*)^T L*
     std::unique_ptr<Factor> shaping;  // L* (L*)^T, regularised
 };
 
 bool factor_normal(mr_laplacian& system);
 bool factor_shaping(mr_laplacian& system);
-void shape(const Factor& factor, const double* deltas, int64_t columns, const double* steps, const double* slopes,
-           double lambda, int32_t* symbols);
+void shape(const Factor& factor, const double* deltas, int64_t columns, const double* steps, const double* prices,
+           int32_t* symbols);
 
 #endif

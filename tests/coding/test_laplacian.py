@@ -5,7 +5,7 @@ import pytest
 
 from meshreel import _core
 from meshreel.coding import laplacian
-from meshreel.coding.laplacian import AnchorRule
+from meshreel.format.layout import AnchorRule
 from meshreel.geometry.topology import components, subdivide_midpoint
 from meshreel.types import Mesh
 
@@ -103,7 +103,7 @@ def test_shaped_rounding_keeps_the_error_in_proportion_to_the_step(base: Mesh, s
     rng = np.random.default_rng(3)
     weights = np.cumsum(rng.normal(size=(len(base.vertices), 4)), axis=0) * 0.01
     deltas = system.forward(weights)
-    symbols = system.quantize(deltas, np.full(4, step), np.zeros_like(deltas), 0.0)
+    symbols = system.quantize(deltas, np.full(4, step), np.zeros(4))
     error = system.inverse(symbols * step) - weights
     plain = system.inverse(np.rint(deltas / step) * step) - weights
     assert np.sqrt((error**2).mean()) < 1.5 * step

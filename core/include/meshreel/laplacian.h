@@ -20,7 +20,8 @@ enum {
     MR_LAPLACIAN_NO_MEMORY = 3,
 };
 
-// L* of a mesh: `vertices` rows of mean-value weights (eq. 11), then one unit row an anchor.
+// L* of a mesh: `vertices` rows of mean-value weights (eq. 11), then a row of `anchor_weight` times a unit
+// vector for each anchor.
 int mr_laplacian_create(const double* positions, int64_t vertices, const int32_t* faces, int64_t face_count,
                         const int32_t* anchors, int64_t anchor_count, double anchor_weight,
                         mr_laplacian** out);
@@ -36,10 +37,10 @@ int mr_laplacian_forward(const mr_laplacian* system, const double* weights, int6
 int mr_laplacian_inverse(mr_laplacian* system, const double* deltas, int64_t columns, double* weights);
 
 // Symbols whose inverse is close to the weights: each rounding takes into account the error that those before it leave
-// in the *weights*. `slopes` (V + l) x columns are the bits that one more unit of a symbol's magnitude costs and
-// `lambda` the price of a bit, in squared steps; zero rounds without regard to the rate. Encoder only.
+// in the *weights*. `prices` are, for each column, the squared error in squared steps that one unit less of a symbol's
+// magnitude is worth; 0 rounds without regard to the rate. Encoder only.
 int mr_laplacian_quantize(mr_laplacian* system, const double* deltas, int64_t columns, const double* steps,
-                          const double* slopes, double lambda, int32_t* symbols);
+                          const double* prices, int32_t* symbols);
 
 // `count` vertices or more that are far from each other in edge hops, at least one for each component that has faces.
 // Writes at most `vertices` indices and returns how many; negative on bad input.

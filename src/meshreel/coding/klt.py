@@ -89,5 +89,5 @@ def dequantize(symbols: BasisSymbols) -> Basis:
 
 
 def _bits_for(amplitude: float, step: float) -> int:
-    """Fraction bits at which rounding moves `amplitude` by a thirty-second of a step at most; at least 5, at most 24."""
-    return int(np.clip(np.ceil(np.log2(max(16.0 * amplitude / step, 1.0))), 5, 24))
+    """Fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/64 of a step."""
+    return int(np.clip(np.ceil(np.log2(max(32.0 * amplitude / step, 1.0))), 5, 24))

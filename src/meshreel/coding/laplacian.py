@@ -9,21 +9,13 @@ faces has the identity for its row; the anchors' rows may weigh more than 1, whi
 
 from __future__ import annotations
 
-from enum import IntEnum
-
 import numpy as np
 from jaxtyping import Float64, Int32
 
 from .. import _core
+from ..format.layout import AnchorRule
 from ..geometry.topology import components
 from ..types import Mesh
-
-
-class AnchorRule(IntEnum):
-    """How the anchors are found from the connectivity; the value travels in the stream."""
-
-    SPREAD = 0  # every k-th vertex, and the first of each component that would have none
-    FARTHEST = 1  # farthest points by edge hops, starting from the first vertex of each component
 
 
 def anchors(rule: AnchorRule, count: int, faces: Int32[np.ndarray, "F 3"], vertices: int) -> Int32[np.ndarray, " l"]:
@@ -64,16 +56,15 @@ class System:
         self,
         deltas: Float64[np.ndarray, "R M"],
         steps: Float64[np.ndarray, " M"],
-        slopes: Float64[np.ndarray, "R M"],
-        price: float,
+        prices: Float64[np.ndarray, " M"],
     ) -> Int32[np.ndarray, "R M"]:
         """Symbols chosen so that `inverse(symbols * steps)` is near the weights the deltas came from.
 
         The inverse amplifies smooth errors of the deltas by orders of magnitude; each rounding here takes up what the
-        earlier ones left in the weights, so that the error that remains is white in the weights. `slopes` are the
-        bits that a symbol's magnitude costs a unit, `price` what a bit is worth in squared steps.
+        earlier ones left in the weights, so that the error that remains is white in the weights. `prices` are the
+        squared error, in squared steps, that a symbol smaller by one is worth; 0 disregards the rate.
         """
-        return self._core.quantize(deltas, steps, slopes, price)
+        return self._core.quantize(deltas, steps, prices)
 
 
 def forward(

@@ -37,7 +37,8 @@ class Form(IntEnum):
 class AnchorRule(IntEnum):
     """How the anchors of the Laplacian coordinates are chosen on both sides."""
 
-    SPREAD = 1  # the rule of coding/laplacian
+    SPREAD = 1  # every k-th vertex, and the first of each component that would have none
+    FARTHEST = 2  # farthest points by edge hops, starting from the first vertex of each component
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,20 +115,26 @@ class LaplacianGroup:
 
 
 @dataclass(frozen=True, slots=True)
+class Component:
+    """One direction of the basis and the streams of its weights."""
+
+    basis_bits: Annotated[int, U8, "b, at most 30: the direction's numbers are integers times 2^-b"]
+    step_level: Annotated[int, U8, "k: the quantiser's step is 2^(-k/8)"]
+    anchors_size: Annotated[int, Varint(), "bytes of its anchors' stream"]
+    deltas_size: Annotated[int, Varint(), "bytes of its deltas' stream"]
+
+
+@dataclass(frozen=True, slots=True)
 class DisplacementHead:
-    """The start of coded displacements: T frames, M components; the components' streams follow, strongest first."""
+    """The start of coded displacements. Behind it, for each component in turn, its anchors' and its deltas' stream."""
 
     frames: Annotated[int, U16, "T, above 0"]
     anchor_rule: Annotated[AnchorRule, Choice(U8, AnchorRule), "how anchors are chosen"]
-    anchor_count: Annotated[int, U32, "number of anchors"]
-    anchor_weight: Annotated[float, F32, "weight of an anchor in the least squares"]
-    basis_step: Annotated[float, F32, "quantiser step of the basis"]
-    mean_step: Annotated[float, F32, "quantiser step of the mean"]
-    base_step: Annotated[float, F32, "quantiser step of level 0"]
-    step_levels: Annotated[
-        tuple[int, ...], List(U16, I16), "M; level of each component's quantiser step, above base_step"
-    ]
-    stream_sizes: Annotated[tuple[int, ...], List(U16, U32), "bytes of each component's stream"]
+    anchor_count: Annotated[int, Varint(), "number of anchors asked for; each connected component has at least one"]
+    anchor_weight: Annotated[int, U8, "factor of the anchors' rows, above 0"]
+    mean_bits: Annotated[int, U8, "b, at most 30: the mean's numbers are integers times 2^-b"]
+    components: Annotated[tuple[Component, ...], List(U16, Nested(Component)), "strongest first, at most 3 T"]
+    basis: Annotated[bytes, Blob(Varint()), "integers: 3 T of the mean, then 3 T of each component's direction"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,4 +155,4 @@ class EmptyGroup:
 
 
 RECORDS = (Preamble, Header, Index, IndexEntry, Layer, Checksum)
-PAYLOADS = (LaplacianGroup, DisplacementHead, DracoGroup, EmptyGroup)
+PAYLOADS = (LaplacianGroup, DisplacementHead, Component, DracoGroup, EmptyGroup)

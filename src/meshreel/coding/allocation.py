@@ -1,0 +1,111 @@
+"""Which components a displacement field gets and how fine each is (encoder; reverse water-filling, paper section 3.3.3).
+
+In: a field, its base's Laplacian system. Out: the basis as transmitted and each component's step and symbols, such that
+distortion + price * rate is least: the distortion is the squared error after the least-squares inverse (the basis is
+orthonormal but for its rounding, so components add), the rate is what the entropy coder really spends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64
+
+from ..errors import InputError
+from ..format.layout import AnchorRule
+from . import entropy, klt
+from .laplacian import System
+from .steps import LEVELS, level_of, step_of
+
+
+@dataclass(frozen=True, slots=True)
+class DisplacementOptions:
+    """How displacements are coded; lengths relative to the sequence's diagonal."""
+
+    step: float = 1.2e-3  # quantiser step of a component; the error is about half of it a component
+    basis_size: int | None = None  # exactly so many components; None: as many as pay
+    price: float = 0.1  # of one bit, in squared steps
+    anchor_rule: AnchorRule = AnchorRule.FARTHEST
+    anchor_count: int = 10  # more buys nothing: the quantiser keeps smooth errors small (docs/decisions)
+    anchor_weight: int = 1  # 1 to 255
+
+    def __post_init__(self) -> None:
+        finest, coarsest = step_of(LEVELS - 1), step_of(0)
+        if not finest <= self.step <= coarsest:
+            raise InputError(f"step {self.step}: give a fraction of the diagonal in {finest:.2g} .. {coarsest:g}")
+        if self.basis_size is not None and self.basis_size < 0:
+            raise InputError(f"basis size {self.basis_size}: give a number of components, 0 or more")
+        if not 0 <= self.price < 10:
+            raise InputError(f"price {self.price}: give squared steps a bit, 0 to 10")
+        if self.anchor_count < 0 or not 1 <= self.anchor_weight <= 255:
+            raise InputError(
+                f"{self.anchor_count} anchors of weight {self.anchor_weight}: give a count of 0 or more, weights 1 to 255"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Allocation:
+    """What the encoder has decided."""
+
+    basis: klt.BasisSymbols
+    levels: Int64[np.ndarray, " M"]  # of each component's step
+    symbols: Int32[np.ndarray, "R M"]  # V deltas, then l anchors
+
+
+def allocate(
+    field: Float64[np.ndarray, "V T 3"], system: System, neighbours: entropy.Neighbours, options: DisplacementOptions
+) -> Allocation:
+    """The components, steps and symbols of least distortion + price * rate."""
+    basis = klt.fit(field)
+    if options.basis_size is not None:
+        return _quantize(field, basis, np.arange(len(basis.energies)) < options.basis_size, system, options)
+    kept = basis.energies > (0.2 * options.step) ** 2
+    trial = _quantize(field, basis, kept, system, options)
+    pays = kept.copy()
+    pays[kept] = _pays(field, trial, system, neighbours, options)
+    return trial if np.array_equal(pays, kept) else _quantize(field, basis, pays, system, options)
+
+
+def _quantize(
+    field: Float64[np.ndarray, "V T 3"],
+    basis: klt.Basis,
+    kept: Bool[np.ndarray, " C"],
+    system: System,
+    options: DisplacementOptions,
+) -> Allocation:
+    """Symbols of the kept components at the step; the price of a symbol comes from how large its column's are."""
+    chosen = klt.Basis(basis.mean, np.ascontiguousarray(basis.vectors[:, kept]), basis.energies[kept])
+    rounded = klt.quantize(chosen, int(kept.sum()), options.step)
+    deltas = system.forward(klt.forward(field, klt.dequantize(rounded)))
+    levels = np.full(deltas.shape[1], level_of(options.step))
+    steps = np.full(deltas.shape[1], step_of(level_of(options.step)))
+    symbols = np.rint(deltas / steps)
+    for _ in range(2):
+        symbols = system.quantize(deltas, steps, options.price * _slopes(symbols[: len(field)]))
+    return Allocation(rounded, levels, symbols)
+
+
+def _pays(
+    field: Float64[np.ndarray, "V T 3"],
+    trial: Allocation,
+    system: System,
+    neighbours: entropy.Neighbours,
+    options: DisplacementOptions,
+) -> Bool[np.ndarray, " M"]:
+    """Which components lower distortion + price * rate."""
+    weights = klt.forward(field, klt.dequantize(trial.basis))
+    steps = np.array([step_of(level) for level in trial.levels.tolist()])
+    error = system.inverse(trial.symbols * steps) - weights
+    gain = (weights**2).sum(axis=0) - (error**2).sum(axis=0)
+    bits = entropy.weights_cost(trial.symbols[: len(field)], neighbours)
+    bits += np.log2(2.0 * np.abs(trial.symbols[len(field) :]) + 1).sum(axis=0)
+    bits += np.log2(2.0 * np.abs(trial.basis.vectors) + 1).sum(axis=1)
+    return gain > options.price * options.step**2 * bits
+
+
+def _slopes(symbols: Float64[np.ndarray, "V M"] | Int32[np.ndarray, "V M"]) -> Float64[np.ndarray, " M"]:
+    """Bits that a unit of magnitude costs where magnitudes follow a two-sided geometric law of each column's mean."""
+    mean = np.maximum(np.abs(symbols).mean(axis=0, dtype=np.float64) if len(symbols) else 1.0, 1e-3)
+    ratio = mean / (1 + np.sqrt(1 + mean**2))  # of mean = 2 r / (1 - r^2)
+    return -np.log2(ratio) * np.ones(symbols.shape[1])

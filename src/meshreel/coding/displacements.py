@@ -1,0 +1,125 @@
+"""Displacement fields <-> bytes: KLT, Laplacian coordinates, quantisation, entropy coding (paper, section 3.3.3).
+
+In: a field of V x T displacements of a base mesh as decoded, in units of the sequence's diagonal. Out: one payload:
+DisplacementHead, then for each component, strongest first, the stream of its anchors and the stream of its deltas. The
+head and the first k components decode without the rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from ..errors import FormatError, InputError
+from ..format import records
+from ..format.layout import Component, DisplacementHead
+from ..types import Mesh
+from . import entropy, klt, laplacian, quantize
+from .allocation import Allocation, DisplacementOptions, allocate
+from .steps import LEVELS, step_of
+
+MOST_FRAMES = 65_535
+MOST_BITS = 30
+
+
+def encode_displacements(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: DisplacementOptions) -> bytes:
+    """The payload of a field; decoding it needs the same base, to the bit."""
+    vertices, frames, _ = field.shape
+    if not np.isfinite(field).all() or np.abs(field).max(initial=0.0) > 1e3:
+        raise InputError("displacements must be finite and in units of the diagonal; normalise the sequence first")
+    if not 0 < frames <= MOST_FRAMES:
+        raise InputError(f"a group of {frames} frames: give 1 to {MOST_FRAMES}")
+    anchors = laplacian.anchors(options.anchor_rule, options.anchor_count, base.faces, vertices)
+    system = laplacian.System(base, anchors, options.anchor_weight)
+    neighbours = entropy.causal_neighbours(base.faces, vertices)
+    choice = allocate(field, system, neighbours, options)  # eqs. 8 and 12
+    anchor_streams = [entropy.encode_integers(column) for column in choice.symbols[vertices:].T]
+    delta_streams = entropy.encode_weights(choice.symbols[:vertices], neighbours)
+    head = _head(frames, choice, anchor_streams, delta_streams, options)
+    streams = (stream for pair in zip(anchor_streams, delta_streams, strict=True) for stream in pair)
+    return records.pack(head) + b"".join(streams)
+
+
+def decode_displacements(data: bytes, base: Mesh, components: int | None = None) -> Float64[np.ndarray, "V T 3"]:
+    """The field; with `components`, that of the first so many, for which `data` may end behind theirs."""
+    head, offset = _read_head(data)
+    count = len(head.components) if components is None else min(components, len(head.components))
+    if components is None and offset + sum(map(_size, head.components)) != len(data):
+        raise FormatError(f"displacements: {len(data)} bytes do not fit the sizes in their head; damaged or truncated")
+    vertices = len(base.vertices)
+    neighbours = entropy.causal_neighbours(base.faces, vertices)
+    anchors = laplacian.anchors(head.anchor_rule, head.anchor_count, base.faces, vertices)
+    parts = _streams(data, offset, head.components[:count])
+    deltas = entropy.decode_weights([deltas for _, deltas in parts], vertices, neighbours)
+    fixed = [entropy.decode_integers(stream, len(anchors)) for stream, _ in parts]
+    symbols = np.concatenate([deltas, np.array(fixed, dtype=np.int32).reshape(count, len(anchors)).T])
+    steps = np.array([step_of(component.step_level) for component in head.components[:count]], dtype=np.float64)
+    system = laplacian.System(base, anchors, head.anchor_weight)
+    weights = system.inverse(quantize.inverse(symbols, steps))  # eq. 13
+    return klt.inverse(weights, _read_basis(head, count))  # eq. 9
+
+
+def layer_sizes(data: bytes) -> list[int]:
+    """Bytes of the head and of each component: any sum of the first k + 1 is a prefix that decodes k components."""
+    head, offset = _read_head(data)
+    return [offset] + [_size(component) for component in head.components]
+
+
+def _head(
+    frames: int,
+    choice: Allocation,
+    anchor_streams: list[bytes],
+    delta_streams: list[bytes],
+    options: DisplacementOptions,
+) -> DisplacementHead:
+    bits = choice.basis.bits.tolist()
+    parts = zip(bits[1:], choice.levels.tolist(), anchor_streams, delta_streams, strict=True)
+    basis = np.concatenate([choice.basis.mean, choice.basis.vectors.reshape(-1)]).astype(np.int32)
+    return DisplacementHead(
+        frames=frames,
+        anchor_rule=options.anchor_rule,
+        anchor_count=options.anchor_count,
+        anchor_weight=options.anchor_weight,
+        mean_bits=bits[0],
+        components=tuple(Component(b, level, len(a), len(d)) for b, level, a, d in parts),
+        basis=entropy.encode_integers(basis),
+    )
+
+
+def _read_head(data: bytes) -> tuple[DisplacementHead, int]:
+    """The head, checked, and the offset of the first stream."""
+    head, offset = records.unpack(DisplacementHead, data)
+    if not 0 < head.frames <= MOST_FRAMES or len(head.components) > 3 * head.frames:
+        raise FormatError(f"displacements: {len(head.components)} components of {head.frames} frames")
+    if head.anchor_weight < 1 or head.mean_bits > MOST_BITS:
+        raise FormatError(f"displacements: anchor weight {head.anchor_weight}, {head.mean_bits} bits for the mean")
+    for component in head.components:
+        if component.basis_bits > MOST_BITS or component.step_level >= LEVELS:
+            raise FormatError(f"displacements: {component.basis_bits} bits, level {component.step_level}")
+    return head, offset
+
+
+def _read_basis(head: DisplacementHead, count: int) -> klt.Basis:
+    width = 3 * head.frames
+    values = entropy.decode_integers(head.basis, width * (1 + len(head.components))).astype(np.int64)
+    bits = np.array([head.mean_bits, *(component.basis_bits for component in head.components[:count])], dtype=np.int64)
+    return klt.dequantize(
+        klt.BasisSymbols(values[:width], values[width : width * (1 + count)].reshape(count, width), bits)
+    )
+
+
+def _streams(data: bytes, offset: int, components: tuple[Component, ...]) -> list[tuple[bytes, bytes]]:
+    """Each component's anchors and deltas."""
+    parts = []
+    for number, component in enumerate(components):
+        middle = offset + component.anchors_size
+        end = middle + component.deltas_size
+        if end > len(data):
+            raise FormatError(f"displacements: component {number} ends at byte {end} of {len(data)}; truncated")
+        parts.append((data[offset:middle], data[middle:end]))
+        offset = end
+    return parts
+
+
+def _size(component: Component) -> int:
+    return component.anchors_size + component.deltas_size
