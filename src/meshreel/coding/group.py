@@ -7,6 +7,7 @@ reference as decoded and subdivided, which both sides have.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from jaxtyping import Float64
@@ -16,7 +17,7 @@ from ..format.layout import DracoGroup, Form, LaplacianGroup
 from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh
-from .displacements import DisplacementOptions, decode_displacements, displacement_parts, encode_displacements, layer_ends
+from .displacements import DisplacementOptions, decode_displacements, encode_displacements, layer_sizes
 from .intra import decode_empty, decode_intra
 from .mesh import check_growth, check_step, decode_mesh, encode_mesh
 
@@ -46,8 +47,8 @@ def encode_group(
     displacements = encode_displacements(field, reference.base, options)
     record = LaplacianGroup(Form.LAPLACIAN, reference.levels, reference.step, reference.data, displacements)
     payload = pack(record)
-    start = len(payload) - len(displacements)
-    return payload, tuple(start + end for end in layer_ends(displacements))
+    sizes = layer_sizes(displacements)
+    return payload, tuple(accumulate(sizes[1:], initial=len(payload) - sum(sizes[1:])))
 
 
 def decode_group(data: bytes, frame_count: int, components: int | None = None) -> list[Mesh]:
@@ -83,7 +84,8 @@ def payload_parts(data: bytes) -> dict[str, int]:
     form = data[0] if data else None
     if form == Form.LAPLACIAN:
         record = unpack_all(LaplacianGroup, data)
-        parts = {"reference": len(record.reference)} | displacement_parts(record.displacements)
+        head, *components = layer_sizes(record.displacements)
+        parts = {"reference": len(record.reference), "basis": head, "displacements": sum(components)}
     elif form == Form.DRACO:
         parts = {"draco": sum(len(mesh) for mesh in unpack_all(DracoGroup, data).meshes)}
     else:
