@@ -110,6 +110,20 @@ def test_a_file_object_that_is_full_is_an_input_error():
         writer.add_group(0, 10, EMPTY)
 
 
+def test_a_chunk_that_failed_to_be_written_spoils_the_file_even_if_nobody_minds(tmp_path, monkeypatch):
+    class HalfFull(io.BytesIO):
+        def write(self, data: bytes) -> int:
+            super().write(data[: len(data) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(InputError, match="a chunk could not be written"), ReelWriter(tmp_path / "x", HEADER) as writer:
+        writer.add_group(0, 10, EMPTY)
+        monkeypatch.setattr(writer, "_spool", HalfFull())
+        with pytest.raises(InputError, match="No space left"):
+            writer.add_group(10, 10, BIG)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_target_that_cannot_be_is_refused_before_any_work(tmp_path):
     for path in (tmp_path, tmp_path / "none" / "out.reel"):
         with pytest.raises(InputError, match="cannot be written"), ReelWriter(path, HEADER):

@@ -101,6 +101,8 @@ class ReelWriter:
         check_index(index)
         check_header(self._header, self.frame_count)
         head = pack_head(self._header, index)
+        if self._spool.seek(0, os.SEEK_END) != sum(layer.size for entry in self._entries for layer in entry.layers):
+            raise InputError(f"{self._target}: a chunk could not be written, encode again")
         self._spool.seek(0)
         if not isinstance(self._target, Path):
             _copy(head, self._spool, self._target)
