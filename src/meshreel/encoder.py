@@ -140,10 +140,12 @@ def analyze(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions) -
     Raises NoReferenceError where no surface can be made of the frames.
     """
     reference = extract_reference(frames, centers, options.reference)
+    if reference.mesh.is_empty:
+        raise NoReferenceError("no surface is common to the frames")
     coded = code_reference(reference.mesh, options.reference_bits, options.levels)
     if coded.base.is_empty:
         raise NoReferenceError("the reference mesh has no faces left after Draco")
-    predictions = predict(reference, centers, coded.base, options.reference)
+    predictions = predict(reference, coded.base, centers, options.reference.deform)
     return coded, fit_frames(coded.base.faces, predictions, frames, options.fit)
 
 
@@ -185,7 +187,7 @@ def _encode_span(
         reference, fit = analyze(frames, centers, options)
     except NoReferenceError:
         return [_intra_only(frames, options, stages)]
-    cut = cut_at(fit.residuals, options.groups)
+    cut = cut_at(np.array([residual.distance for residual in fit.residuals]), options.groups)
     if cut is not None:
         halves = (slice(None, cut), slice(cut, None))
         return [g for h in halves for g in _encode_span(frames[h], _part(centers, h), options, stages)]

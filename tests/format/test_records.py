@@ -1,4 +1,4 @@
-"""Laws of records: unpack undoes pack; bytes that are no record raise FormatError, values that do not fit InputError."""
+"""Laws of records: unpack undoes pack; bad bytes raise FormatError, values that do not fit InputError."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import IntEnum
 from typing import Annotated
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.errors import FormatError, InputError
@@ -17,6 +17,9 @@ from meshreel.format.kinds import F32, F64, I16, I32, I64, U8, U16, U32, U64, Ar
 from meshreel.format.layout import PAYLOADS, RECORDS, Layer
 from meshreel.format.records import Nested, least_size, pack, unpack, unpack_all
 from tests.format.strategies import records
+
+# The run-time type checker draws items of tuples at random, which hypothesis takes for the test's own doing.
+pytestmark = pytest.mark.filterwarnings("ignore:Do not use the `random` module")
 
 
 class Fruit(IntEnum):
@@ -67,6 +70,7 @@ class One:
     layers: Annotated[tuple[Layer, ...], List(U8, Nested(Layer)), ""] = ()
 
 
+@settings(max_examples=60, deadline=None)
 @given(records(Everything))
 def test_unpack_undoes_pack(record):
     assert unpack_all(Everything, pack(record)) == record
@@ -74,6 +78,7 @@ def test_unpack_undoes_pack(record):
 
 @pytest.mark.parametrize("record_type", RECORDS + PAYLOADS, ids=lambda record: record.__name__)
 def test_unpack_undoes_pack_for_every_record_of_the_layout(record_type):
+    @settings(max_examples=25, deadline=None)
     @given(records(record_type))
     def law(record):
         data = pack(record)
@@ -83,6 +88,7 @@ def test_unpack_undoes_pack_for_every_record_of_the_layout(record_type):
     law()
 
 
+@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_every_truncation_is_a_format_error(data):
     record = data.draw(records(One))
@@ -92,6 +98,7 @@ def test_every_truncation_is_a_format_error(data):
         unpack(One, whole[:cut])
 
 
+@settings(max_examples=60, deadline=None)
 @given(st.binary(max_size=60))
 def test_any_bytes_give_a_record_or_a_format_error(data):
     for record_type in (Everything, *RECORDS, *PAYLOADS):

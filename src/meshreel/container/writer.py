@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, BinaryIO
+from typing import IO, Any, Protocol, runtime_checkable
 
 from ..errors import FormatError, InputError
 from ..format.checks import check_header, check_index, parse_metadata
@@ -23,14 +23,23 @@ from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, I
 from ..format.records import least_size, pack
 
 
+@runtime_checkable
+class Sink(Protocol):
+    """What bytes can be written to: io.BytesIO, an open binary file."""
+
+    def write(self, data: bytes, /) -> Any: ...
+
+    def flush(self) -> Any: ...
+
+
 class ReelWriter:
     """A context manager: chunks go in by `add_*`, and the file appears when the block ends without an exception.
 
-    The target is a path, or a binary file object such as io.BytesIO that is given the bytes. InputError where it cannot
+    The target is a path, or a Sink such as io.BytesIO that is given the bytes. InputError where it cannot
     be written (no such folder, disk full), where no frame was added, or where a value cannot be stored.
     """
 
-    def __init__(self, target: str | Path | BinaryIO, header: Header) -> None:
+    def __init__(self, target: str | Path | Sink, header: Header) -> None:
         self._target = Path(target) if isinstance(target, str | Path) else target
         self.header = header  # may be replaced until the block ends: what was measured goes into its metadata
         self._entries: list[IndexEntry] = []
@@ -75,8 +84,9 @@ class ReelWriter:
             raise InputError(f"group at frame {first_frame}: {frame_count} frames, add at least one")
         if any(not 0 <= chunk < len(self._entries) or self._entries[chunk].frames for chunk in depends_on):
             raise InputError(f"group at frame {first_frame}: depends on {tuple(depends_on)}, name static chunks only")
-        layered = _layers(payload, layers)
-        return self._add(IndexEntry(ChunkKind.GROUP, _form(payload), frame_count, tuple(depends_on), layered), payload)
+        form = _form(payload)
+        entry = IndexEntry(ChunkKind.GROUP, form, frame_count, tuple(depends_on), _layers(payload, layers))
+        return self._add(entry, payload)
 
     def _add(self, entry: IndexEntry, payload: bytes) -> int:
         pack(entry)  # refuses what does not fit its field
@@ -91,6 +101,8 @@ class ReelWriter:
         check_index(index)
         check_header(self.header, self.frame_count)
         head = pack_head(self.header, index)
+        if self._spool.seek(0, os.SEEK_END) != sum(layer.size for entry in self._entries for layer in entry.layers):
+            raise InputError(f"{self._target}: a chunk could not be written, encode again")
         self._spool.seek(0)
         if not isinstance(self._target, Path):
             _copy(head, self._spool, self._target)
@@ -113,7 +125,7 @@ def pack_head(header: Header, index: Index) -> bytes:
     return data + pack(Checksum(zlib.crc32(data)))
 
 
-def _open_spool(target: Path | BinaryIO) -> IO[bytes]:
+def _open_spool(target: Path | Sink) -> IO[bytes]:
     if not isinstance(target, Path):
         return tempfile.TemporaryFile()
     if target.is_dir():
@@ -121,7 +133,7 @@ def _open_spool(target: Path | BinaryIO) -> IO[bytes]:
     return tempfile.TemporaryFile(dir=target.parent)
 
 
-def _copy(head: bytes, spool: IO[bytes], target: IO[bytes]) -> None:
+def _copy(head: bytes, spool: IO[bytes], target: Sink) -> None:
     target.write(head)
     shutil.copyfileobj(spool, target)
     target.flush()
@@ -144,7 +156,7 @@ def _layers(payload: bytes, ends: Sequence[int]) -> tuple[Layer, ...]:
 
 
 @contextmanager
-def _as_input_error(target: Path | BinaryIO) -> Iterator[None]:
+def _as_input_error(target: Path | Sink) -> Iterator[None]:
     """What goes wrong inside is the caller's to mend: an InputError that names the target."""
     name = target if isinstance(target, Path) else "the output"
     try:

@@ -1,0 +1,144 @@
+"""What was written is read again, by the byte ranges that are needed and no others."""
+
+from __future__ import annotations
+
+import io
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from meshreel.container.reader import FIRST_REQUEST, ReelReader
+from meshreel.container.sources import BytesSource, FileSource, Source
+from meshreel.container.writer import ReelWriter
+from meshreel.errors import InputError
+from meshreel.format.layout import ChunkKind, EmptyGroup, Form
+from meshreel.format.records import pack
+from tests.container.files import FRAMES, HEADER, PAYLOADS, small_file
+
+
+class CountingSource:
+    """Remembers which ranges were asked for."""
+
+    def __init__(self, data: bytes) -> None:
+        self.inner = BytesSource(data)
+        self.ranges: list[tuple[int, int]] = []
+
+    @property
+    def size(self) -> int:
+        return self.inner.size
+
+    def get_bytes(self, offset: int, length: int) -> bytes:
+        self.ranges.append((offset, length))
+        return self.inner.get_bytes(offset, length)
+
+
+def test_every_chunk_comes_back():
+    data = small_file()
+    reader = ReelReader(BytesSource(data))
+    assert tuple(reader.read_chunk(number) for number in range(4)) == PAYLOADS
+    assert reader.header == HEADER
+    assert reader.metadata == {"quality": 50}
+    assert (reader.frame_count, reader.frame_rate, reader.size) == (FRAMES, 30.0, len(data))
+    assert reader.missing == ()
+
+
+def test_the_index_says_what_each_chunk_is():
+    reader = ReelReader(BytesSource(small_file()))
+    background, laplacian, empty, draco = reader.chunks
+    assert reader.groups == (laplacian, empty, draco)
+    assert background.kind == ChunkKind.STATIC
+    assert [chunk.form for chunk in reader.groups] == [Form.LAPLACIAN, Form.EMPTY, Form.DRACO]
+    assert [(chunk.first_frame, chunk.frame_count) for chunk in reader.groups] == [(0, 10), (10, 5), (15, 3)]
+    assert laplacian.depends_on == (0,)
+    assert background.offset == reader.head_size
+    assert [chunk.size for chunk in reader.chunks] == [len(payload) for payload in PAYLOADS]
+    assert str(draco) == "chunk 3 (frames 15 to 17)"
+
+
+@pytest.mark.parametrize(("frame", "number"), [(0, 1), (9, 1), (10, 2), (14, 2), (15, 3), (17, 3)])
+def test_a_frame_is_found_in_its_group(frame, number):
+    assert ReelReader(BytesSource(small_file())).chunk_of_frame(frame).number == number
+
+
+@pytest.mark.parametrize("frame", [-1, FRAMES])
+def test_a_frame_that_is_not_there_is_an_index_error(frame):
+    reader = ReelReader(BytesSource(small_file()))
+    with pytest.raises(IndexError, match="frames 0 to 17"):
+        reader.chunk_of_frame(frame)
+    with pytest.raises(IndexError):
+        reader.timestamp(frame)
+
+
+def test_the_first_layers_are_a_prefix_of_the_chunk():
+    reader = ReelReader(BytesSource(small_file()))
+    assert [len(reader.read_chunk(1, layers)) for layers in (0, 1, 2, 3, 9)] == [
+        20,
+        20,
+        30,
+        len(PAYLOADS[1]),
+        len(PAYLOADS[1]),
+    ]
+    assert reader.read_chunk(1, 2) == PAYLOADS[1][:30]
+
+
+def test_a_chunk_costs_one_request_of_its_own_bytes():
+    source = CountingSource(small_file())
+    assert isinstance(source, Source)
+    reader = ReelReader(source)
+    assert source.ranges == [(0, source.size)]
+    chunk = reader.chunks[1]
+    reader.read_chunk(3)
+    reader.read_chunk(1, 2)
+    assert source.ranges[1:] == [(reader.chunks[3].offset, len(PAYLOADS[3])), (chunk.offset, 30)]
+
+
+def test_a_long_head_costs_one_more_request():
+    header = replace(HEADER, metadata=json.dumps({"note": "x" * FIRST_REQUEST}))
+    source = CountingSource(small_file(header))
+    reader = ReelReader(source)
+    assert source.ranges == [(0, FIRST_REQUEST), (FIRST_REQUEST, reader.head_size - FIRST_REQUEST)]
+    assert reader.read_chunk(3) == PAYLOADS[3]
+
+
+def test_among_many_groups_each_frame_is_found():
+    file = io.BytesIO()
+    with ReelWriter(file, HEADER) as writer:
+        for number in range(100):
+            writer.add_group(10 * number, 10, pack(EmptyGroup(Form.EMPTY)))
+    reader = ReelReader(BytesSource(file.getvalue()))
+    assert [reader.chunk_of_frame(frame).number for frame in range(1000)] == [frame // 10 for frame in range(1000)]
+
+
+def test_times_are_uniform_from_the_first():
+    reader = ReelReader(BytesSource(small_file()))
+    assert [reader.timestamp(frame) for frame in (0, 3, 15)] == [1.0, 1.1, 1.5]
+
+
+def test_times_may_be_uneven():
+    intervals = (40_000, 10_000, *[50_000] * 15)
+    reader = ReelReader(BytesSource(small_file(replace(HEADER, intervals=intervals))))
+    assert [reader.timestamp(frame) for frame in (0, 1, 2, 17)] == [1.0, 1.04, 1.05, 1.8]
+
+
+def test_a_file_on_disk_reads_like_one_in_memory(tmp_path):
+    path = tmp_path / "small.reel"
+    path.write_bytes(small_file())
+    with FileSource(path) as source:
+        assert isinstance(source, Source)
+        assert ReelReader(source).read_chunk(3) == PAYLOADS[3]
+        assert source.get_bytes(source.size - 3, 100) == small_file()[-3:]
+
+
+def test_a_missing_file_or_a_folder_is_an_input_error(tmp_path):
+    for path in (tmp_path / "none.reel", tmp_path):
+        with pytest.raises(InputError, match="cannot be opened"):
+            FileSource(path)
+
+
+def test_reading_imports_nothing_but_the_standard_library():
+    code = "import sys, json, meshreel.container.reader; print(json.dumps(sorted(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"scipy", "open3d", "torch", "igl", "skimage", "trimesh"} & set(json.loads(result.stdout))

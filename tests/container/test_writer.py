@@ -1,0 +1,187 @@
+"""A file appears whole or not at all, and bad calls are refused where they are made."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import signal
+import subprocess
+import sys
+import tracemalloc
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from meshreel.container.reader import ReelReader
+from meshreel.container.sources import BytesSource, FileSource
+from meshreel.container.writer import ReelWriter
+from meshreel.errors import InputError
+from meshreel.format.layout import EmptyGroup, Form
+from meshreel.format.records import pack
+from tests.container.files import HEADER, PAYLOADS, small_file
+
+EMPTY = pack(EmptyGroup(Form.EMPTY))
+BIG = bytes([Form.DRACO]) + bytes(999_999)
+
+IN_A_CHILD = """
+import os, resource, signal, sys
+from meshreel.container.writer import ReelWriter
+from meshreel.errors import InputError
+from tests.container.files import HEADER
+limit, path = int(sys.argv[1]), sys.argv[2]
+if limit:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+try:
+    with ReelWriter(path, HEADER) as writer:
+        for group in range(3):
+            writer.add_group(10 * group, 10, bytes([3]) + bytes(999_999))
+        if not limit:
+            os.kill(os.getpid(), signal.SIGKILL)
+except InputError as error:
+    sys.exit(str(error))
+"""
+
+
+def in_a_child(limit: int, path: Path) -> subprocess.CompletedProcess[str]:
+    """Runs a writer of 3 MB that may write `limit` bytes a file, or is killed before it ends."""
+    root = Path(__file__).resolve().parents[2]
+    environment = os.environ | {"PYTHONPATH": f"{root / 'src'}{os.pathsep}{root}"}
+    command = [sys.executable, "-c", IN_A_CHILD, str(limit), str(path)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True)
+
+
+def test_a_file_and_memory_get_the_same_bytes(tmp_path):
+    path = tmp_path / "out.reel"
+    with ReelWriter(path, HEADER) as writer:
+        writer.add_static(PAYLOADS[0])
+        writer.add_group(0, 10, PAYLOADS[1], layers=(20, 30, len(PAYLOADS[1])), depends_on=(0,))
+        writer.add_group(10, 5, PAYLOADS[2])
+        assert not path.exists()
+        writer.add_group(15, 3, PAYLOADS[3])
+    assert path.read_bytes() == small_file()
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_exception_leaves_the_old_file_and_no_other(tmp_path):
+    path = tmp_path / "out.reel"
+    path.write_bytes(b"old")
+    with pytest.raises(KeyboardInterrupt), ReelWriter(path, HEADER) as writer:
+        writer.add_group(0, 10, BIG)
+        raise KeyboardInterrupt
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_an_exception_while_the_file_is_put_together_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(_: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupted)
+    with pytest.raises(KeyboardInterrupt), ReelWriter(tmp_path / "out.reel", HEADER) as writer:
+        writer.add_group(0, 10, BIG)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_encoder_leaves_nothing(tmp_path):
+    assert in_a_child(0, tmp_path / "out.reel").returncode == -signal.SIGKILL
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("limit", [500_000, 3_000_050])
+def test_a_disk_that_fills_up_is_an_input_error_and_leaves_nothing(tmp_path, limit):
+    result = in_a_child(limit, tmp_path / "out.reel")  # full while spooling, full while putting together
+    assert result.returncode == 1
+    assert "out.reel: cannot be written: File too large" in result.stderr
+    assert len(result.stderr.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_object_that_is_full_is_an_input_error():
+    class Full(io.BytesIO):
+        def write(self, _: object) -> int:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with (
+        pytest.raises(InputError, match="the output: cannot be written: No space left"),
+        ReelWriter(Full(), HEADER) as writer,
+    ):
+        writer.add_group(0, 10, EMPTY)
+
+
+def test_a_chunk_that_failed_to_be_written_spoils_the_file_even_if_nobody_minds(tmp_path, monkeypatch):
+    class HalfFull(io.BytesIO):
+        def write(self, data: bytes) -> int:
+            super().write(data[: len(data) // 2])
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(InputError, match="a chunk could not be written"), ReelWriter(tmp_path / "x", HEADER) as writer:
+        writer.add_group(0, 10, EMPTY)
+        monkeypatch.setattr(writer, "_spool", HalfFull())
+        with pytest.raises(InputError, match="No space left"):
+            writer.add_group(10, 10, BIG)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_target_that_cannot_be_is_refused_before_any_work(tmp_path):
+    for path in (tmp_path, tmp_path / "none" / "out.reel"):
+        with pytest.raises(InputError, match="cannot be written"), ReelWriter(path, HEADER):
+            raise AssertionError("the block must not run")
+
+
+@pytest.mark.parametrize(
+    "change", [{"metadata": "no JSON"}, {"metadata": "é" * 40_000}, {"scale": 0.0}, {"intervals": (1,)}]
+)
+def test_a_header_that_readers_would_refuse_is_an_input_error(change):
+    file = io.BytesIO()
+    with pytest.raises(InputError), ReelWriter(file, replace(HEADER, **change)) as writer:
+        writer.add_group(0, 10, EMPTY)
+    assert file.getvalue() == b""
+
+
+def test_a_file_without_frames_is_an_input_error(tmp_path):
+    with pytest.raises(InputError, match="no frames"), ReelWriter(tmp_path / "out.reel", HEADER) as writer:
+        writer.add_static(EMPTY)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"first_frame": 3}, "frame 10 comes next"),
+        ({"frame_count": 0}, "add at least one"),
+        ({"frame_count": 65_536}, "IndexEntry.frames"),
+        ({"payload": b""}, "first byte must be a Form"),
+        ({"payload": b"\xffdata"}, "first byte must be a Form"),
+        ({"layers": (5, 5, 10)}, "must rise"),
+        ({"layers": (0, 10)}, "must rise"),
+        ({"layers": (5,)}, "payload's 10 bytes"),
+        ({"depends_on": (1,)}, "static chunks only"),
+        ({"depends_on": (2,)}, "static chunks only"),
+        ({"depends_on": (-1,)}, "static chunks only"),
+    ],
+)
+def test_a_group_that_cannot_be_is_refused_and_the_file_goes_on(arguments, message):
+    file = io.BytesIO()
+    good = {"first_frame": 10, "frame_count": 5, "payload": b"\x03" + bytes(9), "layers": (4, 10), "depends_on": (0,)}
+    with ReelWriter(file, HEADER) as writer:
+        assert writer.add_static(EMPTY) == 0
+        assert writer.add_group(0, 10, EMPTY) == 1
+        with pytest.raises(InputError, match=message):
+            writer.add_group(**(good | arguments))
+        assert writer.add_group(**good) == 2
+    assert ReelReader(BytesSource(file.getvalue())).frame_count == 15
+
+
+def test_memory_does_not_grow_with_the_file(tmp_path):
+    path = tmp_path / "out.reel"
+    tracemalloc.start()
+    with ReelWriter(path, HEADER) as writer:
+        for group in range(30):
+            writer.add_group(10 * group, 10, BIG)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 3_000_000
+    with FileSource(path) as source:
+        assert ReelReader(source).read_chunk(29) == BIG
