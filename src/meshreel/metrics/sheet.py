@@ -24,6 +24,8 @@ from .render import View, Window, look
 from .samples import box_center, used_surface
 
 _COLUMNS = ("original", "decoded", "error")
+_LEFT, _RIGHT, _TOP, _GAP = 64, 100, 32, 8  # pixels around and between the pictures
+_DPI = 100
 _INVENTED = (1.0, 0.0, 1.0)  # magenta
 _LEAST_LIMIT = 1e-3  # % or mm; under it the color bar would show rounding
 
@@ -76,7 +78,7 @@ def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOp
     figure = _draw(rows, options)
     temporary = path.with_name(path.name + ".part")
     try:
-        figure.savefig(temporary, format="png", dpi=100)
+        figure.savefig(temporary, format="png", dpi=_DPI)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
@@ -128,22 +130,27 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
     from matplotlib.figure import Figure
 
     height, width = rows[0].original.window.shape
+    size = np.array([_LEFT + 3 * (width + _GAP) + _RIGHT, _TOP + len(rows) * (height + _GAP)])
     limit = options.limit or _limit(rows)
-    figure = Figure(figsize=((3 * width + 260) / 100, (len(rows) * (height + 8) + 40) / 100), layout="constrained")
+    figure = Figure(figsize=tuple(size / _DPI), dpi=_DPI)
     FigureCanvasAgg(figure)
-    axes = figure.subplots(len(rows), 3, squeeze=False)
+
+    def axes_at(left: int, top: int, wide: int, high: int) -> Any:  # pixels, so that pictures keep theirs
+        return figure.add_axes((left / size[0], 1 - (top + high) / size[1], wide / size[0], high / size[1]))
+
     image: Any = None
-    for line, row in zip(axes, rows, strict=True):
-        line[0].imshow(row.original.colors)
-        line[1].imshow(row.decoded.colors)
-        image = _heat_map(line[2], row, limit)
-        line[0].set_ylabel(row.label)
-        for axis in line:
-            axis.set(xticks=[], yticks=[])
-    for axis, title in zip(axes[0], _COLUMNS, strict=True):
-        axis.set_title(title)
+    for i, row in enumerate(rows):
+        top = _TOP + i * (height + _GAP)
+        panels = [axes_at(_LEFT + k * (width + _GAP), top, width, height) for k in range(3)]
+        panels[0].imshow(row.original.colors)
+        panels[1].imshow(row.decoded.colors)
+        image = _heat_map(panels[2], row, limit)
+        panels[0].set_ylabel(row.label)
+        for panel, title in zip(panels, _COLUMNS, strict=True):
+            panel.set(xticks=[], yticks=[], title=title if i == 0 else "")
     unit = "mm" if options.unit == "mm" else "% of the diagonal"
-    figure.colorbar(image, ax=axes, label=f"distance to the decoded surface, {unit}", extend="max", shrink=0.8)
+    bar = axes_at(int(size[0]) - _RIGHT + _GAP, _TOP, 16, height)
+    figure.colorbar(image, cax=bar, label=f"distance to the decoded surface, {unit}", extend="max")
     return figure
 
 
