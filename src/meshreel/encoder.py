@@ -187,7 +187,7 @@ def _encode_span(
         reference, fit = analyze(frames, centers, options)
     except NoReferenceError:
         return [_intra_only(frames, options, stages)]
-    cut = cut_at(np.array([residual.distance for residual in fit.residuals]), options.groups)
+    cut = cut_at(np.array([residual.rms for residual in fit.residuals]), options.groups)
     if cut is not None:
         halves = (slice(None, cut), slice(cut, None))
         return [g for h in halves for g in _encode_span(frames[h], _part(centers, h), options, stages)]

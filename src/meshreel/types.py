@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64, Int32
@@ -45,6 +45,7 @@ class Mesh:
         return float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
 
 
+@runtime_checkable
 class MeshSequence(Protocol):
     """Frames read one at a time: `len`, `sequence[i]`, iteration and a frame rate; never all in memory."""
 
