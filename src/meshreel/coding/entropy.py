@@ -65,7 +65,7 @@ def weights_cost(symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours) -> F
 def contexts(
     symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours
 ) -> tuple[UInt8[np.ndarray, "N M"], UInt8[np.ndarray, "N M"]]:
-    """The context in which the coder sees each symbol's magnitude (< 15) and its sign (< 27)."""
+    """The context in which the coder sees each symbol's magnitude (< 15) and its sign (< 48; 0 for a zero)."""
     columns = _columns(symbols)
     sizes, signs = np.zeros(columns.shape, np.uint8), np.zeros(columns.shape, np.uint8)
     _core.weight_contexts(columns, neighbours.indptr, neighbours.indices, sizes, signs)
