@@ -16,7 +16,7 @@ from meshreel.errors import FormatError
 INT32 = st.integers(-(2**31), 2**31 - 1)
 Body = tuple[np.ndarray, entropy.Neighbours, list[bytes]]
 GOLDEN_INTEGERS = "ff3e06a8c57c7dc8fef3bc63d3022fff"
-GOLDEN_WEIGHTS = ["13b8e1506fac55", "02520e870f4b315ebfb7"]
+GOLDEN_WEIGHTS = ["25b64d5a7fbd0b", "04860f25fe383fc0bb47"]
 SMALL_OR_ANY = st.one_of(st.integers(-3, 3), st.integers(-3000, 3000), INT32)
 
 
@@ -87,6 +87,14 @@ def test_the_entropy_of_the_contexts_is_what_an_ideal_coder_needs(body: Body) ->
         bits += _ans_bits(np.abs(column), sizes[:, c]) + _ans_bits((column < 0)[moves], signs[moves, c])
     assert bits == pytest.approx(_context_entropy(symbols, neighbours), rel=0.005)
     assert 8 * sum(map(len, streams)) <= 1.03 * bits
+
+
+def test_columns_that_move_together_predict_each_other(body: Body) -> None:
+    symbols, neighbours, streams = body
+    lead = symbols[:, :1]
+    pair = entropy.weights_cost(np.concatenate([lead, -lead], axis=1), neighbours)
+    assert pair[1] < 0.5 * pair[0]
+    assert pair[0] == 8 * len(streams[0])
 
 
 def test_the_cost_is_the_length_of_the_streams(body: Body) -> None:

@@ -34,7 +34,7 @@ struct meshreel_weights {
 int meshreel_encode_weights(const struct meshreel_weights* weights, uint8_t* out, size_t capacity, size_t* sizes);
 // Fills weights->symbols; on MESHREEL_ENTROPY_BAD_STREAM *column is the one that failed.
 int meshreel_decode_weights(const struct meshreel_weights* weights, const uint8_t* data, const size_t* sizes, size_t* column);
-// The contexts the coder sees: `classes` of the magnitude (< 16) and `signs` (< 27), in the order of the symbols.
+// The contexts the coder sees: `classes` of the magnitude (< 15) and `signs` (< 48; 0 for a zero), in the order of the symbols.
 int meshreel_weight_contexts(const struct meshreel_weights* weights, uint8_t* classes, uint8_t* signs);
 
 int meshreel_encode_integers(const int32_t* values, size_t count, uint8_t* out, size_t capacity, size_t* size);

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace meshreel {
+namespace meshreel::entropy {
 
 constexpr uint32_t kTop = 1u << 24;  // the range never stays below
 constexpr uint32_t kSlowMemory = 300;  // symbols: weights are not stationary over a mesh, so a model forgets,
@@ -158,4 +158,4 @@ private:
     uint32_t range_ = 0xFFFFFFFFu;
 };
 
-}  // namespace meshreel
+}  // namespace meshreel::entropy

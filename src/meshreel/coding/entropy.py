@@ -33,8 +33,9 @@ def causal_neighbours(faces: Int32[np.ndarray, "F 3"], count: int) -> Neighbours
     if len(f) and (f.min() < 0 or f.max() >= count):
         raise FormatError(f"a face names vertex {int(f.max())} or {int(f.min())} of {count}; the mesh is damaged")
     pairs = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
-    high, low = pairs.max(axis=1, initial=0), pairs.min(axis=1, initial=count)
-    keys = np.unique((high * count + low)[high != low])
+    high, low = np.maximum(pairs[:, 0], pairs[:, 1]), np.minimum(pairs[:, 0], pairs[:, 1])
+    keys = np.sort((high * count + low)[high != low])
+    keys = keys[np.concatenate([[True], keys[1:] != keys[:-1]])[: len(keys)]]  # np.unique takes ten times as long
     counts = np.bincount(keys // max(count, 1), minlength=count)
     indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     return Neighbours(indptr, (keys % max(count, 1)).astype(np.int32))
@@ -65,7 +66,7 @@ def weights_cost(symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours) -> F
 def contexts(
     symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours
 ) -> tuple[UInt8[np.ndarray, "N M"], UInt8[np.ndarray, "N M"]]:
-    """The context in which the coder sees each symbol's magnitude (< 15) and its sign (< 27)."""
+    """The context in which the coder sees each symbol's magnitude (< 15) and its sign (< 48; 0 for a zero)."""
     columns = _columns(symbols)
     sizes, signs = np.zeros(columns.shape, np.uint8), np.zeros(columns.shape, np.uint8)
     _core.weight_contexts(columns, neighbours.indptr, neighbours.indices, sizes, signs)
