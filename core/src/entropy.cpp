@@ -37,7 +37,7 @@ constexpr std::array<uint32_t, kNearest + 1> sixteenths() {
 }
 constexpr auto kSixteenths = sixteenths();
 
-constexpr uint64_t kFirstRatio = 1u << 11;  // a column like the past: that counts about twofold, in 1 / 256 of a step
+constexpr uint64_t kFirstRatio = 1u << 11;  // a column about as large as the one before
 
 int sign(int value) { return (value > 0) - (value < 0); }
 int clamped(int32_t value) { return value > kClamp ? kClamp : value < -kClamp ? -kClamp : value; }
@@ -115,8 +115,12 @@ public:
             total += near;
         }
         uint32_t expected;  // sixteenths
-        if (end > begin) expected = sum * kSixteenths[end - begin] >> 16;
-        else expected = 8 * ((v > 0 ? magnitude(current_[v - 1]) : 0) + (v > 1 ? magnitude(current_[v - 2]) : 0));
+        if (end > begin) {
+            expected = sum * kSixteenths[end - begin] >> 16;
+        } else {  // a vertex of the mesh before its subdivision: those coded just before lie near
+            expected = 8 * ((v > 0 ? magnitude(current_[v - 1]) : 0) + (v > 1 ? magnitude(current_[v - 2]) : 0));
+            total = v > 0 ? current_[v - 1] : 0;
+        }
         if (column_ > 0) expected = (2 * expected + 3 * scaled(past_[v])) / 5;
         const int size = kClassOf[expected < kLastBegin ? expected : kLastBegin];
         return {size, (sign(total) + 1) * 9 + signs_[v], past_[v]};
@@ -140,7 +144,7 @@ public:
         }
         for (size_t v = 0; v < weights_.count; ++v) {
             const uint32_t around = degrees_[v] ? 16 * sums_[v] / degrees_[v] : 0;
-            past_[v] = past_[v] * 45 / 64 + 16 * (32 * magnitude(current_[v]) + around) / 3;
+            past_[v] = past_[v] * 45 / 64 + 16 * (128 * magnitude(current_[v]) + around) / 9;
             signs_[v] = static_cast<uint8_t>((sign(current_[v]) + 1) * 3 + signs_[v] / 3);
             sums_[v] = 0;
         }
@@ -153,13 +157,13 @@ public:
 private:
     uint32_t scaled(uint32_t past) const { return static_cast<uint32_t>((static_cast<uint64_t>(past) * ratio_) >> 16); }
 
-    // The past says where a column is large; how large against the past is learned, with a memory of 1000 vertices.
+    // The past says where a column is large; how large against the past is learned, with a memory of 400 vertices.
     void rescale() {
         age_ = 0;
         ratio_ = ((seen_ << 16) + 1024 * kFirstRatio) / (expected_ + 1024);
         if (ratio_ > 1u << 20) ratio_ = 1u << 20;
-        seen_ -= seen_ / 16;
-        expected_ -= expected_ / 16;
+        seen_ -= seen_ / 6;
+        expected_ -= expected_ / 6;
     }
 
     const meshreel_weights& weights_;

@@ -15,8 +15,8 @@ from meshreel.errors import FormatError
 
 INT32 = st.integers(-(2**31), 2**31 - 1)
 Body = tuple[np.ndarray, entropy.Neighbours, list[bytes]]
-GOLDEN_INTEGERS = "fe9525f1d3603bb68e97bec8dfaa6d51"
-GOLDEN_WEIGHTS = ["13d1ff48b3d89f", "026a2fe8bb0fcd5d8c1fd0"]
+GOLDEN_INTEGERS = "ff3e06a8c57c7dc8fef3bc63d3022fff"
+GOLDEN_WEIGHTS = ["13b8e1506fac55", "02520e870f4b315ebfb7"]
 SMALL_OR_ANY = st.one_of(st.integers(-3, 3), st.integers(-3000, 3000), INT32)
 
 
