@@ -99,7 +99,7 @@ def test_degenerate_faces_leave_all_weights_positive_finite_and_bounded() -> Non
 @pytest.mark.parametrize("step", [0.1, 0.001])
 def test_shaped_rounding_keeps_the_error_in_proportion_to_the_step(base: Mesh, step: float) -> None:
     indices = laplacian.anchors(AnchorRule.FARTHEST, 1, base.faces, len(base.vertices))
-    system = laplacian.System(base, indices, 4.0)
+    system = laplacian.System(base, indices, 4)
     rng = np.random.default_rng(3)
     weights = np.cumsum(rng.normal(size=(len(base.vertices), 4)), axis=0) * 0.01
     deltas = system.forward(weights)

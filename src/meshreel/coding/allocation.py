@@ -1,4 +1,4 @@
-"""Which components a displacement field gets and how fine each is (encoder; reverse water-filling, paper section 3.3.3).
+"""Which components a displacement field gets, and its symbols (encoder; reverse water-filling, paper section 3.3.3).
 
 In: a field, its base's Laplacian system. Out: the basis as transmitted and each component's step and symbols, such that
 distortion + price * rate is least: the distortion is the squared error after the least-squares inverse (the basis is
@@ -25,7 +25,7 @@ class DisplacementOptions:
 
     step: float = 1.2e-3  # quantiser step of a component; the error is about half of it a component
     basis_size: int | None = None  # exactly so many components; None: as many as pay
-    price: float = 0.1  # of one bit, in squared steps
+    price: float = 0.5  # of one bit, in squared steps
     anchor_rule: AnchorRule = AnchorRule.FARTHEST
     anchor_count: int = 10  # more buys nothing: the quantiser keeps smooth errors small (docs/decisions)
     anchor_weight: int = 1  # 1 to 255
@@ -40,7 +40,7 @@ class DisplacementOptions:
             raise InputError(f"price {self.price}: give squared steps a bit, 0 to 10")
         if self.anchor_count < 0 or not 1 <= self.anchor_weight <= 255:
             raise InputError(
-                f"{self.anchor_count} anchors of weight {self.anchor_weight}: give a count of 0 or more, weights 1 to 255"
+                f"{self.anchor_count} anchors of weight {self.anchor_weight}: give 0 or more, weighing 1 to 255"
             )
 
 

@@ -8,7 +8,7 @@ head and the first k components decode without the rest.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64, Int32
+from jaxtyping import Float64
 
 from ..errors import FormatError, InputError
 from ..format import records
@@ -35,7 +35,7 @@ def encode_displacements(field: Float64[np.ndarray, "V T 3"], base: Mesh, option
     choice = allocate(field, system, neighbours, options)  # eqs. 8 and 12
     anchor_streams = [entropy.encode_integers(column) for column in choice.symbols[vertices:].T]
     delta_streams = entropy.encode_weights(choice.symbols[:vertices], neighbours)
-    head = _head(frames, choice, anchor_streams, delta_streams, options)
+    head = _head(field, choice, anchor_streams, delta_streams, options)
     streams = (stream for pair in zip(anchor_streams, delta_streams, strict=True) for stream in pair)
     return records.pack(head) + b"".join(streams)
 
@@ -47,6 +47,8 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
     if components is None and offset + sum(map(_size, head.components)) != len(data):
         raise FormatError(f"displacements: {len(data)} bytes do not fit the sizes in their head; damaged or truncated")
     vertices = len(base.vertices)
+    if head.anchor_count > vertices or not np.isfinite(base.vertices).all():
+        raise FormatError(f"displacements: {head.anchor_count} anchors among {vertices} vertices, or a base not finite")
     neighbours = entropy.causal_neighbours(base.faces, vertices)
     anchors = laplacian.anchors(head.anchor_rule, head.anchor_count, base.faces, vertices)
     parts = _streams(data, offset, head.components[:count])
@@ -66,7 +68,7 @@ def layer_sizes(data: bytes) -> list[int]:
 
 
 def _head(
-    frames: int,
+    field: Float64[np.ndarray, "V T 3"],
     choice: Allocation,
     anchor_streams: list[bytes],
     delta_streams: list[bytes],
@@ -76,9 +78,9 @@ def _head(
     parts = zip(bits[1:], choice.levels.tolist(), anchor_streams, delta_streams, strict=True)
     basis = np.concatenate([choice.basis.mean, choice.basis.vectors.reshape(-1)]).astype(np.int32)
     return DisplacementHead(
-        frames=frames,
+        frames=field.shape[1],
         anchor_rule=options.anchor_rule,
-        anchor_count=options.anchor_count,
+        anchor_count=min(options.anchor_count, len(field)),
         anchor_weight=options.anchor_weight,
         mean_bits=bits[0],
         components=tuple(Component(b, level, len(a), len(d)) for b, level, a, d in parts),

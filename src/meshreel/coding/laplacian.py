@@ -41,8 +41,8 @@ def anchors(rule: AnchorRule, count: int, faces: Int32[np.ndarray, "F 3"], verti
 class System:
     """The extended Laplacian of one base mesh, factorised once and used for any number of columns."""
 
-    def __init__(self, base: Mesh, anchors: Int32[np.ndarray, " l"], weight: float = 1.0) -> None:
-        self._core = _core.Laplacian(base.vertices, base.faces, anchors, weight)
+    def __init__(self, base: Mesh, anchors: Int32[np.ndarray, " l"], weight: int = 1) -> None:
+        self._core = _core.Laplacian(base.vertices, base.faces, anchors, float(weight))
 
     def forward(self, weights: Float64[np.ndarray, "V M"]) -> Float64[np.ndarray, "R M"]:
         """Deltas, anchors last (eq. 12)."""

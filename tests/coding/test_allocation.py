@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from meshreel.coding import entropy, klt, laplacian
+from meshreel.coding.allocation import DisplacementOptions, allocate
+from meshreel.coding.displacements import decode_displacements, encode_displacements
+from meshreel.coding.steps import step_of
+from meshreel.errors import InputError
+
+from .test_displacements import BASE, FIELD, moving, rms
+from .test_laplacian import icosahedron
+
+
+def test_the_steps_follow_the_option() -> None:
+    for step in (1e-2, 1e-3, 1e-4):
+        system = laplacian.System(BASE, np.array([0, 5], np.int32))
+        choice = allocate(
+            FIELD, system, entropy.causal_neighbours(BASE.faces, len(FIELD)), DisplacementOptions(step=step)
+        )
+        assert all(abs(step_of(level) / step - 1) < 0.1 for level in choice.levels.tolist())
+
+
+def test_components_below_the_step_are_dropped() -> None:
+    noise = 1e-5 * np.random.default_rng(0).normal(size=FIELD.shape)
+    options = DisplacementOptions(step=1e-3)
+    system = laplacian.System(BASE, np.array([0, 5], np.int32))
+    choice = allocate(noise, system, entropy.causal_neighbours(BASE.faces, len(FIELD)), options)
+    assert choice.symbols.shape == (len(BASE.vertices) + 2, 0)
+
+
+def test_components_are_as_many_as_the_motion_has() -> None:
+    field = moving(BASE, 8)
+    basis = klt.fit(field)
+    strong = int((basis.energies > 1e-3**2).sum())
+    system = laplacian.System(BASE, np.array([0, 5], np.int32))
+    choice = allocate(field, system, entropy.causal_neighbours(BASE.faces, len(field)), DisplacementOptions(step=1e-3))
+    assert 1 <= len(choice.levels) <= strong + 2
+
+
+def test_the_chosen_number_of_components_is_no_worse_than_any_fixed_one() -> None:
+    def cost(size: int | None) -> float:
+        options = DisplacementOptions(step=1e-3, basis_size=size)
+        data = encode_displacements(FIELD, BASE, options)
+        error = ((decode_displacements(data, BASE) - FIELD) ** 2).sum()
+        return float(error + options.price * options.step**2 * 8 * len(data))
+
+    best = min(cost(size) for size in range(8))
+    assert cost(None) <= 1.03 * best
+
+
+def test_a_price_on_bits_saves_more_bytes_than_a_coarser_step_of_equal_error() -> None:
+    base = icosahedron(4)
+    field = moving(base)
+
+    def coded(step: float, price: float) -> tuple[int, float]:
+        data = encode_displacements(field, base, DisplacementOptions(step=step, price=price))
+        return len(data), rms(decode_displacements(data, base) - field)
+
+    size, error = coded(5e-4, 0.5)
+    for step in np.geomspace(5e-4, 2e-3, 7):
+        free_size, free_error = coded(float(step), 0.0)
+        assert free_error > error or free_size > size
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        ({"step": 0.0}, "step"),
+        ({"step": float("nan")}, "step"),
+        ({"step": 2.0}, "step"),
+        ({"basis_size": -1}, "basis size"),
+        ({"price": -1.0}, "price"),
+        ({"anchor_count": -1}, "anchors"),
+        ({"anchor_weight": 0}, "weight"),
+        ({"anchor_weight": 256}, "weight"),
+    ],
+)
+def test_options_name_the_value_that_is_wrong(values: dict[str, float], named: str) -> None:
+    with pytest.raises(InputError, match=named):
+        DisplacementOptions(**values)

@@ -1,0 +1,188 @@
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from meshreel.coding import displacements
+from meshreel.coding.allocation import DisplacementOptions
+from meshreel.coding.displacements import decode_displacements, encode_displacements, layer_sizes
+from meshreel.coding.steps import LEVELS, level_of, step_of
+from meshreel.errors import FormatError, InputError
+from meshreel.format import records
+from meshreel.format.layout import AnchorRule, DisplacementHead
+from meshreel.types import Mesh
+
+from .test_laplacian import icosahedron, spoiled
+
+
+def moving(base: Mesh, frames: int = 5, seed: int = 0) -> np.ndarray:
+    """A smooth motion of low rank with a little noise, about a tenth of the diagonal in size."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(frames)
+    x = base.vertices
+    wave = [np.sin(x @ rng.normal(size=3) + k)[:, None, None] * np.cos(t * 0.3 * k)[None, :, None] for k in range(3)]
+    smooth = sum(w * rng.normal(size=3) for w in wave)
+    return np.ascontiguousarray(0.05 * smooth + 1e-4 * rng.normal(size=(len(x), frames, 3)))
+
+
+def rms(difference: np.ndarray) -> float:
+    return float(np.sqrt((difference**2).sum(axis=-1).mean()))
+
+
+BASE = icosahedron(3)
+FIELD = moving(BASE)
+DATA = encode_displacements(FIELD, BASE, DisplacementOptions())
+
+
+@pytest.mark.parametrize("base", [BASE, spoiled()], ids=["sphere", "spoiled"])
+@pytest.mark.parametrize("step", [1e-2, 1.2e-3, 1e-4])
+def test_the_error_stays_in_proportion_to_the_step(base: Mesh, step: float) -> None:
+    field = moving(base)
+    decoded = decode_displacements(encode_displacements(field, base, DisplacementOptions(step=step)), base)
+    assert rms(decoded - field) < 2 * step
+    assert np.abs(decoded - field).max() < 12 * step
+
+
+@pytest.mark.parametrize("rule", list(AnchorRule))
+@pytest.mark.parametrize("count", [0, 3, 100, 10_000])
+def test_any_anchors_decode(rule: AnchorRule, count: int) -> None:
+    options = DisplacementOptions(anchor_rule=rule, anchor_count=count, anchor_weight=3, price=0.0)
+    decoded = decode_displacements(encode_displacements(FIELD, BASE, options), BASE)
+    assert rms(decoded - FIELD) < 20e-3
+
+
+def test_a_finer_step_costs_more_and_errs_less() -> None:
+    sizes, errors = [], []
+    for step in (8e-3, 2e-3, 5e-4):
+        data = encode_displacements(FIELD, BASE, DisplacementOptions(step=step))
+        sizes.append(len(data))
+        errors.append(rms(decode_displacements(data, BASE) - FIELD))
+    assert sizes == sorted(sizes)
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_equal_fields_give_equal_bytes_and_equal_bytes_equal_fields() -> None:
+    assert encode_displacements(FIELD.copy(), BASE, DisplacementOptions()) == DATA
+    np.testing.assert_array_equal(decode_displacements(DATA, BASE), decode_displacements(bytes(DATA), BASE))
+
+
+@pytest.mark.parametrize("count", [0, 1, 3, 15, 99])
+def test_basis_size_gives_exactly_so_many_components(count: int) -> None:
+    data = encode_displacements(FIELD, BASE, DisplacementOptions(basis_size=count))
+    assert len(layer_sizes(data)) - 1 == min(count, 15)
+
+
+def test_the_first_components_decode_from_their_bytes_alone() -> None:
+    sizes = np.cumsum(layer_sizes(DATA)).tolist()
+    assert sizes[-1] == len(DATA)
+    assert len(sizes) > 3
+    errors = []
+    for count, size in enumerate(sizes):
+        part = decode_displacements(DATA[:size], BASE, count)
+        np.testing.assert_array_equal(part, decode_displacements(DATA, BASE, count))
+        errors.append(rms(part - FIELD))
+    assert errors == sorted(errors, reverse=True)
+    np.testing.assert_array_equal(decode_displacements(DATA, BASE, 99), decode_displacements(DATA, BASE))
+
+
+def test_a_component_that_is_cut_is_refused() -> None:
+    sizes = np.cumsum(layer_sizes(DATA)).tolist()
+    with pytest.raises(FormatError, match="truncated"):
+        decode_displacements(DATA[: sizes[2] - 1], BASE, 2)
+
+
+def test_nothing_moves_or_nothing_is_there() -> None:
+    for base in (BASE, Mesh.empty(), Mesh.of(np.eye(3), np.zeros((0, 3)))):
+        for frames in (1, 4):
+            still = np.zeros((len(base.vertices), frames, 3))
+            data = encode_displacements(still, base, DisplacementOptions())
+            assert len(data) < 40
+            np.testing.assert_array_equal(decode_displacements(data, base), still)
+
+
+def test_a_rigid_shift_travels_in_the_mean() -> None:
+    field = np.zeros((len(BASE.vertices), 3, 3)) + np.array([[0.1, 0, 0], [0.2, 0, 0], [0.3, 0.01, 0]])
+    data = encode_displacements(field, BASE, DisplacementOptions())
+    assert len(layer_sizes(data)) == 1
+    np.testing.assert_allclose(decode_displacements(data, BASE), field, atol=1e-4)
+
+
+def test_every_truncation_and_a_byte_too_many_are_refused() -> None:
+    for size in [*range(200), *range(200, len(DATA), 37)]:
+        with pytest.raises(FormatError):
+            decode_displacements(DATA[:size], BASE)
+    with pytest.raises(FormatError):
+        decode_displacements(DATA + b"\0", BASE)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, len(DATA) - 1), st.integers(1, 255))
+def test_a_damaged_byte_decodes_to_finite_numbers_or_is_refused(where: int, flip: int) -> None:
+    damaged = bytearray(DATA)
+    damaged[where] ^= flip
+    try:
+        field = decode_displacements(bytes(damaged), BASE)
+    except FormatError:
+        return
+    assert np.isfinite(field).all()
+    assert len(field) == len(BASE.vertices)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"frames": 0},
+        {"anchor_weight": 0},
+        {"mean_bits": 31},
+        {"frames": 65535},
+        {"anchor_count": 2**63},
+    ],
+)
+def test_absurd_heads_are_refused(change: dict[str, int]) -> None:
+    head, offset = records.unpack(DisplacementHead, DATA)
+    with pytest.raises(FormatError):
+        decode_displacements(records.pack(dataclasses.replace(head, **change)) + DATA[offset:], BASE)
+
+
+@pytest.mark.parametrize("change", [{"basis_bits": 31}, {"step_level": LEVELS}, {"deltas_size": 2**60}])
+def test_absurd_components_are_refused(change: dict[str, int]) -> None:
+    head, offset = records.unpack(DisplacementHead, DATA)
+    components = (dataclasses.replace(head.components[0], **change), *head.components[1:])
+    with pytest.raises(FormatError):
+        decode_displacements(records.pack(dataclasses.replace(head, components=components)) + DATA[offset:], BASE)
+
+
+def test_another_base_is_refused_or_gives_a_field_of_its_own_size() -> None:
+    other = icosahedron(2)
+    with contextlib.suppress(FormatError):
+        assert len(decode_displacements(DATA, other)) == len(other.vertices)
+
+
+def test_a_base_that_no_payload_can_have_is_refused() -> None:
+    for bad in (Mesh(BASE.vertices * np.nan, BASE.faces), Mesh(BASE.vertices, BASE.faces + 1)):
+        with pytest.raises(FormatError):
+            decode_displacements(DATA, bad)
+
+
+def test_displacements_that_are_not_normalised_are_refused() -> None:
+    for bad in (np.nan, np.inf, 1e6):
+        with pytest.raises(InputError, match="normalise"):
+            encode_displacements(FIELD * bad, BASE, DisplacementOptions())
+    with pytest.raises(InputError, match="0 frames"):
+        encode_displacements(FIELD[:, :0], BASE, DisplacementOptions())
+
+
+def test_the_ladder_of_steps_is_exact_and_falls_by_the_eighth_root_of_two() -> None:
+    for level in range(LEVELS):
+        assert math.isclose(step_of(level), 2 ** (-level / 8), rel_tol=1e-9)
+        assert level_of(step_of(level)) == level
+
+
+def test_the_head_says_what_it_takes() -> None:
+    assert displacements.layer_sizes(DATA)[0] < len(DATA) / 2
