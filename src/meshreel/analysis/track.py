@@ -30,10 +30,10 @@ class TrackOptions:
     centers: int = 2000  # K, of all bodies together
     samples: int = 45_000  # points that stand for the volume of a frame
     reach: float = 0.058  # distance that halves an affinity
-    agreement: float = 0.01  # difference of motion (RMS, a frame) that halves an affinity
+    agreement: float = 0.003  # difference of motion (RMS, a frame) that halves an affinity
     neighbours: int = 32  # at most, of a center
     spread: float = 1.0  # weight of the even spread (Lloyd)
-    rigidity: float = 1.0  # weight of the rigid term
+    rigidity: float = 3.0  # weight of the rigid term
     tolerance: float = 1e-4  # a frame is done when a round can lower the energy by no more than this share
     rounds: int = 300  # at most, a frame
     seed: int = 0
@@ -104,7 +104,7 @@ def _spread_over_bodies(
 
 
 def _shares(sizes: Int64[np.ndarray, " B"], centers: int) -> Int64[np.ndarray, " B"]:
-    """Centers of each body: by volume, a few at least, never more than it has samples, `centers` in all if it can be."""
+    """Centers of each body: by volume, a few at least, never more than it has samples."""
     counts = np.maximum(np.floor(centers * sizes / sizes.sum()).astype(np.int64), FEWEST_CENTERS)
     counts[0] += centers - counts.sum()  # the largest body, which comes first, takes what rounding left
     return np.minimum(np.maximum(counts, 1), sizes)
