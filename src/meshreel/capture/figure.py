@@ -15,7 +15,7 @@ from .implicit import Body, Chain
 Row = tuple[tuple[float, ...], tuple[float, ...], float, float]  # start, end, their radii; m
 Vector = Float64[np.ndarray, "3"]
 
-_THIGH, _SHIN, _UPPER_ARM, _FOREARM = 0.43, 0.43, 0.28, 0.25  # m
+_THIGH, _SHIN, _UPPER_ARM, _FOREARM = 0.43, 0.415, 0.28, 0.25  # m
 _STANCE = 0.6  # of a step cycle a foot is on the ground
 
 
@@ -36,7 +36,7 @@ class Pose:
 
 def figure(pose: Pose, thinnest: float) -> Body:
     """The person's parts in the world; none is thinner than `thinnest` (m), so that a grid can see it."""
-    bob = 0.05 * pose.stride * np.cos(4 * np.pi * pose.step) - 0.06 * pose.stride
+    bob = 0.05 * pose.stride * np.cos(4 * np.pi * pose.step) - 0.05 * pose.stride
     lift = np.array([0.0, bob, 0.0])
     chains = [_torso(lift, pose), _head(lift)]
     for side, phase in ((1.0, 0.0), (-1.0, 0.5)):
@@ -77,21 +77,21 @@ def _torso(lift: Vector, pose: Pose) -> Chain:
         ((-0.055, 1.13, 0.0), (0.055, 1.13, 0.0), 0.092 * g, 0.092 * g),  # waist
         ((0.0, 1.08, 0.03), (0.0, 1.12, 0.03), 0.085 * g * g - wobble, 0.080 * g * g - wobble),  # belly
         ((-0.075, 0.96, -0.01), (0.075, 0.96, -0.01), 0.100 * g, 0.100 * g),  # hips
-        ((-0.07, 0.93, -0.05), (0.07, 0.93, -0.05), 0.075 * g, 0.075 * g),  # seat
+        ((-0.07, 0.93, -0.05), (0.07, 0.93, -0.05), 0.072 * g, 0.072 * g),  # seat
     ]
     return _moved(_chain(rows, 0.09, 0.04), lift)
 
 
 def _head(lift: Vector) -> Chain:
     rows: list[Row] = [
-        ((0.0, 1.42, -0.015), (0.0, 1.56, 0.005), 0.056, 0.050),  # neck
+        ((0.0, 1.42, -0.015), (0.0, 1.56, 0.005), 0.060, 0.054),  # neck
         ((0.0, 1.675, -0.015), (0.0, 1.670, 0.015), 0.090, 0.084),  # skull
         ((0.0, 1.645, 0.03), (0.0, 1.585, 0.055), 0.066, 0.036),  # face and chin
         ((0.0, 1.665, 0.105), (0.0, 1.638, 0.118), 0.010, 0.014),  # nose
         ((0.088, 1.655, 0.0), (0.090, 1.635, -0.004), 0.016, 0.012),  # ears
         ((-0.088, 1.655, 0.0), (-0.090, 1.635, -0.004), 0.016, 0.012),
     ]
-    return _moved(_chain(rows, 0.025, 0.05), lift)
+    return _moved(_chain(rows, 0.025, 0.05), lift + [0.0, -0.02, 0.0])
 
 
 def _leg(lift: Vector, side: float, phase: float, stride: float) -> Chain:

@@ -76,7 +76,7 @@ def _others(lines: Lines, first: np.ndarray, second: np.ndarray, other: np.ndarr
         found = other & (first == ord("v")) & (second == ord(mark))
         dropped |= {_DROPS["v" + mark]} if found.any() else set()
         other = other & ~found
-    for number in np.flatnonzero(other).tolist():
+    for number in np.flatnonzero(other):
         keyword = lines.line(number).split(maxsplit=1)[0]
         if keyword not in _KNOWN:
             raise Unreadable(f"line {number + 1} ({lines.line(number)!r}) begins with no OBJ keyword")

@@ -105,5 +105,5 @@ def _is_ear(flat: Float64[np.ndarray, "N 2"], ring: list[int], k: int) -> bool:
     return not (sides[0] & sides[1] & sides[2]).any()
 
 
-def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray | np.floating:
     return (b[0] - a[0]) * (c[..., 1] - a[1]) - (b[1] - a[1]) * (c[..., 0] - a[0])

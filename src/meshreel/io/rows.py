@@ -39,7 +39,7 @@ class Lines:
     def __len__(self) -> int:
         return len(self.starts)
 
-    def line(self, number: int) -> str:
+    def line(self, number: int | np.integer) -> str:
         """One line as text, shortened so that it fits in a message."""
         shown = self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
         return shown if len(shown) <= 60 else shown[:57] + "..."

@@ -11,7 +11,6 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -50,20 +49,6 @@ class SequenceOptions:
         return range(count)[begin:end]
 
 
-class Frames(Protocol):
-    """Where frames come from."""
-
-    def __len__(self) -> int: ...
-
-    def name(self, index: int) -> str:
-        """What an error calls a frame."""
-        ...
-
-    def load(self, index: int, where: str) -> Loaded:
-        """One frame, checked; `where` begins every error's text."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Files:
     """One file a frame."""
@@ -95,7 +80,7 @@ class _Seen:
 class FileSequence:
     """Frames read from files when they are asked for; nothing of them is kept but counts."""
 
-    def __init__(self, frames: Frames, options: SequenceOptions, remarks: Sequence[str] = ()) -> None:
+    def __init__(self, frames: Files | Archive, options: SequenceOptions, remarks: Sequence[str] = ()) -> None:
         self._frames, self._options, self._remarks, self._seen = frames, options, tuple(remarks), _Seen()
         self._chosen = options.chosen(len(frames))
         if len(self._chosen) == 0:

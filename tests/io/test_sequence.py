@@ -1,0 +1,254 @@
+"""Sequences: which files, in what order, how lazily, and what is said about them."""
+
+from __future__ import annotations
+
+import pickle
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from meshreel.errors import InputError
+from meshreel.geometry.topology import weld
+from meshreel.io import meshes
+from meshreel.io.sequence import SequenceOptions, open_sequence
+from meshreel.types import Mesh
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def put(folder: Path, *names: str, text: str = TRIANGLE) -> list[Path]:
+    """Files of that text; the x of the first vertex tells which one was read."""
+    paths = []
+    for number, name in enumerate(names):
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text.replace("v 0 0 0", f"v {-number} 0 0", 1))
+        paths.append(path)
+    return paths
+
+
+def names_of(sequence) -> list[str]:
+    return [sequence.name(k).split("/")[-1].rstrip(")") for k in range(len(sequence))]
+
+
+def test_frames_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    put(tmp_path, "mesh_10.obj", "mesh_2.obj", "mesh_1.obj")
+    assert names_of(open_sequence(tmp_path)) == ["mesh_1.obj", "mesh_2.obj", "mesh_10.obj"]
+
+
+def test_the_last_number_that_varies_is_the_frame_number(tmp_path: Path) -> None:
+    put(tmp_path, "take2_009_v1.obj", "take2_010_v1.obj", "take2_0008_v1.obj")
+    assert names_of(open_sequence(tmp_path)) == ["take2_0008_v1.obj", "take2_009_v1.obj", "take2_010_v1.obj"]
+
+
+def test_numbers_of_folders_count_in_a_glob(tmp_path: Path) -> None:
+    put(tmp_path, "f10/mesh.obj", "f9/mesh.obj", "notes/readme.txt")
+    sequence = open_sequence(f"{tmp_path}/*/mesh.obj")
+    assert [sequence[k].vertices[0, 0] for k in range(2)] == [-1.0, 0.0]
+
+
+def test_two_files_with_one_frame_number_are_refused(tmp_path: Path) -> None:
+    put(tmp_path, "a1_003.obj", "a2_003.obj", "a2_004.obj")
+    with pytest.raises(InputError, match=r"'a1_003' and 'a2_003' both have frame number 3; give a glob"):
+        open_sequence(tmp_path)
+
+
+def test_names_of_two_patterns_are_refused(tmp_path: Path) -> None:
+    put(tmp_path, "dancer_1.obj", "dancer_2.obj", "background.obj")
+    with pytest.raises(InputError, match=r"2 patterns, as 'background' and 'dancer_\d'; give a glob"):
+        open_sequence(tmp_path)
+    assert len(open_sequence(str(tmp_path / "dancer_*"))) == 2
+
+
+def test_names_without_numbers_are_taken_by_the_alphabet_and_it_is_said(tmp_path: Path) -> None:
+    put(tmp_path, "b.obj", "a.obj")
+    sequence = open_sequence(tmp_path)
+    assert names_of(sequence) == ["a.obj", "b.obj"]
+    assert "alphabetical order" in sequence.warnings[0]
+
+
+def test_a_list_keeps_its_order(tmp_path: Path) -> None:
+    paths = put(tmp_path, "m_3.obj", "m_1.obj")
+    assert names_of(open_sequence(paths)) == ["m_3.obj", "m_1.obj"]
+
+
+def test_a_folder_of_two_kinds_is_refused_and_other_files_are_passed_over(tmp_path: Path) -> None:
+    put(tmp_path, "m_1.obj", "m_2.OBJ", "m_1.png", ".m_3.ply")
+    assert len(open_sequence(tmp_path)) == 2
+    put(tmp_path, "m_1.ply")
+    with pytest.raises(InputError, match=r"several kinds of files \(2 .obj, 1 .ply\); choose one, as '.*/\*.obj'"):
+        open_sequence(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        ("missing", r"missing: no such file or folder; check the path"),
+        ("missing_*.obj", r"missing_\*.obj: no mesh file fits this pattern; check it"),
+        ("", r"holds 0 mesh files; give a folder with \.obj"),
+    ],
+)
+def test_a_source_without_frames_is_refused(tmp_path: Path, source: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        open_sequence(str(tmp_path / source))
+
+
+def test_an_empty_list_is_refused() -> None:
+    with pytest.raises(InputError, match="0 frames; give at least one"):
+        open_sequence([])
+
+
+def test_one_file_is_a_sequence_of_one_frame(tmp_path: Path) -> None:
+    sequence = open_sequence(put(tmp_path, "m.obj")[0])
+    assert len(sequence) == 1
+    assert sequence[-1].faces.tolist() == [[0, 1, 2]]
+    with pytest.raises(IndexError):
+        sequence[1]
+
+
+@pytest.mark.parametrize(("frames", "kept"), [(":", [0, 1, 2, 3]), ("1:3", [1, 2]), ("2:", [2, 3]), (":-3", [0])])
+def test_frames_are_chosen_as_python_slices(tmp_path: Path, frames: str, kept: list[int]) -> None:
+    put(tmp_path, *(f"m_{k}.obj" for k in range(4)))
+    sequence = open_sequence(tmp_path, SequenceOptions(frames=frames))
+    assert [-int(mesh.vertices[0, 0]) for mesh in sequence] == kept
+    assert sequence.name(0).startswith(f"frame {kept[0]} (")
+
+
+def test_a_choice_of_no_frames_is_refused(tmp_path: Path) -> None:
+    put(tmp_path, "m_1.obj", "m_2.obj")
+    with pytest.raises(InputError, match=r"frames '5:9' of 2 frames leave 0; choose at least one"):
+        open_sequence(tmp_path, SequenceOptions(frames="5:9"))
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"frames": "1:2:3"}, r"frames '1:2:3' is not a range; give A:B"),
+        ({"frame_rate": 0.0}, r"frame rate 0.0 is not a positive number"),
+        ({"scale": float("nan")}, r"scale nan is not a positive number"),
+    ],
+)
+def test_impossible_options_are_refused(options: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        SequenceOptions(**options)
+
+
+def test_only_the_frame_that_is_asked_for_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(tmp_path, *(f"m_{k}.obj" for k in range(5)))
+    read, parse = [], meshes._PARSERS[".obj"]
+    monkeypatch.setitem(meshes._PARSERS, ".obj", lambda data: (read.append(data), parse(data))[1])
+    sequence = open_sequence(tmp_path)
+    assert (len(sequence), sequence.frame_rate, read) == (5, 30.0, [])
+    assert sequence[3].vertices[0, 0] == -3
+    assert len(read) == 1
+    next(iter(sequence))
+    assert len(read) == 2
+
+
+def test_scale_multiplies_coordinates(tmp_path: Path) -> None:
+    path = put(tmp_path, "m.obj")[0]
+    assert open_sequence(path, SequenceOptions(scale=0.5))[0].vertices[1].tolist() == [0.5, 0, 0]
+
+
+def test_welding_is_reported_and_counts_a_frame_once(tmp_path: Path) -> None:
+    seam = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 4 6 5\nf 2 4 6\n"
+    path = put(tmp_path, "m.obj", text=seam)[0]
+    assert len(open_sequence(path)[0].vertices) == 6
+    sequence = open_sequence(path, SequenceOptions(weld=weld))
+    for _ in range(2):
+        assert len(sequence[0].vertices) == 4
+    said = "welded 2 of 6 vertices that repeat a position, and 1 faces that collapsed with them, in 1 frames"
+    assert sequence.warnings == (said,)
+
+
+def test_what_is_dropped_is_said_once_for_the_sequence(tmp_path: Path) -> None:
+    text = TRIANGLE.replace("v 0 1 0\n", "v 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl skin\n")
+    put(tmp_path, "m_1.obj")
+    put(tmp_path, "m_2.obj", "m_3.obj", text=text)
+    sequence = open_sequence(tmp_path)
+    assert sequence.warnings == ()
+    for mesh in sequence:
+        assert mesh.faces.shape == (1, 3)
+    assert sequence.warnings == (
+        "only geometry is kept; dropped: materials, normals, texture coordinates (first in frame 1)",
+    )
+
+
+def test_frames_of_very_different_scale_are_read_and_pointed_out(tmp_path: Path) -> None:
+    put(tmp_path, "m_1.obj")
+    put(tmp_path, "m_2.obj", text="v 0 0 0\nv 1000 0 0\nv 0 1000 0\nf 1 2 3\n")
+    sequence = open_sequence(tmp_path)
+    assert [round(mesh.diagonal) for mesh in sequence] == [1, 1414]
+    assert sequence.warnings == ("frame 1 is 1e+03 times as large as frame 0: are they in the same unit?",)
+
+
+def test_a_frame_without_faces_is_empty_and_its_vertices_are_mentioned(tmp_path: Path) -> None:
+    put(tmp_path, "m_1.obj", "m_2.obj", text="# nothing\n")
+    put(tmp_path, "m_2.obj", text="v 1 2 3\n")
+    sequence = open_sequence(tmp_path)
+    assert [mesh.is_empty for mesh in sequence] == [True, True]
+    assert len(sequence[1].vertices) == 0
+    assert "frame 1 has vertices but no faces" in sequence.warnings[0]
+
+
+def save(path: Path, vertices: object, faces: object, compressed: bool = False) -> Path:
+    (np.savez_compressed if compressed else np.savez)(path, vertices=vertices, faces=faces)
+    return path
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_an_archive_is_read_in_any_order(tmp_path: Path, compressed: bool) -> None:
+    vertices = np.random.default_rng(0).normal(size=(5, 4, 3)).astype(np.float32)
+    path = save(tmp_path / "body.npz", vertices, np.array([[0, 1, 2, 3]]), compressed)
+    sequence = open_sequence(path, SequenceOptions(frames="1:"))
+    for k in (3, 0, 2, 2):
+        assert np.array_equal(sequence[k].vertices, vertices[k + 1])
+        assert sequence[k].faces.shape == (2, 3)
+    copy = pickle.loads(pickle.dumps(sequence))
+    assert np.array_equal(copy[1].vertices, vertices[2])
+
+
+def test_an_archive_is_not_held_in_memory(tmp_path: Path) -> None:
+    path = save(tmp_path / "body.npz", np.zeros((200, 2000, 3)), np.array([[0, 1, 2]]))  # 9.6 MB
+    tracemalloc.start()
+    for _ in open_sequence(path):
+        pass
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1e6
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "words"),
+    [
+        (np.zeros((0, 4, 3)), [[0, 1, 2]], r"has 0 frames"),
+        (np.zeros((4, 3)), [[0, 1, 2]], r"'vertices' is float64 \(4, 3\); it must be numbers T x V x 3"),
+        (np.zeros((2, 4, 3)), [[0.0, 1, 2]], r"'faces' is float64 \(1, 3\); it must be integers F x 3"),
+        (np.zeros((2, 4, 3)), [[0, 1, 4]], r"frame 0 \(.*body.npz\[0\]\): face 0 refers to vertex 4, but there are 4"),
+        (np.full((2, 4, 3), np.nan), [[0, 1, 2]], r"frame 0 .*vertex 0 is at \(nan, nan, nan\)"),
+    ],
+)
+def test_a_bad_archive_is_refused(tmp_path: Path, vertices: np.ndarray, faces: list, words: str) -> None:
+    path = save(tmp_path / "body.npz", vertices, np.array(faces))
+    with pytest.raises(InputError, match=words):
+        open_sequence(path)[0]
+
+
+def test_an_archive_with_other_names_or_cut_short_is_refused(tmp_path: Path) -> None:
+    np.savez(tmp_path / "other.npz", points=np.zeros(3))
+    with pytest.raises(InputError, match=r"other.npz: has points; save it as 'vertices' and 'faces'"):
+        open_sequence(tmp_path / "other.npz")
+    path = save(tmp_path / "body.npz", np.zeros((2, 4, 3)), np.array([[0, 1, 2]]))
+    data = path.read_bytes()
+    for length in range(0, len(data), 37):
+        path.write_bytes(data[:length])
+        with pytest.raises(InputError, match=r"body.npz"):
+            list(open_sequence(path))
+
+
+def test_meshes_are_float64_and_int32(tmp_path: Path) -> None:
+    mesh = open_sequence(put(tmp_path, "m.obj")[0])[0]
+    assert isinstance(mesh, Mesh)
+    assert (mesh.vertices.dtype, mesh.faces.dtype) == (np.float64, np.int32)
