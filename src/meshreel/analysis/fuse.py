@@ -33,7 +33,7 @@ class FuseOptions:
     cover: float = 0.3  # a frame adds points where those before it have less than this share of its surface
     cell: float = 0.5  # points are averaged in cells of this size
     reach: float = 1.5  # no surface farther than this from every point
-    torn: float = 3.0  # a length that grows by this factor, beyond one center spacing, tears
+    torn: float = 1.5  # a length that grows beyond this factor, plus half a center spacing, tears
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
     poisson: PoissonOptions = field(default_factory=PoissonOptions)
 
@@ -127,15 +127,15 @@ class Group:
     def _parting(self, edges: Edges, binding: Binding, pose: Float64[np.ndarray, "K 3"]) -> Bool[np.ndarray, " F"]:
         """Faces that join centers which are far more apart in some frame than in this pose."""
         i, j = binding.nearest[edges[0]].T
-        now = np.linalg.norm(pose[i] - pose[j], axis=1) + self.spacing
-        return (self.distances[i, j] > self.fuse.torn * now)[edges[1]].any(axis=1)
+        now = np.linalg.norm(pose[i] - pose[j], axis=1)
+        return (self.distances[i, j] > self.fuse.torn * now + self.spacing / 2)[edges[1]].any(axis=1)
 
     def _torn(
         self, here: Float64[np.ndarray, "V 3"], there: Float64[np.ndarray, "V 3"], edges: Edges
     ) -> Bool[np.ndarray, " F"]:
         """Faces with an edge that is far longer in one pose than in the other."""
         one, two = _lengths(here, edges[0]), _lengths(there, edges[0])
-        far = np.maximum(one, two) > self.fuse.torn * (np.minimum(one, two) + self.spacing)
+        far = np.maximum(one, two) > self.fuse.torn * np.minimum(one, two) + self.spacing / 2
         return far[edges[1]].any(axis=1)
 
     def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:

@@ -126,7 +126,7 @@ def _trial(
     for surface, moved in zip(surfaces, group.sent(mesh, pose), strict=True):
         original = surface.mesh.vertices
         there = _gaps(Surface(Mesh(moved, mesh.faces)), original[:: max(1, len(original) // PROBES)])
-        back = _gaps(surface, moved)
+        back = _outside(surface, moved, group.edge)
         rms.append(max(np.sqrt(np.mean(there**2)), np.sqrt(np.mean(back**2))))
         tail.append(max(np.quantile(there, 0.95), np.quantile(back, 0.95)))
     return Trial(frame, key, float(np.mean(rms)), float(np.mean(tail)))
@@ -134,6 +134,17 @@ def _trial(
 
 def _misfit(trial: Trial) -> float:
     return trial.rms + trial.tail
+
+
+def _outside(surface: Surface, points: Float64[np.ndarray, "N 3"], most: float) -> Float64[np.ndarray, " N"]:
+    """Distances to a surface, those of points inside it at `most`: where bodies touch, the frame has no surface
+    between them, and a good reference has.
+    """
+    hits = surface.closest(points)
+    offset = points - hits.points
+    gaps = np.linalg.norm(offset, axis=1)
+    inside = np.einsum("nd,nd->n", offset, surface.normals[hits.faces]) < 0
+    return np.where(inside, np.minimum(gaps, most), gaps)
 
 
 def _gaps(surface: Surface, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
