@@ -14,9 +14,12 @@ from jaxtyping import Bool, Float64, Int32, Int64
 
 from ..errors import InputError
 from ..format.layout import AnchorRule
+from ..geometry.topology import components
 from . import entropy, klt
 from .laplacian import System
 from .steps import LEVELS, level_of, step_of
+
+LARGE = 1000  # vertices of a component that deserves all six anchors
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,8 +30,8 @@ class DisplacementOptions:
     basis_size: int | None = None  # exactly so many components; None: as many as pay
     price: float = 0.5  # of one bit, in squared steps
     anchor_rule: AnchorRule = AnchorRule.FARTHEST
-    anchor_count: int = 10  # more buys nothing: the quantiser keeps smooth errors small (docs/decisions)
-    anchor_weight: int = 1  # 1 to 255
+    anchor_count: int | None = None  # None: six for each large connected component
+    anchor_weight: int = 4  # 1 to 255
 
     def __post_init__(self) -> None:
         finest, coarsest = step_of(LEVELS - 1), step_of(0)
@@ -38,10 +41,18 @@ class DisplacementOptions:
             raise InputError(f"basis size {self.basis_size}: give a number of components, 0 or more")
         if not 0 <= self.price < 10:
             raise InputError(f"price {self.price}: give squared steps a bit, 0 to 10")
-        if self.anchor_count < 0 or not 1 <= self.anchor_weight <= 255:
+        if (self.anchor_count or 0) < 0 or not 1 <= self.anchor_weight <= 255:
             raise InputError(
                 f"{self.anchor_count} anchors of weight {self.anchor_weight}: give 0 or more, weighing 1 to 255"
             )
+
+
+def anchor_count(faces: Int32[np.ndarray, "F 3"], vertices: int, options: DisplacementOptions) -> int:
+    """How many anchors to ask for. More cost rate and buy nothing: the quantiser keeps smooth errors small itself."""
+    if options.anchor_count is not None:
+        return min(options.anchor_count, vertices)
+    sizes = np.bincount(components(faces, vertices)) if vertices else np.zeros(0)
+    return int(np.ceil(np.minimum(sizes[sizes > 1] / LARGE, 1.0) * 6).sum())
 
 
 @dataclass(frozen=True, slots=True)
