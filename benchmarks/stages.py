@@ -24,6 +24,7 @@ from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
 
 FIRST, COUNT = 27, 10  # of the story's 90 frames: the hands meet on the way
+CONTACT = 5  # of these: the two surfaces are melted into one
 
 
 @dataclass(frozen=True, slots=True)
