@@ -99,14 +99,14 @@ def extract_reference(frames: Sequence[Mesh], centers: Centers, options: Referen
     return Reference(mesh, poses[frame], frame, kin, canonical.stress, trials)
 
 
-def predict(
-    reference: Reference, mesh: Mesh, centers: Centers, options: DeformOptions
-) -> Float64[np.ndarray, "T V 3"]:
+def predict(reference: Reference, mesh: Mesh, centers: Centers, options: DeformOptions) -> Float64[np.ndarray, "T V 3"]:
     """Where the vertices of a mesh in the reference pose (the decoded, subdivided one, say) are in each frame."""
     binding = bind(mesh, reference.pose, reference.neighbours, options)
     return np.stack(
         [
-            move(mesh.vertices, binding, center_motions(reference.pose, pose, reference.neighbours), reference.neighbours)
+            move(
+                mesh.vertices, binding, center_motions(reference.pose, pose, reference.neighbours), reference.neighbours
+            )
             for pose in centers.positions
         ]
     )

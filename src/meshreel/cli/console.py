@@ -41,6 +41,11 @@ class Common:
             if not self.quiet:
                 print(f"meshreel: warning: {text}", file=sys.stderr)
 
+    def note(self, text: str) -> None:
+        """One line about what goes on, on standard error; above the progress bars where there are any."""
+        if not self.quiet:
+            print(text, file=sys.stderr)
+
     def result(self, row: dict[str, Any], *texts: object) -> None:
         """The result: `row` as JSON, or the texts and tables."""
         if self.json:
