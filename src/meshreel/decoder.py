@@ -19,7 +19,7 @@ from .errors import FormatError
 from .types import Mesh
 
 
-def open(source: str | Path | bytes | Source) -> Video:  # noqa: A001  (the promised name: meshreel.open)
+def open(source: str | Path | bytes | Source) -> Video:
     """The video in a .reel file, in bytes, or behind any source of byte ranges.
 
     Raises FormatError where the header or the index are damaged, or of a version this reader does not know.

@@ -6,6 +6,7 @@ In -> out: MeshSequence -> Survey. Errors of any frame surface here, before minu
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -41,10 +42,10 @@ class Survey:
         """Runs of at most `size` frames, each all empty or all with a surface, of even lengths."""
         edges = [0, *(i for i in range(1, len(self.empty)) if self.empty[i] != self.empty[i - 1]), len(self.empty)]
         windows = []
-        for start, stop in zip(edges, edges[1:], strict=False):
+        for start, stop in pairwise(edges):
             parts = -(-(stop - start) // size)
             cuts = [start + (stop - start) * k // parts for k in range(parts + 1)]
-            windows += [range(a, b) for a, b in zip(cuts, cuts[1:], strict=False)]
+            windows += [range(a, b) for a, b in pairwise(cuts)]
         return windows
 
 

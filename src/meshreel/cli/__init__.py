@@ -1,39 +1,103 @@
 """The command line: `meshreel encode|decode|info|compare|bench|demo`.
 
-Errors take one line on standard error and exit code 2; `--debug` shows the traceback.
+Errors take one line on standard error and exit code 2; `--debug` shows the traceback. A command's module is imported
+when it is called: `decode` and `info` work where the extra `encode` is not installed.
 """
 
 from __future__ import annotations
 
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from types import FrameType
+from typing import NoReturn
 
 from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import MeshreelError
-from . import bench, compare, decode, demo, encode, info
 
-app = App(name="meshreel", help="Compression of time-varying meshes.", version=__version__)
-for module in (encode, decode, info, compare, bench, demo):
-    app.command(module.command, name=module.__name__.rsplit(".", 1)[-1])
+FAILED = 2
+INTERRUPTED = 130  # 128 + SIGINT, as shells have it
+TERMINATED = 143  # 128 + SIGTERM
+
+COMMANDS = {
+    "encode": "Encode a sequence of meshes into one .reel file.",
+    "decode": "Decode a .reel file into a directory of meshes.",
+    "info": "Show rate by part, groups, forms and the quality recorded when the file was encoded.",
+    "compare": "Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.",
+    "bench": "Measure codecs against each other, and make tables and plots of the rows.",
+    "demo": "Make a short capture of moving people, encode it, and measure what comes back.",
+}
+
+
+class Terminated(BaseException):
+    """SIGTERM arrived; an exception, so that temporary files are removed on the way out."""
+
+
+def make_app() -> App:
+    """The command line's parser."""
+    app = App(name="meshreel", help="Compression of time-varying meshes.", version=__version__)
+    for name, text in COMMANDS.items():
+        app.command(f"meshreel.cli.{name}:command", name=name, help=text)
+    return app
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command; exits with 0, 2 after an error, 130 after an interrupt."""
+    """Runs one command; 0, or 2 after an error, 130 after an interrupt, 143 after SIGTERM. Exits where called bare."""
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        with _sigterm_raises():
+            make_app()(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         code = 0
-    except (MeshreelError, OSError, CycloptsError) as error:
+    except KeyboardInterrupt:
+        code = _tell("interrupted", INTERRUPTED)
+    except Terminated:
+        code = _tell("terminated", TERMINATED)
+    except Exception as error:
         if "--debug" in tokens:
             raise
-        text = " ".join(str(error).split()) or type(error).__name__
-        print(f"meshreel: error: {text}", file=sys.stderr)
-        code = 2
-    except KeyboardInterrupt:
-        print("meshreel: interrupted", file=sys.stderr)
-        code = 130
+        code = _tell(f"error: {one_line(error)}", FAILED)
     if arguments is None:
         sys.exit(code)
     return code
+
+
+def one_line(error: Exception) -> str:
+    """What went wrong and what to do, without line breaks."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("meshreel"):
+        return f"{error.name} is missing; install it with: pip install 'meshreel[encode]'"
+    if isinstance(error, CycloptsError):
+        return f"{text} (see meshreel --help)"
+    if isinstance(error, BrokenProcessPool):
+        return "a worker process died, out of memory perhaps; give fewer --jobs"
+    if isinstance(error, MemoryError):
+        return "out of memory; give fewer --jobs or smaller meshes"
+    if isinstance(error, (MeshreelError, OSError)):
+        return text
+    return f"{type(error).__name__}: {text}; this is a fault of meshreel: please report it with the output of --debug"
+
+
+def _tell(text: str, code: int) -> int:
+    print(f"meshreel: {text}", file=sys.stderr)
+    return code
+
+
+@contextmanager
+def _sigterm_raises() -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread may set handlers
+        return
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _terminate(_number: int, _frame: FrameType | None) -> NoReturn:
+    raise Terminated

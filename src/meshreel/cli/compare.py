@@ -2,39 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Any, Literal
 
-from cyclopts import Parameter
+import numpy as np
 from rich.table import Table
 
+from ..container.sources import FileSource
+from ..decoder import Video
 from ..decoder import open as open_video
 from ..errors import InputError
-from ..io.sequence import SequenceOptions, open_sequence
+from ..format.layout import MAGIC
+from ..geometry.topology import weld
+from ..io.sequence import FileSequence, SequenceOptions, open_sequence
+from ..metrics.cameras import ViewOptions
 from ..metrics.report import ComparisonOptions, compare_sequences
-from ..metrics.sheet import write_sheet
-from ..types import MeshSequence
-from .console import Common
+from ..metrics.sheet import SheetOptions, write_sheet
+from ..types import Mesh, MeshSequence
+from .console import Common, StageBars
+from .info import describe_file
+
+_READ = SequenceOptions()
+_VIEWS = ViewOptions()
 
 
 def command(
-    originals: Path,
-    decoded: Path,
+    originals: str,
+    decoded: str,
+    /,
     *,
-    fps: float = 30.0,
-    frames: str = ":",
-    scale: float = 1.0,
-    cameras: Path | None = None,
+    fps: float = _READ.frame_rate,
+    frames: str = _READ.frames,
+    scale: float = _READ.scale,
     ssim: bool = True,
+    cameras: Path | None = None,
+    width: int = _VIEWS.width,
+    height: int = _VIEWS.height,
+    up: Literal["y", "z"] = "y",
+    keys: tuple[int, ...] = (),
     sheet: Path | None = None,
     common: Common = Common(),
 ) -> None:
-    """Compare original meshes with decoded ones: distances, normals, SSIM, and the rate of a .reel file.
+    """Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.
 
     Parameters
     ----------
     originals
-        The original sequence: a directory, a glob or an .npz.
+        The original sequence: a directory, a glob, a file or an .npz.
     decoded
         A .reel file, or the decoded meshes.
     fps
@@ -43,35 +58,78 @@ def command(
         Which frames of the originals, as A:B with B excluded.
     scale
         Factor on the originals' coordinates, as given to `encode`.
+    ssim
+        Render and compare pictures too (some seconds a frame).
     cameras
         A file of Open3D pinhole cameras for SSIM; four views around the sequence where it is not given.
-    ssim
-        Render and compare pictures too (slower).
+    width
+        Of the rendered pictures, pixels.
+    height
+        Of the rendered pictures, pixels.
+    up
+        The axis that points up.
+    keys
+        Key frames: means are also given without them.
     sheet
         Write a PNG: original, decoded, error heat map.
     """
-    sequence = open_sequence(originals, SequenceOptions(frame_rate=fps, frames=frames, scale=scale))
-    other: MeshSequence = (
-        open_video(decoded) if decoded.suffix == ".reel" else open_sequence(decoded, SequenceOptions(frame_rate=fps))
-    )
+    options = ComparisonOptions(cameras, ViewOptions(width, height, up=up), ssim, keys)
+    sequence = open_sequence(originals, SequenceOptions(fps, frames, scale, weld))
+    reel = is_reel(decoded)
+    meshes = SequenceOptions(fps, weld=weld)
+    other: Video | FileSequence = open_video(decoded) if reel else open_sequence(decoded, meshes)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
-    comparison = compare_sequences(sequence, other, ComparisonOptions(cameras=cameras, ssim=ssim))
-    row = comparison.to_row()
-    if decoded.suffix == ".reel":
-        size = decoded.stat().st_size
-        row |= {"bytes": size, "mbps": size * 8 * sequence.frame_rate / len(sequence) / 1e6}
+    with common.stages(len(sequence)) as progress:
+        row = compare_sequences(sequence, counted(other, progress), options).to_row()
     if sheet is not None:
-        write_sheet(sequence, other, sheet)
-    common.result(row, metric_table(row))
+        write_sheet(sequence, other, sheet, SheetOptions(up=up))
+    if reel:
+        described = describe_file(Path(decoded))
+        row = {name: described[name] for name in ("bytes", "mbps", "parts", "parts_mbps")} | row
+    warnings = [*sequence.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
+    common.warn(warnings)
+    texts = [f"picture: {sheet}"] if sheet is not None else []
+    common.result({"warnings": warnings} | row, metric_table(row), *_cameras(row), *texts)
 
 
-def metric_table(row: dict[str, object]) -> Table:
-    """The numbers of a row, one a line."""
-    table = Table("metric", "value")
-    for key, value in row.items():
-        if isinstance(value, float):
-            table.add_row(key, f"{value:.6g}")
-        elif isinstance(value, (int, str)):
-            table.add_row(key, str(value))
+def is_reel(path: str) -> bool:
+    """True for a name that ends in .reel and for a file that begins as one."""
+    if path.endswith(".reel"):
+        return True
+    if not Path(path).is_file():
+        return False
+    with FileSource(path) as source:
+        return source.get_bytes(0, len(MAGIC)) == MAGIC
+
+
+def metric_table(row: dict[str, Any]) -> Table:
+    """The numbers of a row, one metric a line: the mean over frames and the worst frame."""
+    table = Table("metric", "mean", "worst frame", "without key frames")
+    for name, value in row.items():
+        if name.endswith(("_worst", "_without_keys")) or not isinstance(value, (int, float, type(None))):
+            continue
+        table.add_row(name, *(_number(row.get(key)) for key in (name, f"{name}_worst", f"{name}_without_keys")))
     return table
+
+
+def counted(sequence: MeshSequence, progress: StageBars) -> Iterator[Mesh]:
+    """The frames of a sequence, each reported when it has been used."""
+    for i, mesh in enumerate(sequence):
+        yield mesh
+        progress("compare", i + 1, len(sequence))
+
+
+def _cameras(row: dict[str, Any]) -> list[str]:
+    """A line for each view of SSIM; all of a camera is in the JSON."""
+    lines = []
+    for number, camera in enumerate(row["cameras"]):
+        extrinsic = np.reshape(camera["extrinsic"], (4, 4)).T
+        eye = -extrinsic[:3, :3].T @ extrinsic[:3, 3]
+        size = f"{camera['intrinsic']['width']} x {camera['intrinsic']['height']}"
+        lines.append(f"SSIM view {number}: from ({eye[0]:.4g}, {eye[1]:.4g}, {eye[2]:.4g}), {size} pixels")
+    return lines
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.6g}"

@@ -1,17 +1,26 @@
-"""The terminal: one-line errors, progress by stage with time left, results as text or JSON."""
+"""The terminal: warnings, progress by stage with the time left, results as text or JSON."""
 
 from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 
 @Parameter(name="*")
@@ -20,16 +29,22 @@ class Common:
     """What every command takes."""
 
     quiet: Annotated[bool, Parameter(negative="")] = False
-    """Say nothing but errors."""
+    """Say nothing but errors (and JSON, where asked for)."""
     json: Annotated[bool, Parameter(negative="")] = False
     """Print one JSON object instead of text."""
     debug: Annotated[bool, Parameter(negative="")] = False
     """Show the traceback of an error."""
 
-    def warn(self, text: str) -> None:
-        """One line of warning on standard error."""
+    def warn(self, texts: Iterable[str]) -> None:
+        """Warnings on standard error, a line each."""
+        for text in texts:
+            if not self.quiet:
+                print(f"meshreel: warning: {text}", file=sys.stderr)
+
+    def note(self, text: str) -> None:
+        """One line about what goes on, on standard error; above the progress bars where there are any."""
         if not self.quiet:
-            print(f"meshreel: warning: {text}", file=sys.stderr)
+            print(text, file=sys.stderr)
 
     def result(self, row: dict[str, Any], *texts: object) -> None:
         """The result: `row` as JSON, or the texts and tables."""
@@ -38,21 +53,23 @@ class Common:
         elif not self.quiet:
             console = Console(highlight=False, soft_wrap=True)
             for text in texts:
-                console.print(text)
+                console.print(text, markup=False)
 
     @contextmanager
     def stages(self, total: int) -> Iterator[StageBars]:
-        """Progress bars, one a stage, on standard error; nothing where quiet, JSON or not a terminal."""
+        """Progress bars, one a stage, on standard error; nothing where quiet or not a terminal."""
         console = Console(stderr=True)
-        disable = self.quiet or self.json or not console.is_terminal
         columns = (
             SpinnerColumn(),
             TextColumn("{task.description:<10}"),
             BarColumn(),
             MofNCompleteColumn(),
-            TimeRemainingColumn(elapsed_when_finished=True),
+            TextColumn("frames"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
         )
-        with Progress(*columns, console=console, disable=disable) as bars:
+        with Progress(*columns, console=console, disable=self.quiet or not console.is_terminal) as bars:
             yield StageBars(bars, total)
 
 
@@ -62,7 +79,7 @@ class StageBars:
     def __init__(self, bars: Progress, total: int) -> None:
         self.bars = bars
         self.total = total
-        self.tasks: dict[str, Any] = {}
+        self.tasks: dict[str, TaskID] = {}
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """`done` of `total` frames have passed `stage`."""

@@ -7,14 +7,16 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from ..decoder import Video
 from ..decoder import open as open_video
-from ..errors import InputError
+from ..errors import FormatError, InputError
 from ..io.write import write_mesh
 from .console import Common
 
 
 def command(
     file: Path,
+    /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     format: Literal["ply", "obj", "glb"] = "ply",
@@ -22,6 +24,8 @@ def command(
     common: Common = Common(),
 ) -> None:
     """Decode a .reel file into a directory of meshes.
+
+    Frames of a damaged group are left out, and the others written, before the error.
 
     Parameters
     ----------
@@ -37,11 +41,29 @@ def command(
     if components is not None and components < 0:
         raise InputError(f"--components must not be negative, got {components}")
     video = open_video(file).at(components)
-    output.mkdir(parents=True, exist_ok=True)
-    digits = max(5, len(str(len(video))))
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{output}: cannot be made a folder ({error.strerror}); choose another") from None
+    names = [f"frame_{i:0{max(5, len(str(len(video) - 1)))}}.{format}" for i in range(len(video))]
+    others = {path.name for path in output.glob(f"frame_*.{format}")} - set(names)
+    if others:
+        common.warn([f"{output} holds {len(others)} other frame files, as {min(others)}; they are not of this video"])
+    failed: list[FormatError] = []
     with common.stages(len(video)) as progress:
-        for i, mesh in enumerate(video):
-            write_mesh(mesh, output / f"frame_{i:0{digits}}.{format}")
+        for i, name in enumerate(names):
+            _write_frame(video, i, output / name, failed)
             progress("decode", i + 1, len(video))
-    row = {"output": str(output), "frames": len(video), "format": format}
+    if failed:
+        raise FormatError(f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written")
+    row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")
+
+
+def _write_frame(video: Video, frame: int, path: Path, failed: list[FormatError]) -> None:
+    try:
+        mesh = video[frame]
+    except FormatError as error:
+        failed.append(error)
+        return
+    write_mesh(mesh, path)

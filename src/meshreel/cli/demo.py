@@ -7,26 +7,30 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..capture.procedural import BodiesOptions, soft_bodies
+from ..capture.procedural import SoftBodiesOptions, soft_bodies
 from ..decoder import open as open_video
 from ..encoder import encode
 from ..errors import InputError
 from ..metrics.report import ComparisonOptions, compare_sequences
 from ..metrics.sheet import write_sheet
 from ..presets import preset_options
-from .compare import metric_table
+from .compare import counted, metric_table
 from .console import Common
-from .encode import describe, summary_row
+from .encode import describe, summary_row, workers
+
+_CODE = preset_options()
 
 
 def command(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("demo"),
     frames: int = 20,
-    quality: float = 50.0,
+    quality: float = _CODE.quality,
+    ssim: bool = True,
+    jobs: int = 1,
     common: Common = Common(),
 ) -> None:
-    """Make a short capture of soft bodies that walk, touch and part, encode it, and measure what comes back.
+    """Make a short capture of people who walk, touch and part, encode it, and measure what comes back.
 
     Parameters
     ----------
@@ -36,21 +40,27 @@ def command(
         How many frames to make.
     quality
         0 (small) to 100 (fine).
+    ssim
+        Render and compare pictures too (some seconds a frame).
+    jobs
+        Groups to encode side by side.
     """
-    if frames < 1:
-        raise InputError(f"--frames must be at least 1, got {frames}")
+    if jobs < 1:
+        raise InputError(f"--jobs must be at least 1, got {jobs}")
+    capture = soft_bodies(SoftBodiesOptions(frames=frames))
+    options = preset_options(quality=quality)
     output.mkdir(parents=True, exist_ok=True)
-    capture = soft_bodies(BodiesOptions(frames=frames))
-    file = output / "demo.reel"
-    with common.stages(frames) as progress:
-        summary = encode(capture, file, preset_options(quality=quality), progress=progress)
-    video = open_video(file)
-    measured = compare_sequences(capture, video, ComparisonOptions()).to_row()
-    write_sheet(capture, video, output / "demo.png")
+    file, picture = output / "demo.reel", output / "demo.png"
+    with common.stages(frames) as progress, workers(jobs) as executor:
+        summary = encode(capture, file, options, executor, progress)
+        video = open_video(file)
+        measured = compare_sequences(capture, counted(video, progress), ComparisonOptions(ssim=ssim)).to_row()
+    write_sheet(capture, video, picture)
     row = summary_row(summary, capture.frame_rate) | measured
     common.result(
         {"output": str(output)} | row,
         metric_table(measured),
         f"{file}: {describe(row)}",
-        f"Picture: {output / 'demo.png'}. Meshes: meshreel decode {file} -o {output / 'meshes'}",
+        f"picture: {picture}",
+        f"meshes: meshreel decode {file} -o {output / 'meshes'}",
     )

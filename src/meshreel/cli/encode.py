@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
+import multiprocessing
+import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -12,27 +14,34 @@ from cyclopts import Parameter
 
 from ..encoder import Summary, encode
 from ..errors import InputError
+from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions, open_sequence
 from ..presets import preset_options
 from .console import Common
 
+_READ = SequenceOptions()
+_CODE = preset_options()
+
 
 def command(
     inputs: list[str],
+    /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     preset: Literal["paper"] = "paper",
-    quality: float = 50.0,
-    fps: float = 30.0,
-    frames: str = ":",
-    scale: float = 1.0,
-    basis_size: int | None = None,
-    centers: int = 2000,
-    group_size: int = 10,
+    quality: float = _CODE.quality,
+    fps: float = _READ.frame_rate,
+    frames: str = _READ.frames,
+    scale: float = _READ.scale,
+    basis_size: int | None = _CODE.displacements.basis_size,
+    centers: int = _CODE.track.centers,
+    group_size: int = _CODE.group_size,
     jobs: int = 1,
     common: Common = Common(),
 ) -> None:
     """Encode a sequence of meshes into one .reel file.
+
+    Vertices that repeat a position are welded, and a warning says how many.
 
     Parameters
     ----------
@@ -61,17 +70,16 @@ def command(
     """
     if output.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
-    options = preset_options(
-        preset=preset, quality=quality, basis_size=basis_size, group_size=group_size, centers=centers
-    )
-    source: Any = inputs[0] if len(inputs) == 1 else inputs
-    sequence = open_sequence(source, SequenceOptions(frame_rate=fps, frames=frames, scale=scale))
-    with common.stages(len(sequence)) as progress, _executor(jobs) as executor:
+    if jobs < 1:
+        raise InputError(f"--jobs must be at least 1, got {jobs}")
+    options = preset_options(preset, quality, basis_size, group_size, centers)
+    source = inputs[0] if len(inputs) == 1 else inputs
+    sequence = open_sequence(source, SequenceOptions(fps, frames, scale, weld))
+    with common.stages(len(sequence)) as progress, workers(jobs) as executor:
         summary = encode(sequence, output, options, executor, progress)
-    for warning in sequence.warnings:
-        common.warn(warning)
+    common.warn(sequence.warnings)
     row = summary_row(summary, sequence.frame_rate)
-    common.result({"output": str(output)} | row, f"{output}: {describe(row)}")
+    common.result({"output": str(output), "warnings": sequence.warnings} | row, f"{output}: {describe(row)}")
 
 
 def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
@@ -82,9 +90,15 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
         "frames": summary.frame_count,
         "mbps": summary.size * 8 / seconds / 1e6,
         "groups": [
-            {"form": g.form.name.lower(), "frames": g.frame_count, "bytes": g.size, "rms_m": g.quality.distance,
-             "worst_rms_m": g.quality.worst, "normal_error_deg": g.quality.angle}
-            for g in summary.groups
+            {
+                "form": group.form.name.lower(),
+                "frames": group.frame_count,
+                "bytes": group.size,
+                "rms_m": group.quality.distance,
+                "worst_rms_m": group.quality.worst,
+                "normal_error_deg": group.quality.angle,
+            }
+            for group in summary.groups
         ],
     }
 
@@ -96,12 +110,26 @@ def describe(row: dict[str, Any]) -> str:
     return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, groups: {counted}"
 
 
-@contextlib.contextmanager
-def _executor(jobs: int) -> Iterator[Executor | None]:
-    if jobs < 1:
-        raise InputError(f"--jobs must be at least 1, got {jobs}")
+@contextmanager
+def workers(jobs: int) -> Iterator[Executor | None]:
+    """Processes for `jobs` windows at a time, none for one; an interrupt ends them at once."""
     if jobs == 1:
         yield None
         return
-    with ProcessPoolExecutor(jobs) as executor:
+    # Spawned, not forked: the progress display and Open3D have threads, which a fork would lose.
+    context = multiprocessing.get_context("spawn")
+    executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_leave_interrupts)
+    try:
         yield executor
+    except BaseException:
+        executor.shutdown(wait=False, cancel_futures=True)
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise
+    executor.shutdown()
+
+
+def _leave_interrupts() -> None:
+    """In a worker: Ctrl-C is the parent's affair, and SIGTERM ends the worker without a word."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)

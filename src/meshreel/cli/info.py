@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from ..errors import FormatError
 from .console import Common
 
 
-def command(file: Path, *, common: Common = Common()) -> None:
+def command(file: Path, /, *, common: Common = Common()) -> None:
     """Show rate by part, groups, forms and the quality recorded when the file was encoded.
 
     Parameters
@@ -24,24 +23,22 @@ def command(file: Path, *, common: Common = Common()) -> None:
         The .reel file.
     """
     row = describe_file(file)
-    table = Table("group", "frames", "form", "bytes", "parts")
-    for number, group in enumerate(row["groups"]):
-        parts = ", ".join(f"{name} {size}" for name, size in group["parts"].items())
-        last = group["first_frame"] + group["frames"] - 1
-        table.add_row(str(number), f"{group['first_frame']}-{last}", group["form"], str(group["bytes"]), parts)
-    rates = Table("part", "bytes", "Mbps")
-    for name, size in row["parts"].items():
-        rates.add_row(name, str(size), f"{size * row['mbps'] / max(row['bytes'], 1):.4f}")
-    head = f"{file}: {row['frames']} frames at {row['frame_rate']:g}/s, {row['bytes']} bytes, {row['mbps']:.3f} Mbps"
-    common.result(row, head, rates, table, f"recorded at encode: {json.dumps(row['metadata'])}")
+    head = f"{file}: {row['frames']} frames at {row['frame_rate']:g}/s, {row['bytes']} bytes, {row['mbps']:.4g} Mbps"
+    recorded = ", ".join(f"{name} {value}" for name, value in row["metadata"].items())
+    common.result(row, head, f"recorded at encode: {recorded or 'nothing'}", _rates(row), _groups(row))
+    common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
 
 
 def describe_file(file: Path) -> dict[str, Any]:
     """Everything `info` shows, ready for JSON. A damaged group is reported with its error; the others are read."""
     with FileSource(file) as source:
-        reader = ReelReader(source)
+        try:
+            reader = ReelReader(source)
+        except FormatError as error:
+            raise FormatError(f"{file}: {error}") from error
         groups = [_describe_group(reader, chunk) for chunk in reader.groups]
-    parts = {"header and index": reader.head_size}
+        static = sum(chunk.size for chunk in reader.chunks) - sum(chunk.size for chunk in reader.groups)
+    parts = {"header and index": reader.head_size} | ({"static": static} if static else {})
     for group in groups:
         for name, count in group["parts"].items():
             parts[name] = parts.get(name, 0) + count
@@ -49,17 +46,40 @@ def describe_file(file: Path) -> dict[str, Any]:
         "frames": reader.frame_count,
         "frame_rate": reader.frame_rate,
         "bytes": reader.size,
-        "mbps": reader.size * 8 * reader.frame_rate / reader.frame_count / 1e6,
+        "mbps": megabits(reader.size, reader),
         "parts": parts,
+        "parts_mbps": {name: megabits(count, reader) for name, count in parts.items()},
         "groups": groups,
         "metadata": reader.metadata,
     }
 
 
+def megabits(size: int, reader: ReelReader) -> float:
+    """The rate of so many bytes spread over all frames, Mbit/s."""
+    return size * 8 * reader.frame_rate / reader.frame_count / 1e6
+
+
 def _describe_group(reader: ReelReader, chunk: Chunk) -> dict[str, Any]:
-    row = {"first_frame": chunk.first_frame, "frames": chunk.frame_count, "form": chunk.form.name.lower()}
-    row |= {"bytes": chunk.size, "components": len(chunk.layers) - 1}
+    row: dict[str, Any] = {"first_frame": chunk.first_frame, "frames": chunk.frame_count}
+    row |= {"form": chunk.form.name.lower(), "bytes": chunk.size, "components": len(chunk.layers) - 1}
     try:
         return row | {"parts": payload_parts(reader.read_chunk(chunk.number))}
     except FormatError as error:
         return row | {"parts": {"damaged": chunk.size}, "error": str(error)}
+
+
+def _rates(row: dict[str, Any]) -> Table:
+    table = Table("part", "bytes", "Mbps", "share")
+    for name, size in row["parts"].items():
+        table.add_row(name, str(size), f"{row['parts_mbps'][name]:.4f}", f"{100 * size / row['bytes']:.1f} %")
+    return table
+
+
+def _groups(row: dict[str, Any]) -> Table:
+    table = Table("group", "frames", "form", "components", "bytes", "parts")
+    for number, group in enumerate(row["groups"]):
+        parts = ", ".join(f"{name} {size}" for name, size in group["parts"].items())
+        first, last = group["first_frame"], group["first_frame"] + group["frames"] - 1
+        components = str(group["components"]) if group["form"] == "laplacian" else ""
+        table.add_row(str(number), f"{first}-{last}", group["form"], components, str(group["bytes"]), parts)
+    return table

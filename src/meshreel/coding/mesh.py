@@ -31,7 +31,9 @@ def encode_mesh(mesh: Mesh, step: float) -> bytes:
     cells = float((mesh.vertices.max(axis=0) - low).max()) / step
     bits = max(1, math.ceil(math.log2(cells + 2)))
     if bits > MAX_BITS:
-        raise InputError(f"a mesh {cells * step:g} wide needs {bits} bits at step {step:g}; at most {MAX_BITS}: raise the step")
+        raise InputError(
+            f"a mesh {cells * step:g} wide needs {bits} bits at step {step:g}; at most {MAX_BITS}: raise the step"
+        )
     return bytes(
         DracoPy.encode(
             mesh.vertices,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from ..types import Mesh, MeshSequence
 
 Progress = Callable[[str, int, int], None]  # stage, frames done, frames of the sequence
 
 
+@runtime_checkable
 class Codec(Protocol):
     """A codec at one operating point."""
 

@@ -1,35 +1,76 @@
-"""Decodes a file in this process and prints times and peak memory as JSON: the runner starts it as a fresh process.
+"""Measures one thing in this process and prints it as JSON: the runner starts it as a fresh process.
 
-Times are processor time of one thread; decoding starts from bytes. The steady state is the median over the frames of
-the second pass, each group's cost spread over its frames.
+`decode FILE` gives times of decoding a .reel file; `draco FILE` the same of DracoPy on the frames in an .npz, the named
+peer; `encode NAME DATA FRAMES OPTIONS` encodes a sequence. Times are processor time; decoding starts from bytes. The
+steady state is the best of three passes, each group's cost spread over its frames.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from ..decoder import Video
 from ..decoder import open as open_video
 
+PASSES = 3
 
-def main(path: str) -> None:
-    """Prints {"first_frame_ms", "frame_ms", "frames", "vertices", "peak_rss_mb"} of decoding the file at `path`."""
+
+def main(task: str, *arguments: str) -> None:
+    """Prints what `task` measured."""
+    tasks: dict[str, Callable[..., dict[str, Any]]] = {
+        "decode": measure_decode,
+        "draco": measure_draco,
+        "encode": measure_encode,
+    }
+    row = tasks[task](*arguments)
+    sys.stdout.write(json.dumps(row | {"peak_rss_mb": peak_rss_mb()}) + "\n")
+
+
+def measure_decode(path: str) -> dict[str, Any]:
+    """First frame and steady state, ms a frame, of the file at `path`."""
     data = Path(path).read_bytes()
     start = time.process_time()
-    first = open_video(data)[0]
+    open_video(data)[0]
     first_ms = 1e3 * (time.process_time() - start)
-    frame_ms = min(_pass_ms(open_video(data)) for _ in range(3))
-    row = {
-        "first_frame_ms": first_ms,
-        "frame_ms": frame_ms,
-        "frames": len(open_video(data)),
-        "vertices": len(first.vertices),
-        "peak_rss_mb": peak_rss_mb(),
-    }
-    sys.stdout.write(json.dumps(row) + "\n")
+    frame_ms = min(_pass_ms(open_video(data)) for _ in range(PASSES))
+    sizes = [len(mesh.vertices) for mesh in open_video(data)]
+    return {"first_frame_ms": first_ms, "frame_ms": frame_ms, "frames": len(sizes), "vertices": sum(sizes) / len(sizes)}
+
+
+def measure_draco(path: str) -> dict[str, Any]:
+    """ms a frame of DracoPy on an .npz whose arrays are Draco bytes, a frame each."""
+    import DracoPy
+    import numpy as np
+
+    frames = [frame.tobytes() for frame in np.load(path).values()]
+    DracoPy.decode(frames[0])
+    passes = []
+    for _ in range(PASSES):
+        start = time.process_time()
+        for frame in frames:
+            DracoPy.decode(frame)
+        passes.append(1e3 * (time.process_time() - start) / len(frames))
+    return {"frame_ms": min(passes), "frames": len(frames)}
+
+
+def measure_encode(name: str, data: str, frames: str, options: str) -> dict[str, Any]:
+    """Bytes and CPU s a frame of encoding so many frames of a sequence; the memory is what it is run for."""
+    from ..encoder import encode
+    from ..presets import preset_options
+    from .datasets import open_dataset
+
+    sequence = open_dataset(name, Path(data), int(frames))
+    start = time.process_time()
+    with tempfile.TemporaryDirectory() as folder:
+        summary = encode(sequence, Path(folder) / "video.reel", preset_options(**json.loads(options)))
+    seconds = time.process_time() - start
+    return {"frames": summary.frame_count, "bytes": summary.size, "encode_s": seconds / summary.frame_count}
 
 
 def peak_rss_mb() -> float | None:
@@ -50,4 +91,4 @@ def _pass_ms(video: Video) -> float:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated
 
-from .kinds import F32, F64, I16, I64, U8, U16, U32, Array, Blob, Bytes, Choice, List, Rest, Text, Varint
+from .kinds import F32, F64, I64, U8, U16, U32, Array, Blob, Bytes, Choice, List, Rest, Text, Varint
 from .records import Nested
 
 MAGIC = b"REEL\r\n\x1a\n"  # the line ends betray a transfer in text mode
@@ -109,7 +109,9 @@ class LaplacianGroup:
 
     form: Annotated[Form, Choice(U8, Form), "LAPLACIAN"]
     levels: Annotated[int, U8, "midpoint subdivisions of the decoded reference mesh"]
-    step: Annotated[float, F64, "spacing of the reference's lattice, above 0: decoded vertices are rounded to multiples"]
+    step: Annotated[
+        float, F64, "spacing of the reference's lattice, above 0: decoded vertices are rounded to multiples"
+    ]
     reference: Annotated[bytes, Blob(U32), "the reference mesh, Draco"]
     displacements: Annotated[bytes, Rest(), "a DisplacementHead and its streams"]
 

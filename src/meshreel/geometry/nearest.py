@@ -34,14 +34,15 @@ class Surface:
         self.normals, self.areas = face_normals(mesh)
         self._scene = o3d.t.geometry.RaycastingScene()
         self._scene.add_triangles(
-            o3d.core.Tensor(mesh.vertices.astype(np.float32)), o3d.core.Tensor(mesh.faces.astype(np.uint32))
+            o3d.core.Tensor.from_numpy(mesh.vertices.astype(np.float32)),
+            o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32)),
         )
 
     def closest(self, queries: Float64[np.ndarray, "N 3"]) -> Hits:
         """The closest point of the surface to each query, its face and its barycentric weights."""
         import open3d as o3d
 
-        answer = self._scene.compute_closest_points(o3d.core.Tensor(queries.astype(np.float32)))
+        answer = self._scene.compute_closest_points(o3d.core.Tensor.from_numpy(queries.astype(np.float32)))
         faces = answer["primitive_ids"].numpy().astype(np.int64)
         uv = answer["primitive_uvs"].numpy().astype(np.float64)
         barycentric = np.stack([1 - uv[:, 0] - uv[:, 1], uv[:, 0], uv[:, 1]], axis=1)

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from ...analysis.survey import survey
-from ...coding.intra import encode_intra
+from ...coding.intra import encode_empty, encode_intra
 from ...container.writer import ReelWriter
 from ...decoder import open as open_video
 from ...encoder import make_header
+from ...errors import InputError
 from ...geometry.decimate import decimate
 from ...types import Mesh, MeshSequence
 from ..codec import Progress
@@ -27,18 +28,25 @@ class DracoCodec:
 
     qp: int = 10
 
+    def __post_init__(self) -> None:
+        _check_qp(self.qp)
+
     @property
     def name(self) -> str:
+        """What rows and plots call it."""
         return "draco"
 
     @property
     def options(self) -> dict[str, Any]:
+        """The operating point, ready for JSON."""
         return asdict(self)
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        return _encode_frames(sequence, self.qp, 1.0, 0)
+        """A .reel file of single frames."""
+        return _encode_frames(sequence, (self.qp, 1.0, 0), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
+        """The frames, from the bytes alone."""
         return open_video(data)
 
 
@@ -53,35 +61,56 @@ class DecimatedDracoCodec:
     qp: int = 10
     levels: int = 0
 
+    def __post_init__(self) -> None:
+        _check_qp(self.qp)
+        if not 0 < self.fraction <= 1 or not 0 <= self.levels <= 4:
+            raise InputError(f"fraction {self.fraction:g}, levels {self.levels}: give 0 < fraction <= 1, levels 0 to 4")
+
     @property
     def name(self) -> str:
+        """What rows and plots call it."""
         return "decimated_draco" if self.levels == 0 else "decimated_draco_subdivided"
 
     @property
     def options(self) -> dict[str, Any]:
+        """The operating point, ready for JSON."""
         return asdict(self)
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        return _encode_frames(sequence, self.qp, self.fraction, self.levels)
+        """A .reel file of single frames."""
+        return _encode_frames(sequence, (self.qp, self.fraction, self.levels), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
+        """The frames, from the bytes alone."""
         return open_video(data)
 
 
-def _encode_frames(sequence: MeshSequence, qp: int, fraction: float, levels: int) -> bytes:
+def _check_qp(qp: int) -> None:
+    if not 2 <= qp <= 20:
+        raise InputError(f"qp {qp}: give 2 to 20 bits")
+
+
+def lattice_step(extent: float, qp: int) -> float:
+    """The spacing at which a mesh `extent` wide takes `qp` bits, wherever the lattice's origin lies."""
+    return max(extent, 1e-12) / (2**qp - 3)
+
+
+def _encode_frames(sequence: MeshSequence, point: tuple[int, float, int], progress: Progress | None) -> bytes:
     seen = survey(sequence)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "anchor.reel"
         with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-            for frame in sequence:
-                writer.add_group(1, _encode_frame(seen.normalise(frame), qp, fraction, levels))
+            for i, frame in enumerate(sequence):
+                writer.add_group(i, 1, _encode_frame(seen.normalise(frame), *point))
+                if progress is not None:
+                    progress("code", i + 1, len(sequence))
         return path.read_bytes()
 
 
 def _encode_frame(mesh: Mesh, qp: int, fraction: float, levels: int) -> bytes:
     if mesh.is_empty:
-        return encode_intra([mesh], 1.0, 0)
+        return encode_empty()
     if fraction < 1:
         mesh = decimate(mesh, max(4, round(fraction * len(mesh.vertices))))
     extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
-    return encode_intra([mesh], max(extent, 1e-12) / (2**qp - 1), levels)
+    return encode_intra([mesh], lattice_step(extent, qp), levels)

@@ -27,17 +27,21 @@ class MeshreelCodec:
 
     @property
     def name(self) -> str:
+        """What rows and plots call it; points with a fixed m are a curve of their own."""
         return f"meshreel {self.preset}" + ("" if self.basis_size is None else " m")
 
     @property
     def options(self) -> dict[str, Any]:
+        """The operating point, ready for JSON."""
         return asdict(self)
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+        """The .reel file."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "video.reel"
             encode(sequence, path, preset_options(**self.options), progress=progress)
             return path.read_bytes()
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
+        """The frames, from the bytes alone."""
         return open_video(data)

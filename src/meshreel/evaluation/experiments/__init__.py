@@ -1,4 +1,4 @@
-"""The experiments by name; each module declares its points and what is promised of the rows."""
+"""The experiments by name; each module declares its points, reference curves and what is promised of the rows."""
 
 from __future__ import annotations
 

@@ -1,0 +1,93 @@
+"""Makes the golden files of a format version: tiny .reel files and, beside each, what they must decode to, bit for bit.
+
+Run once when a version is released: `python benchmarks/make_golden.py conformance/v1`. They stay as they are for ever:
+a reader that no longer decodes them to these bits is wrong.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from meshreel.capture.procedural import deforming_sphere
+from meshreel.coding.displacements import DisplacementOptions
+from meshreel.coding.group import code_reference, encode_group
+from meshreel.coding.intra import encode_empty, encode_intra
+from meshreel.container.writer import ReelWriter
+from meshreel.decoder import Video
+from meshreel.decoder import open as open_video
+from meshreel.format.layout import Header
+from meshreel.types import Mesh
+from tests.golden import frame_record
+
+FRAMES = 4
+Group = tuple[int, bytes, tuple[int, ...]]  # frames, payload, layer ends
+
+
+def main(folder: Path) -> None:
+    """Writes every golden file and its record."""
+    folder.mkdir(parents=True, exist_ok=True)
+    moving, still, nothing = laplacian_group(), draco_group(), (2, encode_empty(), ())
+    files = {
+        "laplacian": (header(), [moving]),
+        "draco": (header(), [still]),
+        "empty": (header(), [nothing]),
+        "mixed": (header(intervals=(40_000, 20_000, 33_333) * 3), [nothing, moving, still, (1, *nothing[1:])]),
+    }
+    for name, (head, groups) in files.items():
+        path = folder / f"{name}.reel"
+        with ReelWriter(path, head) as writer:
+            for frames, payload, layers in groups:
+                writer.add_group(writer.frame_count, frames, payload, layers)
+        path.with_suffix(".json").write_text(json.dumps(record(open_video(path)), indent=1) + "\n")
+
+
+def header(intervals: tuple[int, ...] = ()) -> Header:
+    """Far from the origin, so that a reader in single precision is found out."""
+    corner = (0.5, 0.5, 0.5)
+    return Header(
+        frame_rate=25.0,
+        origin=(1e6 + 0.125, -2.5, 0.1),
+        scale=1.7,
+        minimum=tuple(-x for x in corner),
+        maximum=corner,
+        metadata='{"preset":"golden"}',
+        first_time=500_000 if intervals else 0,
+        intervals=intervals,
+    )
+
+
+def laplacian_group() -> Group:
+    """A ball that stretches, with ripples, on a subdivided reference."""
+    ball = deforming_sphere(1, levels=1)[0]
+    reference = code_reference(Mesh.of(0.25 * ball.vertices, ball.faces), 10, 1)
+    points = reference.base.vertices
+    time = np.arange(FRAMES)
+    ripple = np.sin(20 * points[:, None, :] + time[None, :, None])
+    field = 0.01 * ripple + 0.1 * points[:, None, :] * time[None, :, None] / FRAMES
+    payload, layers = encode_group(reference, field, DisplacementOptions(step=0.002))
+    return FRAMES, payload, layers
+
+
+def draco_group() -> Group:
+    """A ball, nothing, and a larger ball: one subdivision in the decoder."""
+    ball = deforming_sphere(1, levels=1)[0]
+    meshes = [Mesh.of(0.2 * ball.vertices, ball.faces), Mesh.empty(), Mesh.of(0.3 * ball.vertices, ball.faces)]
+    return 3, encode_intra(meshes, 0.001, 1), ()
+
+
+def record(video: Video) -> dict[str, object]:
+    """What a reader must find in a file."""
+    return {
+        "frame_rate": video.frame_rate,
+        "timestamps": video.timestamps,
+        "frames": [frame_record(mesh) for mesh in video],
+        "frames_with_one_component": [frame_record(mesh) for mesh in video.at(1)],
+    }
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

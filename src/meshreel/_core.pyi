@@ -1,0 +1,86 @@
+"""Types of the compiled core (core/python/bind_*.cpp)."""
+
+import numpy as np
+from jaxtyping import Float64, Int32, Int64, UInt8
+
+# bind_entropy.cpp
+
+def encode_weights(
+    columns: Int32[np.ndarray, "C V"], starts: Int64[np.ndarray, " V+1"], indices: Int32[np.ndarray, " N"]
+) -> list[bytes]: ...
+def decode_weights(
+    data: bytes,
+    sizes: Int64[np.ndarray, " C"],
+    columns: Int32[np.ndarray, "C V"],
+    starts: Int64[np.ndarray, " V+1"],
+    indices: Int32[np.ndarray, " N"],
+) -> int: ...
+def weight_contexts(
+    columns: Int32[np.ndarray, "C V"],
+    starts: Int64[np.ndarray, " V+1"],
+    indices: Int32[np.ndarray, " N"],
+    classes: UInt8[np.ndarray, "C V"],
+    signs: UInt8[np.ndarray, "C V"],
+) -> None: ...
+def encode_integers(values: Int32[np.ndarray, " N"]) -> bytes: ...
+def decode_integers(data: bytes, values: Int32[np.ndarray, " N"]) -> bool: ...
+
+# bind_laplacian.cpp
+
+class Laplacian:
+    def __init__(
+        self,
+        vertices: Float64[np.ndarray, "V 3"],
+        faces: Int32[np.ndarray, "F 3"],
+        anchors: Int32[np.ndarray, " A"],
+        anchor_weight: float,
+    ) -> None: ...
+    def weights(
+        self,
+    ) -> tuple[Int32[np.ndarray, " N"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]: ...
+    def forward(self, weights: Float64[np.ndarray, "V M"]) -> Float64[np.ndarray, "V+A M"]: ...
+    def inverse(self, deltas: Float64[np.ndarray, "V+A M"]) -> Float64[np.ndarray, "V M"]: ...
+    def quantize(
+        self,
+        deltas: Float64[np.ndarray, "V+A M"],
+        steps: Float64[np.ndarray, " M"],
+        prices: Float64[np.ndarray, " M"],
+    ) -> Int32[np.ndarray, "V+A M"]: ...
+
+def farthest_anchors(faces: Int32[np.ndarray, "F 3"], vertices: int, count: int) -> Int32[np.ndarray, " A"]: ...
+def klt_inverse(
+    weights: Float64[np.ndarray, "V M"], vectors: Float64[np.ndarray, "M 3T"], mean: Float64[np.ndarray, " 3T"]
+) -> Float64[np.ndarray, "V 3T"]: ...
+
+# bind_tracking.cpp
+
+def spread_centers(
+    samples: Float64[np.ndarray, "N 3"],
+    centers: Float64[np.ndarray, "K 3"],
+    owners: Int32[np.ndarray, " N"],
+    tolerance: float,
+    max_rounds: int,
+) -> tuple[float, int]: ...
+def follow_centers(
+    samples: Float64[np.ndarray, "N 3"],
+    previous: Float64[np.ndarray, "K 3"],
+    offsets: Int32[np.ndarray, " K+1"],
+    indices: Int32[np.ndarray, " P"],
+    weights: Float64[np.ndarray, " P"],
+    centers: Float64[np.ndarray, "K 3"],
+    rotations: Float64[np.ndarray, "K 9"],
+    owners: Int32[np.ndarray, " N"],
+    spread: float,
+    rigidity: float,
+    tolerance: float,
+    max_rounds: int,
+) -> tuple[float, int]: ...
+def motion_differences(
+    offsets: Int32[np.ndarray, " K+1"],
+    indices: Int32[np.ndarray, " P"],
+    rotations: Float64[np.ndarray, "K 9"],
+    shifts: Float64[np.ndarray, "K 3"],
+    means: Float64[np.ndarray, "K 3"],
+    covariances: Float64[np.ndarray, "K 9"],
+    out: Float64[np.ndarray, " P"],
+) -> None: ...

@@ -1,0 +1,38 @@
+"""A promise: something the project set out to reach, and what was measured. `bench run` prints it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from .rows import Row
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """A target and its measured value; `value` and `met` are None where no row tells."""
+
+    text: str
+    bound: str
+    value: str | None = None
+    met: bool | None = None
+
+    @property
+    def verdict(self) -> str:
+        """One word."""
+        return {None: "not measured", True: "met", False: "MISSED"}[self.met]
+
+
+Measure = Callable[[Row], tuple[str, bool]]
+
+
+def of_row(text: str, bound: str, row: Row | None, measure: Measure) -> Promise:
+    """The promise as `measure` finds it in a row: the value as text, and whether it holds."""
+    return Promise(text, bound) if row is None else Promise(text, bound, *measure(row))
+
+
+def of_rows(
+    text: str, bound: str, rows: Sequence[Row], measure: Callable[[Sequence[Row]], tuple[str, bool]]
+) -> Promise:
+    """The same over several rows; not measured where there are none."""
+    return Promise(text, bound, *measure(rows)) if rows else Promise(text, bound)
