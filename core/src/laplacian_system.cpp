@@ -112,13 +112,12 @@ void shape(const Factor& factor, const double* deltas, int64_t columns, const do
         const double pivot = factor.pivots[k];
         for (int64_t c = 0; c < columns; ++c) {
             const double wanted = deltas[i * columns + c] / steps[c] + debt[k * columns + c];
+            const auto cost = [&](double q) {
+                return (q - wanted) * (q - wanted) + pivot * prices[c] * std::fabs(q);
+            };
             double q = std::floor(wanted + 0.5);
-            double best = (q - wanted) * (q - wanted) + pivot * prices[c] * std::fabs(q);
-            const double toward = q > 0.0 ? q - 1.0 : q + 1.0;
-            if (q != 0.0) {
-                const double cost = (toward - wanted) * (toward - wanted) + pivot * prices[c] * std::fabs(toward);
-                if (cost < best) q = toward;
-            }
+            const double smaller = q > 0.0 ? q - 1.0 : q + 1.0;
+            if (q != 0.0 && cost(smaller) < cost(q)) q = smaller;
             q = std::min(std::max(q, -1.0e9), 1.0e9);
             symbols[i * columns + c] = static_cast<int32_t>(q);
             u[c] = q - wanted;

@@ -100,7 +100,7 @@ def test_affinity_is_one_for_a_center_itself_half_at_its_reach_and_knows_no_unit
     a = affinity(distances, OPTIONS)
     np.testing.assert_array_equal(np.diag(a), 1)
     assert center_spacing(distances) == 1
-    assert a[0, 4] == pytest.approx(0.5)
+    assert a[0, 2] == pytest.approx(0.5)
     np.testing.assert_allclose(affinity(1000 * distances, OPTIONS), a, rtol=1e-5)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from meshreel.coding import entropy, klt, laplacian
-from meshreel.coding.allocation import DisplacementOptions, allocate
+from meshreel.coding.allocation import WORTH, DisplacementOptions, allocate, alternatives
 from meshreel.coding.displacements import decode_displacements, encode_displacements
 from meshreel.coding.steps import step_of
 from meshreel.errors import InputError
@@ -44,7 +44,7 @@ def test_the_chosen_number_of_components_is_no_worse_than_any_fixed_one() -> Non
         options = DisplacementOptions(step=1e-3, basis_size=size)
         data = encode_displacements(FIELD, BASE, options)
         error = ((decode_displacements(data, BASE) - FIELD) ** 2).sum()
-        return float(error + options.price * options.step**2 * 8 * len(data))
+        return float(error + WORTH * options.step**2 * 8 * len(data))
 
     best = min(cost(size) for size in range(8))
     assert cost(None) <= 1.03 * best
@@ -55,7 +55,7 @@ def test_a_price_on_bits_saves_more_bytes_than_a_coarser_step_of_equal_error() -
     field = moving(base)
 
     def coded(step: float, price: float) -> tuple[int, float]:
-        data = encode_displacements(field, base, DisplacementOptions(step=step, price=price))
+        data = encode_displacements(field, base, DisplacementOptions(step=step, price=price, anchor_count=6))
         return len(data), rms(decode_displacements(data, base) - field)
 
     size, error = coded(5e-4, 0.5)
@@ -72,6 +72,7 @@ def test_a_price_on_bits_saves_more_bytes_than_a_coarser_step_of_equal_error() -
         ({"step": 2.0}, "step"),
         ({"basis_size": -1}, "basis size"),
         ({"price": -1.0}, "price"),
+        ({"dead_zone": 0.3}, "dead zone"),
         ({"anchor_count": -1}, "anchors"),
         ({"anchor_weight": 0}, "weight"),
         ({"anchor_weight": 256}, "weight"),
@@ -80,3 +81,12 @@ def test_a_price_on_bits_saves_more_bytes_than_a_coarser_step_of_equal_error() -
 def test_options_name_the_value_that_is_wrong(values: dict[str, float], named: str) -> None:
     with pytest.raises(InputError, match=named):
         DisplacementOptions(**values)
+
+
+def test_the_kept_number_of_anchors_is_the_cheaper_one() -> None:
+    for step in (1e-2, 3e-4):
+        options = DisplacementOptions(step=step)
+        ways = alternatives(BASE.faces, len(BASE.vertices), options)
+        sizes = [len(encode_displacements(FIELD, BASE, way)) for way in ways]
+        assert len(encode_displacements(FIELD, BASE, options)) in sizes
+        assert len(ways) == 2

@@ -54,7 +54,10 @@ def test_obj_names_what_it_holds_besides_geometry(tmp_path: Path) -> None:
 
 
 BAD_OBJ = {
-    "nan": (TRIANGLE.replace("v 1 0 0", "v 1 nan 0"), r"vertex 1 is at \(1, nan, 0\), and 1 in all are not finite"),
+    "nan": (
+        TRIANGLE.replace("v 1 0 0", "v 1 nan 0"),
+        r"vertex 1 is at \(1, nan, 0\), and 1 in all are not",
+    ),
     "infinite": (TRIANGLE.replace("v 1 0 0", "v 1e999 0 0"), r"vertex 1 is at \(inf, 0, 0\)"),
     "index_too_large": (TRIANGLE.replace("f 1 2 3", "f 1 2 4"), r"line 4 .* vertex 4, but the file has 3 vertices"),
     "index_zero": (TRIANGLE.replace("f 1 2 3", "f 0 1 2"), r"line 4 \('f 0 1 2'\) refers to vertex 0"),
@@ -68,6 +71,7 @@ BAD_OBJ = {
     "short_vertex": (TRIANGLE.replace("v 1 0 0", "v 1 0"), r"line 2 \('v 1 0'\) has 2 coordinates instead of 3"),
     "short_face": (TRIANGLE.replace("f 1 2 3", "f 1 2"), r"line 4 \('f 1 2'\) has 2 corners instead of 3 or more"),
     "junk_statement": (TRIANGLE + "hello world\n", r"line 5 \('hello world'\) begins with no OBJ keyword"),
+    "overflowing": (TRIANGLE.replace("v 1 0 0", "v 1e200 0 0"), r"vertex 1 is at \(1e\+200, 0, 0\)"),
     "nothing": ("", r"has 0 bytes"),
     "bytes": (bytes(range(256)), r"begins with no OBJ keyword"),
 }
@@ -195,6 +199,8 @@ def test_a_ply_cut_anywhere_is_refused(tmp_path: Path, data: bytes) -> None:
         ("list uchar int", "list uchar text", r"PLY header has 'property list uchar text"),
         ("5 0 1 2 4 3 7", "5 0 1 2 4 9 7", r"face 2 refers to vertex 9, but there are 5"),
         ("3 0 1 2 7", "2 0 1 7", r"face 0 has 2 corners"),
+        ("3 0 1 2 7", "3 0 1 1.5 7", r"PLY index is 1.5 where a whole number must be"),
+        ("3 0 1 2 7", "nan 0 1 2 7", r"PLY list length is nan"),
         ("3 0 1 2 7", "-3 0 1 2 7", r"face 0 is too short"),
         ("1 1 0 1 2 3\n1000000 1", "1 1 0 1 2 3\none 1", r"line 4 .*'one' where a number"),
         ("property double z\n", "", r"no x, y, z"),
@@ -285,3 +291,29 @@ def test_obj_agrees_with_trimesh_on_a_captured_frame() -> None:
     polygons = parse_obj(path.read_bytes())
     assert np.array_equal(polygons.vertices, other.vertices)
     assert np.array_equal(polygons.corners.reshape(-1, 3), other.faces)
+
+
+@pytest.mark.parametrize("name", ["m.obj", "text.ply", "binary.ply", "m.stl", "m.off", "m.glb"])
+def test_damaged_bytes_give_a_mesh_or_an_input_error_and_nothing_else(tmp_path: Path, name: str) -> None:
+    extension, random = name.split(".")[1], np.random.default_rng(7)
+    data = {"text.ply": PLY_TEXT.encode(), "binary.ply": binary_ply(">")}.get(name)
+    if data is None:
+        data = trimesh.creation.box().export(file_type=extension)
+        data = data.encode() if isinstance(data, str) else data
+    for _ in range(150):
+        bad = bytearray(data)
+        for place in random.integers(0, len(bad), 3):
+            bad[place] = random.integers(0, 256)
+        try:
+            mesh = read(tmp_path, name, bytes(bad)).mesh
+        except InputError:
+            continue
+        assert np.isfinite(mesh.vertices).all()
+        assert mesh.is_empty or (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices))
+
+
+def test_a_glb_of_absurd_size_is_refused_before_memory_is_taken(tmp_path: Path) -> None:
+    text = b'{"meshes":[{}],"accessors":[{"count":99999999999,"componentType":5126,"type":"VEC3"}]}  '
+    words = np.array([2, 20 + len(text), len(text)], "<u4").tobytes()
+    with pytest.raises(InputError, match=r"announces 99999999999 values in \d+ bytes"):
+        read(tmp_path, "m.glb", b"glTF" + words + b"JSON" + text)

@@ -126,8 +126,8 @@ def test_a_choice_of_no_frames_is_refused(tmp_path: Path) -> None:
     ("options", "words"),
     [
         ({"frames": "1:2:3"}, r"frames '1:2:3' is not a range; give A:B"),
-        ({"frame_rate": 0.0}, r"frame rate 0.0 is not a positive number"),
-        ({"scale": float("nan")}, r"scale nan is not a positive number"),
+        ({"frame_rate": 0.0}, r"frame rate 0.0 is not between"),
+        ({"scale": float("nan")}, r"scale nan is not between"),
     ],
 )
 def test_impossible_options_are_refused(options: dict, words: str) -> None:

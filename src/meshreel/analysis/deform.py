@@ -26,14 +26,14 @@ FRONT = 4.0  # a center in front of the surface counts as this many times as far
 class DeformOptions:
     """Which centers move a point, and how their say falls off."""
 
-    neighbours: int = 10  # centers per neighbourhood (the paper's K_nbr), itself included
+    neighbours: int = 8  # centers per neighbourhood (the paper's K_nbr), itself included
     falloff: float = 1.0  # a center's say falls to 1/e at this many center spacings beyond the point's nearest one
     guard_choices: int = 6  # nearest centers a vertex may take instead of a stranger; 1 is the paper's rule alone
     guard_rounds: int = 2  # passes of that guard over the mesh
 
     def __post_init__(self) -> None:
         if self.neighbours < 1:
-            raise InputError(f"neighbours is {self.neighbours}: give at least 1 center (10 is usual)")
+            raise InputError(f"neighbours is {self.neighbours}: give at least 1 center (8 is usual)")
         if not self.falloff > 0:
             raise InputError(f"falloff is {self.falloff}: give a positive multiple of the center spacing")
         if self.guard_choices < 1 or self.guard_rounds < 0:

@@ -24,7 +24,7 @@ class ReferenceCenterOptions:
 
     max_rounds: int = 80  # SMACOF rounds at most
     tolerance: float = 2e-4  # stop where a round lowers the stress by less than this share
-    reach: float = 4.0  # affinity is 1/2 at this many typical distances between nearest centers (eq. 6's sigma)
+    reach: float = 2.0  # affinity is 1/2 at this many typical distances between nearest centers (eq. 6's sigma)
     seed: int = 0  # of the eigenvector iteration's start
 
     def __post_init__(self) -> None:

@@ -31,7 +31,7 @@ class TrackOptions:
     samples: int = 45_000  # points that stand for the volume of a frame
     reach: float = 0.058  # distance that halves an affinity
     agreement: float = 0.003  # difference of motion (RMS, a frame) that halves an affinity
-    neighbours: int = 32  # at most, of a center
+    neighbours: int = 16  # at most, of a center
     spread: float = 1.0  # weight of the even spread (Lloyd)
     rigidity: float = 3.0  # weight of the rigid term
     tolerance: float = 1e-4  # a frame is done when a round can lower the energy by no more than this share

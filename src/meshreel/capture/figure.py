@@ -36,7 +36,7 @@ class Pose:
 
 def figure(pose: Pose, thinnest: float) -> Body:
     """The person's parts in the world; none is thinner than `thinnest` (m), so that a grid can see it."""
-    bob = 0.05 * pose.stride * np.cos(4 * np.pi * pose.step) - 0.05 * pose.stride
+    bob = -pose.stride * (0.035 + 0.02 * np.cos(4 * np.pi * pose.step))  # lowest when both feet are far apart
     lift = np.array([0.0, bob, 0.0])
     chains = [_torso(lift, pose), _head(lift)]
     for side, phase in ((1.0, 0.0), (-1.0, 0.5)):

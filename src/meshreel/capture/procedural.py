@@ -32,6 +32,7 @@ class SoftBodiesOptions:
     spacing: float = 0.022  # m between grid points: 0.022 gives about 10k vertices for two people
     people: int = 2  # 1 to 3
     story: float = 3.0  # s to walk up, shake hands, part and wave; then it begins again
+    begin: float = 0.0  # s into the story; 0.95 with 30 frames: apart, in touch, apart
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
@@ -42,6 +43,8 @@ class SoftBodiesOptions:
             raise InputError(f"people {self.people} is not 1, 2 or 3; choose one of these")
         if not 0.008 <= self.spacing <= 0.1:
             raise InputError(f"spacing {self.spacing} m is outside 0.008 to 0.1; 0.022 suits two people")
+        if not (math.isfinite(self.begin) and self.begin >= 0):
+            raise InputError(f"begin {self.begin} is not a time from 0 on; give seconds, as 0.95")
         for name, value in (("frame rate", self.frame_rate), ("story", self.story)):
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"{name} {value} is not a positive number; give one, as 30 or 3")
@@ -66,7 +69,8 @@ class SoftBodies:
 
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[operator.index(index)]
-        moment = number / self.options.frame_rate / self.options.story % 1.0
+        seconds = self.options.begin + number / self.options.frame_rate
+        moment = seconds / self.options.story % 1.0
         return polygonize(cast(moment, self.options), _TOUCH, _grid(number, self.options))
 
 
@@ -105,8 +109,8 @@ def _host(moment: float) -> Pose:
     shake = _shake(moment)
     hello = _during(moment, 0.02, 0.10, 0.17, 0.27)
     wave = place + [0.12, 1.62, 0.42 + 0.10 * np.sin(2 * np.pi * 7 * moment)]
-    right = _mixed((wave, hello), (np.array([-0.10, 1.10 + shake, 0.0]), _meeting(moment)))
-    pat = np.array([_NEAR / 2 - 0.15, 1.34 + 0.02 * np.sin(2 * np.pi * 8 * moment), -0.20])
+    right = _mixed((wave, hello), (np.array([-0.10, 1.10 + shake, 0.055]), _meeting(moment)))
+    pat = np.array([_NEAR / 2 - 0.14, 1.34 + 0.02 * np.sin(2 * np.pi * 8 * moment), -0.18])
     reach = (_during(moment, 0.36, 0.44, 0.56, 0.64), right[1])
     return Pose(place, np.pi / 2, step, stride, (pat, right[0]), reach, _wobble(step, stride), 1.0, 1.0)
 
@@ -117,9 +121,9 @@ def _guest(moment: float) -> Pose:
     place = np.array([gap / 2, 0.0, 0.12])
     bye = _during(moment, 0.72, 0.80, 0.90, 0.98)
     wave = place + [-0.12, 1.52, -0.42 + 0.10 * np.sin(2 * np.pi * 7 * moment)]
-    right = _mixed((wave, bye), (np.array([0.10, 1.10 + _shake(moment), 0.0]), _meeting(moment)))
-    pose = Pose(place, -np.pi / 2, step + 0.5, stride, (None, right[0]), (0.0, right[1]), _wobble(step, stride))
-    return Pose(pose.place, pose.heading, pose.step, pose.stride, pose.wrists, pose.reach, pose.softness, 0.95, 1.12)
+    right = _mixed((wave, bye), (np.array([0.10, 1.10 + _shake(moment), -0.055]), _meeting(moment)))
+    wrists, reach = (None, right[0]), (0.0, right[1])
+    return Pose(place, -np.pi / 2, step + 0.5, stride, wrists, reach, _wobble(step, stride), 0.95, 1.12)
 
 
 def _child(moment: float) -> Pose:

@@ -15,7 +15,7 @@ from ..format import records
 from ..format.layout import Component, DisplacementHead
 from ..types import Mesh
 from . import entropy, klt, laplacian, quantize
-from .allocation import Allocation, DisplacementOptions, allocate
+from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost
 from .steps import LEVELS, step_of
 
 MOST_FRAMES = 65_535
@@ -29,15 +29,8 @@ def encode_displacements(field: Float64[np.ndarray, "V T 3"], base: Mesh, option
         raise InputError("displacements must be finite and in units of the diagonal; normalise the sequence first")
     if not 0 < frames <= MOST_FRAMES:
         raise InputError(f"a group of {frames} frames: give 1 to {MOST_FRAMES}")
-    anchors = laplacian.anchors(options.anchor_rule, options.anchor_count, base.faces, vertices)
-    system = laplacian.System(base, anchors, options.anchor_weight)
-    neighbours = entropy.causal_neighbours(base.faces, vertices)
-    choice = allocate(field, system, neighbours, options)  # eqs. 8 and 12
-    anchor_streams = [entropy.encode_integers(column) for column in choice.symbols[vertices:].T]
-    delta_streams = entropy.encode_weights(choice.symbols[:vertices], neighbours)
-    head = _head(field, choice, anchor_streams, delta_streams, options)
-    streams = (stream for pair in zip(anchor_streams, delta_streams, strict=True) for stream in pair)
-    return records.pack(head) + b"".join(streams)
+    coded = [_encode(field, base, choice) for choice in alternatives(base.faces, vertices, options)]
+    return min(coded, key=lambda pair: cost(pair[1], len(pair[0]), options))[0]
 
 
 def decode_displacements(data: bytes, base: Mesh, components: int | None = None) -> Float64[np.ndarray, "V T 3"]:
@@ -67,25 +60,34 @@ def layer_sizes(data: bytes) -> list[int]:
     return [offset] + [_size(component) for component in head.components]
 
 
-def _head(
-    field: Float64[np.ndarray, "V T 3"],
-    choice: Allocation,
-    anchor_streams: list[bytes],
-    delta_streams: list[bytes],
-    options: DisplacementOptions,
-) -> DisplacementHead:
-    bits = choice.basis.bits.tolist()
-    parts = zip(bits[1:], choice.levels.tolist(), anchor_streams, delta_streams, strict=True)
-    basis = np.concatenate([choice.basis.mean, choice.basis.vectors.reshape(-1)]).astype(np.int32)
-    return DisplacementHead(
-        frames=field.shape[1],
+def _encode(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: DisplacementOptions) -> tuple[bytes, float]:
+    """The payload for one number of anchors, and its squared error."""
+    vertices, frames, _ = field.shape
+    count = options.anchor_count or 0
+    anchors = laplacian.anchors(options.anchor_rule, count, base.faces, vertices)
+    system = laplacian.System(base, anchors, options.anchor_weight)
+    neighbours = entropy.causal_neighbours(base.faces, vertices)
+    choice = allocate(field, system, neighbours, options)  # eqs. 8 and 12
+    anchor_streams = [entropy.encode_integers(column) for column in choice.symbols[vertices:].T]
+    delta_streams = entropy.encode_weights(choice.symbols[:vertices], neighbours)
+    head = DisplacementHead(
+        frames=frames,
         anchor_rule=options.anchor_rule,
-        anchor_count=min(options.anchor_count, len(field)),
+        anchor_count=count,
         anchor_weight=options.anchor_weight,
-        mean_bits=bits[0],
-        components=tuple(Component(b, level, len(a), len(d)) for b, level, a, d in parts),
-        basis=entropy.encode_integers(basis),
+        mean_bits=int(choice.basis.bits[0]),
+        components=_components(choice, anchor_streams, delta_streams),
+        basis=entropy.encode_integers(np.append(choice.basis.mean, choice.basis.vectors).astype(np.int32)),
     )
+    streams = (stream for pair in zip(anchor_streams, delta_streams, strict=True) for stream in pair)
+    weights = system.inverse(quantize.inverse(choice.symbols, np.array([step_of(k) for k in choice.levels.tolist()])))
+    error = klt.inverse(weights, klt.dequantize(choice.basis)) - field
+    return records.pack(head) + b"".join(streams), float((error**2).sum())
+
+
+def _components(choice: Allocation, anchors: list[bytes], deltas: list[bytes]) -> tuple[Component, ...]:
+    parts = zip(choice.basis.bits[1:].tolist(), choice.levels.tolist(), anchors, deltas, strict=True)
+    return tuple(Component(bits, level, len(fixed), len(stream)) for bits, level, fixed, stream in parts)
 
 
 def _read_head(data: bytes) -> tuple[DisplacementHead, int]:

@@ -89,5 +89,5 @@ def dequantize(symbols: BasisSymbols) -> Basis:
 
 
 def _bits_for(amplitude: float, step: float) -> int:
-    """Fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/64 of a step."""
-    return int(np.clip(np.ceil(np.log2(max(32.0 * amplitude / step, 1.0))), 5, 24))
+    """Fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/32 of a step."""
+    return int(np.clip(np.ceil(np.log2(max(16.0 * amplitude / step, 1.0))), 5, 24))

@@ -8,10 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 
 from ..errors import InputError
 from ..types import Mesh
+from .decimate import decimate
 from .topology import clean, components
 
 
@@ -22,9 +23,12 @@ class PoissonOptions:
     depth: int = 9  # of the octree
     trim: float = 2.0  # octree levels below the median density at which surface is cut away
     reach: float = 0.01  # surface farther than this from all points is cut away, in units of the points
+    vertices: int = 30_000  # the closed surface is decimated to this many before it is trimmed
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
 
     def __post_init__(self) -> None:
+        if self.vertices < 4:
+            raise InputError(f"vertices is {self.vertices}: give at least 4")
         if not 3 <= self.depth <= 12:
             raise InputError(f"depth is {self.depth}: give 3 to 12 octree levels (the paper has 9)")
         if self.trim < 0 or not self.reach > 0 or not 0 <= self.smallest < 1:
@@ -47,9 +51,9 @@ def reconstruct(
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.normals = o3d.utility.Vector3dVector(normals)
     solid, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=options.depth, n_threads=1)
-    mesh = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
-    levels = np.asarray(density)
-    trusted = (levels >= np.median(levels) - options.trim) & _near(mesh.vertices, points, options.reach)
+    whole = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
+    mesh = decimate(whole, options.vertices)
+    trusted = _dense(mesh, whole, np.asarray(density), options.trim) & _near(mesh.vertices, points, options.reach)
     return drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[trusted[mesh.faces].all(axis=1)])), options.smallest)
 
 
@@ -76,6 +80,13 @@ def thin_out(
     mean = [np.stack([np.bincount(group, a[:, d], len(count)) for d in range(3)], axis=1) for a in (points, normals)]
     length = np.linalg.norm(mean[1], axis=1, keepdims=True)
     return mean[0] / count[:, None], mean[1] / np.where(length > 0, length, 1.0)
+
+
+def _dense(mesh: Mesh, whole: Mesh, levels: Float64[np.ndarray, " W"], trim: float) -> Bool[np.ndarray, " V"]:
+    """Vertices of the decimated mesh where the points were not much sparser than in the middle."""
+    from scipy.spatial import cKDTree
+
+    return levels[cKDTree(whole.vertices).query(mesh.vertices)[1]] >= np.median(levels) - trim
 
 
 def _near(queries: Float64[np.ndarray, "V 3"], points: Float64[np.ndarray, "N 3"], reach: float) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 from .polygons import Dropped, Polygons, Unreadable
 
 _DROPS = {"NORMAL": "normals", "TEXCOORD": "texture coordinates", "COLOR": "colors", "JOINTS": "skinning"}
+_DENSEST = 64  # values a byte: no mesh compression comes near
 
 
 def parse_glb(data: bytes) -> Polygons:
@@ -23,9 +24,9 @@ def parse_glb(data: bytes) -> Polygons:
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
         parts = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
+        return _joined([part for part in parts if isinstance(part[1], trimesh.Trimesh)], _dropped(tree))
     except Exception as error:  # whatever a foreign parser raises, the file is what is wrong
         raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
-    return _joined([part for part in parts if isinstance(part[1], trimesh.Trimesh)], _dropped(tree))
 
 
 def _json_chunk(data: bytes) -> dict[str, Any]:
@@ -42,6 +43,9 @@ def _json_chunk(data: bytes) -> dict[str, Any]:
         raise Unreadable(f"GLB scene description is no JSON ({error})") from None
     if not isinstance(tree, dict):
         raise Unreadable("GLB scene description is no JSON object")
+    for accessor in tree.get("accessors") or ():
+        if isinstance(accessor, dict) and not 0 <= accessor.get("count", 0) <= _DENSEST * len(data):
+            raise Unreadable(f"GLB announces {accessor['count']} values in {len(data)} bytes")
     return tree
 
 

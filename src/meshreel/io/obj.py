@@ -77,8 +77,8 @@ def _others(lines: Lines, first: np.ndarray, second: np.ndarray, other: np.ndarr
         dropped |= {_DROPS["v" + mark]} if found.any() else set()
         other = other & ~found
     for number in np.flatnonzero(other):
-        keyword = lines.line(number).split(maxsplit=1)[0]
-        if keyword not in _KNOWN:
+        keyword = next(iter(lines.line(number).split(maxsplit=1)), "")
+        if keyword and keyword not in _KNOWN:
             raise Unreadable(f"line {number + 1} ({lines.line(number)!r}) begins with no OBJ keyword")
         dropped |= {_DROPS[keyword]} if keyword in _DROPS else set()
     return frozenset(dropped)

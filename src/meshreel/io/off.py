@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from .polygons import Polygons, Unreadable
-from .rows import Lines
+from .rows import Lines, whole
 
 _DROPS = {"ST": "texture coordinates", "C": "vertex colors", "N": "normals"}
 
@@ -25,7 +25,7 @@ def parse_off(data: bytes) -> Polygons:
     head, _ = lines.values(filled[:1], lines.block(filled[:1]))
     if len(head) < 2 or (head < 0).any():
         raise Unreadable(f"OFF counts expected, found {lines.line(int(filled[0]))!r}")
-    vertex_count, face_count = int(head[0]), int(head[1])
+    vertex_count, face_count = whole(head[:2], "OFF count").tolist()
     if len(filled) < 1 + vertex_count + face_count:
         raise Unreadable(
             f"OFF announces {vertex_count} vertices and {face_count} faces but has {len(filled) - 1} lines"
@@ -42,10 +42,10 @@ def parse_off(data: bytes) -> Polygons:
 def _faces(lines: Lines, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
     values, counts = lines.values(chosen, lines.block(chosen))
     begins = np.cumsum(counts) - counts
-    sizes = values[begins].astype(np.int64)
+    sizes = whole(values[begins], "OFF corner count")
     if (sizes + 1 > counts).any():
         face = int(np.argmax(sizes + 1 > counts))
         raise Unreadable(f"OFF face {face} announces {sizes[face]} corners but has {counts[face] - 1} (truncated?)")
     place = np.arange(len(values)) - np.repeat(begins, counts)  # within its line
     corners = values[(place > 0) & (place <= np.repeat(sizes, counts))]
-    return corners.astype(np.int64), sizes, bool((counts > sizes + 1).any())
+    return whole(corners, "OFF index"), sizes, bool((counts > sizes + 1).any())

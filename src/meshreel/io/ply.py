@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .polygons import Dropped, Polygons, Unreadable
-from .rows import Lines
+from .rows import Lines, whole
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -132,11 +132,11 @@ class _Text:
             if field.count is None:
                 columns[field.name] = here
                 continue
-            length = here.astype(np.int64)
+            length = whole(here, "PLY list length")
             if ((length < 0) | (place + length > ends)).any():
                 raise _short(element, int(np.argmax((length < 0) | (place + length > ends))))
             if field.name == wanted:
-                items, sizes = padded[_ranges(place, length)].astype(np.int64), length
+                items, sizes = whole(padded[_ranges(place, length)], "PLY index"), length
             place = place + length
         return columns, items, sizes
 
@@ -201,7 +201,7 @@ class _Binary:
         lengths = np.array(sizes, dtype=np.int64)
         picked = _ranges(np.array(begins, dtype=np.int64), lengths * dtype.itemsize)
         items = np.frombuffer(self._data, dtype=np.uint8)[picked].view(dtype)
-        return {}, items.astype(np.int64), lengths
+        return {}, whole(items, "PLY index"), lengths
 
 
 def _even_rows(element: _Element, rows: np.ndarray, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
@@ -211,7 +211,7 @@ def _even_rows(element: _Element, rows: np.ndarray, wanted: str | None) -> tuple
             columns[field.name] = rows[f"{k}"][:, 0]
         elif field.name == wanted:
             block = rows[f"{k}"]
-            items, sizes = block.astype(np.int64).reshape(-1), np.full(len(block), block.shape[1], dtype=np.int64)
+            items, sizes = whole(block.reshape(-1), "PLY index"), np.full(len(block), block.shape[1], dtype=np.int64)
     return columns, items, sizes
 
 

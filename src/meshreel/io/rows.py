@@ -13,7 +13,7 @@ from jaxtyping import Float64, Int64
 
 from .polygons import Unreadable
 
-_BLANKS = np.frombuffer(b" \t\n\v\f", dtype=np.uint8)
+_IS_BLANK = np.isin(np.arange(256), list(b" \t\n\v\f"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,8 @@ class Lines:
             data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if comment in data:
             data = re.sub(re.escape(comment) + rb"[^\n]*", b"", data)
-        data = re.sub(rb"(?m)^[ \t\v\f]+", b"", data)
+        if data[:1].isspace() or b"\n " in data or b"\n\t" in data:
+            data = re.sub(rb"(?m)^[ \t\v\f]+", b"", data)
         text = np.frombuffer(data + b"\n", dtype=np.uint8)
         ends = np.flatnonzero(text == ord("\n"))
         return Lines(text, np.concatenate([[0], ends[:-1] + 1]), ends)
@@ -45,11 +46,20 @@ class Lines:
         return shown if len(shown) <= 60 else shown[:57] + "..."
 
     def block(self, chosen: Int64[np.ndarray, " N"], skip: int = 0) -> np.ndarray:
-        """The chosen lines' bytes with their newlines, `skip` bytes left out at the start of each; uint8."""
-        step = np.zeros(len(self.text) + 1, dtype=np.int8)
-        step[self.starts[chosen] + skip] = 1
-        step[self.ends[chosen] + 1] -= 1
-        return self.text[np.cumsum(step[:-1], dtype=np.int8).astype(bool)]
+        """The chosen lines' bytes with their newlines, the first `skip` bytes of each blanked; uint8."""
+        if len(chosen) == 0:
+            return np.zeros(0, dtype=np.uint8)
+        starts, sizes = self.starts[chosen], self.ends[chosen] + 1 - self.starts[chosen]
+        if chosen[-1] - chosen[0] == len(chosen) - 1:  # one run of lines, as nearly always: no mask over the text
+            block = self.text[starts[0] : starts[-1] + sizes[-1]].copy()
+        else:
+            wanted = np.zeros(len(self), dtype=bool)
+            wanted[chosen] = True
+            block = self.text[np.repeat(wanted, self.ends + 1 - self.starts)]
+        begins = np.cumsum(sizes) - sizes
+        for k in range(skip):
+            block[begins + k] = ord(" ")
+        return block
 
     def values(
         self, chosen: Int64[np.ndarray, " N"], block: np.ndarray
@@ -79,9 +89,17 @@ def count_words(block: np.ndarray) -> Int64[np.ndarray, " N"]:
     """How many words each line of a block (uint8, newline-ended lines) has."""
     if len(block) == 0:
         return np.zeros(0, dtype=np.int64)
-    blank = np.isin(block, _BLANKS)
+    blank = _IS_BLANK[block]
     begins = ~blank
     begins[1:] &= blank[:-1]
     ends = np.flatnonzero(block == ord("\n"))
-    totals = np.cumsum(begins)[ends]
-    return np.diff(totals, prepend=0)
+    return np.diff(np.searchsorted(np.flatnonzero(begins), ends), prepend=0)
+
+
+def whole(values: np.ndarray, what: str) -> Int64[np.ndarray, "..."]:
+    """The values as integers; refuses fractions, NaN and what no index can be."""
+    with np.errstate(invalid="ignore"):
+        bad = np.flatnonzero(~((np.abs(values) < 2**53) & (values == np.floor(values))))
+    if len(bad):
+        raise Unreadable(f"{what} is {values.reshape(-1)[bad[0]]:g} where a whole number must be")
+    return values.astype(np.int64)

@@ -5,7 +5,6 @@ In: a folder, a glob, a list of files, one file or an .npz, and SequenceOptions.
 
 from __future__ import annotations
 
-import math
 import operator
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -38,8 +37,8 @@ class SequenceOptions:
     def __post_init__(self) -> None:
         """Refuses values that no sequence can have."""
         for name, value in (("frame rate", self.frame_rate), ("scale", self.scale)):
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"{name} {value} is not a positive number; give one, as 30 or 0.001")
+            if not 1e-9 <= value <= 1e9:  # also refuses NaN
+                raise InputError(f"{name} {value} is not between 1e-9 and 1e9; give such a number, as 30 or 0.001")
         if not _FRAMES.fullmatch(self.frames):
             raise InputError(f"frames {self.frames!r} is not a range; give A:B, A: or :B, as 0:10")
 

@@ -1,0 +1,150 @@
+"""Panels for the documentation's pictures: meshes by ray casting, points and bars by matplotlib, all headless.
+
+A Sheet is a row of equal panels in whole pixels. The same input gives the same PNG bytes.
+"""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from PIL import Image
+
+from meshreel.geometry.nearest import Surface
+from meshreel.metrics.cameras import Box, OrthographicCamera, parallel_views_around
+from meshreel.metrics.render import Window, look
+from meshreel.types import Mesh
+
+DPI = 100
+TOP, GAP, RIGHT = 26, 6, 80  # pixels over, between and, for a color bar, right of the panels
+LIGHT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
+BOTTOM = 8  # pixels under them
+FINE = 3  # rays a pixel and axis, averaged
+COLORS = 256  # of a picture's palette
+
+
+class Sheet:
+    """A row of square panels with titles."""
+
+    def __init__(self, panels: int, size: int = 300, bar: bool = False) -> None:
+        self.size = size
+        self.shape = (panels * (size + GAP) + (RIGHT if bar else 0), size + TOP + BOTTOM)
+        self.figure = Figure(figsize=(self.shape[0] / DPI, self.shape[1] / DPI), dpi=DPI)
+        FigureCanvasAgg(self.figure)
+        self.axes = [self._axes(k * (size + GAP), size) for k in range(panels)]
+        for axes in self.axes:
+            axes.set_axis_off()
+
+    def image(self, panel: int, title: str, pixels: np.ndarray) -> None:
+        """A picture, pixel for pixel."""
+        self.axes[panel].imshow(np.clip(pixels, 0, 1), interpolation="nearest")
+        self.axes[panel].set_title(title, fontsize=9)
+
+    def bar(self, image: Any, label: str) -> None:
+        """The color bar right of the last panel."""
+        bar = self._axes(len(self.axes) * (self.size + GAP), 12)
+        self.figure.colorbar(image, cax=bar, extend="max").set_label(label, fontsize=8)
+        bar.tick_params(labelsize=7)
+
+    def write(self, path: Path) -> None:
+        """The PNG, with few colors, so that it is small."""
+        write_figure(self.figure, path)
+
+    def _axes(self, left: int, width: int) -> Any:
+        wide, high = self.shape
+        return self.figure.add_axes((left / wide, BOTTOM / high, width / wide, self.size / high))
+
+
+def write_figure(figure: Figure, path: Path) -> None:
+    """A figure as a PNG with a palette."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    picture = Image.open(buffer).convert("RGB").quantize(COLORS, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    picture.save(path, optimize=True)
+
+
+def camera_for(meshes: list[Mesh], size: int, view: int = 0) -> OrthographicCamera:
+    """A parallel view of everything in the meshes: 0 front, 1 right, 2 back, 3 left."""
+    return parallel_views_around(Box.of(meshes), size)[view]
+
+
+def shaded(mesh: Mesh, camera: OrthographicCamera, colors: Float64[np.ndarray, "V 3"] | None = None) -> np.ndarray:
+    """A mesh under a lamp beside the camera: grey, or colors of its vertices."""
+    camera = _finer(camera)
+    view = look(mesh, camera, Window(0, camera.height, 0, camera.width))
+    picture = np.ones((camera.height, camera.width, 3))
+    turned = view.normals @ camera.extrinsic[:3, :3].T * [1, -1, -1]
+    light = 0.45 + 0.55 * np.abs(turned @ LIGHT)
+    base = np.full((len(view.points), 3), 0.82) if colors is None else _at_points(mesh, view.points, colors)
+    picture[view.covered] = base * light[:, None]
+    return _averaged(picture)
+
+
+def normal_colored(mesh: Mesh, camera: OrthographicCamera) -> np.ndarray:
+    """A mesh in the colors of its normals, as in the paper."""
+    camera = _finer(camera)
+    return _averaged(look(mesh, camera, Window(0, camera.height, 0, camera.width)).colors)
+
+
+def heat(mesh: Mesh, camera: OrthographicCamera, other: Mesh) -> np.ma.MaskedArray:
+    """Distance from what the camera sees of a mesh to the surface of another one; masked where nothing is seen."""
+    view = look(mesh, camera, Window(0, camera.height, 0, camera.width))
+    distances = np.ma.masked_array(np.zeros(view.covered.shape), mask=~view.covered)
+    distances[view.covered] = np.linalg.norm(Surface(other).closest(view.points).points - view.points, axis=1)
+    return distances
+
+
+def draw_edges(axes: Any, mesh: Mesh, camera: OrthographicCamera, line: float = 0.3) -> None:
+    """The mesh's faces with their edges, nearest last."""
+    rotation, shift = camera.extrinsic[:3, :3], camera.extrinsic[:3, 3]
+    points = mesh.vertices @ rotation.T + shift
+    flat = camera.project(points)[mesh.faces]
+    a, b, c = (points[mesh.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    front = normals[:, 2] < 0
+    order = np.argsort(-points[mesh.faces][:, :, 2].mean(axis=1), kind="stable")
+    order = order[front[order]]
+    light = 0.45 + 0.55 * np.abs((normals * [1, -1, -1]) @ LIGHT)
+    grey = np.repeat((0.85 * light)[:, None], 3, axis=1)
+    axes.add_collection(
+        PolyCollection(flat[order], facecolors=grey[order], edgecolors=(0.1, 0.2, 0.4), linewidths=line)
+    )
+    axes.set(xlim=(0, camera.width), ylim=(camera.height, 0))
+
+
+def draw_points(
+    axes: Any,
+    points: Float64[np.ndarray, "K 3"],
+    camera: OrthographicCamera,
+    colors: np.ndarray,
+    size: float = 7.0,
+    rim: float = 0.2,
+) -> None:
+    """Points as dots, nearest last."""
+    placed = points @ camera.extrinsic[:3, :3].T + camera.extrinsic[:3, 3]
+    order = np.argsort(-placed[:, 2], kind="stable")
+    flat = camera.project(placed)
+    axes.scatter(*flat[order].T, s=size, c=colors[order], linewidths=rim, edgecolors="black")
+    axes.set(xlim=(0, camera.width), ylim=(camera.height, 0))
+
+
+def _finer(camera: OrthographicCamera) -> OrthographicCamera:
+    return replace(camera, width=FINE * camera.width, height=FINE * camera.height, pixel=camera.pixel / FINE)
+
+
+def _averaged(picture: np.ndarray) -> np.ndarray:
+    high, wide = picture.shape[0] // FINE, picture.shape[1] // FINE
+    return picture.reshape(high, FINE, wide, FINE, 3).mean(axis=(1, 3))
+
+
+def _at_points(mesh: Mesh, points: np.ndarray, colors: np.ndarray) -> np.ndarray:
+    hits = Surface(mesh).closest(points)
+    return np.einsum("nk,nkd->nd", hits.barycentric, colors[mesh.faces[hits.faces]])

@@ -1,0 +1,243 @@
+"""The pictures of docs/pipeline.md, one a stage, from procedural data only.
+
+python benchmarks/pictures.py            # all, into docs/pictures (about a minute)
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
+
+from meshreel.geometry.topology import components as connected
+from meshreel.metrics.cameras import Box
+from meshreel.metrics.sheet import SheetOptions, write_sheet
+from meshreel.presets import preset_options
+from meshreel.types import Mesh, MeshList
+
+sys.path.insert(0, str(Path(__file__).parent))
+from drawing import (
+    DPI,
+    Sheet,
+    camera_for,
+    draw_edges,
+    draw_points,
+    heat,
+    normal_colored,
+    shaded,
+    write_figure,
+)
+from stages import CONTACT, FIRST, Stages, compute, story
+
+OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "pictures"
+BODIES = np.array([[0.87, 0.45, 0.20], [0.20, 0.45, 0.70], [0.35, 0.65, 0.35]])
+Picture = Callable[[Stages, Path], None]
+
+
+def main(arguments: list[str]) -> int:
+    """Draws everything."""
+    parser = argparse.ArgumentParser(description="Draw the pictures of docs/pipeline.md.")
+    parser.add_argument("-o", "--output", type=Path, default=OUTPUT)
+    output = parser.parse_args(arguments).output
+    output.mkdir(parents=True, exist_ok=True)
+    draw_all(compute(story(), preset_options()), output)
+    return 0
+
+
+def draw_all(stages: Stages, output: Path) -> None:
+    """One file for each stage."""
+    matplotlib.rcParams["font.family"] = "DejaVu Sans"  # comes with matplotlib: the same letters everywhere
+    for name, draw in PICTURES.items():
+        draw(stages, output / f"{name}.png")
+        print(f"{output / name}.png")
+
+
+def frames(stages: Stages, path: Path) -> None:
+    """Frames as they come, and the connectivity of one spot in two of them."""
+    sheet = Sheet(5, 250)
+    camera = camera_for(list(stages.frames), 250)
+    for panel, t in enumerate((0, CONTACT, len(stages.frames) - 1)):
+        mesh = stages.frames[t]
+        title = f"frame {FIRST + t}: {len(mesh.vertices)} vertices, {_parts(mesh)}"
+        sheet.image(panel, title, normal_colored(mesh, camera))
+    for panel, t in ((3, CONTACT - 1), (4, CONTACT)):
+        spot = _around_hands(stages, t)
+        draw_edges(sheet.axes[panel], stages.frames[t], camera_for([spot], 250), 0.5)
+        sheet.axes[panel].set_title(f"frame {FIRST + t}, the hands", fontsize=9)
+    sheet.write(path)
+
+
+def centers(stages: Stages, path: Path) -> None:
+    """Centers by body, by place in the first frame, and their trajectories."""
+    sheet = Sheet(3, 320)
+    camera = camera_for(list(stages.frames), 320)
+    positions = stages.centers.positions
+    draw_points(sheet.axes[0], positions[-1], camera, BODIES[stages.centers.bodies % 3])
+    sheet.axes[0].set_title(f"{positions.shape[1]} centers by body", fontsize=9)
+    colors = _colors_by_place(stages)
+    for panel, t in ((1, 0), (2, len(positions) - 1)):
+        draw_points(sheet.axes[panel], positions[t], camera, colors)
+        sheet.axes[panel].set_title(f"frame {FIRST + t}: one color, one trajectory", fontsize=9)
+    tracks = np.stack([camera.project(_placed(p, camera)) for p in positions])
+    for k in range(0, tracks.shape[1], 3):
+        sheet.axes[2].plot(*tracks[:, k].T, color=colors[k], linewidth=0.7, zorder=0)
+    sheet.write(path)
+
+
+def reference_centers(stages: Stages, path: Path) -> None:
+    """A frame's centers beside those of eq. 5, from the front and from the side."""
+    sheet = Sheet(4, 300)
+    poses = (stages.centers.positions[CONTACT], stages.spread)
+    box = [Mesh.of(pose, np.zeros((0, 3))) for pose in poses]
+    names = (f"frame {FIRST + CONTACT}", f"reference (stress {stages.stress:.3f})")
+    for panel in range(4):
+        pose, view = poses[panel % 2], panel // 2
+        draw_points(sheet.axes[panel], pose, camera_for(box, 300, view), BODIES[stages.centers.bodies % 3])
+        sheet.axes[panel].set_title(f"{names[panel % 2]}, {('front', 'right')[view]}", fontsize=9)
+    sheet.write(path)
+
+
+def deformed(stages: Stages, path: Path) -> None:
+    """Frames in the pose of the reference centers, in the colors that their normals had in the frame."""
+    sheet = Sheet(4, 300)
+    camera = camera_for([moved.mesh for moved in stages.moved], 300)
+    last = len(stages.frames) - 1
+    for panel, t in enumerate((0, CONTACT, last)):
+        moved = stages.moved[t]
+        sheet.image(panel, f"frame {FIRST + t}, moved", shaded(moved.mesh, camera, moved.colors))
+    together = [stages.moved[t].mesh.vertices for t in (0, CONTACT, last)]
+    colors = np.repeat(BODIES, [len(points) for points in together], axis=0)
+    draw_points(sheet.axes[3], np.concatenate(together), camera, colors, 1.0, 0.0)
+    sheet.axes[3].set_title("points of the three, laid together", fontsize=9)
+    sheet.write(path)
+
+
+def reference(stages: Stages, path: Path) -> None:
+    """The reference mesh as decoded, then subdivided; and closer."""
+    sheet = Sheet(3, 340)
+    base = stages.coded.base
+    camera = camera_for([base], 340)
+    sheet.image(0, f"{len(base.vertices)} vertices, {_parts(base)}", shaded(base, camera))
+    coarse = stages.reference.mesh
+    for panel, (mesh, name) in enumerate(((coarse, "before subdivision"), (base, "after it")), 1):
+        low, high = coarse.vertices.min(axis=0), coarse.vertices.max(axis=0)
+        top = Mesh.of(_inside(mesh, (high - low) * [0, 0.68, 0] + low, (high - low) * [0.45, 1, 1] + low), [])
+        draw_edges(sheet.axes[panel], mesh, camera_for([top], 340), 0.4)
+        sheet.axes[panel].set_title(f"{name}: {len(mesh.faces)} faces", fontsize=9)
+    sheet.write(path)
+
+
+def fit(stages: Stages, path: Path) -> None:
+    """How far the reference is from a frame: deformed only, then fitted."""
+    sheet = Sheet(4, 260, bar=True)
+    last = len(stages.frames) - 1
+    frame, faces = stages.frames[last], stages.coded.base.faces
+    camera = camera_for([frame], 260)
+    shapes = {"deformed": Mesh(stages.predictions[last], faces), "fitted": Mesh(stages.fit.positions[last], faces)}
+    image = None
+    for panel, (name, mesh) in enumerate(shapes.items()):
+        sheet.image(2 * panel, f"reference {name}", shaded(mesh, camera))
+        errors = 100 * heat(frame, camera, mesh)
+        image = sheet.axes[2 * panel + 1].imshow(errors, cmap="viridis", vmin=0, vmax=0.3, interpolation="nearest")
+        rms = float(np.sqrt(np.mean(np.square(errors.compressed()))))
+        sheet.axes[2 * panel + 1].set_title(f"RMS {rms:.3f} %", fontsize=9)
+    sheet.bar(image, f"distance of frame {FIRST + last}, % of the diagonal")
+    sheet.write(path)
+
+
+def components(stages: Stages, path: Path) -> None:
+    """The energy of each KLT component, those kept in color, and the quantiser's step."""
+    figure = Figure(figsize=(8, 3), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    deviations = 100 * np.sqrt(stages.basis.energies)
+    numbers = np.arange(len(deviations)) + 1
+    kept = numbers <= stages.components
+    axes.bar(numbers[kept], deviations[kept], color=BODIES[1], label=f"kept: {stages.components}")
+    axes.bar(numbers[~kept], deviations[~kept], color="lightgrey", label="dropped")
+    step = 100 * preset_options().displacements.step
+    axes.axhline(step, color=BODIES[0], linewidth=1, label=f"quantiser's step: {step:.2f} %")
+    axes.set(
+        yscale="log", xlabel="component", ylabel="RMS of its weights,\n% of the diagonal", xlim=(0, len(numbers) + 1)
+    )
+    axes.legend(frameon=False, fontsize=8)
+    write_figure(figure, path)
+
+
+def decoded(stages: Stages, path: Path) -> None:
+    """What `meshreel compare --sheet` draws: original, decoded, error."""
+    last = len(stages.frames) - 1
+    pictures = MeshList(stages.frames), MeshList(stages.decoded)
+    write_sheet(*pictures, path, SheetOptions(frames=(0, last), height=340))
+    picture = Image.open(path).convert("RGB").quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    picture.save(path, optimize=True)
+
+
+def parts(stages: Stages, path: Path) -> None:
+    """The payload's bytes by what they are for."""
+    figure = Figure(figsize=(8, 1.5), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    start = 0
+    for number, (name, size) in enumerate(stages.parts.items()):
+        axes.barh(0, size, left=start, label=f"{name}: {size}", color=f"C{number}")
+        start += size
+    axes.set(yticks=[], xlim=(0, start), xlabel=f"bytes of the group: {start}, for {len(stages.frames)} frames")
+    axes.legend(frameon=False, fontsize=8, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    write_figure(figure, path)
+
+
+PICTURES: dict[str, Picture] = {
+    "frames": frames,
+    "centers": centers,
+    "reference-centers": reference_centers,
+    "deformed": deformed,
+    "reference": reference,
+    "fit": fit,
+    "components": components,
+    "decoded": decoded,
+    "parts": parts,
+}
+
+
+def _around_hands(stages: Stages, t: int) -> Mesh:
+    """What lies in the middle between the two, a tenth of the diagonal around."""
+    box = Box.of(stages.frames)
+    middle = box.center + [0, 0.14 * box.size[1], 0]
+    frame = stages.frames[t]
+    near = np.linalg.norm(frame.vertices[:, :2] - middle[:2], axis=1) < 0.08
+    return replace(frame, vertices=frame.vertices[near], faces=np.zeros((0, 3), np.int32))
+
+
+def _parts(mesh: Mesh) -> str:
+    count = len(np.unique(connected(mesh.faces, len(mesh.vertices))))
+    return f"{count} part" + "s" * (count != 1)
+
+
+def _colors_by_place(stages: Stages) -> np.ndarray:
+    """A color for each trajectory from where it is in the first frame."""
+    first = stages.centers.positions[0]
+    low, high = first.min(axis=0), first.max(axis=0)
+    share = (first - low) / (high - low)
+    return matplotlib.colormaps["turbo"]((3.2 * share[:, 1] + 0.5 * share[:, 0]) % 1.0)[:, :3]
+
+
+def _placed(points: np.ndarray, camera: object) -> np.ndarray:
+    extrinsic = camera.extrinsic  # type: ignore[attr-defined]
+    return points @ extrinsic[:3, :3].T + extrinsic[:3, 3]
+
+
+def _inside(mesh: Mesh, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    return mesh.vertices[((mesh.vertices >= low) & (mesh.vertices <= high)).all(axis=1)]
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,112 @@
+"""One group of procedural frames taken through every stage of the encoder, with what each stage made kept for pictures.
+
+In: a window of the procedural story in which two people walk up to each other and take hands. Out: Stages.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from meshreel.analysis.deform import bind, center_motions, move
+from meshreel.analysis.fit import Fit, fit_frames
+from meshreel.analysis.reference import Reference, extract_reference, predict
+from meshreel.analysis.reference_centers import largest_distances, reference_centers
+from meshreel.analysis.survey import survey
+from meshreel.analysis.track import track_centers
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.coding import klt
+from meshreel.coding.group import CodedReference, code_reference, decode_group, encode_group, payload_parts
+from meshreel.encoder import EncoderOptions
+from meshreel.geometry.topology import vertex_normals
+from meshreel.types import Centers, Mesh, MeshList
+
+FIRST, COUNT = 27, 10  # of the story's 90 frames: the hands meet on the way
+CONTACT = 5  # of these: the two surfaces are melted into one
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A frame's vertices in another pose, with the normals they had in their own to color them by."""
+
+    mesh: Mesh
+    colors: Float64[np.ndarray, "V 3"]  # RGB, 0 to 1
+
+
+@dataclass(frozen=True, slots=True)
+class Stages:
+    """What every stage of one group gives; coordinates are normalised: the sequence's diagonal is 1."""
+
+    frames: tuple[Mesh, ...]
+    centers: Centers
+    spread: Float64[np.ndarray, "K 3"]  # the reference centers of eq. 5
+    stress: float
+    reference: Reference
+    moved: tuple[Moved, ...]  # the frames in the pose of eq. 5
+    coded: CodedReference
+    predictions: Float64[np.ndarray, "T V 3"]
+    fit: Fit
+    basis: klt.Basis
+    payload: bytes
+    components: int
+    decoded: tuple[Mesh, ...]
+
+    @property
+    def parts(self) -> dict[str, int]:
+        """Bytes of the group's payload by what they are for."""
+        return payload_parts(self.payload)
+
+
+def story(first: int = FIRST, count: int = COUNT) -> MeshList:
+    """Frames of the procedural story, in metres."""
+    people = soft_bodies(SoftBodiesOptions())
+    return MeshList(tuple(people[first + t] for t in range(count)), people.frame_rate)
+
+
+def compute(sequence: MeshList, options: EncoderOptions) -> Stages:
+    """The stages of a sequence that is one group."""
+    seen = survey(sequence)
+    frames = tuple(seen.normalise(mesh) for mesh in sequence)
+    centers = track_centers(frames, options.track)
+    middle = centers.positions[len(frames) // 2]
+    spread = reference_centers(largest_distances(centers), middle, options.reference.centers)
+    reference = extract_reference(frames, centers, options.reference)
+    coded = code_reference(reference.mesh, options.reference_bits, options.levels)
+    predictions = predict(reference, coded.base, centers, options.reference.deform)
+    fit = fit_frames(coded.base.faces, predictions, frames, options.fit)
+    field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
+    payload, layers = encode_group(coded, field, options.displacements)
+    moved = tuple(
+        _moved(frame, own, spread.positions, (reference, options))
+        for frame, own in zip(frames, centers.positions, strict=True)
+    )
+    return Stages(
+        frames=frames,
+        centers=centers,
+        spread=spread.positions,
+        stress=spread.stress,
+        reference=reference,
+        moved=moved,
+        coded=coded,
+        predictions=predictions,
+        fit=fit,
+        basis=klt.fit(field),
+        payload=payload,
+        components=len(layers) - 1,
+        decoded=tuple(decode_group(payload, len(frames))),
+    )
+
+
+def _moved(
+    frame: Mesh,
+    own: Float64[np.ndarray, "K 3"],
+    pose: Float64[np.ndarray, "K 3"],
+    how: tuple[Reference, EncoderOptions],
+) -> Moved:
+    reference, options = how
+    binding = bind(frame, own, reference.neighbours, options.reference.deform)
+    motions = center_motions(own, pose, reference.neighbours)
+    vertices = move(frame.vertices, binding, motions, reference.neighbours)
+    return Moved(Mesh(vertices, frame.faces), (vertex_normals(frame) + 1) / 2)

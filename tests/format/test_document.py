@@ -1,0 +1,95 @@
+"""FORMAT.md tells the truth: its Python decodes what the encoder writes."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from meshreel.coding import entropy, laplacian
+from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
+from meshreel.format import records
+from meshreel.format.layout import AnchorRule, DisplacementHead
+from meshreel.types import Mesh
+
+DOCUMENT = Path(__file__).resolve().parents[2] / "FORMAT.md"
+
+
+def require(condition: bool) -> None:
+    assert condition
+
+
+@pytest.fixture(scope="module")
+def decoder() -> dict[str, Any]:
+    """What the document's Python defines."""
+    names: dict[str, Any] = {"np": np, "sqrt": math.sqrt, "require": require}
+    names |= {rule.name: rule for rule in AnchorRule}
+    for block in re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL):
+        exec(block, names)
+    return names
+
+
+def body() -> Mesh:
+    """A grid, a triangle apart from it, a degenerate face, a sliver, and a vertex of no face."""
+    side = 12
+    x, y = np.meshgrid(np.arange(side), np.arange(side))
+    points = np.stack([x, y, np.sin(x) * np.cos(y)], axis=2).reshape(-1, 3) * 0.05
+    corner = (x[:-1, :-1] + side * y[:-1, :-1]).reshape(-1)
+    faces = np.concatenate([np.stack([corner, corner + 1, corner + side], 1),
+                            np.stack([corner + 1, corner + side + 1, corner + side], 1)])  # fmt: skip
+    more = np.array([[2.0, 0, 0], [2.1, 0, 0], [2.05, 1e-7, 0], [3.0, 3.0, 3.0]])
+    n = len(points)
+    faces = np.concatenate([faces, [[n, n + 1, n + 2], [5, 5, 6], [n + 2, n + 1, n + 2]]])
+    return Mesh.of(np.concatenate([points, more]), faces)
+
+
+def field(vertices: int, frames: int) -> np.ndarray:
+    generator = np.random.default_rng(3)
+    rough = generator.laplace(size=(vertices, 4)) @ generator.normal(size=(4, 3 * frames))
+    return 0.01 * np.cumsum(rough.reshape(vertices, frames, 3), axis=0)
+
+
+@pytest.mark.parametrize("rule", AnchorRule)
+def test_the_document_decodes_displacements(decoder: dict[str, Any], rule: AnchorRule) -> None:
+    base, options = body(), DisplacementOptions(step=3e-3, anchor_rule=rule, anchor_count=7, anchor_weight=3)
+    data = encode_displacements(field(len(base.vertices), 3), base, options)
+    head, offset = records.unpack(DisplacementHead, data)
+    assert len(head.components) >= 4
+    streams = []
+    for component in head.components:
+        middle, end = offset + component.anchors_size, offset + component.anchors_size + component.deltas_size
+        streams.append((data[offset:middle], data[middle:end]))
+        offset = end
+    plain = [tuple(point) for point in base.vertices.tolist()], [tuple(face) for face in base.faces.tolist()]
+    told = np.array(decoder["decode_displacements"](head, streams, *plain)).reshape(len(base.vertices), -1, 3)
+    np.testing.assert_allclose(told, decode_displacements(data, base), rtol=0, atol=1e-9)
+    told = np.array(decoder["decode_displacements"](head, streams[:2], *plain)).reshape(len(base.vertices), -1, 3)
+    np.testing.assert_allclose(told, decode_displacements(data, base, 2), rtol=0, atol=1e-9)
+
+
+def test_the_document_decodes_every_size_of_delta(decoder: dict[str, Any]) -> None:
+    base, generator = body(), np.random.default_rng(4)
+    vertices = len(base.vertices)
+    sizes = np.exp2(generator.uniform(0, 31, (vertices, 8)) * np.array([0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1]))
+    symbols = np.rint(generator.choice([-1, 1], sizes.shape) * sizes).astype(np.int32)
+    symbols[generator.random(symbols.shape) < 0.3] = 0
+    streams = entropy.encode_weights(symbols, entropy.causal_neighbours(base.faces, vertices))
+    told = decoder["decode_weights"](streams, vertices, [tuple(face) for face in base.faces.tolist()])
+    np.testing.assert_array_equal(np.array(told).T, symbols)
+
+
+def test_the_document_decodes_integers_of_every_length(decoder: dict[str, Any]) -> None:
+    values = np.array([0, *(sign * (2**k + 1) for k in range(31) for sign in (1, -1)), 2**31 - 1, -(2**31)], np.int32)
+    assert decoder["decode_integers"](entropy.encode_integers(values), len(values)) == values.tolist()
+
+
+@pytest.mark.parametrize("rule", AnchorRule)
+def test_the_document_finds_the_anchors(decoder: dict[str, Any], rule: AnchorRule) -> None:
+    base = body()
+    for count in (0, 1, 2, 5, 40, len(base.vertices)):
+        told = decoder["anchors"](rule, count, [tuple(face) for face in base.faces.tolist()], len(base.vertices))
+        assert told == laplacian.anchors(rule, count, base.faces, len(base.vertices)).tolist()
