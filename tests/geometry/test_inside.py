@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.geometry.inside import interior_samples, winding_inside
+from meshreel.geometry.inside import Samples, interior_samples, winding_inside
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
@@ -32,7 +32,7 @@ def sheet(side: float = 0.5) -> Mesh:
     return subdivide_midpoint(square, 4)
 
 
-def samples_of(mesh: Mesh, count: int = 8000):  # noqa: ANN201
+def samples_of(mesh: Mesh, count: int = 8000) -> Samples:
     return interior_samples(mesh, count, np.random.default_rng(1))
 
 
@@ -103,7 +103,7 @@ def test_a_flat_sheet_is_sampled_on_its_surface() -> None:
 def test_a_sheet_beside_a_solid_becomes_a_body_of_its_own() -> None:
     samples = samples_of(together(sphere(0.2, (0, 0, 0.5)), sheet()))
     assert samples.bodies.max() == 1
-    assert np.abs(samples.points[samples.bodies == 1, 2]).max() < 1e-12
+    assert np.abs(samples.points[samples.bodies == 1, 2]).max() < 1e-3
 
 
 def test_zero_area_faces_do_no_harm() -> None:

@@ -34,7 +34,7 @@ class TrackOptions:
     neighbours: int = 16  # at most, of a center
     spread: float = 1.0  # weight of the even spread (Lloyd)
     rigidity: float = 3.0  # weight of the rigid term
-    tolerance: float = 1e-4  # a frame is done when a round can lower the energy by no more than this share
+    tolerance: float = 1e-5  # a frame is done when a round can lower the energy by no more than this share
     rounds: int = 300  # at most, a frame
     seed: int = 0
 
