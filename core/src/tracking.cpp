@@ -10,71 +10,11 @@
 #include <new>
 #include <vector>
 
+#include "rigid3.h"
+
 namespace {
 
-struct Vec {
-    double x, y, z;
-};
-
-Vec operator+(Vec a, Vec b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-Vec operator-(Vec a, Vec b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-Vec operator*(double s, Vec a) { return {s * a.x, s * a.y, s * a.z}; }
-double dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vec cross(Vec a, Vec b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
-Vec load(const double* p) { return {p[0], p[1], p[2]}; }
-void store(double* p, Vec a) { p[0] = a.x, p[1] = a.y, p[2] = a.z; }
-
-struct Matrix {
-    Vec row[3];
-};
-
-Vec operator*(const Matrix& m, Vec a) { return {dot(m.row[0], a), dot(m.row[1], a), dot(m.row[2], a)}; }
-Matrix identity() { return {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; }
-Vec column(const Matrix& m, int k) {
-    if (k == 0) return {m.row[0].x, m.row[1].x, m.row[2].x};
-    if (k == 1) return {m.row[0].y, m.row[1].y, m.row[2].y};
-    return {m.row[0].z, m.row[1].z, m.row[2].z};
-}
-void add_outer(Matrix& m, Vec a, Vec b) {
-    m.row[0] = m.row[0] + a.x * b;
-    m.row[1] = m.row[1] + a.y * b;
-    m.row[2] = m.row[2] + a.z * b;
-}
-
-// The rotation by the rotation vector w, through a unit quaternion that is right to third order and exactly unit.
-Matrix turn(Vec w) {
-    const double n = std::sqrt(1 + 0.25 * dot(w, w));
-    const double s = 1 / n;
-    const Vec v = (0.5 / n) * w;
-    return {{{1 - 2 * (v.y * v.y + v.z * v.z), 2 * (v.x * v.y - s * v.z), 2 * (v.x * v.z + s * v.y)},
-             {2 * (v.x * v.y + s * v.z), 1 - 2 * (v.x * v.x + v.z * v.z), 2 * (v.y * v.z - s * v.x)},
-             {2 * (v.x * v.z - s * v.y), 2 * (v.y * v.z + s * v.x), 1 - 2 * (v.x * v.x + v.y * v.y)}}};
-}
-
-Matrix product(const Matrix& a, const Matrix& b) {
-    Matrix m;
-    for (int r = 0; r < 3; ++r)
-        m.row[r] = a.row[r].x * b.row[0] + a.row[r].y * b.row[1] + a.row[r].z * b.row[2];
-    return m;
-}
-
-// Turns `r` towards the rotation nearest to `s` (maximal trace of r^T s). Directions in which s says nothing keep r: so a
-// degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice.
-void follow(Matrix& r, const Matrix& s, int steps) {
-    for (int step = 0; step < steps; ++step) {
-        Vec torque{0, 0, 0};
-        double alignment = 0, size = 0;
-        for (int k = 0; k < 3; ++k) {
-            const Vec a = column(r, k), b = column(s, k);
-            torque = torque + cross(a, b);
-            alignment += dot(a, b);
-            size += dot(b, b);
-        }
-        const Vec w = (1 / (std::fabs(alignment) + 1e-9 * std::sqrt(size) + 1e-300)) * torque;
-        r = product(turn(w), r);
-        if (dot(w, w) < 1e-16) break;
-    }
-}
+using namespace meshreel;
 
 // Centers in a uniform grid: the nearest one within a ball, exactly.
 class Grid {
@@ -210,7 +150,6 @@ public:
     const std::vector<int32_t>& owners() const { return owner_; }
     Vec sum(size_t i) const { return sums_[i]; }
     double size(size_t i) const { return sizes_[i]; }
-
 private:
     static double length(Vec a) { return std::sqrt(dot(a, a)); }
 

@@ -22,6 +22,7 @@ from .analysis.groups import GroupOptions, cut_at
 from .analysis.reference import ReferenceOptions, extract_reference, predict
 from .analysis.survey import Survey, survey
 from .analysis.track import TrackOptions, track_centers
+from .compact import CompactOptions, compact, displacements
 from .choice import IntraOptions, Quality, cheapest_intra, finest_intra, measure
 from .coding.displacements import DisplacementOptions
 from .coding.group import CodedReference, code_reference, decode_group, encode_group
@@ -49,6 +50,7 @@ class EncoderOptions:
     reference: ReferenceOptions = ReferenceOptions()
     fit: FitOptions = FitOptions()
     groups: GroupOptions = GroupOptions()
+    compact: CompactOptions = CompactOptions()
     displacements: DisplacementOptions = DisplacementOptions()
     intra: IntraOptions = IntraOptions()
 
@@ -191,9 +193,12 @@ def _encode_span(
     if cut is not None:
         halves = (slice(None, cut), slice(cut, None))
         return [g for h in halves for g in _encode_span(frames[h], _part(centers, h), options, stages)]
+    if options.displacements.basis_size is not None:
+        fit = compact(fit, reference.base, frames, options.displacements.basis_size, options.compact)
     stages.add("fit", len(frames))
-    field = np.moveaxis(fit.positions, 0, 1) - reference.base.vertices[:, None]
-    group = _cheaper(frames, _laplacian(frames, reference, field, options.displacements), options)
+    group = _laplacian(frames, reference, displacements(fit, reference.base), options.displacements)
+    if options.displacements.basis_size is None:
+        group = _cheaper(frames, group, options)
     stages.add("code", len(frames))
     return [group]
 
