@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64
@@ -49,6 +49,7 @@ class Survey:
         return windows
 
 
+@runtime_checkable
 class Counter(Protocol):
     """Counts frames through stages."""
 
@@ -60,7 +61,8 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
     low, high, empty = np.full(3, np.inf), np.full(3, -np.inf), []
-    for mesh in sequence:
+    for number, mesh in enumerate(sequence):
+        _check(mesh, f"frame {number}")
         empty.append(mesh.is_empty)
         if not mesh.is_empty:
             used = mesh.vertices[np.unique(mesh.faces)]
@@ -70,3 +72,13 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     if all(empty):
         low, high = np.zeros(3), np.zeros(3)
     return Survey(low, high, tuple(empty))
+
+
+def _check(mesh: Mesh, where: str) -> None:
+    """Raises InputError for what files cannot have either (io checks those), but a mesh made in memory may."""
+    if not np.isfinite(mesh.vertices).all():
+        vertex = int(np.argmin(np.isfinite(mesh.vertices).all(axis=1)))
+        raise InputError(f"{where}: vertex {vertex} is at {mesh.vertices[vertex].tolist()}; all must be finite")
+    if not mesh.is_empty and not (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)):
+        wrong = mesh.faces.max() if mesh.faces.min() >= 0 else mesh.faces.min()
+        raise InputError(f"{where}: a face refers to vertex {wrong}, but there are {len(mesh.vertices)} (from 0)")
