@@ -20,6 +20,7 @@ from .laplacian import System
 from .steps import LEVELS, level_of, step_of
 
 WORTH = 1.8  # squared steps that a bit saves along the curve of distortion over rate (measured)
+LADDER = (0, -4, -2, 2, 4)  # steps that a component may have, eighths of an octave from the base step; more is finer
 LARGE = 1000  # vertices of a component that deserves all six anchors
 
 
@@ -87,51 +88,64 @@ def allocate(
     """The components, steps and symbols of least distortion + price * rate."""
     basis = klt.fit(field)
     if options.basis_size is not None:
-        return _quantize(field, basis, np.arange(len(basis.energies)) < options.basis_size, system, options)
-    kept = basis.energies > (0.4 * options.step) ** 2
-    trial = _quantize(field, basis, kept, system, options)
-    pays = kept.copy()
-    pays[kept] = _pays(field, trial, system, neighbours, options)
-    return trial if np.array_equal(pays, kept) else _quantize(field, basis, pays, system, options)
+        kept = np.arange(len(basis.energies)) < options.basis_size
+    else:
+        kept = basis.energies > (0.4 * options.step) ** 2
+    coded = _Components(field, _only(basis, kept), system, options)
+    ladder = [np.full(coded.count, level_of(options.step) + offset) for offset in LADDER]
+    values = np.array([coded.value(coded.quantized(levels), levels, neighbours) for levels in ladder])
+    levels = np.choose(values.argmin(axis=0), ladder) if coded.count else ladder[0]
+    pays = values.min(axis=0) < coded.dropped() if options.basis_size is None else np.ones(coded.count, dtype=bool)
+    if not pays.all():
+        kept[kept] = pays
+        coded, levels = _Components(field, _only(basis, kept), system, options), levels[pays]
+    return Allocation(coded.basis, levels, coded.quantized(levels))
 
 
-def _quantize(
-    field: Float64[np.ndarray, "V T 3"],
-    basis: klt.Basis,
-    kept: Bool[np.ndarray, " C"],
-    system: System,
-    options: DisplacementOptions,
-) -> Allocation:
-    """Symbols of the kept components at the step; the price of a symbol comes from how large its column's are."""
-    chosen = klt.Basis(basis.mean, np.ascontiguousarray(basis.vectors[:, kept]), basis.energies[kept])
-    rounded = klt.quantize(chosen, int(kept.sum()), options.step)
-    deltas = system.forward(klt.forward(field, klt.dequantize(rounded)))
-    levels = np.full(deltas.shape[1], level_of(options.step))
-    steps = np.full(deltas.shape[1], step_of(level_of(options.step)))
-    if options.dead_zone is not None:
-        return Allocation(rounded, levels, quantize.forward(deltas, steps, options.dead_zone))
-    symbols = np.rint(deltas / steps)
-    for _ in range(2):
-        symbols = system.quantize(deltas, steps, options.price * _slopes(symbols[: len(field)]))
-    return Allocation(rounded, levels, symbols)
+class _Components:
+    """Components of a field in the basis as transmitted, ready to be quantised at any steps."""
+
+    def __init__(
+        self, field: Float64[np.ndarray, "V T 3"], basis: klt.Basis, system: System, options: DisplacementOptions
+    ) -> None:
+        self.system, self.options = system, options
+        self.count, self.vertices = len(basis.energies), len(field)
+        self.basis = klt.quantize(basis, self.count, options.step)
+        self.weights = klt.forward(field, klt.dequantize(self.basis))
+        self.deltas = system.forward(self.weights)
+
+    def quantized(self, levels: Int64[np.ndarray, " M"]) -> Int32[np.ndarray, "R M"]:
+        """Symbols at a step level for each component; a symbol's price comes from how large its column's are."""
+        steps = _steps(levels)
+        if self.options.dead_zone is not None:
+            return quantize.forward(self.deltas, steps, self.options.dead_zone)
+        price = self.options.price * (self.options.step / steps) ** 2  # of a bit, in the component's own squared steps
+        symbols = np.rint(self.deltas / steps)
+        for _ in range(2):
+            symbols = self.system.quantize(self.deltas, steps, price * _slopes(symbols[: self.vertices]))
+        return symbols
+
+    def value(
+        self, symbols: Int32[np.ndarray, "R M"], levels: Int64[np.ndarray, " M"], neighbours: entropy.Neighbours
+    ) -> Float64[np.ndarray, " M"]:
+        """Distortion + price * rate of each component: the basis is orthonormal, so they add."""
+        error = self.system.inverse(symbols * _steps(levels)) - self.weights
+        bits = entropy.weights_cost(symbols[: self.vertices], neighbours)
+        bits += np.log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
+        bits += np.log2(2.0 * np.abs(self.basis.vectors) + 1).sum(axis=1)
+        return (error**2).sum(axis=0) + WORTH * self.options.step**2 * bits
+
+    def dropped(self) -> Float64[np.ndarray, " M"]:
+        """What it costs to leave each component out."""
+        return (self.weights**2).sum(axis=0)
 
 
-def _pays(
-    field: Float64[np.ndarray, "V T 3"],
-    trial: Allocation,
-    system: System,
-    neighbours: entropy.Neighbours,
-    options: DisplacementOptions,
-) -> Bool[np.ndarray, " M"]:
-    """Which components lower distortion + price * rate."""
-    weights = klt.forward(field, klt.dequantize(trial.basis))
-    steps = np.array([step_of(level) for level in trial.levels.tolist()])
-    error = system.inverse(trial.symbols * steps) - weights
-    gain = (weights**2).sum(axis=0) - (error**2).sum(axis=0)
-    bits = entropy.weights_cost(trial.symbols[: len(field)], neighbours)
-    bits += np.log2(2.0 * np.abs(trial.symbols[len(field) :]) + 1).sum(axis=0)
-    bits += np.log2(2.0 * np.abs(trial.basis.vectors) + 1).sum(axis=1)
-    return gain > WORTH * options.step**2 * bits
+def _only(basis: klt.Basis, kept: Bool[np.ndarray, " C"]) -> klt.Basis:
+    return klt.Basis(basis.mean, np.ascontiguousarray(basis.vectors[:, kept]), basis.energies[kept])
+
+
+def _steps(levels: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
+    return np.array([step_of(level) for level in levels.tolist()], dtype=np.float64)
 
 
 def _slopes(symbols: Float64[np.ndarray, "V M"] | Int32[np.ndarray, "V M"]) -> Float64[np.ndarray, " M"]:
