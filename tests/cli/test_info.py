@@ -48,4 +48,4 @@ def test_other_files_are_told(run, tmp_path):
     (tmp_path / "a.reel").write_bytes(b"PK\x03\x04")
     assert failed(run("info", tmp_path / "a.reel"), "a.reel", "not a .reel")
     assert failed(run("info", tmp_path / "b.reel", "--json"), "b.reel")
-    assert failed(run("info"), "file")
+    assert failed(run("info"), "FILE")

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..geometry.topology import clean
 from ..types import Mesh, MeshSequence
 
 
@@ -35,7 +36,8 @@ class Survey:
         return float(np.linalg.norm(self.high - self.low)) or 1.0
 
     def normalise(self, mesh: Mesh) -> Mesh:
-        """The mesh in normalised coordinates: centered, the sequence's diagonal as the unit."""
+        """The mesh in normalised coordinates, cleaned: centered, the sequence's diagonal as the unit."""
+        mesh = clean(mesh)
         return Mesh.of((mesh.vertices - self.center) / self.diagonal, mesh.faces)
 
     def windows(self, size: int) -> list[range]:
@@ -63,10 +65,10 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     low, high, empty = np.full(3, np.inf), np.full(3, -np.inf), []
     for number, mesh in enumerate(sequence):
         _check(mesh, f"frame {number}")
+        mesh = clean(mesh)
         empty.append(mesh.is_empty)
         if not mesh.is_empty:
-            used = mesh.vertices[np.unique(mesh.faces)]
-            low, high = np.minimum(low, used.min(axis=0)), np.maximum(high, used.max(axis=0))
+            low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
         if stages is not None:
             stages.add("survey", 1)
     if all(empty):
