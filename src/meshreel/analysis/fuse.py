@@ -193,7 +193,7 @@ def _longest_edges(points: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, 
 
 def _vertex_areas(mesh: Mesh, faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " V"]:
     areas = face_normals(Mesh.of(mesh.vertices, faces))[1] / 3
-    return np.bincount(faces.reshape(-1), np.repeat(areas, 3), len(mesh.vertices))
+    return np.bincount(faces.reshape(-1), np.repeat(areas, 3), len(mesh.vertices)).astype(np.float64)  # int if empty
 
 
 def _lengths(vertices: Float64[np.ndarray, "V 3"], edges: np.ndarray) -> Float64[np.ndarray, " E"]:
