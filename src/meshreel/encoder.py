@@ -22,11 +22,11 @@ from .analysis.groups import GroupOptions, cut_at
 from .analysis.reference import ReferenceOptions, extract_reference, predict
 from .analysis.survey import Survey, survey
 from .analysis.track import TrackOptions, track_centers
-from .compact import CompactOptions, compact, displacements
 from .choice import IntraOptions, Quality, cheapest_intra, finest_intra, measure
 from .coding.displacements import DisplacementOptions
 from .coding.group import CodedReference, code_reference, decode_group, encode_group
 from .coding.intra import encode_empty
+from .compact import CompactOptions, compact, displacements
 from .container.writer import ReelWriter
 from .errors import InputError, NoReferenceError
 from .format.layout import Form, Header

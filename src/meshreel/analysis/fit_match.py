@@ -1,7 +1,7 @@
 """Closest-point correspondences between a template and a frame's surface, both ways, as point-to-plane rows.
 
-In: template positions, a prepared frame. Out: Rows. A pair counts by a Gaussian of its distance and not at all past the gate, where
-the normals disagree, or where the closest point lies on an open border (nothing is known beyond it).
+In: template positions, a prepared frame. Out: Rows. A pair counts by a Gaussian of its distance and not at all past the
+gate, where the normals disagree, or where the closest point lies on an open border (nothing is known beyond it).
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from ..geometry.nearest import Hits, Surface
 from ..geometry.topology import face_normals, unique_edges, vertex_normals
 from ..types import Mesh
 from .fit_border import border_edges, match_borders, sample_border
-from .fit_system import Rows, Template
+from .fit_rows import Rows
+from .fit_system import Template
 
 EDGES = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]])
 
@@ -30,7 +31,7 @@ class MatchOptions:
 
 
 class Target:
-    """A frame prepared for matching: its surface, vertex normals, and how far inside its border each vertex is (0 or 1)."""
+    """A frame prepared for matching: its surface, vertex normals, and 1 where a vertex is not on a border."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
@@ -44,17 +45,15 @@ class Target:
         return _interpolated(self.normals, self.mesh.faces, hits)
 
 
-def match(
-    template: Template, positions: Float64[np.ndarray, "V 3"], target: Target, options: MatchOptions
-) -> tuple[Rows, Float64[np.ndarray, " V"]]:
-    """The rows that pull the template at `positions` to the frame, and the weight of each vertex's own pair (0: no target)."""
+def match(template: Template, positions: Float64[np.ndarray, "V 3"], target: Target, options: MatchOptions) -> Rows:
+    """The rows that pull the template at `positions` to the frame."""
     mesh = Mesh(positions, template.faces.astype(np.int32))
     forward = _from_target(mesh, target, options)
-    backward, held = _from_template(template, mesh, target, options)
+    backward = _from_template(template, mesh, target, options)
     border = match_borders(
         sample_border(mesh, border_edges(mesh.faces)), target.border, 2 * options.gate, options.agreement
     )
-    return forward + backward + border, held
+    return forward + backward + border
 
 
 def _from_target(mesh: Mesh, target: Target, options: MatchOptions) -> Rows:
@@ -72,9 +71,7 @@ def _from_target(mesh: Mesh, target: Target, options: MatchOptions) -> Rows:
     return Rows(hits.faces[keep], hits.barycentric[keep], normals[keep], values, weights[keep])
 
 
-def _from_template(
-    template: Template, mesh: Mesh, target: Target, options: MatchOptions
-) -> tuple[Rows, Float64[np.ndarray, " V"]]:
+def _from_template(template: Template, mesh: Mesh, target: Target, options: MatchOptions) -> Rows:
     used = np.flatnonzero(template.corner >= 0)
     points = np.concatenate([mesh.vertices[used], mesh.vertices[mesh.faces].mean(axis=1)])
     faces = np.concatenate([template.corner[used] // 3, np.arange(len(mesh.faces))])
@@ -85,11 +82,9 @@ def _from_template(
     weights = _pair_weights(points - hits.points, normals, own, options)
     weights *= _interpolated_scalar(target.inside, target.mesh.faces, hits)
     values = np.einsum("nd,nd->n", normals, hits.points)
-    held = np.zeros(len(mesh.vertices))
-    held[used] = weights[: len(used)]
     scale = np.where(np.arange(len(points)) < len(used), 1.0, 0.5)  # two faces a vertex
     flat = _tangent_rows(faces[len(used) :], normals[len(used) :], weights[len(used) :], options.normal_weight)
-    return Rows(faces, corners, normals, values, weights * scale) + flat, held
+    return Rows(faces, corners, normals, values, weights * scale) + flat
 
 
 def _tangent_rows(faces: np.ndarray, normals: np.ndarray, weights: np.ndarray, strength: float) -> Rows:

@@ -1,8 +1,8 @@
-"""The sparse least-squares problem of one fitting round: rows on a template's corners, normal equations, conjugate gradients.
+"""The sparse least-squares problem of one fitting round: normal equations and conjugate gradients.
 
-In: rows n . (c0 x0 + c1 x1 + c2 x2) = value on the faces of the template, a Laplacian weight per vertex. Out: offsets (V x 3).
-Point-to-plane rows couple x, y and z, so the matrix has 3 x 3 blocks on the one-ring; it is solved, not factorised: 20-40
-block-Jacobi preconditioned iterations from the last round's answer cost a tenth of a Cholesky factor.
+In: rows n . (c0 x0 + c1 x1 + c2 x2) = value on the faces of a template, a shape, a place. Out: a step (V x 3).
+Point-to-plane rows couple x, y and z, so the matrix has 3 x 3 blocks on the one-ring; it is solved, not factorised:
+20-40 block-Jacobi preconditioned iterations cost a tenth of a Cholesky factor.
 """
 
 from __future__ import annotations
@@ -14,26 +14,18 @@ from jaxtyping import Float64, Int32, Int64
 from scipy import sparse
 
 from ..geometry.topology import unique_edges
+from .fit_border import border_edges
+from .fit_rows import Rows, no_rows
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
-    """N equations w * (n . sum_k c_k x_k - value) = 0 on the three corners of one template face each."""
+class Problem:
+    """What stands against the rows: a shape (Laplacian coordinates), how stiff it is, and a place to stay near."""
 
-    faces: Int64[np.ndarray, " N"]
-    corners: Float64[np.ndarray, "N 3"]  # c_k: barycentric weights (sum 1) or an edge (sum 0)
-    normals: Float64[np.ndarray, "N 3"]
-    values: Float64[np.ndarray, " N"]
-    weights: Float64[np.ndarray, " N"]  # squared row weights
-
-    def __add__(self, other: Rows) -> Rows:
-        return Rows(
-            np.concatenate([self.faces, other.faces]),
-            np.concatenate([self.corners, other.corners]),
-            np.concatenate([self.normals, other.normals]),
-            np.concatenate([self.values, other.values]),
-            np.concatenate([self.weights, other.weights]),
-        )
+    shape: Float64[np.ndarray, "V 3"]
+    stiffness: Float64[np.ndarray, " V"]  # row weights
+    place: Float64[np.ndarray, "V 3"]
+    anchor: float  # row weight
 
 
 class Template:
@@ -43,6 +35,7 @@ class Template:
         self.faces = faces.astype(np.int64)
         self.count = count
         self.edges = unique_edges(faces)[0]
+        self.border = border_edges(faces)
         self.laplacian = _uniform_laplacian(self.edges, count)
         self._place_blocks()
         corner = np.full(count, -1)
@@ -77,13 +70,29 @@ class Template:
 
 
 def solve(
+    template: Template,
+    rows: Rows | None,
+    at: Float64[np.ndarray, "V 3"],
+    problem: Problem,
+    limits: tuple[int, float],
+) -> Float64[np.ndarray, "V 3"]:
+    """The step from `at` that fits the rows, keeps the shape and stays near its place; limits as for the solver."""
+    matrix, right = template.normal_equations(no_rows() if rows is None else rows, at)
+    laplacian, squared = template.laplacian, problem.stiffness**2
+    smooth = laplacian.T @ (sparse.diags_array(squared) @ laplacian)
+    smooth = sparse.csr_array(smooth + problem.anchor**2 * sparse.eye_array(template.count))
+    right = right + laplacian.T @ (squared[:, None] * (problem.shape - laplacian @ at))
+    right = right + problem.anchor**2 * (problem.place - at)
+    return _conjugate_gradients(matrix, smooth, right, limits)
+
+
+def _conjugate_gradients(
     matrix: sparse.bsr_array,
     smooth: sparse.csr_array,
     right: Float64[np.ndarray, "V 3"],
-    start: Float64[np.ndarray, "V 3"],
     limits: tuple[int, float],
 ) -> Float64[np.ndarray, "V 3"]:
-    """x of (matrix + smooth on each axis) x = right by conjugate gradients; limits = (iterations, relative residual)."""
+    """x of (matrix + smooth on each axis) x = right; limits = (iterations, relative residual)."""
     count = len(right)
 
     def apply(x: Float64[np.ndarray, "V 3"]) -> Float64[np.ndarray, "V 3"]:
@@ -95,13 +104,13 @@ def solve(
     blocks[rows[on_diagonal]] = matrix.data[on_diagonal]
     blocks[:, range(3), range(3)] += smooth.diagonal()[:, None]
     inverse = np.linalg.inv(blocks)
-    x = start.copy()
-    r = right - apply(x)
+    x = np.zeros_like(right)
+    r = right.copy()
     z = np.einsum("vij,vj->vi", inverse, r)
     p, rz = z.copy(), float(np.vdot(r, z))
-    enough = limits[1] ** 2 * float(np.vdot(right, np.einsum("vij,vj->vi", inverse, right)))
+    enough = limits[1] ** 2 * rz
     for _ in range(limits[0]):
-        if rz <= enough:
+        if rz <= enough or rz == 0:
             break
         ap = apply(p)
         step = rz / float(np.vdot(p, ap))

@@ -24,6 +24,8 @@ from .reference_centers import center_spacing
 
 Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # of geometry.topology.unique_edges
 
+SPARSE_ROUNDS = 4  # midpoint rounds at most for large faces
+
 
 @dataclass(frozen=True, slots=True)
 class FuseOptions:
@@ -92,16 +94,22 @@ class Group:
             wanted = self._around(covered) < self.fuse.cover * self._around(area)
             covered += np.where(wanted, area, 0)
             faces = faces[wanted[nearest][faces].any(axis=1)]
-            points.append(_dense(moved, faces, subdivisions))
-            normals.append(_dense(turned, faces, subdivisions))
+            more, turned = _dense(moved, turned, faces, subdivisions, self.edge)
+            points.append(more)
+            normals.append(turned)
         return thin_out(np.concatenate(points), np.concatenate(normals), self.fuse.cell * self.edge)
 
     def fused(self, pose: Float64[np.ndarray, "K 3"], key: int, depth: int, vertices: int) -> Mesh:
         """One mesh in a pose with about this many vertices, nothing far from data, no face that tears in a frame."""
+        poisson, final = self.fuse.poisson, depth >= self.fuse.poisson.depth
         options = replace(
-            self.fuse.poisson, depth=depth, reach=self.fuse.reach * self.edge, smallest=self.fuse.smallest
+            poisson,
+            depth=depth,
+            reach=self.fuse.reach * self.edge,
+            smallest=self.fuse.smallest,
+            vertices=max(poisson.vertices, 4 * vertices) if final else vertices,
         )
-        subdivisions = self.fuse.subdivisions if depth >= self.fuse.poisson.depth else 0
+        subdivisions = self.fuse.subdivisions if final else 0
         mesh = decimate(reconstruct(*self.cloud(pose, key, subdivisions), options), vertices)
         if mesh.is_empty:
             return mesh
@@ -153,12 +161,34 @@ def _large(faces: Int32[np.ndarray, "F 3"], count: int, share: float) -> Bool[np
 
 
 def _dense(
-    values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], subdivisions: int
-) -> Float64[np.ndarray, "N 3"]:
-    """Values at the vertices of these faces and, linearly, at their midpoints; positions and normals in one order."""
-    used = np.zeros(len(values), bool)
-    used[faces] = True
-    return subdivide_midpoint(Mesh.of(values[used], (np.cumsum(used) - 1)[faces]), subdivisions).vertices
+    points: Float64[np.ndarray, "V 3"],
+    normals: Float64[np.ndarray, "V 3"],
+    faces: Int32[np.ndarray, "F 3"],
+    subdivisions: int,
+    longest: float,
+) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
+    """The points of these faces with their normals, and of midpoint rounds: the first for all, then where too sparse.
+
+    A flat sole may have few, large triangles: without points inside them it would pass for far from data.
+    """
+    found, turned = [], []
+    for round_ in range(max(subdivisions, SPARSE_ROUNDS) + 1):
+        used = np.zeros(len(points), bool)
+        used[faces] = True
+        faces = (np.cumsum(used) - 1)[faces].astype(np.int32)
+        points, normals = points[used], normals[used]
+        found.append(points)
+        turned.append(normals)
+        finer, finer_normals = (subdivide_midpoint(Mesh(a, faces)) for a in (points, normals))
+        points, normals, faces = finer.vertices, finer_normals.vertices, finer.faces
+        if round_ >= subdivisions:
+            faces = faces[_longest_edges(points, faces) > longest]
+    return np.concatenate(found), np.concatenate(turned)
+
+
+def _longest_edges(points: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
+    corners = points[faces]
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
 
 
 def _vertex_areas(mesh: Mesh, faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " V"]:

@@ -23,7 +23,7 @@ class PoissonOptions:
     depth: int = 9  # of the octree
     trim: float = 2.0  # octree levels below the median density at which surface is cut away
     reach: float = 0.01  # surface farther than this from all points is cut away, in units of the points
-    vertices: int = 30_000  # the closed surface is decimated to this many before it is trimmed
+    vertices: int = 15_000  # the closed surface is decimated to this many before it is trimmed
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
 
     def __post_init__(self) -> None:
