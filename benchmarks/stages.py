@@ -19,7 +19,7 @@ from meshreel.analysis.track import track_centers
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
 from meshreel.coding.group import CodedReference, code_reference, decode_group, encode_group, payload_parts
-from meshreel.encoder import EncoderOptions
+from meshreel.windows import EncoderOptions
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
 
