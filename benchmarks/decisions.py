@@ -9,6 +9,7 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,8 @@ import numpy as np
 
 from meshreel.choice import cheapest_intra, measure
 from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
+from meshreel.coding.group import code_reference, decode_group, encode_group
+from meshreel.compact import CompactOptions, compact, displacements
 from meshreel.presets import displacement_step, preset_options
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -27,10 +30,10 @@ Row = dict[str, Any]
 
 def main() -> int:
     """Prints every row as soon as it is there."""
-    stages = compute(story(), preset_options())
-    for rows in (float_rows(), lattice_rows(stages), anchor_rows(stages), pose_rows(stages), floor_rows(stages)):
-        for row in rows:
-            print(json.dumps(row), flush=True)
+    apart, meeting = compute(story(0), preset_options()), compute(story(), preset_options())
+    rows = (float_rows(), lattice_rows(apart), anchor_rows(apart), floor_rows(apart), compact_rows(apart))
+    for row in chain(*rows, pose_rows("apart", apart), pose_rows("meeting", meeting)):
+        print(json.dumps(row), flush=True)
     return 0
 
 
@@ -74,19 +77,44 @@ def anchor_rows(stages: Stages) -> Iterator[Row]:
                        "bytes": len(data), "rms": rms}  # fmt: skip
 
 
-def pose_rows(stages: Stages) -> Iterator[Row]:
-    """The trials that the reference's pose was chosen from: symmetric distances as fractions of the diagonal."""
-    for trial in stages.reference.trials:
-        name = "MDS" if trial.frame < 0 else f"frame {trial.frame}"
-        yield {"decision": "pose", "pose": name, "rms": trial.rms, "q95": trial.tail}
+def pose_rows(name: str, stages: Stages) -> Iterator[Row]:
+    """The fit of the reference that each pose would have given, mean and worst frame, and which was chosen."""
+    options = preset_options()
+    distances = largest_distances(stages.centers)
+    kin = neighbours(affinity(distances, options.reference.centers), options.reference.deform)
+    how = (options.reference.deform, options.reference.fuse)
+    group = Group(stages.frames, stages.centers.positions, distances, kin, how)
+    keys = sorted(trial.key for trial in stages.reference.trials if trial.frame != MDS)
+    for frame, key in [(MDS, key) for key in keys] + [(key, key) for key in keys]:
+        pose = stages.spread if frame == MDS else stages.centers.positions[frame]
+        mesh = group.fused(pose, key, options.reference.fuse.poisson.depth, options.reference.vertices)
+        base = code_reference(mesh, options.reference_bits, options.levels).base
+        fit = fit_frames(base.faces, group.sent(base, pose), stages.frames, options.fit)
+        rms = [residual.rms for residual in fit.residuals]
+        chosen = (frame, key) == (stages.reference.frame, stages.reference.key)
+        yield {"decision": "pose", "group": name, "pose": "MDS" if frame == MDS else f"frame {frame}", "key": key,
+               "chosen": chosen, "mean_rms": float(np.mean(rms)), "worst_rms": max(rms)}  # fmt: skip
 
 
 def floor_rows(stages: Stages) -> Iterator[Row]:
     """Bytes of the group in the laplacian form, and in the draco form that is as good."""
     quality = measure(stages.frames, stages.decoded)
-    found = cheapest_intra(stages.frames, quality, np.inf, replace(preset_options().intra))
+    found = cheapest_intra(stages.frames, quality, np.inf, preset_options().intra)
     yield {"decision": "floor", "laplacian_bytes": len(stages.payload), "draco_bytes": len(found[0]) if found else None,
            "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
+
+
+def compact_rows(stages: Stages) -> Iterator[Row]:
+    """Distance and bytes with few components, of the fit as it is and made compact."""
+    for components in (3, 10):
+        options = replace(preset_options().displacements, basis_size=components)
+        fits = {"as it is": stages.fit}
+        fits["compact"] = compact(stages.fit, stages.coded.base, stages.frames, components, CompactOptions())
+        for name, fit in fits.items():
+            payload, _ = encode_group(stages.coded, displacements(fit, stages.coded.base), options)
+            quality = measure(stages.frames, decode_group(payload, len(stages.frames)))
+            yield {"decision": "compact", "components": components, "fit": name, "bytes": len(payload),
+                   "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
 
 
 if __name__ == "__main__":

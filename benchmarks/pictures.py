@@ -125,8 +125,8 @@ def reference(stages: Stages, path: Path) -> None:
     sheet = Sheet(3, 340)
     base = stages.coded.base
     camera = camera_for([base], 340)
-    sheet.image(0, f"{len(base.vertices)} vertices, {_parts(base)}", shaded(base, camera))
     coarse = stages.reference.mesh
+    sheet.image(0, f"{len(coarse.vertices)} vertices, {_parts(coarse)}", shaded(base, camera))
     for panel, (mesh, name) in enumerate(((coarse, "before subdivision"), (base, "after it")), 1):
         low, high = coarse.vertices.min(axis=0), coarse.vertices.max(axis=0)
         top = Mesh.of(_inside(mesh, (high - low) * [0, 0.68, 0] + low, (high - low) * [0.45, 1, 1] + low), [])
