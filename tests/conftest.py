@@ -2,4 +2,6 @@
 
 from jaxtyping import install_import_hook
 
-install_import_hook("meshreel", "beartype.beartype")
+import tests.typecheck  # noqa: F401  (the hook finds it by name)
+
+install_import_hook("meshreel", "tests.typecheck.check")

@@ -22,7 +22,7 @@ from .types import Mesh
 
 
 def _short_fit() -> FitOptions:
-    return FitOptions(gates=(0.02,), smoothing=(0.5,), anchor=0.05, carry=0.0)
+    return FitOptions(gates=(0.02,), smoothing=(0.5,), anchor=0.05)
 
 
 @dataclass(frozen=True, slots=True)

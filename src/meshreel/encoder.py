@@ -267,7 +267,12 @@ def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[s
     return {
         "preset": options.preset,
         "quality": options.quality,
-        "rms_m": float(f"{mean_square**0.5:.4g}"),
-        "worst_rms_m": float(f"{max(group.quality.worst for group in groups):.4g}"),
-        "normal_error_deg": float(f"{sum(g.frame_count * g.quality.angle for g in groups) / frames:.3g}"),
+        "rms_m": _rounded(mean_square**0.5),
+        "worst_rms_m": _rounded(max(group.quality.worst for group in groups)),
+        "normal_error_deg": _rounded(sum(g.frame_count * g.quality.angle for g in groups) / frames),
     }
+
+
+def _rounded(value: float) -> float | None:
+    """Four digits; None for what JSON has no number for."""
+    return float(f"{value:.4g}") if np.isfinite(value) else None

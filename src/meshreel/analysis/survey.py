@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..geometry.topology import clean
 from ..types import Mesh, MeshSequence
 
 
@@ -35,7 +36,8 @@ class Survey:
         return float(np.linalg.norm(self.high - self.low)) or 1.0
 
     def normalise(self, mesh: Mesh) -> Mesh:
-        """The mesh in normalised coordinates: centered, the sequence's diagonal as the unit."""
+        """The mesh in normalised coordinates, cleaned: centered, the sequence's diagonal as the unit."""
+        mesh = clean(mesh)
         return Mesh.of((mesh.vertices - self.center) / self.diagonal, mesh.faces)
 
     def windows(self, size: int) -> list[range]:
@@ -49,6 +51,7 @@ class Survey:
         return windows
 
 
+@runtime_checkable
 class Counter(Protocol):
     """Counts frames through stages."""
 
@@ -60,13 +63,24 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
     low, high, empty = np.full(3, np.inf), np.full(3, -np.inf), []
-    for mesh in sequence:
+    for number, mesh in enumerate(sequence):
+        _check(mesh, f"frame {number}")
+        mesh = clean(mesh)
         empty.append(mesh.is_empty)
         if not mesh.is_empty:
-            used = mesh.vertices[np.unique(mesh.faces)]
-            low, high = np.minimum(low, used.min(axis=0)), np.maximum(high, used.max(axis=0))
+            low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
         if stages is not None:
             stages.add("survey", 1)
     if all(empty):
         low, high = np.zeros(3), np.zeros(3)
     return Survey(low, high, tuple(empty))
+
+
+def _check(mesh: Mesh, where: str) -> None:
+    """Raises InputError for what files cannot have either (io checks those), but a mesh made in memory may."""
+    if not np.isfinite(mesh.vertices).all():
+        vertex = int(np.argmin(np.isfinite(mesh.vertices).all(axis=1)))
+        raise InputError(f"{where}: vertex {vertex} is at {mesh.vertices[vertex].tolist()}; all must be finite")
+    if not mesh.is_empty and not (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices)):
+        wrong = mesh.faces.max() if mesh.faces.min() >= 0 else mesh.faces.min()
+        raise InputError(f"{where}: a face refers to vertex {wrong}, but there are {len(mesh.vertices)} (from 0)")

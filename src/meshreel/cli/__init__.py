@@ -40,7 +40,8 @@ class Terminated(BaseException):
 
 def make_app() -> App:
     """The command line's parser."""
-    app = App(name="meshreel", help="Compression of time-varying meshes.", version=__version__)
+    help = "Compression of time-varying meshes."
+    app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
     for name, text in COMMANDS.items():
         app.command(f"meshreel.cli.{name}:command", name=name, help=text)
     return app

@@ -52,7 +52,8 @@ def command(
     failed: list[FormatError] = []
     with common.stages(len(video)) as progress:
         for i, name in enumerate(names):
-            _write_frame(video, i, output / name, failed)
+            error = _write_frame(video, i, output / name)
+            failed += [error] if error else []
             progress("decode", i + 1, len(video))
     if failed:
         raise FormatError(f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written")
@@ -60,10 +61,11 @@ def command(
     common.result(row, f"{output}: {len(video)} {format} files")
 
 
-def _write_frame(video: Video, frame: int, path: Path, failed: list[FormatError]) -> None:
+def _write_frame(video: Video, frame: int, path: Path) -> FormatError | None:
+    """Writes a frame; gives the error of one that is damaged."""
     try:
         mesh = video[frame]
     except FormatError as error:
-        failed.append(error)
-        return
+        return error
     write_mesh(mesh, path)
+    return None

@@ -121,5 +121,5 @@ def _page(rows: Sequence[Row], names: Sequence[str], chosen: ModuleType) -> Iter
             yield f"- Reference, not run here: {curve}: {told} (D2-PSNR, paper form)"
 
 
-def _number(value: float | None) -> str:
+def _number(value: int | float | None) -> str:
     return "" if value is None else f"{value:.4g}"

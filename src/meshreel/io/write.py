@@ -60,7 +60,7 @@ def _pack_obj(mesh: Mesh) -> bytes:
     vertex = "v %.9g %.9g %.9g\n" if _fits_float32(mesh) else "v %.17g %.17g %.17g\n"
     vertices = "".join(vertex % tuple(row) for row in mesh.vertices.tolist())
     faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + 1).tolist())
-    return (vertices + faces).encode()
+    return ("# meshreel\n" + vertices + faces).encode()  # not empty where the frame is: readers take that for damage
 
 
 def _pack_glb(mesh: Mesh) -> bytes:

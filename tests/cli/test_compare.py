@@ -1,0 +1,88 @@
+"""`meshreel compare`: every metric of a file or of meshes against the originals."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.io.write import write_mesh
+from meshreel.types import Mesh
+from tests.cli.conftest import FILE, failed
+
+SMALL = ("--width", "64", "--height", "48")
+
+
+@pytest.fixture(scope="module")
+def decoded(tmp_path_factory):
+    """The frames of the golden file as meshes."""
+    folder = tmp_path_factory.mktemp("decoded")
+    for number, mesh in enumerate(meshreel.open(FILE)):
+        write_mesh(mesh, folder / f"{number:02}.ply")
+    return folder
+
+
+def test_a_file_against_its_own_meshes_is_all_but_exact(run, decoded, tmp_path):
+    said = run("compare", decoded, FILE, *SMALL, "--json", "--sheet", tmp_path / "a.png", "--keys", "2")
+    row = said.row
+    assert said.code == 0
+    assert row["bytes"] == FILE.stat().st_size and row["mbps"] == row["bytes"] * 20 / 1e6
+    assert row["d2_psnr_paper"] > 110 and row["normal_error_deg"] < 0.1 and row["ssim_masked"] > 0.999
+    assert (row["frames_compared"], row["frames_empty"], row["frames_missing"]) == (10, 4, 0)
+    assert len(row["per_frame"]) == 10 and len(row["cameras"]) == 4
+    assert row["key_frames"] == [2] and "d2_psnr_paper_without_keys" in row
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+    json.dumps(row, allow_nan=False)
+
+
+def test_the_table_has_a_line_a_metric_and_tells_the_views(run, balls):
+    said = run("compare", balls, balls, *SMALL)
+    assert said.code == 0 and said.err == ""
+    for name in ("d2_psnr_paper", "d1_psnr", "d2_psnr", "hausdorff95_forward_percent", "normal_error_deg", "ssim_masked"):
+        assert name in said.out
+    assert said.out.count("SSIM view") == 4 and "64 x 48 pixels" in said.out
+    assert "Mbps" not in said.out and "bytes" not in said.out  # meshes have no rate
+    assert run("compare", balls, balls, "--no-ssim", "--quiet").out == ""
+
+
+def test_a_known_shift_is_measured(run, tmp_path):
+    ball = sliding_sphere(1)[0]
+    for name, radius in (("a", 1.0), ("b", 1.01)):
+        (tmp_path / name).mkdir()
+        write_mesh(Mesh.of(radius * ball.vertices, ball.faces), tmp_path / name / "0.ply")
+    row = run("compare", tmp_path / "a", tmp_path / "b", "--no-ssim", "--json").row
+    assert row["rms_forward_m"] == pytest.approx(0.01, rel=0.02)
+    assert row["d2_psnr_paper"] == pytest.approx(20 * np.log10(12**0.5 / 0.01), abs=0.2)
+    scaled = run("compare", tmp_path / "a", tmp_path / "b", "--no-ssim", "--scale", "1.01", "--json").row
+    assert scaled["rms_forward_m"] < 1e-6
+
+
+def test_welded_and_split_vertices_are_the_same_surface(run, tmp_path):
+    ball = sliding_sphere(1, levels=2)[0]
+    split = Mesh.of(ball.vertices[ball.faces.reshape(-1)], np.arange(3 * len(ball.faces)))
+    for name, mesh in (("a", ball), ("b", split)):
+        (tmp_path / name).mkdir()
+        write_mesh(mesh, tmp_path / name / "0.ply")
+    said = run("compare", tmp_path / "a", tmp_path / "b", "--no-ssim", "--json")
+    assert said.row["normal_error_deg"] < 0.1 and said.row["rms_forward_m"] < 1e-6
+    assert "welded" in said.err and "b" in said.err
+
+
+def test_lengths_that_differ_are_told_with_the_remedy(run, balls):
+    assert failed(run("compare", balls, FILE), "3 frames", "10", "--frames")
+
+
+def test_missing_things_are_told(run, balls, tmp_path):
+    assert failed(run("compare", tmp_path / "none", FILE), "none")
+    assert failed(run("compare", balls, tmp_path / "none.reel"), "none.reel")
+    assert failed(run("compare", balls, tmp_path / "none"), "none")
+    assert failed(run("compare", balls, balls, "--cameras", tmp_path / "none.json"), "none.json")
+    assert failed(run("compare", balls, balls, "--keys", "9", "--no-ssim"), "9")
+
+
+def test_a_reel_file_of_any_name_is_known_by_its_first_bytes(run, decoded, tmp_path):
+    (tmp_path / "video.bin").write_bytes(FILE.read_bytes())
+    assert run("compare", decoded, tmp_path / "video.bin", "--no-ssim", "--json").row["frames_compared"] == 10

@@ -1,0 +1,78 @@
+"""`meshreel decode`: a file becomes meshes, whole or as far as it can be read."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.io.sequence import open_sequence
+from tests.cli.conftest import FILE, failed
+
+
+@pytest.mark.parametrize("kind", ["ply", "obj", "glb"])
+def test_every_format_gives_the_frames_back(run, tmp_path, kind):
+    said = run("decode", FILE, "-o", tmp_path / "new" / "out", "--format", kind, "--json")
+    assert said.row == {"output": str(tmp_path / "new" / "out"), "frames": 10, "format": kind, "frame_rate": 25.0}
+    names = sorted(path.name for path in (tmp_path / "new" / "out").iterdir())
+    assert names == [f"frame_{i:05}.{kind}" for i in range(10)]
+    for found, wanted in zip(open_sequence(tmp_path / "new" / "out"), meshreel.open(FILE), strict=True):
+        assert len(found.faces) == len(wanted.faces)
+        if not wanted.is_empty:
+            assert np.abs(found.vertices[found.faces] - wanted.vertices[wanted.faces]).max() < 1e-5
+
+
+def test_ply_is_the_default_and_the_answer_is_one_line(run, tmp_path):
+    said = run("decode", FILE, "-o", tmp_path)
+    assert (said.code, said.out, said.err) == (0, f"{tmp_path}: 10 ply files\n", "")
+
+
+def test_quiet_is_silent(run, tmp_path):
+    assert (run("decode", FILE, "-o", tmp_path, "--quiet").out, len(list(tmp_path.iterdir()))) == ("", 10)
+
+
+def test_fewer_components_give_another_shape(run, tmp_path):
+    run("decode", FILE, "-o", tmp_path / "whole")
+    run("decode", FILE, "-o", tmp_path / "coarse", "--components", "1")
+    whole, coarse = ((tmp_path / name / "frame_00003.ply").read_bytes() for name in ("whole", "coarse"))
+    assert len(whole) == len(coarse) and whole != coarse
+    assert failed(run("decode", FILE, "-o", tmp_path, "--components", "-1"), "components", "-1")
+
+
+def test_frames_of_another_video_in_the_folder_are_pointed_out(run, tmp_path):
+    (tmp_path / "frame_00010.ply").write_bytes(b"")
+    assert "frame_00010.ply" in run("decode", FILE, "-o", tmp_path).err
+
+
+def test_a_damaged_group_costs_only_its_frames_and_the_exit_code(run, tmp_path):
+    data = bytearray(FILE.read_bytes())
+    group = meshreel.open(FILE).reader.groups[1]
+    data[group.offset + 60] ^= 4
+    (tmp_path / "a.reel").write_bytes(data)
+    said = run("decode", tmp_path / "a.reel", "-o", tmp_path / "out")
+    assert failed(said, "frames 2 to 5", "4 of 10 frames are lost")
+    assert len(list((tmp_path / "out").iterdir())) == 6
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda data: data[:60], ("truncated",)),
+        (lambda data: data[:-1], ("truncated", "1 of 10 frames")),
+        (lambda data: data[:8] + b"\x02" + data[9:], ("version 2", "update meshreel")),
+        (lambda data: data[:10] + b"\xff\xff\xff\xff" + data[14:], ("4294967295",)),
+        (lambda data: data[:30] + b"~" + data[31:], ("checksum",)),
+        (lambda _: b"", ("not a .reel",)),
+    ],
+)
+def test_a_file_that_is_no_whole_reel_is_told(run, tmp_path, spoil, words):
+    (tmp_path / "a.reel").write_bytes(spoil(FILE.read_bytes()))
+    assert failed(run("decode", tmp_path / "a.reel", "-o", tmp_path / "out"), *words)
+
+
+def test_a_missing_file_and_a_folder_that_cannot_be_are_told(run, tmp_path):
+    assert failed(run("decode", tmp_path / "none.reel", "-o", tmp_path), "none.reel")
+    assert failed(run("decode", tmp_path, "-o", tmp_path / "out"), str(tmp_path))
+    (tmp_path / "taken").write_text("")
+    assert failed(run("decode", FILE, "-o", tmp_path / "taken"), "taken", "choose another")
+    assert failed(run("decode", FILE, "-o", tmp_path, "--format", "fbx"), "fbx")

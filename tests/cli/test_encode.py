@@ -1,0 +1,158 @@
+"""`meshreel encode`: everything it takes, and one line for everything it does not."""
+
+from __future__ import annotations
+
+import inspect
+import shutil
+
+import pytest
+
+import meshreel
+from meshreel.cli.encode import command
+from meshreel.io.sequence import SequenceOptions
+from meshreel.presets import preset_options
+from tests.cli.conftest import failed
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+
+
+def obj(folder, name, text):
+    (folder / name).write_text(text)
+    return folder / name
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_a_folder_becomes_a_file_and_the_answer_says_what_it_cost(run, balls, tmp_path):
+    out = tmp_path / "a.reel"
+    said = run("encode", balls, "-o", out, "--frames", "0:2", "--fps", "25", "--scale", "2", "--json")
+    assert said.code == 0
+    assert said.row["bytes"] == out.stat().st_size
+    assert said.row["mbps"] == pytest.approx(out.stat().st_size * 8 * 12.5 / 1e6)
+    assert sum(group["frames"] for group in said.row["groups"]) == said.row["frames"] == 2
+    video = meshreel.open(out)
+    assert video.frame_rate == 25
+    assert video[0].diagonal == pytest.approx(2 * 12**0.5, rel=0.03)
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_a_list_a_glob_and_an_archive_are_inputs_too(run, balls, archive, tmp_path):
+    first = balls / "ball_0.ply"
+    for number, inputs in enumerate([(first,), (f"{balls}/ball_[0].ply",)]):
+        said = run("encode", *inputs, "-o", tmp_path / f"{number}.reel", "--quiet")
+        assert (said.code, said.out, said.err) == (0, "", "")
+    assert (tmp_path / "0.reel").read_bytes() == (tmp_path / "1.reel").read_bytes()
+    said = run("encode", archive, "-o", tmp_path / "n.reel", "--frames", ":1")
+    assert said.code == 0 and said.out.startswith(f"{tmp_path}/n.reel: 1 frames, ")
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_every_option_reaches_the_encoder(run, balls, tmp_path):
+    options = ["--preset", "paper", "--quality", "70", "--basis-size", "2", "--centers", "100", "--group-size", "2"]
+    files = [balls / f"ball_{i}.ply" for i in range(3)]
+    said = run("encode", *files, "-o", tmp_path / "a.reel", *options, "--jobs", "1", "--json")
+    assert [group["frames"] for group in said.row["groups"]] in ([1, 2], [2, 1])
+    info = run("info", tmp_path / "a.reel", "--json").row
+    assert info["metadata"]["quality"] == 70
+    assert [g["components"] for g in info["groups"] if g["form"] == "laplacian"] == [2]
+
+
+def test_flags_default_to_the_defaults_of_the_options():
+    defaults = {name: parameter.default for name, parameter in inspect.signature(command).parameters.items()}
+    read, code = SequenceOptions(), preset_options()
+    assert (defaults["fps"], defaults["frames"], defaults["scale"]) == (read.frame_rate, read.frames, read.scale)
+    assert (defaults["preset"], defaults["quality"]) == (code.preset, code.quality)
+    assert (defaults["group_size"], defaults["centers"]) == (code.group_size, code.track.centers)
+    assert defaults["basis_size"] is code.displacements.basis_size is None
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_what_is_dropped_or_welded_is_said_once(run, tmp_path):
+    text = "vt 0 0\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\nv 0 0 0 1 0 0\nf 1/1 2/1 3/1\nf 4/1 3/1 2/1\n"
+    for number in range(2):
+        obj(tmp_path, f"f{number}.obj", text)
+    said = run("encode", tmp_path, "-o", tmp_path / "a.reel")
+    assert said.code == 0
+    warnings = said.err.splitlines()
+    assert all(line.startswith("meshreel: warning: ") for line in warnings)
+    assert sum("dropped: colors, texture coordinates" in line for line in warnings) == 1
+    assert sum("welded 2 of 8 vertices" in line for line in warnings) == 1
+    assert run("encode", tmp_path, "-o", tmp_path / "a.reel", "--quiet").err == ""
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_quads_and_polygons_are_triangulated(run, tmp_path):
+    obj(tmp_path, "f0.obj", TRIANGLE + "v 1 1 0\nv 0.5 1.5 0\nf 1 2 4 5 3\n")
+    assert run("encode", tmp_path, "-o", tmp_path / "a.reel").code == 0
+    assert len(meshreel.open(tmp_path / "a.reel")[0].faces) == 3
+
+
+def test_a_missing_input_and_an_empty_folder_are_told(run, tmp_path):
+    out = tmp_path / "a.reel"
+    assert failed(run("encode", tmp_path / "none", "-o", out), "none", "no such file")
+    assert failed(run("encode", tmp_path, "-o", out), "0 mesh files")
+    assert failed(run("encode", tmp_path / "*.ply", "-o", out), "pattern")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (TRIANGLE + "f 1 2 4\n", ("vertex 3", "there are 3")),
+        (TRIANGLE.replace("1 0 0", "nan 0 0") + "f 1 2 3\n", ("vertex 1", "not finite")),
+        (TRIANGLE.replace("1 0 0", "inf 0 0") + "f 1 2 3\n", ("vertex 1", "not finite")),
+        ("v 0 0 zero\n", ("line 1",)),
+        ("", ("0 bytes",)),
+    ],
+)
+def test_a_frame_that_cannot_be_used_is_told_with_file_and_number(run, tmp_path, text, words):
+    obj(tmp_path, "f0.obj", TRIANGLE + "f 1 2 3\n")
+    obj(tmp_path, "f1.obj", text)
+    said = run("encode", tmp_path, "-o", tmp_path / "a.reel")
+    assert failed(said, "frame 1", "f1.obj", *words)
+    assert not (tmp_path / "a.reel").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["-o", "a.mp4"], [".reel"]),
+        (["-o", "a.reel", "--quality", "101"], ["quality", "101"]),
+        (["-o", "a.reel", "--quality", "high"], ["high"]),
+        (["-o", "a.reel", "--group-size", "0"], ["group size", "0"]),
+        (["-o", "a.reel", "--centers", "0"], ["centers", "0"]),
+        (["-o", "a.reel", "--basis-size", "-1"], ["-1"]),
+        (["-o", "a.reel", "--fps", "0"], ["frame rate"]),
+        (["-o", "a.reel", "--scale", "-1"], ["scale"]),
+        (["-o", "a.reel", "--frames", "1-2"], ["1-2"]),
+        (["-o", "a.reel", "--frames", "7:"], ["leave 0"]),
+        (["-o", "a.reel", "--jobs", "0"], ["jobs"]),
+        (["-o", "a.reel", "--preset", "worst"], ["worst"]),
+        (["-o", "a.reel", "--spped", "2"], ["--spped"]),
+        ([], ["output"]),
+    ],
+)
+def test_an_option_that_cannot_be_is_told_before_anything_is_read(run, balls, tmp_path, arguments, words, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert failed(run("encode", balls, *arguments), *words)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_a_folder_that_is_not_there_or_is_the_target_is_told(run, balls, tmp_path):
+    assert failed(run("encode", balls, "-o", tmp_path / "none" / "a.reel", "--frames", ":1"), "a.reel")
+    (tmp_path / "b.reel").mkdir()
+    assert failed(run("encode", balls, "-o", tmp_path / "b.reel", "--frames", ":1"), "b.reel")
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_a_file_that_is_there_stays_as_it_is_when_encoding_fails(run, balls, tmp_path):
+    (tmp_path / "a.reel").write_bytes(b"before")
+    shutil.copytree(balls, tmp_path / "in")
+    (tmp_path / "in" / "ball_2.ply").write_bytes(b"ply\n")
+    assert failed(run("encode", tmp_path / "in", "-o", tmp_path / "a.reel"), "frame 2", "ball_2.ply")
+    assert (tmp_path / "a.reel").read_bytes() == b"before"
+
+
+def test_debug_shows_the_traceback(run, tmp_path):
+    with pytest.raises(meshreel.InputError):
+        run("encode", tmp_path / "none", "-o", tmp_path / "a.reel", "--debug")

@@ -1,0 +1,76 @@
+"""The command line as a whole: help, version, codes, and what it loads."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+import meshreel
+from meshreel.cli import COMMANDS, one_line
+from tests.cli.conftest import FILE, failed
+
+
+def test_help_names_every_command(run):
+    for arguments in (("--help",), ()):
+        said = run(*arguments)
+        assert said.code == 0
+        assert all(name in said.out for name in COMMANDS)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help_that_explains_its_options(run, name):
+    said = run(name, "--help") if name != "bench" else run(name, "run", "--help")
+    assert said.code == 0
+    assert all(flag in said.out for flag in ("--json", "--quiet", "--debug"))
+
+
+def test_version_is_the_packages(run):
+    assert run("--version").out.strip() == meshreel.__version__
+
+
+def test_an_unknown_command_is_told(run):
+    assert failed(run("encod"), "encod")
+
+
+def test_a_ctrl_c_is_130_and_one_line(run, monkeypatch):
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("meshreel.cli.decode.open_video", interrupted)
+    said = run("decode", FILE, "-o", "unused")
+    assert (said.code, said.out, said.err) == (130, "", "meshreel: interrupted\n")
+
+
+def test_the_handler_of_sigterm_is_given_back(run):
+    before = signal.getsignal(signal.SIGTERM)
+    run("--version")
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_a_fault_of_ours_is_one_line_too():
+    assert one_line(ValueError("a\nb")).startswith("ValueError: a b; this is a fault of meshreel")
+    assert "fewer --jobs" in one_line(MemoryError())
+    missing = ModuleNotFoundError("No module named 'open3d'", name="open3d")
+    assert one_line(missing) == "open3d is missing; install it with: pip install 'meshreel[encode]'"
+
+
+def test_decode_and_info_need_nothing_of_the_encoder(tmp_path):
+    script = (
+        "import sys; from meshreel.cli import main\n"
+        "codes = [main(['decode', sys.argv[1], '-o', sys.argv[2], '--quiet']), main(['info', sys.argv[1], '--quiet'])]\n"
+        "heavy = ('open3d', 'scipy', 'skimage', 'igl', 'fast_simplification', 'matplotlib', 'meshreel.encoder')\n"
+        "print(codes, [name for name in heavy if name in sys.modules])"
+    )
+    command = [sys.executable, "-c", script, str(FILE), str(tmp_path)]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "[0, 0] []\n"
+
+
+def test_a_module_run_exits_with_the_code(tmp_path):
+    command = [sys.executable, "-m", "meshreel", "info", str(tmp_path / "none.reel")]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ)
+    assert (answer.returncode, answer.stdout) == (2, "")
+    assert answer.stderr.count("\n") == 1 and "none.reel" in answer.stderr

@@ -1,0 +1,135 @@
+"""Opening .reel files: a Video is a sequence of meshes, read group by group."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.container.sources import BytesSource
+from meshreel.errors import FormatError, InputError
+from tests.golden import GOLDEN, frame_record
+
+MIXED = (GOLDEN / "mixed.reel").read_bytes()  # empty 0-1, laplacian 2-5, draco 6-8, empty 9
+
+
+class Counted(BytesSource):
+    """Remembers which byte ranges were asked for."""
+
+    def __init__(self, data: bytes) -> None:
+        super().__init__(data)
+        self.ranges: list[tuple[int, int]] = []
+
+    def get_bytes(self, offset: int, length: int) -> bytes:
+        self.ranges.append((offset, length))
+        return super().get_bytes(offset, length)
+
+
+def digests(meshes):
+    return [frame_record(mesh) for mesh in meshes]
+
+
+def test_a_path_a_string_bytes_and_a_source_open_the_same_video():
+    path = GOLDEN / "mixed.reel"
+    videos = [meshreel.open(source) for source in (path, str(path), MIXED, BytesSource(MIXED))]
+    assert all(digests(video) == digests(videos[0]) for video in videos)
+
+
+def test_a_video_is_a_sequence_of_meshes():
+    video = meshreel.open(MIXED)
+    assert len(video) == 10 == len(list(video))
+    assert isinstance(video, meshreel.MeshSequence)
+    assert video.frame_rate == 25.0
+    assert [mesh.is_empty for mesh in video] == [True, True] + 4 * [False] + [False, True, False] + [True]
+
+
+def test_slices_and_negative_indices_are_those_of_a_list():
+    video = meshreel.open(MIXED)
+    whole = digests(video)
+    assert digests(video[2:7:2]) == whole[2:7:2]
+    assert frame_record(video[-2]) == whole[-2]
+    assert video[5:5] == []
+    for index in (10, -11):
+        with pytest.raises(IndexError, match="10 frames"):
+            video[index]
+
+
+def test_frames_in_any_order_are_the_same_frames():
+    video = meshreel.open(MIXED)
+    whole = digests(meshreel.open(MIXED))
+    assert [frame_record(video[i]) for i in (8, 2, 9, 4, 3, 0)] == [whole[i] for i in (8, 2, 9, 4, 3, 0)]
+
+
+def test_timestamps_rise_and_start_where_the_header_says():
+    video = meshreel.open(MIXED)
+    assert len(video.timestamps) == 10
+    assert video.timestamps[0] == 0.5
+    assert video.timestamps[1] == pytest.approx(0.54)
+    assert (np.diff(video.timestamps) > 0).all()
+
+
+def test_coordinates_are_in_metres_where_they_were():
+    mesh = meshreel.open(MIXED)[2]
+    assert np.abs(mesh.vertices.mean(axis=0) - [1e6 + 0.125, -2.5, 0.1]).max() < 0.2
+
+
+def test_one_frame_costs_the_bytes_of_its_group_only():
+    source = Counted(MIXED)
+    video = meshreel.open(source)
+    source.ranges.clear()
+    group = video.reader.groups[2]
+    video[7]
+    assert source.ranges == [(group.offset, group.size)]
+    video[8]
+    assert len(source.ranges) == 1  # the group is kept
+
+
+def test_fewer_components_are_fewer_bytes_and_still_a_shape():
+    source = Counted(MIXED)
+    video = meshreel.open(source)
+    whole = video[3]
+    source.ranges.clear()
+    coarse = video.at(1)[3]
+    assert source.ranges[0][1] < video.reader.groups[1].size
+    assert np.array_equal(coarse.faces, whole.faces)
+    errors = [np.abs(video.at(k)[3].vertices - whole.vertices).max() for k in (0, 1, 3, 99)]
+    assert errors[0] > errors[2] and errors[3] == 0
+    with pytest.raises(ValueError, match="-1"):
+        video.at(-1)
+
+
+def test_the_same_bytes_give_the_same_bits_twice():
+    assert digests(meshreel.open(MIXED)) == digests(meshreel.open(MIXED))
+
+
+def test_a_damaged_group_leaves_the_others_readable():
+    group = meshreel.open(MIXED).reader.groups[1]
+    data = bytearray(MIXED)
+    data[group.offset + 40] ^= 1
+    video = meshreel.open(bytes(data))
+    with pytest.raises(FormatError, match="frames 2 to 5"):
+        video[2]
+    others = (0, 1, 6, 7, 8, 9)
+    assert digests(video[i] for i in others) == digests(meshreel.open(MIXED)[i] for i in others)
+
+
+@pytest.mark.parametrize("missing", [1, 200])
+def test_a_truncated_file_keeps_the_groups_it_has(missing):
+    video = meshreel.open(MIXED[:-missing])
+    assert digests(video[:6]) == digests(meshreel.open(MIXED)[:6])
+    with pytest.raises(FormatError, match="truncated"):
+        video[9]
+
+
+def test_a_truncated_head_a_future_version_and_another_file_are_refused():
+    with pytest.raises(FormatError):
+        meshreel.open(MIXED[:50])
+    with pytest.raises(FormatError, match="version 9"):
+        meshreel.open(MIXED[:8] + b"\x09" + MIXED[9:])
+    with pytest.raises(FormatError, match="not a .reel"):
+        meshreel.open(b"solid cube")
+
+
+def test_a_missing_file_is_an_input_error(tmp_path):
+    with pytest.raises(InputError, match=r"none\.reel"):
+        meshreel.open(tmp_path / "none.reel")

@@ -1,0 +1,224 @@
+"""The chain on small procedural bodies: what goes in comes out, whatever it is, and the same bytes each time."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
+from meshreel.choice import IntraOptions
+from meshreel.encoder import encode
+from meshreel.errors import InputError
+from meshreel.format.layout import Form
+from meshreel.io.sequence import SequenceOptions, open_sequence
+from meshreel.metrics.distance import surface_errors
+from meshreel.types import Mesh, MeshList
+from tests.small_options import quick
+
+BODY = SoftBodiesOptions(frames=6, people=1, spacing=0.05)
+BALL = sliding_sphere(1, levels=2)[0]
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory):
+    """A walking body in two groups: the sequence, the file and the summary."""
+    sequence = MeshList(tuple(soft_bodies(BODY)))
+    path = tmp_path_factory.mktemp("body") / "body.reel"
+    return sequence, path, encode(sequence, path, quick(group_size=3))
+
+
+def decoded(sequence, path, options=None):
+    """The frames that come back, each within reach of the original."""
+    summary = encode(sequence, path, options or quick())
+    video = meshreel.open(path)
+    assert len(video) == len(sequence) == summary.frame_count
+    assert path.stat().st_size == summary.size
+    return video, summary
+
+
+def percent(original, found):
+    """Symmetric RMS distance, % of the original's diagonal."""
+    return 100 * surface_errors(original, found).symmetric_rms / original.diagonal
+
+
+def test_a_moving_body_is_coded_by_a_reference_and_its_displacements(body):
+    sequence, path, summary = body
+    assert [group.form for group in summary.groups] == [Form.LAPLACIAN, Form.LAPLACIAN]
+    video = meshreel.open(path)
+    assert [group.frame_count for group in video.reader.groups] == [3, 3]
+    assert max(percent(a, b) for a, b in zip(sequence, video, strict=True)) < 0.6
+    assert len(video[0].faces) == len(video[2].faces)  # one connectivity a group, whatever the input's
+
+
+def test_what_the_summary_says_of_a_group_is_what_the_file_gives(body):
+    sequence, path, summary = body
+    video = meshreel.open(path)
+    distances = [surface_errors(a, b).symmetric_rms for a, b in zip(sequence[:3], video[:3], strict=True)]
+    assert np.sqrt(np.mean(np.square(distances))) == pytest.approx(summary.groups[0].quality.distance, rel=1e-3)
+    assert video.reader.metadata["preset"] == "paper"
+    assert video.reader.metadata["rms_m"] > 0
+
+
+def test_the_same_input_gives_the_same_bytes_with_an_executor_too(body, tmp_path):
+    sequence, path, _ = body
+    stages: list[tuple[str, int, int]] = []
+    with ThreadPoolExecutor(2) as executor:
+        encode(sequence, tmp_path / "b.reel", quick(group_size=3), executor, lambda *told: stages.append(told))
+    assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
+    assert ("survey", 6, 6) in stages and ("code", 6, 6) in stages
+
+
+def test_every_stage_reports_every_frame(tmp_path):
+    last: dict[str, int] = {}
+    encode(sliding_sphere(2, levels=2), tmp_path / "a.reel", quick(), progress=lambda s, done, _: last.update({s: done}))
+    assert last == {"survey": 2, "track": 2, "fit": 2, "code": 2}
+
+
+def test_draco_takes_a_group_that_costs_less_that_way(tmp_path):
+    coarse = sliding_sphere(2, levels=1)  # 18 vertices: any reference costs more
+    options = replace(quick(), intra=IntraOptions((1.0,), (2.0, 1.0, 0.7, 0.5), (0,)))
+    video, summary = decoded(coarse, tmp_path / "a.reel", options)
+    assert [group.form for group in summary.groups] == [Form.DRACO]
+    assert len(video[0].faces) == len(coarse[0].faces)
+
+
+def test_a_group_is_cut_where_one_reference_cannot_follow(tmp_path):
+    one, other = sliding_sphere(2, levels=2), [Mesh.of(BALL.vertices * [1, 0.2, 3] + [0, 4, 0], BALL.faces)] * 2
+    video, summary = decoded(MeshList((*one, *other)), tmp_path / "a.reel")
+    assert len(summary.groups) > 1
+    assert summary.groups[0].frame_count == 2
+    assert max(percent(a, b) for a, b in zip((*one, *other), video, strict=True)) < 2
+
+
+def test_frames_without_faces_are_legal_and_stay_in_their_places(tmp_path):
+    frames = (Mesh.empty(), BALL, Mesh.empty(), Mesh.of(np.zeros((3, 3)), []))
+    video, summary = decoded(MeshList(frames), tmp_path / "a.reel")
+    assert [mesh.is_empty for mesh in video] == [True, False, True, True]
+    assert [group.form for group in summary.groups] == [Form.EMPTY, Form.DRACO, Form.EMPTY]
+
+
+def test_a_sequence_of_nothing_but_empty_frames_is_legal(tmp_path):
+    video, _ = decoded(MeshList((Mesh.empty(),) * 3), tmp_path / "a.reel")
+    assert all(mesh.is_empty for mesh in video)
+
+
+def test_one_frame_is_legal(tmp_path):
+    video, summary = decoded(MeshList((BALL,)), tmp_path / "a.reel")
+    assert [group.form for group in summary.groups] == [Form.DRACO]
+    assert percent(BALL, video[0]) < 0.2
+
+
+def test_no_frames_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no frames"):
+        encode(MeshList(()), tmp_path / "a.reel", quick())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_meshes_of_one_face_come_back(tmp_path):
+    frames = tuple(Mesh.of([[0, 0, 0], [1, 0, 0], [0, 1 + t, 0]], [[0, 1, 2]]) for t in range(3))
+    video, _ = decoded(MeshList(frames), tmp_path / "a.reel")
+    assert [len(mesh.faces) for mesh in video] == [1, 1, 1]
+    assert max(percent(a, b) for a, b in zip(frames, video, strict=True)) < 1
+
+
+def test_a_flat_open_sheet_comes_back(tmp_path):
+    x, z = (c.reshape(-1) for c in np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9)))
+    corners = np.arange(81).reshape(9, 9)
+    a, b, c, d = (part.reshape(-1) for part in (corners[:-1, :-1], corners[1:, :-1], corners[1:, 1:], corners[:-1, 1:]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    frames = tuple(Mesh.of(np.stack([x + 0.05 * t, 0 * x, z], axis=1), faces) for t in range(3))
+    video, _ = decoded(MeshList(frames), tmp_path / "a.reel")
+    assert max(percent(p, q) for p, q in zip(frames, video, strict=True)) < 1
+
+
+def test_two_frames_of_very_different_scale_are_both_kept(tmp_path):
+    frames = (BALL, Mesh.of(1000 * BALL.vertices, BALL.faces))
+    video, _ = decoded(MeshList(frames), tmp_path / "a.reel")
+    assert max(percent(a, b) for a, b in zip(frames, video, strict=True)) < 1
+
+
+def test_coordinates_around_a_million_keep_their_millimetres(tmp_path):
+    far = [4.5e6, 1.2e2, 5.1e6]
+    frames = tuple(Mesh.of(mesh.vertices + far, mesh.faces) for mesh in sliding_sphere(2, levels=2))
+    near, _ = decoded(sliding_sphere(2, levels=2), tmp_path / "near.reel")
+    video, _ = decoded(MeshList(frames), tmp_path / "far.reel")
+    for a, b in zip(near, video, strict=True):
+        assert np.abs(a.vertices + far - b.vertices).max() < 1e-3
+
+
+def degenerate(mesh):
+    """Zero-area and duplicate faces."""
+    flat = [[0, 0, 1], [2, 2, 2]]
+    needle = len(mesh.vertices) + np.array([[0, 1, 2]])
+    points = np.concatenate([mesh.vertices, [mesh.vertices[0]] * 2, [mesh.vertices[1]]])
+    return Mesh.of(points, np.concatenate([mesh.faces, flat, needle, mesh.faces[:5]]))
+
+
+def non_manifold(mesh):
+    """A fin on an edge that two faces share already."""
+    a, b, _ = mesh.faces[0]
+    return Mesh.of([*mesh.vertices, 1.2 * mesh.vertices[a]], [*mesh.faces, [a, b, len(mesh.vertices)]])
+
+
+def unreferenced(mesh):
+    """Vertices that no face uses, one of them absurdly far away."""
+    return Mesh.of([*mesh.vertices, [1e7, 0, 0], [0, 0, 0]], mesh.faces)
+
+
+def isolated(mesh):
+    """A speck apart from the body."""
+    speck = np.array([[0, 0, 0], [0.02, 0, 0], [0, 0.02, 0]]) + [1.6, 0, 0]
+    return Mesh.of([*mesh.vertices, *speck], [*mesh.faces, len(mesh.vertices) + np.arange(3)])
+
+
+@pytest.mark.parametrize("spoil", [degenerate, non_manifold, unreferenced, isolated])
+@pytest.mark.parametrize("count", [1, 2])
+def test_meshes_that_are_not_clean_are_coded_all_the_same(spoil, count, tmp_path):
+    frames = tuple(spoil(mesh) for mesh in sliding_sphere(count, levels=2))
+    video, _ = decoded(MeshList(frames), tmp_path / "a.reel")
+    for original, found in zip(sliding_sphere(count, levels=2), video, strict=True):
+        forward = surface_errors(original, found).forward
+        assert 100 * forward.rms / original.diagonal < 1  # the body is there, whatever became of the rest
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_coordinate_that_is_not_finite_is_refused_with_its_frame(bad, tmp_path):
+    vertices = BALL.vertices.copy()
+    vertices[3, 1] = bad
+    with pytest.raises(InputError, match=r"frame 1: vertex 3 .*finite"):
+        encode(MeshList((BALL, Mesh.of(vertices, BALL.faces))), tmp_path / "a.reel", quick())
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("index", [-1, 66])
+def test_a_face_that_names_no_vertex_is_refused_with_its_frame(index, tmp_path):
+    with pytest.raises(InputError, match=rf"frame 1: .*vertex {index}"):
+        frames = (BALL, Mesh.of(BALL.vertices, [*BALL.faces, [0, 1, index]]))
+        encode(MeshList(frames), tmp_path / "a.reel", quick())
+
+
+def test_a_bad_file_is_named_with_its_frame_before_anything_is_coded(tmp_path):
+    for number, bad in enumerate(("0", "0", "nan")):
+        (tmp_path / f"f{number}.obj").write_text(f"v 0 0 {bad}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(InputError, match=r"frame 2 \(.*f2\.obj\)"):
+        encode(open_sequence(tmp_path, SequenceOptions()), tmp_path / "a.reel", quick())
+    assert not (tmp_path / "a.reel").exists()
+
+
+def test_absurd_options_are_refused():
+    for bad in ({"quality": 101.0}, {"group_size": 0}, {"group_size": 65}):
+        with pytest.raises(InputError, match=str(next(iter(bad.values()))).removesuffix(".0")):
+            replace(quick(), **bad)
+    with pytest.raises(InputError, match="unknown"):
+        meshreel.preset_options("unknown")
+
+
+def test_a_deforming_ball_keeps_its_frame_rate(tmp_path):
+    sequence = MeshList(tuple(deforming_sphere(2, levels=2)), frame_rate=12.5)
+    video, _ = decoded(sequence, tmp_path / "a.reel")
+    assert video.frame_rate == 12.5
+    assert video.timestamps == pytest.approx([0, 0.08])
