@@ -54,7 +54,7 @@ def lattice_rows(stages: Stages) -> Iterator[Row]:
 
 
 def anchor_rows(stages: Stages) -> Iterator[Row]:
-    """Rate and error of the displacements: plain or shaped rounding, few or many anchors, at three qualities."""
+    """Rate and error of the displacements: plain or shaped rounding, few or many anchors, some steps."""
     base = stages.coded.base
     field = np.moveaxis(stages.fit.positions, 0, 1) - base.vertices[:, None]
     few, many = 12, len(base.vertices) // 20
@@ -63,18 +63,14 @@ def anchor_rows(stages: Stages) -> Iterator[Row]:
         "plain, one in twenty": {"anchor_count": many, "anchor_weight": 1, "dead_zone": 0.5},
         "dead zone, one in twenty": {"anchor_count": many, "anchor_weight": 1, "dead_zone": 0.6},
         "shaped, few": {"anchor_count": few},
-        "shaped, one in twenty": {"anchor_count": many},
     }
-    for quality in (20, 50, 80):
-        step = displacement_step(quality)
-        for name, how in ways.items():
-            for factor in (0.25, 0.5, 1.0, 2.0):
-                options = DisplacementOptions(step=factor * step, **how)
-                data = encode_displacements(field, base, options)
-                error = decode_displacements(data, base) - field
-                rms = float(np.sqrt(np.mean(np.sum(np.square(error), axis=2))))
-                yield {"decision": "anchors", "quality": quality, "rounding": name, "step": factor * step,
-                       "bytes": len(data), "rms": rms}  # fmt: skip
+    for name, how in ways.items():
+        for factor in (0.35, 0.7, 1.4, 2.8):
+            options = DisplacementOptions(step=factor * displacement_step(50), **how)
+            data = encode_displacements(field, base, options)
+            error = decode_displacements(data, base) - field
+            rms = float(np.sqrt(np.mean(np.sum(np.square(error), axis=2))))
+            yield {"decision": "anchors", "rounding": name, "step": options.step, "bytes": len(data), "rms": rms}
 
 
 def pose_rows(name: str, stages: Stages) -> Iterator[Row]:
