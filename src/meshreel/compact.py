@@ -4,7 +4,7 @@ In -> out: a fit of a group and its base mesh -> a fit whose energy beyond the f
 may slide along a surface without leaving it; alternating between the truncated KLT (section 3.3.3) and a short surface
 fit from it (section 3.3.2) uses that freedom.
 
-Differs from the paper, which fits first and truncates then (docs/decisions/compact-fit.md).
+Differs from the paper, which fits first and truncates then (docs/decisions/0010-compact-fit.md).
 """
 
 from __future__ import annotations
