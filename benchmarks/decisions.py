@@ -16,6 +16,11 @@ from typing import Any
 import DracoPy
 import numpy as np
 
+from meshreel.analysis.deform import neighbours
+from meshreel.analysis.fit import fit_frames
+from meshreel.analysis.fuse import Group
+from meshreel.analysis.reference import MDS
+from meshreel.analysis.reference_centers import affinity, largest_distances
 from meshreel.choice import cheapest_intra, measure
 from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.group import code_reference, decode_group, encode_group
