@@ -37,7 +37,7 @@ def main() -> int:
     """Prints every row as soon as it is there."""
     apart, meeting = compute(story(0), preset_options()), compute(story(), preset_options())
     rows = (float_rows(), lattice_rows(apart), anchor_rows(apart), floor_rows(apart), compact_rows(apart))
-    for row in chain(*rows, pose_rows("apart", apart), pose_rows("meeting", meeting)):
+    for row in chain(*rows, pose_rows(meeting)):
         print(json.dumps(row), flush=True)
     return 0
 
@@ -78,7 +78,7 @@ def anchor_rows(stages: Stages) -> Iterator[Row]:
             yield {"decision": "anchors", "rounding": name, "step": options.step, "bytes": len(data), "rms": rms}
 
 
-def pose_rows(name: str, stages: Stages) -> Iterator[Row]:
+def pose_rows(stages: Stages) -> Iterator[Row]:
     """The fit of the reference that each pose would have given, mean and worst frame, and which was chosen."""
     options = preset_options()
     distances = largest_distances(stages.centers)
@@ -93,7 +93,7 @@ def pose_rows(name: str, stages: Stages) -> Iterator[Row]:
         fit = fit_frames(base.faces, group.sent(base, pose), stages.frames, options.fit)
         rms = [residual.rms for residual in fit.residuals]
         chosen = (frame, key) == (stages.reference.frame, stages.reference.key)
-        yield {"decision": "pose", "group": name, "pose": "MDS" if frame == MDS else f"frame {frame}", "key": key,
+        yield {"decision": "pose", "pose": "MDS" if frame == MDS else f"frame {frame}", "key": key,
                "chosen": chosen, "mean_rms": float(np.mean(rms)), "worst_rms": max(rms)}  # fmt: skip
 
 
