@@ -6,6 +6,7 @@ performers (docs/results.md).
 
 from __future__ import annotations
 
+from .analysis.fit import FitOptions
 from .analysis.reference import ReferenceOptions
 from .analysis.track import TrackOptions
 from .choice import Quality
@@ -39,15 +40,16 @@ def preset_options(
         target=Quality(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         track=TrackOptions(centers=centers),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
+        fit=FitOptions() if basis_size is None else FitOptions(components=min(basis_size, FitOptions().components)),
         displacements=DisplacementOptions(step=step, basis_size=basis_size),
     )
 
 
 def displacement_step(quality: float) -> float:
-    """Quantiser step of the displacements as a fraction of the diagonal: halves every 20 points, .0011 at 50."""
-    return 0.0011 * 2 ** ((50 - quality) / 20)
+    """Quantiser step of the displacements as a fraction of the diagonal: .0008 at 50, halved every 25 points."""
+    return 0.0008 * 2 ** ((50 - quality) / 25)
 
 
 def reference_vertices(quality: float) -> int:
-    """Vertices of the reference mesh: doubles every 50 points, 3000 at 50."""
-    return round(3000 * 2 ** ((quality - 50) / 50))
+    """Vertices of the reference mesh: 800 at 0, 2000 at 50, 5000 at 100."""
+    return round(2000 * 2.5 ** ((quality - 50) / 50))

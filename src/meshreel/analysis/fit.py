@@ -26,18 +26,17 @@ from .fit_system import Problem, Template, solve
 class FitOptions:
     """How a template is laid onto the frames; one entry per round in `gates` and `smoothing`.
 
-    The last entries of `smoothing` trade rate for accuracy: 0.5 is 1.5 dB and 0.4 degrees better than 1.0 uncoded, and
-    costs a third more rate at one step; at low rates the larger value is the better one.
+    The last entry of `smoothing` trades rate for accuracy: a smaller one follows finer detail and costs more.
     """
 
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # pairs farther apart do not count; of the diagonal
-    smoothing: tuple[float, ...] = (4.0, 2.0, 1.0, 0.7)  # row weight of the shape: its Laplacian against the turned one
+    smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weight of the shape: its Laplacian against the turned one
     agreement: float = 0.3  # least cosine between the normals of a pair
     normal_weight: float = 0.0  # row weight of template edges lying in the frame's tangent plane
     anchor: float = 0.02  # row weight of the offset from the prediction
-    components: int = 10  # of the trajectories, that the second fit starts from; 0: no second fit
+    components: int = 15  # of the trajectories, that the second fit starts from; 0: no second fit
     pull: float = 0.1  # row weight of the offset from these, in the second fit
-    guard: float = 4.0  # factor on the smoothing where faces fold over or collapse
+    guard: float = 1.0  # factor on the smoothing where faces fold over or collapse
     key: int | None = None  # the frame to begin with; the middle one if None
     iterations: int = 40  # of the conjugate gradients, at most, a round
     tolerance: float = 1e-3  # their relative residual
@@ -84,11 +83,8 @@ def fit_frames(
         raise InputError(f"key {options.key} is not one of {count} frames: give 0 to {count - 1}")
     if len(faces) == 0 or count == 0:
         return Fit(predictions.copy(), (NOTHING,) * count)
-    template = Template(faces, predictions.shape[1])
     targets = [None if mesh.is_empty else Target(mesh) for mesh in frames]
-    positions = _first_fit(template, predictions, targets, options)
-    if options.components and count > 1:
-        positions = _second_fit(template, positions, targets, options)
+    positions = fit_targets(faces, predictions, targets, options)
     residuals = [
         NOTHING if target is None else measure(Mesh.of(fitted, faces), target)
         for fitted, target in zip(positions, targets, strict=True)
@@ -96,10 +92,24 @@ def fit_frames(
     return Fit(positions, tuple(residuals))
 
 
+def fit_targets(
+    faces: Int32[np.ndarray, "F 3"],
+    predictions: Float64[np.ndarray, "T V 3"],
+    targets: Sequence[Target | None],
+    options: FitOptions,
+) -> Float64[np.ndarray, "T V 3"]:
+    """The template's positions on frames that are prepared already (None: an empty one); no residuals."""
+    template = Template(faces, predictions.shape[1])
+    positions = _first_fit(template, predictions, targets, options)
+    if options.components and len(targets) > 1:
+        positions = _second_fit(template, positions, targets, options)
+    return positions
+
+
 def _first_fit(
     template: Template,
     predictions: Float64[np.ndarray, "T V 3"],
-    targets: list[Target | None],
+    targets: Sequence[Target | None],
     options: FitOptions,
 ) -> Float64[np.ndarray, "T V 3"]:
     """Every frame from its prediction, the key frame first: its fit is the shape of the others."""
@@ -124,7 +134,7 @@ def _first_fit(
 def _second_fit(
     template: Template,
     first: Float64[np.ndarray, "T V 3"],
-    targets: list[Target | None],
+    targets: Sequence[Target | None],
     options: FitOptions,
 ) -> Float64[np.ndarray, "T V 3"]:
     """The frames fitted again from the strongest components of the first fit's trajectories; the key keeps its fit."""
@@ -144,7 +154,7 @@ def _second_fit(
     return positions
 
 
-def _key(targets: list[Target | None], options: FitOptions) -> int:
+def _key(targets: Sequence[Target | None], options: FitOptions) -> int:
     """The frame asked for, or the middle one; the nearest to it that is not empty."""
     middle = len(targets) // 2 if options.key is None else options.key
     there = [t for t, target in enumerate(targets) if target is not None]

@@ -18,10 +18,13 @@ from ..errors import InputError
 from ..geometry.nearest import Surface
 from ..types import Centers, Mesh
 from .deform import DeformOptions, Neighbours, bind, center_motions, move, neighbours
+from .fit import FitOptions, fit_targets
+from .fit_match import Target
 from .fuse import FuseOptions, Group
 from .reference_centers import ReferenceCenterOptions, affinity, largest_distances, reference_centers
 
 MDS = -1  # in place of a frame's number: the pose is that of eq. 5
+TRIAL_FIT = FitOptions(gates=(0.024, 0.012), smoothing=(2.0, 0.7), components=0, iterations=20)
 PROBES = 4000  # vertices of a frame that are measured in a trial
 
 
@@ -31,6 +34,8 @@ class ReferenceOptions:
 
     vertices: int = 3000  # of the reference mesh
     keys: int = 3  # frames tried as the one whose surface, and whose pose, is taken first
+    canonical_keys: int = 2  # the best so many of them are tried with the MDS pose too
+    trial_frames: int = 4  # frames that a trial is fitted to
     trial_depth: int = 7  # Poisson depth of the trials
     trial_vertices: int = 2000  # of their meshes
     centers: ReferenceCenterOptions = field(default_factory=ReferenceCenterOptions)
@@ -50,8 +55,8 @@ class Trial:
 
     frame: int  # whose centers are the pose, or MDS
     key: int  # the frame whose surface was taken first
-    rms: float  # symmetric surface distance, mean over frames, in units of the vertices
-    tail: float  # the same of the 95 % distance
+    rms: float  # symmetric surface distance after a quick fit, mean over the frames tried, in units of the vertices
+    worst: float  # the same of the worst frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,41 +104,44 @@ def predict(reference: Reference, mesh: Mesh, centers: Centers, options: DeformO
 
 def _trials(group: Group, canonical: Float64[np.ndarray, "K 3"], options: ReferenceOptions) -> tuple[Trial, ...]:
     """Some frames' own poses, each with its own surface first; then the MDS pose with the best of these surfaces."""
-    surfaces = [Surface(frame) for frame in group.frames]
+    targets = [Target(frame) for frame in group.frames]
     count = min(options.keys, len(group.frames))
     keys = sorted({int(key) for key in (np.arange(count) + 0.5) * len(group.frames) / count})
-    trials = [_trial(group, surfaces, (key, key), group.positions[key], options) for key in keys]
+    trials = [_trial(group, targets, (key, key), group.positions[key], options) for key in keys]
     if len(group.frames) > 1:
-        trials.append(_trial(group, surfaces, (MDS, min(trials, key=_misfit).key), canonical, options))
+        best = sorted(trials, key=_misfit)[: options.canonical_keys]
+        trials += [_trial(group, targets, (MDS, trial.key), canonical, options) for trial in best]
     return tuple(trials)
 
 
 def _trial(
     group: Group,
-    surfaces: list[Surface],
+    targets: list[Target],
     names: tuple[int, int],
     pose: Float64[np.ndarray, "K 3"],
     options: ReferenceOptions,
 ) -> Trial:
-    """A quick reference in this pose, sent back to each frame and compared with it in both directions."""
+    """A quick reference in this pose, fitted to some frames, the first and the last among them, and what is left."""
     frame, key = names
-    if len(surfaces) == 1:
+    if len(targets) == 1:
         return Trial(frame, key, 0.0, 0.0)  # nothing to choose from
     mesh = group.fused(pose, key, options.trial_depth, min(options.vertices, options.trial_vertices))
     if mesh.is_empty:
         return Trial(frame, key, np.inf, np.inf)
-    rms, tail = [], []
-    for surface, moved in zip(surfaces, group.sent(mesh, pose), strict=True):
-        original = surface.mesh.vertices
+    tried = sorted({key, *np.linspace(0, len(targets) - 1, options.trial_frames).round().astype(int).tolist()})
+    some = [targets[t] for t in tried]
+    fitted = fit_targets(mesh.faces, group.sent(mesh, pose)[tried], some, replace(TRIAL_FIT, key=tried.index(key)))
+    rms = []
+    for target, moved in zip(some, fitted, strict=True):
+        original = target.mesh.vertices
         there = _gaps(Surface(Mesh(moved, mesh.faces)), original[:: max(1, len(original) // PROBES)])
-        back = _outside(surface, moved, group.edge)
+        back = _outside(target.surface, moved, group.edge)
         rms.append(max(np.sqrt(np.mean(there**2)), np.sqrt(np.mean(back**2))))
-        tail.append(max(np.quantile(there, 0.95), np.quantile(back, 0.95)))
-    return Trial(frame, key, float(np.mean(rms)), float(np.mean(tail)))
+    return Trial(frame, key, float(np.mean(rms)), float(np.max(rms)))
 
 
 def _misfit(trial: Trial) -> float:
-    return trial.rms + trial.tail
+    return trial.rms + trial.worst
 
 
 def _outside(surface: Surface, points: Float64[np.ndarray, "N 3"], most: float) -> Float64[np.ndarray, " N"]:
