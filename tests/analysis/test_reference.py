@@ -19,7 +19,7 @@ from meshreel.types import Centers, Mesh
 
 from .test_deform import ball, inside, rotation
 
-QUICK = ReferenceOptions(vertices=500, trial_depth=5, keys=2, fuse=FuseOptions(poisson=PoissonOptions(depth=6)))
+QUICK = ReferenceOptions(vertices=500, trial_depth=4, keys=2, fuse=FuseOptions(poisson=PoissonOptions(depth=5)))
 RADIUS = 0.1
 
 
@@ -88,7 +88,7 @@ def test_what_the_key_frame_lacks_comes_from_the_others() -> None:
     frames = [whole, Mesh(whole.vertices, hole), whole]
     first = inside((0, 0, 0))
     centers = Centers(np.stack([first] * 3), np.zeros(len(first), np.int32))
-    one_key = ReferenceOptions(vertices=500, keys=1, trial_depth=5, fuse=QUICK.fuse)
+    one_key = ReferenceOptions(vertices=500, keys=1, trial_depth=4, fuse=QUICK.fuse)
     reference = extract_reference(frames, centers, one_key)
     assert reference.key == 1
     assert reference.mesh.vertices[:, 2].max() > 0.095

@@ -27,7 +27,7 @@ class FitOptions:
     """How a template is laid onto the frames; one entry per round in `gates` and `smoothing`.
 
     The last entries of `smoothing` trade rate for accuracy: 0.5 is 1.5 dB and 0.4 degrees better than 1.0 uncoded, and
-    costs 30 % more rate at one step; at low rates the larger value is the better one.
+    costs a third more rate at one step; at low rates the larger value is the better one.
     """
 
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # pairs farther apart do not count; of the diagonal
