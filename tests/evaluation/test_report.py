@@ -54,7 +54,10 @@ def memory(frames, peak):
 GOOD = [
     row("dancer", "meshreel paper", 1.5, 62.0),
     row("dancer", "meshreel paper", 0.5, 58.0, options={"quality": 20.0}),
-    *(row("dancer", "meshreel paper m", mbps - 1, db + 1, options={"basis_size": m}) for m, (mbps, db) in RELEASED.items()),
+    *(
+        row("dancer", "meshreel paper m", mbps - 1, db + 1, options={"basis_size": m})
+        for m, (mbps, db) in RELEASED.items()
+    ),
     row("mitch", "meshreel paper", 1.5, 62.0),
     row("basketball_player", "meshreel paper", 1.5, 62.0),
     row("dancer", "decimated_draco_subdivided", 0.7, 58.0),
@@ -90,7 +93,17 @@ def test_without_rows_nothing_is_claimed():
         ("bridge", row("collision", "meshreel paper", 0.5, 62.0, bridges=[0, 3, 0])),
         ("encode, dancer", row("dancer", "meshreel paper", 1.5, 62.0, encode_s=8.1)),
         ("memory", memory(60, 551.0)),
-        ("decode", row("dancer", "meshreel paper m", 1.0, 66.0, options={"basis_size": 10}, decode={"frame_ms": 26.0, "vertices": 1.0})),
+        (
+            "decode",
+            row(
+                "dancer",
+                "meshreel paper m",
+                1.0,
+                66.0,
+                options={"basis_size": 10},
+                decode={"frame_ms": 26.0, "vertices": 1.0},
+            ),
+        ),
     ],
 )
 def test_a_row_that_falls_short_is_missed(name, bad):

@@ -70,6 +70,8 @@ def thin_out(
     points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], cell: float
 ) -> tuple[Float64[np.ndarray, "M 3"], Float64[np.ndarray, "M 3"]]:
     """One mean point and unit mean normal for each cell of this size and each side of a thin sheet in it."""
+    if len(points) == 0:
+        return points, normals
     grid = np.floor((points - points.min(axis=0)) / cell).astype(np.int64)
     side = np.argmax(np.abs(normals), axis=1)
     side = 2 * side + (normals[np.arange(len(normals)), side] < 0)  # opposite sides of a finger do not average out
