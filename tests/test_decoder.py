@@ -126,7 +126,7 @@ def test_a_truncated_head_a_future_version_and_another_file_are_refused():
         meshreel.open(MIXED[:50])
     with pytest.raises(FormatError, match="version 9"):
         meshreel.open(MIXED[:8] + b"\x09" + MIXED[9:])
-    with pytest.raises(FormatError, match="not a .reel"):
+    with pytest.raises(FormatError, match=r"not a \.reel"):
         meshreel.open(b"solid cube")
 
 

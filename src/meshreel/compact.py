@@ -1,4 +1,4 @@
-"""A fit made compressible where few components are kept: the surfaces stay, the trajectories move into those components.
+"""A fit made compressible where few components are kept: surfaces stay, trajectories move into those components.
 
 In -> out: a fit of a group and its base mesh -> a fit whose energy beyond the first m components is smaller. A template
 may slide along a surface without leaving it; alternating between the truncated KLT (section 3.3.3) and a short surface
