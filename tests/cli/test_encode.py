@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import shutil
+from dataclasses import replace
 
 import pytest
 
@@ -58,8 +59,8 @@ def test_every_option_reaches_the_encoder(run, balls, tmp_path):
 
 def test_flags_default_to_the_defaults_of_the_options():
     defaults = {name: parameter.default for name, parameter in inspect.signature(command).parameters.items()}
-    read, code = SequenceOptions(), preset_options()
-    assert (defaults["fps"], defaults["frames"], defaults["scale"]) == (read.frame_rate, read.frames, read.scale)
+    code = preset_options()
+    assert replace(defaults["reading"].options(), weld=None) == SequenceOptions()
     assert (defaults["preset"], defaults["quality"]) == (code.preset, code.quality)
     assert (defaults["group_size"], defaults["centers"]) == (code.group_size, code.track.centers)
     assert defaults["basis_size"] is code.displacements.basis_size is None

@@ -24,12 +24,10 @@ def command(
 ) -> None:
     """Decode a .reel file into a directory of meshes.
 
-    Frames of a damaged group are left out, and the others written, before the error.
-
     Parameters
     ----------
     file
-        The .reel file.
+        The .reel file. Frames of a damaged group are left out and the others written.
     output
         The directory to write frame_00000.ply and so on into; made if needed.
     format
