@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from meshreel.choice import IntraOptions
-from meshreel.encoder import EncoderOptions
 from meshreel.presets import preset_options
+from meshreel.windows import EncoderOptions
 
 
 def quick(

@@ -14,9 +14,10 @@ from .errors import FormatError, InputError, MeshreelError
 from .types import Mesh, MeshList, MeshSequence
 
 if TYPE_CHECKING:
-    from .encoder import EncoderOptions, encode
+    from .encoder import encode
     from .io.sequence import open_sequence
     from .presets import preset_options
+    from .windows import EncoderOptions
 
 __version__ = "0.1.0"
 
@@ -37,7 +38,7 @@ __all__ = [
 
 # Found on first use, so that a player never imports the encoder.
 _LATER = {
-    "EncoderOptions": ".encoder",
+    "EncoderOptions": ".windows",
     "encode": ".encoder",
     "open_sequence": ".io.sequence",
     "preset_options": ".presets",

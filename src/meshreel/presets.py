@@ -10,8 +10,8 @@ from .analysis.reference import ReferenceOptions
 from .analysis.track import TrackOptions
 from .choice import Quality
 from .coding.displacements import DisplacementOptions
-from .encoder import EncoderOptions
 from .errors import InputError
+from .windows import EncoderOptions
 
 PRESETS = ("paper",)
 
@@ -36,7 +36,7 @@ def preset_options(
         preset=preset,
         quality=quality,
         group_size=group_size,
-        target=Quality(distance=0.6 * step, angle=7.0, worst=step),
+        target=Quality(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         track=TrackOptions(centers=centers),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
         displacements=DisplacementOptions(step=step, basis_size=basis_size),

@@ -35,7 +35,7 @@ class FuseOptions:
     cover: float = 0.3  # a frame adds points where those before it have less than this share of its surface
     cell: float = 0.75  # points are averaged in cells of this size
     reach: float = 1.5  # no surface farther than this from every point
-    torn: float = 1.5  # a length that grows beyond this factor, plus half a center spacing, tears
+    torn: float = 3.0  # a length that grows beyond this factor, plus half a center spacing, tears
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
     poisson: PoissonOptions = field(default_factory=PoissonOptions)
 

@@ -17,26 +17,27 @@ from ..errors import InputError
 class GroupOptions:
     """When a group is cut in two."""
 
-    tolerance: float = 1.6  # a frame whose residual is this many times the group's median is not followed
-    floor: float = 0.0004  # residuals below this never cut; fraction of the diagonal
+    limit: float = 1.5  # a frame whose residual is above this many times the target is not followed
+    tolerance: float = 1.6  # nor is one above the target and this many times the group's median
+    depth: int = 2  # cuts inside cuts; frames that are still not followed are coded one by one
 
     def __post_init__(self) -> None:
-        if self.tolerance < 1:
-            raise InputError(f"group tolerance must be at least 1, got {self.tolerance:g}")
-        if self.floor < 0:
-            raise InputError(f"group floor must not be negative, got {self.floor:g}")
+        if self.limit < 1 or self.tolerance < 1 or self.depth < 0:
+            raise InputError(
+                f"group limit {self.limit:g}, tolerance {self.tolerance:g}, depth {self.depth}: give >= 1, >= 1, >= 0"
+            )
 
 
 def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int | None:
     """The frame that should begin a second group, or None where one reference follows all frames.
 
-    Of all cuts that one is taken which leaves residuals on both sides most alike (least squares on their logarithms);
-    frames that are followed well and those that are not end up apart.
+    Residuals are in units of the distance to reach. Of all cuts that one is taken which leaves residuals on both sides
+    most alike (least squares on their logarithms): frames that are followed well and those that are not end up apart.
     """
-    limit = max(options.floor, options.tolerance * float(np.median(residuals)))
+    limit = min(options.limit, max(1.0, options.tolerance * float(np.median(residuals))))
     if len(residuals) < 2 or residuals.max() <= limit:
         return None
-    logs = np.log(np.maximum(residuals, 1e-12))
+    logs = np.log(np.clip(residuals, 1e-6, 1e6))
     spread = [_scatter(logs[:cut]) + _scatter(logs[cut:]) for cut in range(1, len(logs))]
     return 1 + int(np.argmin(spread))
 

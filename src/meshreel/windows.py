@@ -1,0 +1,164 @@
+"""A window of frames becomes groups: track, reference, fit, cut where it fails, code, and choose the cheaper form.
+
+In -> out: frames in normalised coordinates -> payloads with what was measured on them (paper, sections 3.1 and 3.3). A
+window needs nothing but its frames, so windows can be spread over processes.
+
+Differs from the paper: groups are not all of one length, and frames that no reference follows are coded one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .analysis.fit import Fit, FitOptions, fit_frames
+from .analysis.groups import GroupOptions, cut_at
+from .analysis.reference import ReferenceOptions, extract_reference, predict
+from .analysis.track import TrackOptions, track_centers
+from .choice import IntraOptions, Quality, cheapest_intra, finest_intra, measure
+from .coding.displacements import DisplacementOptions
+from .coding.group import CodedReference, code_reference, decode_group, encode_group
+from .coding.intra import encode_empty
+from .errors import InputError, NoReferenceError
+from .format.layout import Form
+from .types import Centers, Mesh
+
+Progress = Callable[[str, int, int], None]  # stage, frames done in it, frames of the sequence
+MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderOptions:
+    """How to encode; `presets.preset_options` fills it from a preset's name and a quality."""
+
+    preset: str = "paper"
+    quality: float = 50.0  # 0 to 100; what the other fields were made from, recorded in the file
+    group_size: int = 10  # most frames in a group, the paper's GoF
+    reference_bits: int = 14  # of the reference's lattice (paper: qp = 14)
+    levels: int = 1  # midpoint subdivisions of the decoded reference
+    target: Quality = Quality(0.0007, 6.0, 0.0014)  # what every frame should be worth, relative to its own diagonal
+    track: TrackOptions = field(default_factory=TrackOptions)
+    reference: ReferenceOptions = field(default_factory=ReferenceOptions)
+    fit: FitOptions = field(default_factory=FitOptions)
+    groups: GroupOptions = field(default_factory=GroupOptions)
+    displacements: DisplacementOptions = field(default_factory=DisplacementOptions)
+    intra: IntraOptions = field(default_factory=IntraOptions)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.quality <= 100:
+            raise InputError(f"quality must be in 0 to 100, got {self.quality:g}")
+        if not 1 <= self.group_size <= MOST_FRAMES:
+            raise InputError(f"group size must be in 1 to {MOST_FRAMES}, got {self.group_size}")
+        if not 1 <= self.reference_bits <= 20 or not 0 <= self.levels <= 4:
+            raise InputError(f"reference bits {self.reference_bits}, levels {self.levels}: give 1 to 20 and 0 to 4")
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedGroup:
+    """The payload of a group and what was measured on it."""
+
+    form: Form
+    frame_count: int
+    payload: bytes
+    layers: tuple[int, ...]  # k + 1 layers decode with k components
+    quality: Quality
+
+
+class Stages:
+    """Counts frames through the stages for a progress callback."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress = progress
+        self._total = total
+        self._done: dict[str, int] = {}
+
+    def add(self, stage: str, count: int) -> None:
+        """`count` more frames have passed `stage`."""
+        self._done[stage] = self._done.get(stage, 0) + count
+        if self._progress is not None:
+            self._progress(stage, self._done[stage], self._total)
+
+
+def encode_window(frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> list[EncodedGroup]:
+    """The groups of a window: one, or more where one reference cannot follow. Frames are all empty or none is."""
+    stages = stages or Stages(None, len(frames))
+    if frames[0].is_empty:
+        groups = [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), Quality(0.0, 0.0, 0.0))]
+    elif len(frames) == 1:
+        groups = [_intra_only(frames, options)]
+    else:
+        centers = track_centers(frames, options.track)
+        stages.add("track", len(frames))
+        groups = _encode_span(frames, centers, options, options.groups.depth)
+    stages.add("code", len(frames))
+    return groups
+
+
+def analyze(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions) -> tuple[CodedReference, Fit]:
+    """The reference of a group as decoded, and its fit to every frame (paper, sections 3.3.1 and 3.3.2).
+
+    Raises NoReferenceError where no surface can be made of the frames.
+    """
+    reference = extract_reference(frames, centers, options.reference)
+    if reference.mesh.is_empty:
+        raise NoReferenceError("no surface is common to the frames")
+    coded = code_reference(reference.mesh, options.reference_bits, options.levels)
+    if coded.base.is_empty:
+        raise NoReferenceError("the reference mesh has no faces left after Draco")
+    predictions = predict(reference, coded.base, centers, options.reference.deform)
+    fit = fit_frames(coded.base.faces, predictions, frames, replace(options.fit, key=reference.key))
+    return coded, fit
+
+
+def _encode_span(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, depth: int) -> list[EncodedGroup]:
+    """Groups of a run of frames: cut where the fit fails, `depth` times at most, then the cheaper of both forms."""
+    if len(frames) == 1:
+        return [_intra_only(frames, options)]
+    try:
+        reference, fit = analyze(frames, centers, options)
+    except NoReferenceError:
+        return [_intra_only(frames, options)]
+    residuals = np.array([residual.rms for residual in fit.residuals])
+    target = _target(frames, options)
+    cut = cut_at(residuals / target.distance, options.groups)
+    if cut is not None:
+        if depth == 0:
+            return [_intra_only(frames, options)]
+        halves = (slice(None, cut), slice(cut, None))
+        return [g for h in halves for g in _encode_span(frames[h], _part(centers, h), options, depth - 1)]
+    group = _laplacian(frames, reference, fit, options.displacements)
+    return [group if options.displacements.basis_size is not None else _cheaper(frames, group, options)]
+
+
+def _laplacian(
+    frames: Sequence[Mesh], reference: CodedReference, fit: Fit, options: DisplacementOptions
+) -> EncodedGroup:
+    field = np.ascontiguousarray(np.moveaxis(fit.positions, 0, 1) - reference.base.vertices[:, None])
+    payload, layers = encode_group(reference, field, options)
+    quality = measure(frames, decode_group(payload, len(frames)))
+    return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, quality)
+
+
+def _cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions) -> EncodedGroup:
+    """The group, or its `draco` form where that is as good and smaller."""
+    found = cheapest_intra(frames, group.quality, len(group.payload), options.intra)
+    return group if found is None else EncodedGroup(Form.DRACO, len(frames), found[0], (), found[1])
+
+
+def _intra_only(frames: Sequence[Mesh], options: EncoderOptions) -> EncodedGroup:
+    """The `draco` form at the target's quality."""
+    target = _target(frames, options)
+    payload, quality = cheapest_intra(frames, target, np.inf, options.intra) or finest_intra(frames, target.distance)
+    return EncodedGroup(Form.DRACO, len(frames), payload, (), quality)
+
+
+def _target(frames: Sequence[Mesh], options: EncoderOptions) -> Quality:
+    """What these frames should be worth, normalised: relative to the smallest of them, so that none is lost."""
+    diagonal = min(frame.diagonal for frame in frames)
+    return options.target.scaled(diagonal or 1.0)
+
+
+def _part(centers: Centers, frames: slice) -> Centers:
+    return replace(centers, positions=centers.positions[frames])
