@@ -9,14 +9,22 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import DracoPy
 import numpy as np
 
+from meshreel.analysis.deform import neighbours
+from meshreel.analysis.fit import fit_frames
+from meshreel.analysis.fuse import Group
+from meshreel.analysis.reference import MDS
+from meshreel.analysis.reference_centers import affinity, largest_distances
 from meshreel.choice import cheapest_intra, measure
 from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
+from meshreel.coding.group import code_reference, decode_group, encode_group
+from meshreel.compact import CompactOptions, compact, displacements
 from meshreel.presets import displacement_step, preset_options
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -27,10 +35,10 @@ Row = dict[str, Any]
 
 def main() -> int:
     """Prints every row as soon as it is there."""
-    stages = compute(story(), preset_options())
-    for rows in (float_rows(), lattice_rows(stages), anchor_rows(stages), pose_rows(stages), floor_rows(stages)):
-        for row in rows:
-            print(json.dumps(row), flush=True)
+    apart, meeting = compute(story(0), preset_options()), compute(story(), preset_options())
+    rows = (float_rows(), lattice_rows(apart), anchor_rows(apart), floor_rows(apart), compact_rows(apart))
+    for row in chain(*rows, pose_rows(meeting)):
+        print(json.dumps(row), flush=True)
     return 0
 
 
@@ -51,7 +59,7 @@ def lattice_rows(stages: Stages) -> Iterator[Row]:
 
 
 def anchor_rows(stages: Stages) -> Iterator[Row]:
-    """Rate and error of the displacements: plain or shaped rounding, few or many anchors, at three qualities."""
+    """Rate and error of the displacements: plain or shaped rounding, few or many anchors, some steps."""
     base = stages.coded.base
     field = np.moveaxis(stages.fit.positions, 0, 1) - base.vertices[:, None]
     few, many = 12, len(base.vertices) // 20
@@ -60,33 +68,54 @@ def anchor_rows(stages: Stages) -> Iterator[Row]:
         "plain, one in twenty": {"anchor_count": many, "anchor_weight": 1, "dead_zone": 0.5},
         "dead zone, one in twenty": {"anchor_count": many, "anchor_weight": 1, "dead_zone": 0.6},
         "shaped, few": {"anchor_count": few},
-        "shaped, one in twenty": {"anchor_count": many},
     }
-    for quality in (20, 50, 80):
-        step = displacement_step(quality)
-        for name, how in ways.items():
-            for factor in (0.25, 0.5, 1.0, 2.0):
-                options = DisplacementOptions(step=factor * step, **how)
-                data = encode_displacements(field, base, options)
-                error = decode_displacements(data, base) - field
-                rms = float(np.sqrt(np.mean(np.sum(np.square(error), axis=2))))
-                yield {"decision": "anchors", "quality": quality, "rounding": name, "step": factor * step,
-                       "bytes": len(data), "rms": rms}  # fmt: skip
+    for name, how in ways.items():
+        for factor in (0.35, 0.7, 1.4, 2.8):
+            options = DisplacementOptions(step=factor * displacement_step(50), **how)
+            data = encode_displacements(field, base, options)
+            error = decode_displacements(data, base) - field
+            rms = float(np.sqrt(np.mean(np.sum(np.square(error), axis=2))))
+            yield {"decision": "anchors", "rounding": name, "step": options.step, "bytes": len(data), "rms": rms}
 
 
 def pose_rows(stages: Stages) -> Iterator[Row]:
-    """The trials that the reference's pose was chosen from: symmetric distances as fractions of the diagonal."""
-    for trial in stages.reference.trials:
-        name = "MDS" if trial.frame < 0 else f"frame {trial.frame}"
-        yield {"decision": "pose", "pose": name, "rms": trial.rms, "q95": trial.tail}
+    """The fit of the reference that each pose would have given, mean and worst frame, and which was chosen."""
+    options = preset_options()
+    distances = largest_distances(stages.centers)
+    kin = neighbours(affinity(distances, options.reference.centers), options.reference.deform)
+    how = (options.reference.deform, options.reference.fuse)
+    group = Group(stages.frames, stages.centers.positions, distances, kin, how)
+    keys = sorted(trial.key for trial in stages.reference.trials if trial.frame != MDS)
+    for frame, key in [(MDS, key) for key in keys] + [(key, key) for key in keys]:
+        pose = stages.spread if frame == MDS else stages.centers.positions[frame]
+        mesh = group.fused(pose, key, options.reference.fuse.poisson.depth, options.reference.vertices)
+        base = code_reference(mesh, options.reference_bits, options.levels).base
+        fit = fit_frames(base.faces, group.sent(base, pose), stages.frames, options.fit)
+        rms = [residual.rms for residual in fit.residuals]
+        chosen = (frame, key) == (stages.reference.frame, stages.reference.key)
+        yield {"decision": "pose", "pose": "MDS" if frame == MDS else f"frame {frame}", "key": key,
+               "chosen": chosen, "mean_rms": float(np.mean(rms)), "worst_rms": max(rms)}  # fmt: skip
 
 
 def floor_rows(stages: Stages) -> Iterator[Row]:
     """Bytes of the group in the laplacian form, and in the draco form that is as good."""
     quality = measure(stages.frames, stages.decoded)
-    found = cheapest_intra(stages.frames, quality, np.inf, replace(preset_options().intra))
+    found = cheapest_intra(stages.frames, quality, np.inf, preset_options().intra)
     yield {"decision": "floor", "laplacian_bytes": len(stages.payload), "draco_bytes": len(found[0]) if found else None,
            "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
+
+
+def compact_rows(stages: Stages) -> Iterator[Row]:
+    """Distance and bytes with few components, of the fit as it is and made compact."""
+    for components in (3, 10):
+        options = replace(preset_options().displacements, basis_size=components)
+        fits = {"as it is": stages.fit}
+        fits["compact"] = compact(stages.fit, stages.coded.base, stages.frames, components, CompactOptions())
+        for name, fit in fits.items():
+            payload, _ = encode_group(stages.coded, displacements(fit, stages.coded.base), options)
+            quality = measure(stages.frames, decode_group(payload, len(stages.frames)))
+            yield {"decision": "compact", "components": components, "fit": name, "bytes": len(payload),
+                   "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
 
 
 if __name__ == "__main__":

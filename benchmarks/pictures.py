@@ -17,6 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from meshreel.analysis.reference import MDS
 from meshreel.geometry.topology import components as connected
 from meshreel.metrics.cameras import Box
 from meshreel.metrics.sheet import SheetOptions, write_sheet
@@ -125,8 +126,9 @@ def reference(stages: Stages, path: Path) -> None:
     sheet = Sheet(3, 340)
     base = stages.coded.base
     camera = camera_for([base], 340)
-    sheet.image(0, f"{len(base.vertices)} vertices, {_parts(base)}", shaded(base, camera))
     coarse = stages.reference.mesh
+    pose = "MDS" if stages.reference.frame == MDS else f"frame {FIRST + stages.reference.frame}"
+    sheet.image(0, f"{len(coarse.vertices)} vertices, {_parts(coarse)}, pose of {pose}", shaded(base, camera))
     for panel, (mesh, name) in enumerate(((coarse, "before subdivision"), (base, "after it")), 1):
         low, high = coarse.vertices.min(axis=0), coarse.vertices.max(axis=0)
         top = Mesh.of(_inside(mesh, (high - low) * [0, 0.68, 0] + low, (high - low) * [0.45, 1, 1] + low), [])
@@ -154,17 +156,17 @@ def fit(stages: Stages, path: Path) -> None:
 
 
 def components(stages: Stages, path: Path) -> None:
-    """The energy of each KLT component, those kept in color, and the quantiser's step."""
+    """The energy of each KLT component, as many in color as are sent, and the quantiser's base step."""
     figure = Figure(figsize=(8, 3), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     deviations = 100 * np.sqrt(stages.basis.energies)
     numbers = np.arange(len(deviations)) + 1
     kept = numbers <= stages.components
-    axes.bar(numbers[kept], deviations[kept], color=BODIES[1], label=f"kept: {stages.components}")
-    axes.bar(numbers[~kept], deviations[~kept], color="lightgrey", label="dropped")
+    axes.bar(numbers[kept], deviations[kept], color=BODIES[1], label=f"as many as are sent: {stages.components}")
+    axes.bar(numbers[~kept], deviations[~kept], color="lightgrey", label="the others")
     step = 100 * preset_options().displacements.step
-    axes.axhline(step, color=BODIES[0], linewidth=1, label=f"quantiser's step: {step:.2f} %")
+    axes.axhline(step, color=BODIES[0], linewidth=1, label=f"base step of the quantiser: {step:.2f} %")
     axes.set(
         yscale="log", xlabel="component", ylabel="RMS of its weights,\n% of the diagonal", xlim=(0, len(numbers) + 1)
     )

@@ -1,0 +1,51 @@
+"""Runs the Python of a documentation page, in order, in the folder it is called from: `python run_page.py PAGE`.
+
+A process of its own, so that it runs as for a user, without the tests' type checks. Everything in the preset is small.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+
+def blocks(page: Path, language: str) -> str:
+    """A page's code in a language, its blocks one after the other."""
+    return "\n".join(re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+
+
+def main(page: Path) -> None:
+    """Runs the page on a folder `scan`, made here."""
+    import meshreel
+    from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+    from meshreel.io.write import write_mesh
+
+    meshreel.preset_options = small(meshreel.preset_options)  # type: ignore[assignment]
+    Path("scan").mkdir()
+    for number, mesh in enumerate(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.06))):
+        write_mesh(mesh, Path("scan") / f"frame_{number:05}.ply")
+    exec(compile(blocks(page, "python"), str(page), "exec"), {"__name__": "page"})
+
+
+def small(preset_options: Any) -> Any:
+    """A preset's options with little of everything, so that a page runs in seconds."""
+    from meshreel.analysis.reference import ReferenceOptions
+    from meshreel.analysis.track import TrackOptions
+    from meshreel.choice import IntraOptions
+
+    def options(*arguments: Any, **named: Any) -> Any:
+        reference = ReferenceOptions(vertices=300, keys=1, trial_vertices=300)
+        poisson = replace(reference.fuse.poisson, depth=6)
+        reference = replace(reference, fuse=replace(reference.fuse, subdivisions=0, poisson=poisson))
+        intra = IntraOptions(fractions=(0.5, 1.0), steps=(1.0,), levels=(0,))
+        track = TrackOptions(centers=100, samples=5000)
+        return replace(preset_options(*arguments, **named), track=track, reference=reference, intra=intra)
+
+    return options
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
