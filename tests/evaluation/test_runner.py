@@ -20,6 +20,7 @@ from meshreel.evaluation.runner import run_fresh, run_point, run_points
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Mesh, MeshList
+from tests.golden import GOLDEN
 
 BALLS = sliding_sphere(2, levels=2)
 QUICK = ComparisonOptions(ssim=False)
@@ -114,8 +115,10 @@ def test_a_measurement_that_fails_says_so():
         run_fresh("decode", "/none.reel")
 
 
-def test_peak_memory_is_told_in_megabytes():
-    assert 10 < peak_rss_mb() < 100_000
+def test_peak_memory_is_told_in_megabytes_and_is_not_the_parents():
+    ballast = np.ones(60_000_000)
+    assert 480 < peak_rss_mb() < 100_000
+    assert run_fresh("decode", str(GOLDEN / "mixed.reel"))["peak_rss_mb"] < 300 < ballast.nbytes
 
 
 def test_a_sequence_that_is_missing_is_told(tmp_path):
