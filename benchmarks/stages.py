@@ -19,9 +19,9 @@ from meshreel.analysis.track import track_centers
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
 from meshreel.coding.group import CodedReference, code_reference, decode_group, encode_group, payload_parts
-from meshreel.windows import EncoderOptions
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
+from meshreel.windows import EncoderOptions
 
 FIRST, COUNT = 27, 10  # of the story's 90 frames: the hands meet on the way
 CONTACT = 5  # of these: the two surfaces are melted into one

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from meshreel.choice import IntraOptions
-from meshreel.windows import EncoderOptions
+from meshreel.choice import IntraOptions, Quality
 from meshreel.presets import preset_options
+from meshreel.windows import EncoderOptions
 
 
 def quick(
@@ -21,6 +21,7 @@ def quick(
     fuse = replace(options.reference.fuse, poisson=replace(options.reference.fuse.poisson, depth=6))
     return replace(
         options,
+        target=Quality(distance=0.003, angle=15.0, worst=0.006),
         track=replace(options.track, samples=3000),
         reference=replace(options.reference, vertices=150, keys=1, trial_depth=5, trial_vertices=150, fuse=fuse),
         intra=IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,)),

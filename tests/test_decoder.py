@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
 import meshreel
+from meshreel.coding.group import decode_group
 from meshreel.container.sources import BytesSource
 from meshreel.errors import FormatError, InputError
 from tests.golden import GOLDEN, frame_record
 
 MIXED = (GOLDEN / "mixed.reel").read_bytes()  # empty 0-1, laplacian 2-5, draco 6-8, empty 9
+
+WHOLE = [frame_record(mesh) for mesh in meshreel.open(MIXED)]
 
 
 class Counted(BytesSource):
@@ -121,12 +126,54 @@ def test_a_truncated_file_keeps_the_groups_it_has(missing):
         video[9]
 
 
+def survivors(data):
+    """Which frames of the mixed file can still be read; anything but FormatError is a failure."""
+    try:
+        video = meshreel.open(data)
+    except FormatError:
+        return set()
+    found = set()
+    for group in video.reader.groups:
+        with suppress(FormatError):
+            if frame_record(video[group.first_frame]) == WHOLE[group.first_frame]:
+                found.add(group.number)
+    return found
+
+
+def test_wherever_a_file_ends_only_what_is_missing_is_lost():
+    groups = meshreel.open(MIXED).reader.groups
+    for size in range(len(MIXED)):
+        whole = {group.number for group in groups if group.end <= size} if size >= groups[0].offset else set()
+        assert survivors(MIXED[:size]) == whole, size
+
+
+def test_a_flipped_byte_anywhere_is_found_and_costs_one_group_at_most():
+    groups = meshreel.open(MIXED).reader.groups
+    for place in range(len(MIXED)):
+        data = bytearray(MIXED)
+        data[place] ^= 0x40
+        hit = {group.number for group in groups if group.offset <= place < group.end}
+        assert survivors(bytes(data)) == ({0, 1, 2, 3} - hit if hit else set()), place
+
+
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("mask", [0x01, 0xFF])
+def test_payloads_that_lie_behind_a_right_checksum_raise_format_errors_only(number, mask):
+    reader = meshreel.open(MIXED).reader
+    payload, count = reader.read_chunk(number), reader.groups[number].frame_count
+    for place in range(len(payload)):
+        data = bytearray(payload)
+        data[place] ^= mask
+        with suppress(FormatError):
+            assert len(decode_group(bytes(data), count)) == count
+
+
 def test_a_truncated_head_a_future_version_and_another_file_are_refused():
     with pytest.raises(FormatError):
         meshreel.open(MIXED[:50])
     with pytest.raises(FormatError, match="version 9"):
         meshreel.open(MIXED[:8] + b"\x09" + MIXED[9:])
-    with pytest.raises(FormatError, match="not a .reel"):
+    with pytest.raises(FormatError, match=r"not a \.reel"):
         meshreel.open(b"solid cube")
 
 

@@ -8,7 +8,18 @@ import sys
 import meshreel
 from tests.golden import GOLDEN
 
-HEAVY = ("open3d", "scipy", "torch", "skimage", "igl", "fast_simplification", "matplotlib", "trimesh", "rich", "cyclopts")
+HEAVY = (
+    "open3d",
+    "scipy",
+    "torch",
+    "skimage",
+    "igl",
+    "fast_simplification",
+    "matplotlib",
+    "trimesh",
+    "rich",
+    "cyclopts",
+)
 ENCODER_SIDE = ("analysis", "capture", "metrics", "encoder", "choice", "presets", "evaluation", "cli", "io")
 
 LOOK = f"""

@@ -1,7 +1,7 @@
 """meshreel: time-varying meshes as one small .reel file.
 
-`meshreel.open(path)` gives a Video of meshes; `meshreel.encode(sequence, path)` makes the file. Encoding needs the extra
-`encode`; opening does not.
+`meshreel.open(path)` gives a Video of meshes; `meshreel.encode(sequence, path)` makes the file. Encoding needs the
+extra `encode`; opening does not.
 """
 
 from __future__ import annotations

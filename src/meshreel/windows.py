@@ -126,8 +126,10 @@ def _encode_span(frames: Sequence[Mesh], centers: Centers, options: EncoderOptio
     if cut is not None:
         if depth == 0:
             return [_intra_only(frames, options)]
-        halves = (slice(None, cut), slice(cut, None))
-        return [g for h in halves for g in _encode_span(frames[h], _part(centers, h), options, depth - 1)]
+        head, tail = frames[:cut], frames[cut:]
+        known = replace(centers, positions=centers.positions[:cut])
+        anew = track_centers(tail, options.track)  # centers that were lost before the cut would spoil what follows
+        return [*_encode_span(head, known, options, depth - 1), *_encode_span(tail, anew, options, depth - 1)]
     group = _laplacian(frames, reference, fit, options.displacements)
     return [group if options.displacements.basis_size is not None else _cheaper(frames, group, options)]
 
@@ -158,7 +160,3 @@ def _target(frames: Sequence[Mesh], options: EncoderOptions) -> Quality:
     """What these frames should be worth, normalised: relative to the smallest of them, so that none is lost."""
     diagonal = min(frame.diagonal for frame in frames)
     return options.target.scaled(diagonal or 1.0)
-
-
-def _part(centers: Centers, frames: slice) -> Centers:
-    return replace(centers, positions=centers.positions[frames])

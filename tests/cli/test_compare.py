@@ -41,7 +41,14 @@ def test_a_file_against_its_own_meshes_is_all_but_exact(run, decoded, tmp_path):
 def test_the_table_has_a_line_a_metric_and_tells_the_views(run, balls):
     said = run("compare", balls, balls, *SMALL)
     assert said.code == 0 and said.err == ""
-    for name in ("d2_psnr_paper", "d1_psnr", "d2_psnr", "hausdorff95_forward_percent", "normal_error_deg", "ssim_masked"):
+    for name in (
+        "d2_psnr_paper",
+        "d1_psnr",
+        "d2_psnr",
+        "hausdorff95_forward_percent",
+        "normal_error_deg",
+        "ssim_masked",
+    ):
         assert name in said.out
     assert said.out.count("SSIM view") == 4 and "64 x 48 pixels" in said.out
     assert "Mbps" not in said.out and "bytes" not in said.out  # meshes have no rate

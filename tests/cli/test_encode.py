@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import shutil
+from dataclasses import replace
 
 import pytest
 
@@ -58,8 +59,8 @@ def test_every_option_reaches_the_encoder(run, balls, tmp_path):
 
 def test_flags_default_to_the_defaults_of_the_options():
     defaults = {name: parameter.default for name, parameter in inspect.signature(command).parameters.items()}
-    read, code = SequenceOptions(), preset_options()
-    assert (defaults["fps"], defaults["frames"], defaults["scale"]) == (read.frame_rate, read.frames, read.scale)
+    code = preset_options()
+    assert replace(defaults["reading"].options(), weld=None) == SequenceOptions()
     assert (defaults["preset"], defaults["quality"]) == (code.preset, code.quality)
     assert (defaults["group_size"], defaults["centers"]) == (code.group_size, code.track.centers)
     assert defaults["basis_size"] is code.displacements.basis_size is None
@@ -74,7 +75,7 @@ def test_what_is_dropped_or_welded_is_said_once(run, tmp_path):
     assert said.code == 0
     warnings = said.err.splitlines()
     assert all(line.startswith("meshreel: warning: ") for line in warnings)
-    assert sum("dropped: colors, texture coordinates" in line for line in warnings) == 1
+    assert sum("dropped: texture coordinates, vertex colors" in line for line in warnings) == 1
     assert sum("welded 2 of 8 vertices" in line for line in warnings) == 1
     assert run("encode", tmp_path, "-o", tmp_path / "a.reel", "--quiet").err == ""
 
@@ -97,9 +98,9 @@ def test_a_missing_input_and_an_empty_folder_are_told(run, tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (TRIANGLE + "f 1 2 4\n", ("vertex 3", "there are 3")),
-        (TRIANGLE.replace("1 0 0", "nan 0 0") + "f 1 2 3\n", ("vertex 1", "not finite")),
-        (TRIANGLE.replace("1 0 0", "inf 0 0") + "f 1 2 3\n", ("vertex 1", "not finite")),
+        (TRIANGLE + "f 1 2 4\n", ("vertex 4", "3 vertices")),
+        (TRIANGLE.replace("1 0 0", "nan 0 0") + "f 1 2 3\n", ("vertex 1", "not within")),
+        (TRIANGLE.replace("1 0 0", "inf 0 0") + "f 1 2 3\n", ("vertex 1", "not within")),
         ("v 0 0 zero\n", ("line 1",)),
         ("", ("0 bytes",)),
     ],

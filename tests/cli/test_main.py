@@ -61,7 +61,8 @@ def test_a_fault_of_ours_is_one_line_too():
 def test_decode_and_info_need_nothing_of_the_encoder(tmp_path):
     script = (
         "import sys; from meshreel.cli import main\n"
-        "codes = [main(['decode', sys.argv[1], '-o', sys.argv[2], '--quiet']), main(['info', sys.argv[1], '--quiet'])]\n"
+        "commands = [['decode', sys.argv[1], '-o', sys.argv[2], '--quiet'], ['info', sys.argv[1], '--quiet']]\n"
+        "codes = [main(command) for command in commands]\n"
         "heavy = ('open3d', 'scipy', 'skimage', 'igl', 'fast_simplification', 'matplotlib', 'meshreel.encoder')\n"
         "print(codes, [name for name in heavy if name in sys.modules])"
     )

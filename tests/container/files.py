@@ -11,10 +11,10 @@ from meshreel.format.records import pack
 HEADER = Header(30.0, (1.0, 2.0, 3.0), 1.75, (-0.5, -0.25, 0.0), (0.5, 0.25, 0.5), '{"quality": 50}', 1_000_000)
 
 PAYLOADS = (
-    pack(DracoGroup(Form.DRACO, 0, (b"background",))),
-    pack(LaplacianGroup(Form.LAPLACIAN, 2, b"reference", b"displacements of ten frames")),
+    pack(DracoGroup(Form.DRACO, 0, 0.001, (b"background",))),
+    pack(LaplacianGroup(Form.LAPLACIAN, 2, 0.001, b"reference", b"displacements of ten frames")),
     pack(EmptyGroup(Form.EMPTY)),
-    pack(DracoGroup(Form.DRACO, 1, (b"frame 15", b"", b"frame 17"))),
+    pack(DracoGroup(Form.DRACO, 1, 0.001, (b"frame 15", b"", b"frame 17"))),
 )
 FRAMES = 18
 

@@ -47,7 +47,9 @@ def test_too_few_points_give_the_empty_mesh() -> None:
 def test_small_bits_are_dropped() -> None:
     n = directions(5000)
     points = np.concatenate([0.3 * n, 0.02 * n[:60] + 0.5])
-    whole = reconstruct(points, np.concatenate([n, n[:60]]), PoissonOptions(depth=6, reach=0.05, trim=10.0, smallest=0.0))
+    whole = reconstruct(
+        points, np.concatenate([n, n[:60]]), PoissonOptions(depth=6, reach=0.05, trim=10.0, smallest=0.0)
+    )
     assert whole.vertices.max() > 0.4
     assert drop_small(whole, 0.1).vertices.max() < 0.4
     assert drop_small(Mesh.empty(), 0.1).is_empty

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from rich.table import Table
@@ -16,15 +16,12 @@ from ..errors import InputError
 from ..format.layout import MAGIC
 from ..geometry.topology import weld
 from ..io.sequence import FileSequence, SequenceOptions, open_sequence
-from ..metrics.cameras import ViewOptions
-from ..metrics.report import ComparisonOptions, compare_sequences
+from ..metrics.report import compare_sequences
 from ..metrics.sheet import SheetOptions, write_sheet
 from ..types import Mesh, MeshSequence
 from .console import Common, StageBars
 from .info import describe_file
-
-_READ = SequenceOptions()
-_VIEWS = ViewOptions()
+from .reading import Looking, Reading
 
 
 def command(
@@ -32,15 +29,8 @@ def command(
     decoded: str,
     /,
     *,
-    fps: float = _READ.frame_rate,
-    frames: str = _READ.frames,
-    scale: float = _READ.scale,
-    ssim: bool = True,
-    cameras: Path | None = None,
-    width: int = _VIEWS.width,
-    height: int = _VIEWS.height,
-    up: Literal["y", "z"] = "y",
-    keys: tuple[int, ...] = (),
+    reading: Reading = Reading(),
+    looking: Looking = Looking(),
     sheet: Path | None = None,
     common: Common = Common(),
 ) -> None:
@@ -49,41 +39,23 @@ def command(
     Parameters
     ----------
     originals
-        The original sequence: a directory, a glob, a file or an .npz.
+        The original sequence: a directory, a glob, a file or an .npz. It takes --frames and --scale as `encode` did.
     decoded
         A .reel file, or the decoded meshes.
-    fps
-        Frames per second of meshes.
-    frames
-        Which frames of the originals, as A:B with B excluded.
-    scale
-        Factor on the originals' coordinates, as given to `encode`.
-    ssim
-        Render and compare pictures too (some seconds a frame).
-    cameras
-        A file of Open3D pinhole cameras for SSIM; four views around the sequence where it is not given.
-    width
-        Of the rendered pictures, pixels.
-    height
-        Of the rendered pictures, pixels.
-    up
-        The axis that points up.
-    keys
-        Key frames: means are also given without them.
     sheet
         Write a PNG: original, decoded, error heat map.
     """
-    options = ComparisonOptions(cameras, ViewOptions(width, height, up=up), ssim, keys)
-    sequence = open_sequence(originals, SequenceOptions(fps, frames, scale, weld))
+    options = looking.options()
+    sequence = open_sequence(originals, reading.options())
     reel = is_reel(decoded)
-    meshes = SequenceOptions(fps, weld=weld)
+    meshes = SequenceOptions(reading.fps, weld=weld)
     other: Video | FileSequence = open_video(decoded) if reel else open_sequence(decoded, meshes)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
     with common.stages(len(sequence)) as progress:
         row = compare_sequences(sequence, counted(other, progress), options).to_row()
     if sheet is not None:
-        write_sheet(sequence, other, sheet, SheetOptions(up=up))
+        write_sheet(sequence, other, sheet, SheetOptions(up=looking.up))
     if reel:
         described = describe_file(Path(decoded))
         row = {name: described[name] for name in ("bytes", "mbps", "parts", "parts_mbps")} | row

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..decoder import Video
 from ..decoder import open as open_video
 from ..errors import FormatError, InputError
 from ..io.write import write_mesh
@@ -25,12 +24,10 @@ def command(
 ) -> None:
     """Decode a .reel file into a directory of meshes.
 
-    Frames of a damaged group are left out, and the others written, before the error.
-
     Parameters
     ----------
     file
-        The .reel file.
+        The .reel file. Frames of a damaged group are left out and the others written.
     output
         The directory to write frame_00000.ply and so on into; made if needed.
     format
@@ -52,20 +49,14 @@ def command(
     failed: list[FormatError] = []
     with common.stages(len(video)) as progress:
         for i, name in enumerate(names):
-            error = _write_frame(video, i, output / name)
-            failed += [error] if error else []
+            try:
+                mesh = video[i]
+            except FormatError as error:
+                failed.append(error)
+            else:
+                write_mesh(mesh, output / name)
             progress("decode", i + 1, len(video))
     if failed:
         raise FormatError(f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")
-
-
-def _write_frame(video: Video, frame: int, path: Path) -> FormatError | None:
-    """Writes a frame; gives the error of one that is damaged."""
-    try:
-        mesh = video[frame]
-    except FormatError as error:
-        return error
-    write_mesh(mesh, path)
-    return None

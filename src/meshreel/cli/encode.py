@@ -14,12 +14,11 @@ from cyclopts import Parameter
 
 from ..encoder import Summary, encode
 from ..errors import InputError
-from ..geometry.topology import weld
-from ..io.sequence import SequenceOptions, open_sequence
+from ..io.sequence import open_sequence
 from ..presets import preset_options
 from .console import Common
+from .reading import Reading
 
-_READ = SequenceOptions()
 _CODE = preset_options()
 
 
@@ -30,9 +29,7 @@ def command(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     preset: Literal["paper"] = "paper",
     quality: float = _CODE.quality,
-    fps: float = _READ.frame_rate,
-    frames: str = _READ.frames,
-    scale: float = _READ.scale,
+    reading: Reading = Reading(),
     basis_size: int | None = _CODE.displacements.basis_size,
     centers: int = _CODE.track.centers,
     group_size: int = _CODE.group_size,
@@ -41,24 +38,17 @@ def command(
 ) -> None:
     """Encode a sequence of meshes into one .reel file.
 
-    Vertices that repeat a position are welded, and a warning says how many.
-
     Parameters
     ----------
     inputs
         A directory, a glob, mesh files (OBJ, PLY, GLB, STL, OFF) or an .npz of vertices (T x V x 3) and faces (F x 3).
+        Vertices that repeat a position are welded.
     output
         The .reel file to write; it appears only when it is complete.
     preset
         How to code: `paper` is section 3 of the TSMC paper.
     quality
         0 (small) to 100 (fine).
-    fps
-        Frames per second of the input.
-    frames
-        Which frames, as A:B with B excluded.
-    scale
-        Factor on all coordinates, to metres.
     basis_size
         Exactly this many KLT components per group; by rate-distortion where it is not given.
     centers
@@ -74,7 +64,7 @@ def command(
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     options = preset_options(preset, quality, basis_size, group_size, centers)
     source = inputs[0] if len(inputs) == 1 else inputs
-    sequence = open_sequence(source, SequenceOptions(fps, frames, scale, weld))
+    sequence = open_sequence(source, reading.options())
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
         summary = encode(sequence, output, options, executor, progress)
     common.warn(sequence.warnings)

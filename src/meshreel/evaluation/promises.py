@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from .rows import Row
 
+FRAMES = 10  # of a sequence, that targets are about
+
 
 @dataclass(frozen=True, slots=True)
 class Promise:
@@ -28,11 +30,17 @@ Measure = Callable[[Row], tuple[str, bool]]
 
 def of_row(text: str, bound: str, row: Row | None, measure: Measure) -> Promise:
     """The promise as `measure` finds it in a row: the value as text, and whether it holds."""
-    return Promise(text, bound) if row is None else Promise(text, bound, *measure(row))
+    return Promise(text, bound) if row is None else Promise(text, bound, *_told(measure(row), [row]))
 
 
 def of_rows(
     text: str, bound: str, rows: Sequence[Row], measure: Callable[[Sequence[Row]], tuple[str, bool]]
 ) -> Promise:
     """The same over several rows; not measured where there are none."""
-    return Promise(text, bound, *measure(rows)) if rows else Promise(text, bound)
+    return Promise(text, bound, *_told(measure(rows), rows)) if rows else Promise(text, bound)
+
+
+def _told(measured: tuple[str, bool], rows: Sequence[Row]) -> tuple[str, bool]:
+    """The same; a run on fewer frames than the target's says so."""
+    frames = min(row["frames"] for row in rows)
+    return (measured[0] if frames >= FRAMES else f"{measured[0]} ({frames} frames only)"), measured[1]

@@ -6,6 +6,8 @@ Both stop at absolute errors, so the mesh is brought to one scale first.
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 
 from ..errors import InputError
@@ -17,6 +19,7 @@ OPEN_DIAGONAL = 100.0  # below it Open3D takes whole regions for flat
 AGGRESSION = 4.0
 BOUNDARY_WEIGHT = 10.0
 ROUNDS = 3  # collapses at a border take one face, inside two: the count of faces is corrected this often
+_ONE_AT_A_TIME = threading.Lock()  # the library keeps its mesh in statics
 
 
 def decimate(mesh: Mesh, vertices: int) -> Mesh:
@@ -48,7 +51,8 @@ def _collapse_closed(mesh: Mesh, faces: int) -> Mesh:
 
     scale, middle = CLOSED_DIAGONAL / mesh.diagonal, mesh.vertices.mean(axis=0)
     points = ((mesh.vertices - middle) * scale).astype(np.float32)
-    small, triangles = fast_simplification.simplify(points, mesh.faces, target_count=faces, agg=AGGRESSION)
+    with _ONE_AT_A_TIME:
+        small, triangles = fast_simplification.simplify(points, mesh.faces, target_count=faces, agg=AGGRESSION)
     return Mesh.of(small.astype(np.float64) / scale + middle, triangles)
 
 

@@ -5,6 +5,7 @@ Poisson closes whatever is open; what it invents far from the points is cut away
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from ..errors import InputError
 from ..types import Mesh
 from .decimate import decimate
 from .topology import clean, components
+
+_ONE_AT_A_TIME = threading.Lock()  # the library keeps its state in statics: two threads would spoil each other's bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +53,9 @@ def reconstruct(
         return Mesh.empty()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.normals = o3d.utility.Vector3dVector(normals)
-    solid, density = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=options.depth, n_threads=1)
+    with _ONE_AT_A_TIME:
+        build = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson
+        solid, density = build(cloud, depth=options.depth, n_threads=1)
     whole = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
     mesh = decimate(whole, options.vertices)
     trusted = _dense(mesh, whole, np.asarray(density), options.trim) & _near(mesh.vertices, points, options.reach)
@@ -70,6 +75,8 @@ def thin_out(
     points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], cell: float
 ) -> tuple[Float64[np.ndarray, "M 3"], Float64[np.ndarray, "M 3"]]:
     """One mean point and unit mean normal for each cell of this size and each side of a thin sheet in it."""
+    if len(points) == 0:
+        return points, normals
     grid = np.floor((points - points.min(axis=0)) / cell).astype(np.int64)
     side = np.argmax(np.abs(normals), axis=1)
     side = 2 * side + (normals[np.arange(len(normals)), side] < 0)  # opposite sides of a finger do not average out

@@ -1,0 +1,57 @@
+"""Flags that several commands share: how meshes are read, and how SSIM looks at them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from cyclopts import Parameter
+
+from ..geometry.topology import weld
+from ..io.sequence import SequenceOptions
+from ..metrics.cameras import ViewOptions
+from ..metrics.report import ComparisonOptions
+
+_READ = SequenceOptions()
+_VIEWS = ViewOptions()
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """How mesh files become a sequence."""
+
+    fps: float = _READ.frame_rate
+    """Frames per second of the meshes."""
+    frames: str = _READ.frames
+    """Which frames, as A:B with B excluded."""
+    scale: float = _READ.scale
+    """Factor on all coordinates, to metres."""
+
+    def options(self) -> SequenceOptions:
+        """The same for `open_sequence`; vertices that repeat a position are welded."""
+        return SequenceOptions(self.fps, self.frames, self.scale, weld)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Looking:
+    """What is compared, and from where."""
+
+    ssim: bool = True
+    """Render and compare pictures too (some seconds a frame)."""
+    cameras: Path | None = None
+    """A file of Open3D pinhole cameras for SSIM; four views around the sequence where it is not given."""
+    width: int = _VIEWS.width
+    """Of the rendered pictures, pixels."""
+    height: int = _VIEWS.height
+    """Of the rendered pictures, pixels."""
+    up: Literal["y", "z"] = "y"
+    """The axis that points up."""
+    keys: tuple[int, ...] = ()
+    """Key frames: means are also given without them."""
+
+    def options(self) -> ComparisonOptions:
+        """The same for `compare_sequences`."""
+        return ComparisonOptions(self.cameras, ViewOptions(self.width, self.height, up=self.up), self.ssim, self.keys)

@@ -1,0 +1,46 @@
+"""`meshreel bench`: rows into a file, and from the file a report."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.evaluation.experiments import targets
+from meshreel.evaluation.rows import Point
+from tests.cli.conftest import failed
+
+
+@pytest.fixture
+def tiny(monkeypatch, tmp_path):
+    """An experiment of two quick points on a ball that stands in for the dancer."""
+    balls = sliding_sphere(1, levels=2)
+    np.savez(tmp_path / "dancer.npz", vertices=np.stack([mesh.vertices for mesh in balls]), faces=balls[0].faces)
+    points = [Point("dancer", "draco", {"qp": 9}), Point("dancer", "decimated_draco", {"levels": 1})]
+    chosen = ModuleType("tiny")
+    chosen.points = lambda small: points[: 1 if small else 2]
+    chosen.references, chosen.promises = targets.references, targets.promises
+    monkeypatch.setattr("meshreel.cli.bench.find_experiment", lambda _: chosen)
+    return tmp_path
+
+
+def test_a_run_writes_rows_and_goes_on_where_it_was(run, tiny):
+    rows = tiny / "new" / "rows.jsonl"
+    first = run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--small", "--no-ssim")
+    assert first.code == 0 and "dancer draco qp 9:" in first.err and "not measured" in first.out
+    second = run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--no-ssim", "--json")
+    assert "(measured before)" in second.err.splitlines()[0]
+    assert second.row["rows"] == 2 and len(second.row["promises"]) == 11
+    assert len(rows.read_text().splitlines()) == 2
+    said = run("bench", "report", rows, "-o", tiny / "out", "--json")
+    assert [path.rsplit("/", 1)[1] for path in said.row["files"]] == ["results.md", "dancer.png"]
+    assert run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--quiet").err == ""
+
+
+def test_what_is_missing_is_told(run, tmp_path):
+    assert failed(run("bench", "run", "nothing", "-o", tmp_path / "r.jsonl"), "known: targets")
+    said = run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--data", tmp_path)
+    assert failed(said, "dancer", "--data")
+    assert failed(run("bench", "report", tmp_path / "none.jsonl", "-o", tmp_path), "none.jsonl", "bench run")

@@ -1,0 +1,157 @@
+"""Measuring: rows that are whole, that are not measured twice, and that say what they were."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.errors import InputError
+from meshreel.evaluation import runner
+from meshreel.evaluation.bridges import count_bridges
+from meshreel.evaluation.codec import Codec
+from meshreel.evaluation.codecs import CODECS, make_codec
+from meshreel.evaluation.datasets import open_dataset
+from meshreel.evaluation.fresh import peak_rss_mb
+from meshreel.evaluation.rows import Point, read_rows
+from meshreel.evaluation.runner import run_fresh, run_point, run_points
+from meshreel.format.layout import Form
+from meshreel.metrics.report import ComparisonOptions
+from meshreel.types import Mesh, MeshList
+from tests.golden import GOLDEN
+
+BALLS = sliding_sphere(2, levels=2)
+QUICK = ComparisonOptions(ssim=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with one sequence, `ball`."""
+    path = tmp_path_factory.mktemp("data")
+    np.savez(path / "ball.npz", vertices=np.stack([mesh.vertices for mesh in BALLS]), faces=BALLS[0].faces)
+    return path
+
+
+def test_every_codec_follows_the_protocol_and_tells_its_options():
+    for kind in CODECS:
+        codec = make_codec(kind, {})
+        assert isinstance(codec, Codec)
+        assert make_codec(kind, codec.options) == codec
+        json.dumps(codec.options)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "words"),
+    [
+        ("tvmc", {}, "known: decimated_draco"),
+        ("draco", {"bits": 3}, "bits"),
+        ("draco", {"qp": 1}, "qp 1"),
+        ("decimated_draco", {"fraction": 0.0}, "fraction 0"),
+    ],
+)
+def test_codecs_and_points_that_do_not_exist_are_told(kind, options, words):
+    with pytest.raises(InputError, match=words):
+        make_codec(kind, options)
+
+
+@pytest.mark.parametrize("qp", [7, 10])
+def test_draco_errs_by_no_more_than_its_lattice(qp):
+    codec = make_codec("draco", {"qp": qp})
+    found = codec.decode(codec.encode(BALLS))
+    step = 2 / (2**qp - 3)
+    for mesh, ball in zip(found, BALLS, strict=True):
+        radius = np.linalg.norm(mesh.vertices - ball.vertices.mean(axis=0), axis=1)
+        assert np.abs(radius - 1).max() <= step * 3**0.5 / 2 + 1e-9
+
+
+def test_the_decimated_anchor_is_smaller_and_its_subdivision_is_free():
+    codecs = [make_codec("decimated_draco", {"fraction": f, "levels": n}) for f, n in ((1.0, 0), (0.5, 0), (0.5, 1))]
+    whole, small, subdivided = (codec.encode(BALLS) for codec in codecs)
+    assert len(small) < len(whole) and len(subdivided) == len(small)
+    assert len(codecs[2].decode(subdivided)[0].faces) == 4 * len(codecs[1].decode(small)[0].faces)
+
+
+def test_anchors_keep_empty_frames():
+    codec = make_codec("draco", {"qp": 9})
+    video = codec.decode(codec.encode(MeshList((Mesh.empty(), BALLS[0]))))
+    assert [mesh.is_empty for mesh in video] == [True, False]
+    assert video.reader.groups[0].form == Form.EMPTY
+
+
+def test_a_row_has_rate_times_memory_peer_and_every_metric():
+    row = run_point("ball", BALLS, make_codec("draco", {"qp": 9}), QUICK)
+    assert row["mbps"] == row["bytes"] * 8 * 30 / 2 / 1e6
+    assert row["codec"] == "draco" and row["options"] == {"qp": 9} and row["frames"] == 2
+    assert row["decode"]["frame_ms"] > 0 and row["decode"]["peak_rss_mb"] > 1
+    assert row["peer"]["qp"] == 9
+    assert row["decode_over_peer"] == pytest.approx(row["decode"]["frame_ms"] / row["peer"]["frame_ms"])
+    assert set(row["encode_stages_s"]) == {"code"}
+    assert row["bridges"] == [0, 0]
+    assert {"d2_psnr_paper", "symmetric_psnr", "normal_error_deg", "d2_psnr_paper_worst"} <= set(row)
+    json.dumps(row, allow_nan=False)
+
+
+def test_points_that_have_rows_are_not_run_again(folder, tmp_path, monkeypatch):
+    points = [Point("ball", "draco", {"qp": qp}) for qp in (7, 8)]
+    told: list[bool] = []
+    first = run_points(points[:1], folder, tmp_path / "rows.jsonl", QUICK, lambda _, new: told.append(new))
+    rows = run_points(points, folder, tmp_path / "rows.jsonl", QUICK, lambda _, new: told.append(new))
+    assert told == [True, False, True]
+    assert rows[0] == json.loads(json.dumps(first[0])) and rows == read_rows(tmp_path / "rows.jsonl")
+    monkeypatch.setattr(runner, "run_point", lambda *_: pytest.fail("measured again"))
+    assert run_points(points, folder, tmp_path / "rows.jsonl", QUICK, lambda *_: None) == rows
+
+
+def test_an_encode_is_measured_in_a_process_of_its_own(tmp_path):
+    np.savez(tmp_path / "nothing.npz", vertices=np.zeros((3, 4, 3)), faces=np.zeros((1, 3), dtype=np.int32))
+    row = run_fresh("encode", "nothing", str(tmp_path), "2", json.dumps({"quality": 10.0}))
+    assert row["frames"] == 2 and row["bytes"] > 50 and row["peak_rss_mb"] > 10 and row["encode_s"] > 0
+
+
+def test_a_measurement_that_fails_says_so():
+    with pytest.raises(RuntimeError, match="decode"):
+        run_fresh("decode", "/none.reel")
+
+
+def test_peak_memory_is_told_in_megabytes_and_is_not_the_parents():
+    ballast = np.ones(60_000_000)
+    assert 480 < peak_rss_mb() < 100_000
+    assert run_fresh("decode", str(GOLDEN / "mixed.reel"))["peak_rss_mb"] < 300 < ballast.nbytes
+
+
+def test_a_sequence_that_is_missing_is_told(tmp_path):
+    with pytest.raises(InputError, match="--data"):
+        open_dataset("dancer", tmp_path)
+
+
+def test_the_demo_is_a_sequence_too(tmp_path):
+    assert len(open_dataset("demo", tmp_path, 7)) == 7
+
+
+@pytest.mark.parametrize("text", ["[1]\n", '{"a": 1}\n', "{\n"])
+def test_a_line_that_is_no_row_is_told_by_its_number(tmp_path, text):
+    (tmp_path / "rows.jsonl").write_text('{"point": "", "kind": "quality"}\n' + text)
+    with pytest.raises(InputError, match="line 2"):
+        read_rows(tmp_path / "rows.jsonl")
+
+
+def two_balls(gap):
+    """Two balls side by side, `gap` apart, as one mesh."""
+    ball = BALLS[0]
+    other = ball.vertices + [2 + gap, 0, 0]
+    return Mesh.of([*ball.vertices, *other], [*ball.faces, *(ball.faces + len(ball.vertices))])
+
+
+def test_a_triangle_between_two_bodies_is_a_bridge():
+    apart = two_balls(0.5)
+    assert count_bridges(apart, apart) == 0
+    count = len(BALLS[0].vertices)
+    bridged = Mesh.of(apart.vertices, [*apart.faces, [0, 1, count], [0, count, count + 1]])
+    assert count_bridges(apart, bridged) == 2
+
+
+def test_one_body_and_nothing_have_no_bridges():
+    assert count_bridges(BALLS[0], BALLS[1]) == 0
+    assert count_bridges(Mesh.empty(), BALLS[0]) == count_bridges(two_balls(1), Mesh.empty()) == 0
