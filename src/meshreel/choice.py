@@ -81,15 +81,18 @@ def _on_one_frame(
     frame: Mesh, target: Quality, budget: float, options: IntraOptions
 ) -> Iterator[tuple[int, float, float, int]]:
     """Bytes, fraction, step and levels of what reaches the target on one frame and is below the budget."""
-    for levels in options.levels:
-        for fraction in options.fractions:
-            reduced = _reduced(frame, fraction)
-            for step in options.steps:
-                payload = encode_intra([reduced], step * target.distance, levels)
-                if len(payload) > budget:
+    for fraction in sorted(options.fractions):
+        reduced = _reduced(frame, fraction)
+        sizes = [len(encode_intra([reduced], step * target.distance, 0)) for step in options.steps]
+        if min(sizes) > budget:
+            return  # more vertices cost more
+        for levels in options.levels:
+            for step, size in zip(options.steps, sizes, strict=True):
+                if size > budget:
                     break  # finer steps cost more
+                payload = encode_intra([reduced], step * target.distance, levels)
                 if measure([frame], decode_intra(payload)).reaches(target):
-                    yield len(payload), fraction, step * target.distance, levels
+                    yield size, fraction, step * target.distance, levels
                     break
 
 

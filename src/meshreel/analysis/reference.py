@@ -48,6 +48,10 @@ class ReferenceOptions:
         if self.keys < 1:
             raise InputError(f"keys is {self.keys}: give at least 1 frame to try")
 
+    def fewer_trials(self) -> ReferenceOptions:
+        """The same with one key frame less to try, for a part of a group that was tried as a whole."""
+        return replace(self, keys=max(1, self.keys - 1), canonical_keys=1)
+
 
 @dataclass(frozen=True, slots=True)
 class Trial:
