@@ -19,7 +19,7 @@ class GroupOptions:
 
     limit: float = 1.5  # a frame whose residual is above this many times the target is not followed
     tolerance: float = 1.6  # nor is one above the target and this many times the group's median
-    depth: int = 2  # cuts inside cuts; frames that are still not followed are coded one by one
+    depth: int = 1  # cuts inside cuts; frames that are still not followed are coded one by one
 
     def __post_init__(self) -> None:
         if self.limit < 1 or self.tolerance < 1 or self.depth < 0:
