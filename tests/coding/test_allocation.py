@@ -19,7 +19,8 @@ def test_the_steps_follow_the_option() -> None:
         choice = allocate(
             FIELD, system, entropy.causal_neighbours(BASE.faces, len(FIELD)), DisplacementOptions(step=step)
         )
-        assert all(abs(step_of(level) / step - 1) < 0.1 for level in choice.levels.tolist())
+        assert choice.levels.size > 0
+        assert all(0.65 < step_of(level) / step < 1.55 for level in choice.levels.tolist())  # half an octave around it
 
 
 def test_components_below_the_step_are_dropped() -> None:

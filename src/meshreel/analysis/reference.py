@@ -35,6 +35,9 @@ class ReferenceOptions:
     vertices: int = 3000  # of the reference mesh
     keys: int = 3  # frames tried as the one whose surface, and whose pose, is taken first
     canonical_keys: int = 2  # the best so many of them are tried with the MDS pose too
+    canonical_gain: float = (
+        0.85  # the MDS pose must fit to this share of the best frame's own: it takes more components
+    )
     trial_frames: int = 4  # frames that a trial is fitted to
     trial_depth: int = 7  # Poisson depth of the trials
     trial_vertices: int = 2000  # of their meshes
@@ -87,14 +90,14 @@ def extract_reference(frames: Sequence[Mesh], centers: Centers, options: Referen
     group = Group([frames[t] for t in full], centers.positions[full], distances, kin, (options.deform, options.fuse))
     canonical = reference_centers(distances, group.positions[len(full) // 2], options.centers)
     trials = _trials(group, canonical.positions, options)
-    best = min(trials, key=_misfit)
+    best = _best(trials, options)
     pose = canonical.positions if best.frame == MDS else group.positions[best.frame]
     mesh = group.fused(pose, best.key, options.fuse.poisson.depth, options.vertices)
     trials = tuple(
         replace(trial, frame=MDS if trial.frame == MDS else int(full[trial.frame]), key=int(full[trial.key]))
         for trial in trials
     )
-    best = min(trials, key=_misfit)
+    best = _best(trials, options)
     return Reference(mesh, pose, best.frame, best.key, kin, canonical.stress, trials)
 
 
@@ -142,6 +145,11 @@ def _trial(
         back = _outside(target.surface, moved, group.edge)
         rms.append(max(np.sqrt(np.mean(there**2)), np.sqrt(np.mean(back**2))))
     return Trial(frame, key, float(np.mean(rms)), float(np.max(rms)))
+
+
+def _best(trials: Sequence[Trial], options: ReferenceOptions) -> Trial:
+    """The trial that fits best; displacements from the MDS pose lie in more components, so it must gain something."""
+    return min(trials, key=lambda trial: _misfit(trial) / (options.canonical_gain if trial.frame == MDS else 1.0))
 
 
 def _misfit(trial: Trial) -> float:
