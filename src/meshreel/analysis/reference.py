@@ -36,7 +36,7 @@ class ReferenceOptions:
     keys: int = 3  # frames tried as the one whose surface, and whose pose, is taken first
     canonical_keys: int = 2  # the best so many of them are tried with the MDS pose too
     canonical_gain: float = (
-        0.85  # the MDS pose must fit to this share of the best frame's own: it takes more components
+        0.85  # MDS must fit to this share of the best frame pose: it takes more components
     )
     trial_frames: int = 4  # frames that a trial is fitted to
     trial_depth: int = 7  # Poisson depth of the trials
