@@ -6,7 +6,6 @@ performers (docs/results.md).
 
 from __future__ import annotations
 
-from .analysis.fit import FitOptions
 from .analysis.reference import ReferenceOptions
 from .analysis.track import TrackOptions
 from .choice import Quality
@@ -40,7 +39,6 @@ def preset_options(
         target=Quality(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         track=TrackOptions(centers=centers),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
-        fit=FitOptions() if basis_size is None else FitOptions(components=min(basis_size, FitOptions().components)),
         displacements=DisplacementOptions(step=step, basis_size=basis_size),
     )
 

@@ -17,8 +17,8 @@ from ..errors import InputError
 class GroupOptions:
     """When a group is cut in two."""
 
-    limit: float = 1.5  # a frame whose residual is above this many times the target is not followed
-    tolerance: float = 1.6  # nor is one above the target and this many times the group's median
+    limit: float = 2.0  # a frame whose residual is above this many times the target is not followed
+    tolerance: float = 2.0  # nor is one above the target and this many times the group's median
     depth: int = 1  # cuts inside cuts; frames that are still not followed are coded one by one
 
     def __post_init__(self) -> None:

@@ -35,9 +35,7 @@ class ReferenceOptions:
     vertices: int = 3000  # of the reference mesh
     keys: int = 3  # frames tried as the one whose surface, and whose pose, is taken first
     canonical_keys: int = 2  # the best so many of them are tried with the MDS pose too
-    canonical_gain: float = (
-        0.85  # MDS must fit to this share of the best frame pose: it takes more components
-    )
+    canonical_gain: float = 0.85  # MDS must fit to this share of the best frame pose: it takes more components
     trial_frames: int = 4  # frames that a trial is fitted to
     trial_depth: int = 7  # Poisson depth of the trials
     trial_vertices: int = 2000  # of their meshes

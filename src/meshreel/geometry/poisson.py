@@ -26,6 +26,7 @@ class PoissonOptions:
     depth: int = 9  # of the octree
     trim: float = 2.0  # octree levels below the median density at which surface is cut away
     reach: float = 0.01  # surface farther than this from all points is cut away, in units of the points
+    hole: float = 0.002  # patches to be cut away with less than this share of all faces stay: no pinholes
     vertices: int = 15_000  # the closed surface is decimated to this many before it is trimmed
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
 
@@ -34,9 +35,10 @@ class PoissonOptions:
             raise InputError(f"vertices is {self.vertices}: give at least 4")
         if not 3 <= self.depth <= 12:
             raise InputError(f"depth is {self.depth}: give 3 to 12 octree levels (the paper has 9)")
-        if self.trim < 0 or not self.reach > 0 or not 0 <= self.smallest < 1:
+        if min(self.trim, self.hole) < 0 or not self.reach > 0 or not 0 <= self.smallest < 1:
             raise InputError(
-                f"trim {self.trim}, reach {self.reach}, smallest {self.smallest}: give >= 0, > 0 and 0 to below 1"
+                f"trim {self.trim}, hole {self.hole}, reach {self.reach}, smallest {self.smallest}: "
+                "give >= 0, >= 0, > 0 and 0 to below 1"
             )
 
 
@@ -58,8 +60,11 @@ def reconstruct(
         solid, density = build(cloud, depth=options.depth, n_threads=1)
     whole = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
     mesh = decimate(whole, options.vertices)
-    trusted = _dense(mesh, whole, np.asarray(density), options.trim) & _near(mesh.vertices, points, options.reach)
-    return drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[trusted[mesh.faces].all(axis=1)])), options.smallest)
+    gaps = _gaps(mesh.vertices, points)
+    trusted = _dense(mesh, whole, np.asarray(density), options.trim) & (gaps <= options.reach)
+    kept = trusted[mesh.faces].all(axis=1)
+    kept |= _holes(mesh, ~kept, options.hole) & (gaps <= 3 * options.reach)[mesh.faces].all(axis=1)
+    return drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[kept])), options.smallest)
 
 
 def drop_small(mesh: Mesh, share: float) -> Mesh:
@@ -96,7 +101,16 @@ def _dense(mesh: Mesh, whole: Mesh, levels: Float64[np.ndarray, " W"], trim: flo
     return levels[cKDTree(whole.vertices).query(mesh.vertices)[1]] >= np.median(levels) - trim
 
 
-def _near(queries: Float64[np.ndarray, "V 3"], points: Float64[np.ndarray, "N 3"], reach: float) -> np.ndarray:
+def _gaps(queries: Float64[np.ndarray, "V 3"], points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " V"]:
+    """The distance from each query to the nearest point."""
     from scipy.spatial import cKDTree
 
-    return np.isfinite(cKDTree(points).query(queries, distance_upper_bound=reach)[0])
+    return cKDTree(points).query(queries)[0]
+
+
+def _holes(mesh: Mesh, cut: Bool[np.ndarray, " F"], share: float) -> Bool[np.ndarray, " F"]:
+    """Of the faces to be cut, those in connected patches so small that a hole there would be worse than a guess."""
+    label = np.zeros(len(mesh.faces), dtype=np.int64)
+    label[cut] = 1 + components(mesh.faces[cut], len(mesh.vertices))[mesh.faces[cut][:, 0]]
+    size = np.bincount(label)
+    return cut & (size[label] <= share * len(mesh.faces))

@@ -43,7 +43,7 @@ def points(small: bool) -> Iterator[Point]:
                 yield Point(body, "decimated_draco", {"fraction": fraction, "qp": qp, "levels": levels})
     yield Point("collision", "meshreel", {"quality": 50.0})
     for frames in (20, 60):
-        yield Point("collision", "meshreel", {"quality": 50.0, "centers": 500}, frames, "memory")
+        yield Point("collision", "meshreel", {"quality": 50.0, "centers": 200}, frames, "memory")
 
 
 def references(sequence: str) -> dict[str, list[tuple[float, float]]]:
