@@ -22,10 +22,13 @@ from meshreel.analysis.fuse import Group
 from meshreel.analysis.reference import MDS
 from meshreel.analysis.reference_centers import affinity, largest_distances
 from meshreel.choice import cheapest_intra, measure
+from meshreel.coding import quantize
 from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.group import code_reference, decode_group, encode_group
-from meshreel.compact import CompactOptions, compact, displacements
+from meshreel.coding.laplacian import System, anchors
+from meshreel.format.layout import AnchorRule
 from meshreel.presets import displacement_step, preset_options
+from meshreel.types import Mesh
 
 sys.path.insert(0, str(Path(__file__).parent))
 from stages import Stages, compute, story
@@ -36,8 +39,8 @@ Row = dict[str, Any]
 def main() -> int:
     """Prints every row as soon as it is there."""
     apart, meeting = compute(story(0), preset_options()), compute(story(), preset_options())
-    rows = (float_rows(), lattice_rows(apart), anchor_rows(apart), floor_rows(apart), compact_rows(apart))
-    for row in chain(*rows, pose_rows(meeting)):
+    rows = (float_rows(), lattice_rows(apart), noise_rows(apart.frames[0]), anchor_rows(apart))
+    for row in chain(*rows, floor_rows(apart), second_fit_rows(apart), pose_rows(meeting)):
         print(json.dumps(row), flush=True)
     return 0
 
@@ -56,6 +59,23 @@ def lattice_rows(stages: Stages) -> Iterator[Row]:
     """How far the positions that Draco gives are from the lattice, in its steps."""
     cells = np.asarray(DracoPy.decode(stages.coded.data).points, dtype=np.float64) / stages.coded.step
     yield {"decision": "lattice", "largest_distance_steps": float(np.abs(cells - np.rint(cells)).max())}
+
+
+def noise_rows(base: Mesh) -> Iterator[Row]:
+    """The variance of the error that rounding leaves in smooth weights on a mesh, in units of step^2 / 12."""
+    points = base.vertices
+    weights = np.concatenate([np.sin(k * points + k) for k in range(1, 5)], axis=1)
+    steps, free = np.full(weights.shape[1], 1e-3), np.zeros(weights.shape[1])
+    tenth, hundredth = len(points) // 10, len(points) // 100
+    ways = [("plain", tenth, 1), ("plain", hundredth, 1), ("plain", 12, 1), ("plain", 2, 1)]
+    ways += [("shaped", tenth, 1), ("shaped", 12, 4), ("shaped", 2, 4)]
+    for rounding, count, weight in ways:
+        system = System(base, anchors(AnchorRule.FARTHEST, count, base.faces, len(points)), weight)
+        deltas = system.forward(weights)
+        symbols = system.quantize(deltas, steps, free) if rounding == "shaped" else quantize.forward(deltas, steps)
+        variance = float(np.mean(np.square(system.inverse(symbols * steps) - weights)))
+        yield {"decision": "noise", "rounding": rounding, "anchors": count, "anchor_weight": weight,
+               "vertices": len(points), "variance": variance / (steps[0] ** 2 / 12)}  # fmt: skip
 
 
 def anchor_rows(stages: Stages) -> Iterator[Row]:
@@ -90,7 +110,7 @@ def pose_rows(stages: Stages) -> Iterator[Row]:
         pose = stages.spread if frame == MDS else stages.centers.positions[frame]
         mesh = group.fused(pose, key, options.reference.fuse.poisson.depth, options.reference.vertices)
         base = code_reference(mesh, options.reference_bits, options.levels).base
-        fit = fit_frames(base.faces, group.sent(base, pose), stages.frames, options.fit)
+        fit = fit_frames(base.faces, group.sent(base, pose), stages.frames, replace(options.fit, key=key))
         rms = [residual.rms for residual in fit.residuals]
         chosen = (frame, key) == (stages.reference.frame, stages.reference.key)
         yield {"decision": "pose", "pose": "MDS" if frame == MDS else f"frame {frame}", "key": key,
@@ -105,17 +125,19 @@ def floor_rows(stages: Stages) -> Iterator[Row]:
            "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
 
 
-def compact_rows(stages: Stages) -> Iterator[Row]:
-    """Distance and bytes with few components, of the fit as it is and made compact."""
-    for components in (3, 10):
-        options = replace(preset_options().displacements, basis_size=components)
-        fits = {"as it is": stages.fit}
-        fits["compact"] = compact(stages.fit, stages.coded.base, stages.frames, components, CompactOptions())
-        for name, fit in fits.items():
-            payload, _ = encode_group(stages.coded, displacements(fit, stages.coded.base), options)
+def second_fit_rows(stages: Stages) -> Iterator[Row]:
+    """Bytes and distance of fits made without a second fit, or with one from few or many components of the first."""
+    options = preset_options()
+    key, base = stages.reference.key, stages.coded.base
+    for start in (0, 3, 15):
+        fit = fit_frames(base.faces, stages.predictions, stages.frames, replace(options.fit, key=key, components=start))
+        field = np.ascontiguousarray(np.moveaxis(fit.positions, 0, 1) - base.vertices[:, None])
+        for sent in (3, 10, None):
+            how = replace(options.displacements, basis_size=sent)
+            payload, layers = encode_group(stages.coded, field, how)
             quality = measure(stages.frames, decode_group(payload, len(stages.frames)))
-            yield {"decision": "compact", "components": components, "fit": name, "bytes": len(payload),
-                   "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
+            yield {"decision": "second fit", "start": start, "basis_size": sent, "components": len(layers) - 1,
+                   "bytes": len(payload), "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
 
 
 if __name__ == "__main__":

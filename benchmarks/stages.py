@@ -5,7 +5,7 @@ In: a window of the procedural story in which two people walk up to each other a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
@@ -75,7 +75,7 @@ def compute(sequence: MeshList, options: EncoderOptions) -> Stages:
     reference = extract_reference(frames, centers, options.reference)
     coded = code_reference(reference.mesh, options.reference_bits, options.levels)
     predictions = predict(reference, coded.base, centers, options.reference.deform)
-    fit = fit_frames(coded.base.faces, predictions, frames, options.fit)
+    fit = fit_frames(coded.base.faces, predictions, frames, replace(options.fit, key=reference.key))
     field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
     payload, layers = encode_group(coded, field, options.displacements)
     moved = tuple(

@@ -1,0 +1,113 @@
+"""The tables of docs/decisions from measured.jsonl, each between its markers `<!-- table: NAME -->` and `<!-- end -->`.
+
+python benchmarks/tables.py        # after benchmarks/decisions.py
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+PAGES = Path(__file__).resolve().parents[1] / "docs" / "decisions"
+MARKED = re.compile(r"(<!-- table: ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+Row = dict[str, Any]
+Table = tuple[list[str], list[list[str]]]  # heads, those of numbers with a leading ">"; and cells
+
+
+def main() -> int:
+    """Rewrites the pages that hold a table."""
+    lines = (PAGES / "measured.jsonl").read_text(encoding="utf-8").splitlines()
+    rows = [json.loads(line) for line in lines]
+    for page in sorted(PAGES.glob("0*.md")):
+        old = page.read_text(encoding="utf-8")
+        new = re.sub(
+            r"(<!-- table: ([\w ]+) -->\n).*?(<!-- end -->)", lambda at: _filled(at, rows), old, flags=re.DOTALL
+        )
+        if new != old:
+            page.write_text(new, encoding="utf-8")
+            print(page)
+    return 0
+
+
+def noise(rows: list[Row]) -> Table:
+    """The variance that each way of rounding leaves."""
+    heads = ["rounding", "> anchors", "> weight", "> variance, step² / 12"]
+    return heads, [[r["rounding"], r["anchors"], r["anchor_weight"], _rough(r["variance"])] for r in rows]
+
+
+def anchors(rows: list[Row]) -> Table:
+    """Bytes and error, a row a step and a column a way of rounding."""
+    ways, steps = _distinct(rows, "rounding"), _distinct(rows, "step")
+    found = {(r["step"], r["rounding"]): f"{r['bytes']} / {_thousandths(r['rms'])}" for r in rows}
+    cells = [[_thousandths(step, 3), *(found[step, way] for way in ways)] for step in steps]
+    return ["> step x 1000", *(f"> {way}" for way in ways)], cells
+
+
+def floor(rows: list[Row]) -> Table:
+    """Bytes of both forms."""
+    heads = ["> `laplacian`, bytes", "> `draco`, bytes", "> RMS x 1000", "> normal error, degrees"]
+    return heads, [
+        [r["laplacian_bytes"], r["draco_bytes"] or "none found", _thousandths(r["rms"]), f"{r['normal_error_deg']:.2f}"]
+        for r in rows
+    ]
+
+
+def pose(rows: list[Row]) -> Table:
+    """What is left in each pose."""
+    heads = ["pose", "> key", "> mean over the frames", "> worst frame", ""]
+    return heads, [
+        [r["pose"], r["key"], _thousandths(r["mean_rms"]), _thousandths(r["worst_rms"]), "chosen" * r["chosen"]]
+        for r in rows
+    ]
+
+
+def second_fit(rows: list[Row]) -> Table:
+    """A row a fit and a number of components that are sent."""
+    heads = ["> components sent", "> second fit from", "> bytes", "> RMS x 1000", "> normal error, degrees"]
+    ordered = sorted(rows, key=lambda r: (r["basis_size"] or 999, r["start"]))
+    return heads, [
+        [
+            r["basis_size"] or f"as many as pay: {r['components']}",
+            r["start"] or "no second fit",
+            r["bytes"],
+            _thousandths(r["rms"]),
+            f"{r['normal_error_deg']:.2f}",
+        ]
+        for r in ordered
+    ]
+
+
+TABLES: dict[str, Callable[[list[Row]], Table]] = {
+    "noise": noise,
+    "anchors": anchors,
+    "floor": floor,
+    "pose": pose,
+    "second fit": second_fit,
+}
+
+
+def _filled(at: re.Match[str], rows: list[Row]) -> str:
+    heads, cells = TABLES[at[2]]([row for row in rows if row["decision"] == at[2]])
+    lines = [[head.removeprefix("> ") for head in heads], ["---:" if head[:1] == ">" else "---" for head in heads]]
+    return at[1] + "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines + cells) + at[3]
+
+
+def _distinct(rows: list[Row], name: str) -> list[Any]:
+    return list(dict.fromkeys(row[name] for row in rows))
+
+
+def _thousandths(value: float, digits: int = 2) -> str:
+    return f"{1000 * value:.{digits}f}"
+
+
+def _rough(value: float) -> str:
+    """Two digits that count."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
