@@ -129,7 +129,8 @@ def _encode_span(frames: Sequence[Mesh], centers: Centers, options: EncoderOptio
         head, tail = frames[:cut], frames[cut:]
         known = replace(centers, positions=centers.positions[:cut])
         anew = track_centers(tail, options.track)  # centers that were lost before the cut would spoil what follows
-        return [*_encode_span(head, known, options, depth - 1), *_encode_span(tail, anew, options, depth - 1)]
+        quick = replace(options, reference=options.reference.fewer_trials())
+        return [*_encode_span(head, known, quick, depth - 1), *_encode_span(tail, anew, quick, depth - 1)]
     group = _laplacian(frames, reference, fit, options.displacements)
     return [group if options.displacements.basis_size is not None else _cheaper(frames, group, options)]
 
