@@ -106,11 +106,6 @@ def surface_errors(original: Mesh, decoded: Mesh) -> SurfaceErrors:
     return SurfaceErrors(diagonal, _one_way(a, match(a, b, resolution)), _one_way(b, match(b, a, resolution)))
 
 
-def symmetric_distance(original: Mesh, decoded: Mesh) -> float:
-    """`SurfaceErrors.symmetric_rms` of two meshes, m; inf where one is empty."""
-    return surface_errors(original, decoded).symmetric_rms
-
-
 _PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, math.inf, WORST_ANGLE, WORST_ANGLE)
 
