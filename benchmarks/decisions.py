@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -23,8 +22,7 @@ from meshreel.analysis.reference import MDS
 from meshreel.analysis.reference_centers import affinity, largest_distances
 from meshreel.choice import cheapest_intra, measure
 from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
-from meshreel.coding.group import code_reference, decode_group, encode_group
-from meshreel.compact import CompactOptions, compact, displacements
+from meshreel.coding.group import code_reference
 from meshreel.presets import displacement_step, preset_options
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -36,7 +34,7 @@ Row = dict[str, Any]
 def main() -> int:
     """Prints every row as soon as it is there."""
     apart, meeting = compute(story(0), preset_options()), compute(story(), preset_options())
-    rows = (float_rows(), lattice_rows(apart), anchor_rows(apart), floor_rows(apart), compact_rows(apart))
+    rows = (float_rows(), lattice_rows(apart), anchor_rows(apart), floor_rows(apart))
     for row in chain(*rows, pose_rows(meeting)):
         print(json.dumps(row), flush=True)
     return 0
@@ -103,19 +101,6 @@ def floor_rows(stages: Stages) -> Iterator[Row]:
     found = cheapest_intra(stages.frames, quality, np.inf, preset_options().intra)
     yield {"decision": "floor", "laplacian_bytes": len(stages.payload), "draco_bytes": len(found[0]) if found else None,
            "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
-
-
-def compact_rows(stages: Stages) -> Iterator[Row]:
-    """Distance and bytes with few components, of the fit as it is and made compact."""
-    for components in (3, 10):
-        options = replace(preset_options().displacements, basis_size=components)
-        fits = {"as it is": stages.fit}
-        fits["compact"] = compact(stages.fit, stages.coded.base, stages.frames, components, CompactOptions())
-        for name, fit in fits.items():
-            payload, _ = encode_group(stages.coded, displacements(fit, stages.coded.base), options)
-            quality = measure(stages.frames, decode_group(payload, len(stages.frames)))
-            yield {"decision": "compact", "components": components, "fit": name, "bytes": len(payload),
-                   "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
 
 
 if __name__ == "__main__":
