@@ -48,7 +48,10 @@ class SurfaceErrors:
 
     @property
     def d1_psnr(self) -> float:
-        """10 log10(3 p^2 / MSE), point to point, the worse of both directions (MPEG PCC common test conditions)."""
+        """10 log10(3 p^2 / MSE), point to point, the worse of both directions (MPEG PCC common test conditions).
+
+        From each vertex to the closest point of the surface, where MPEG has the nearest of the points it samples.
+        """
         return _psnr(max(self.forward.point_mse, self.backward.point_mse) / 3, self.diagonal)
 
     @property
