@@ -99,7 +99,7 @@ def test_fewer_components_are_fewer_bytes_and_still_a_shape():
     assert np.array_equal(coarse.faces, whole.faces)
     errors = [np.abs(video.at(k)[3].vertices - whole.vertices).max() for k in (0, 1, 3, 99)]
     assert errors[0] > errors[2] and errors[3] == 0
-    with pytest.raises(ValueError, match="-1"):
+    with pytest.raises(InputError, match="-1"):
         video.at(-1)
 
 

@@ -20,7 +20,7 @@ HEAVY = (
     "rich",
     "cyclopts",
 )
-ENCODER_SIDE = ("analysis", "capture", "metrics", "encoder", "choice", "presets", "evaluation", "cli", "io")
+ENCODER_SIDE = ("analysis", "capture", "metrics", "encoder", "windows", "choice", "presets", "evaluation", "cli", "io")
 
 LOOK = f"""
 import sys

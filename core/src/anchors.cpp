@@ -45,7 +45,7 @@ void add_source(const Graph& g, int32_t source, std::vector<int32_t>& hops, std:
 }  // namespace
 
 int64_t mr_farthest_anchors(const int32_t* faces, int64_t face_count, int64_t vertices, int64_t count, int32_t* out) {
-    if (vertices < 0 || face_count < 0 || count < 0) return -1;
+    if (vertices < 0 || vertices > INT_MAX || face_count < 0 || count < 0) return -1;
     for (int64_t k = 0; k < 3 * face_count; ++k)
         if (faces[k] < 0 || faces[k] >= vertices) return -1;
     try {

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <new>
 #include <vector>
 
 #include "rigid3.h"
@@ -321,7 +320,7 @@ extern "C" int meshreel_relax_centers(const meshreel_relaxation* problem, meshre
     if (!problem || !result || !sound(*problem, *result)) return MESHREEL_TRACKING_BAD_INPUT;
     try {
         relax(*problem, *result);
-    } catch (const std::bad_alloc&) {
+    } catch (...) {  // only a want of memory can throw here
         return MESHREEL_TRACKING_NO_MEMORY;
     }
     return MESHREEL_TRACKING_OK;

@@ -57,6 +57,14 @@ def test_every_option_reaches_the_encoder(run, balls, tmp_path):
     assert [g["components"] for g in info["groups"] if g["form"] == "laplacian"] == [2]
 
 
+@pytest.mark.usefixtures("quick_presets")
+def test_two_processes_write_the_same_file_as_one(run, balls, tmp_path):
+    for jobs in ("1", "2"):
+        said = run("encode", balls, "-o", tmp_path / f"{jobs}.reel", "--group-size", "1", "--jobs", jobs, "--quiet")
+        assert (said.code, said.err) == (0, "")
+    assert (tmp_path / "1.reel").read_bytes() == (tmp_path / "2.reel").read_bytes()
+
+
 def test_flags_default_to_the_defaults_of_the_options():
     defaults = {name: parameter.default for name, parameter in inspect.signature(command).parameters.items()}
     code = preset_options()

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.coding import displacements
+from meshreel.coding import displacements, entropy
 from meshreel.coding.allocation import DisplacementOptions
 from meshreel.coding.displacements import decode_displacements, encode_displacements, layer_sizes
 from meshreel.coding.steps import LEVELS, level_of, step_of
 from meshreel.errors import FormatError, InputError
 from meshreel.format import records
-from meshreel.format.layout import AnchorRule, DisplacementHead
+from meshreel.format.layout import AnchorRule, Component, DisplacementHead
 from meshreel.types import Mesh
 
 from .test_laplacian import icosahedron, spoiled
@@ -168,6 +168,35 @@ def test_a_base_that_no_payload_can_have_is_refused() -> None:
     for bad in (Mesh(BASE.vertices * np.nan, BASE.faces), Mesh(BASE.vertices, BASE.faces + 1)):
         with pytest.raises(FormatError):
             decode_displacements(DATA, bad)
+
+
+def still_payload(base: Mesh, frames: int, anchors: int) -> bytes:
+    """A payload that is right in itself: one component without any motion."""
+    symbols = np.zeros((len(base.vertices), 1), np.int32)
+    [deltas] = entropy.encode_weights(symbols, entropy.causal_neighbours(base.faces, len(base.vertices)))
+    fixed = entropy.encode_integers(np.zeros(anchors, np.int32))
+    basis = entropy.encode_integers(np.zeros(6 * frames, np.int32))
+    component = Component(10, 40, len(fixed), len(deltas))
+    head = DisplacementHead(frames, AnchorRule.FARTHEST, anchors, 1, 10, (component,), basis)
+    return records.pack(head) + fixed + deltas
+
+
+def test_parts_that_only_a_collapsed_face_ties_are_refused() -> None:
+    solid = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    points = np.concatenate([np.eye(4)[:, :3], np.eye(4)[:, :3] + 3])
+    apart = Mesh.of(points, np.concatenate([solid, solid + 4]))
+    assert not decode_displacements(still_payload(apart, 2, 2), apart).any()
+    tied = Mesh.of(points, np.concatenate([apart.faces, [[0, 0, 4]]]))
+    with pytest.raises(FormatError, match="no solution"):
+        decode_displacements(still_payload(tied, 2, 1), tied)
+
+
+def test_a_field_of_absurd_size_is_refused_before_memory_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = still_payload(BASE, 4, 1)
+    assert decode_displacements(data, BASE).shape == (len(BASE.vertices), 4, 3)
+    monkeypatch.setattr(displacements, "MOST_NUMBERS", 3 * 4 * len(BASE.vertices) - 1)
+    with pytest.raises(FormatError, match="4 frames"):
+        decode_displacements(data, BASE)
 
 
 def test_displacements_that_are_not_normalised_are_refused() -> None:

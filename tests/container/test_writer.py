@@ -140,6 +140,12 @@ def test_a_header_that_readers_would_refuse_is_an_input_error(change):
     assert file.getvalue() == b""
 
 
+@pytest.mark.parametrize("change", [{"frame_rate": 0.0}, {"scale": -1.0}, {"intervals": (1, 0)}])
+def test_a_header_without_meaning_is_refused_before_any_work(change):
+    with pytest.raises(InputError, match="Header"):
+        ReelWriter(io.BytesIO(), replace(HEADER, **change)).__enter__()
+
+
 def test_a_file_without_frames_is_an_input_error(tmp_path):
     with pytest.raises(InputError, match="no frames"), ReelWriter(tmp_path / "out.reel", HEADER) as writer:
         writer.add_static(EMPTY)

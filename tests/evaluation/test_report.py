@@ -8,7 +8,7 @@ import pytest
 
 from meshreel.errors import InputError
 from meshreel.evaluation.experiments import experiment
-from meshreel.evaluation.experiments.targets import RELEASED
+from meshreel.evaluation.experiments.targets import LARGEST, RELEASED
 from meshreel.evaluation.report import write_report
 from meshreel.evaluation.rows import Point
 
@@ -55,9 +55,10 @@ GOOD = [
     row("dancer", "meshreel paper", 1.5, 62.0),
     row("dancer", "meshreel paper", 0.5, 58.0, options={"quality": 20.0}),
     *(
-        row("dancer", "meshreel paper m", mbps - 1, db + 1, options={"basis_size": m})
+        row("dancer", "meshreel paper m", mbps - 1, db + 1, options={"basis_size": m, "quality": 50.0})
         for m, (mbps, db) in RELEASED.items()
     ),
+    row("dancer", "meshreel paper m", 7.0, 66.0, options=dict(LARGEST)),
     row("mitch", "meshreel paper", 1.5, 62.0),
     row("basketball_player", "meshreel paper", 1.5, 62.0),
     row("dancer", "decimated_draco_subdivided", 0.7, 58.0),
@@ -85,8 +86,8 @@ def test_without_rows_nothing_is_claimed():
 @pytest.mark.parametrize(
     ("name", "bad"),
     [
-        ("dancer, m = 10", row("dancer", "meshreel paper m", 5.0, 56.0, options={"basis_size": 10})),
-        ("dancer, m = 10", row("dancer", "meshreel paper m", 5.9, 60.0, options={"basis_size": 10})),
+        ("dancer, m = 10", row("dancer", "meshreel paper m", 5.0, 56.0, options={"basis_size": 10, "quality": 50.0})),
+        ("dancer, m = 10", row("dancer", "meshreel paper m", 5.9, 60.0, options={"basis_size": 10, "quality": 50.0})),
         ("one point", row("dancer", "meshreel paper", 1.9, 62.0)),
         ("one point", row("dancer", "meshreel paper", 1.5, 62.0, normal_error_deg=6.1)),
         ("mitch", row("mitch", "meshreel paper", 1.5, 62.0, d2_psnr_paper_worst=54.9)),
@@ -100,7 +101,7 @@ def test_without_rows_nothing_is_claimed():
                 "meshreel paper m",
                 1.0,
                 66.0,
-                options={"basis_size": 10},
+                options=dict(LARGEST),
                 decode={"frame_ms": 26.0, "vertices": 1.0},
             ),
         ),

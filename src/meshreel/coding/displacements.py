@@ -20,6 +20,7 @@ from .steps import LEVELS, step_of
 
 MOST_FRAMES = 65_535
 MOST_BITS = 30
+MOST_NUMBERS = 1 << 29  # of a decoded field: 4 GiB
 
 
 def encode_displacements(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: DisplacementOptions) -> bytes:
@@ -42,6 +43,8 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
     vertices = len(base.vertices)
     if head.anchor_count > vertices or not np.isfinite(base.vertices).all():
         raise FormatError(f"displacements: {head.anchor_count} anchors among {vertices} vertices, or a base not finite")
+    if 3 * head.frames * vertices > MOST_NUMBERS:
+        raise FormatError(f"displacements: {head.frames} frames of {vertices} vertices exceed {MOST_NUMBERS} numbers")
     neighbours = entropy.causal_neighbours(base.faces, vertices)
     anchors = laplacian.anchors(head.anchor_rule, head.anchor_count, base.faces, vertices)
     parts = _streams(data, offset, head.components[:count])
@@ -49,8 +52,11 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
     fixed = [entropy.decode_integers(stream, len(anchors)) for stream, _ in parts]
     symbols = np.concatenate([deltas, np.array(fixed, dtype=np.int32).reshape(count, len(anchors)).T])
     steps = np.array([step_of(component.step_level) for component in head.components[:count]], dtype=np.float64)
-    system = laplacian.System(base, anchors, head.anchor_weight)
-    weights = system.inverse(quantize.inverse(symbols, steps))  # eq. 13
+    try:
+        system = laplacian.System(base, anchors, head.anchor_weight)
+        weights = system.inverse(quantize.inverse(symbols, steps))  # eq. 13
+    except ValueError as error:  # collapsed faces, which no encoder's Draco keeps, tie parts that have no anchor
+        raise FormatError(f"displacements: the base's least squares have no solution: {error}") from error
     return klt.inverse(weights, _read_basis(head, count))  # eq. 9
 
 

@@ -65,17 +65,3 @@ class System:
         squared error, in squared steps, that a symbol smaller by one is worth; 0 disregards the rate.
         """
         return self._core.quantize(deltas, steps, prices)
-
-
-def forward(
-    weights: Float64[np.ndarray, "V M"], base: Mesh, anchors: Int32[np.ndarray, " l"]
-) -> Float64[np.ndarray, "R M"]:
-    """Deltas of the weights: Laplacian rows, then the anchors' own weights (eq. 12)."""
-    return System(base, anchors).forward(weights)
-
-
-def inverse(
-    deltas: Float64[np.ndarray, "R M"], base: Mesh, anchors: Int32[np.ndarray, " l"]
-) -> Float64[np.ndarray, "V M"]:
-    """The weights that fit the deltas best (eq. 13)."""
-    return System(base, anchors).inverse(deltas)

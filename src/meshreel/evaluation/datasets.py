@@ -13,7 +13,6 @@ from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions, open_sequence
 from ..types import MeshSequence
 
-PERFORMERS = ("dancer", "basketball_player", "mitch", "collision")
 SCALES = {"basketball_player": 0.1}  # to metres; the others are in metres
 
 

@@ -20,9 +20,8 @@ from .meshes import Loaded, read_mesh
 from .names import find_frames
 
 _FRAMES = re.compile(r"(-?\d+)?:(-?\d+)?")
-_SUSPICIOUS_RATIO = (
-    20.0  # between the diagonals of two frames: more than a person who crouches or a second one who enters
-)
+# Between the diagonals of two frames: more than a person who crouches or a second one who enters.
+_SUSPICIOUS_RATIO = 20.0
 
 
 @dataclass(frozen=True, slots=True)

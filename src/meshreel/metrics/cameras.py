@@ -17,9 +17,9 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..io.write import replacing
 from ..types import Mesh
 
-VIEW_NAMES = ("front", "right", "back", "left")
 _MARGIN = 1.05  # of the box, so that nothing touches the border
 
 
@@ -186,9 +186,8 @@ def write_cameras(path: Path, cameras: list[PinholeCamera]) -> None:
         "version_major": 1,
         "version_minor": 0,
     }
-    temporary = path.with_name(path.name + ".part")
-    temporary.write_text(json.dumps(record, indent=1) + "\n")
-    temporary.replace(path)
+    with replacing(path) as file:
+        file.write((json.dumps(record, indent=1) + "\n").encode())
 
 
 def camera_record(camera: PinholeCamera) -> dict[str, Any]:

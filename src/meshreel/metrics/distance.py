@@ -48,7 +48,10 @@ class SurfaceErrors:
 
     @property
     def d1_psnr(self) -> float:
-        """10 log10(3 p^2 / MSE), point to point, the worse of both directions (MPEG PCC common test conditions)."""
+        """10 log10(3 p^2 / MSE), point to point, the worse of both directions (MPEG PCC common test conditions).
+
+        From each vertex to the closest point of the surface, where MPEG has the nearest of the points it samples.
+        """
         return _psnr(max(self.forward.point_mse, self.backward.point_mse) / 3, self.diagonal)
 
     @property
@@ -104,11 +107,6 @@ def surface_errors(original: Mesh, decoded: Mesh) -> SurfaceErrors:
     a, b = sample_pair(original, decoded)
     resolution = RESOLUTION * diagonal
     return SurfaceErrors(diagonal, _one_way(a, match(a, b, resolution)), _one_way(b, match(b, a, resolution)))
-
-
-def symmetric_distance(original: Mesh, decoded: Mesh) -> float:
-    """`SurfaceErrors.symmetric_rms` of two meshes, m; inf where one is empty."""
-    return surface_errors(original, decoded).symmetric_rms
 
 
 _PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -17,6 +17,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..geometry.nearest import Surface
+from ..io.write import replacing
 from ..types import Mesh
 from .cameras import Box, PinholeCamera, ViewOptions, views_around
 from .distance import surface_errors
@@ -76,12 +77,8 @@ def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOp
     options = options or SheetOptions()
     rows = list(_rows(originals, decoded, options))
     figure = _draw(rows, options)
-    temporary = path.with_name(path.name + ".part")
-    try:
-        figure.savefig(temporary, format="png", dpi=_DPI)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as file:
+        figure.savefig(file, format="png", dpi=_DPI)
 
 
 def error_at_pixels(view: View, decoded: Mesh) -> Float64[np.ndarray, " N"]:

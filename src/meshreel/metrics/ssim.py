@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..types import Mesh
-from .cameras import Box, Camera, parallel_views_around
+from .cameras import Camera
 from .render import look, window_of
 
 _SIDE = 7  # pixels, side of the SSIM window
@@ -38,11 +38,6 @@ def ssim_normals(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> No
     masked = tuple(score[1] for score in scores)
     seen = [value for value in masked if value is not None]
     return NormalSsim(float(np.mean(whole)), float(np.mean(seen)) if seen else 1.0, whole, masked)
-
-
-def quick_ssim(original: Mesh, decoded: Mesh, size: int = 512) -> float:
-    """Masked SSIM in four orthographic views of size x size pixels around the original: for quick decisions."""
-    return ssim_normals(original, decoded, parallel_views_around(Box.of([original]), size)).masked
 
 
 def _ssim_view(original: Mesh, decoded: Mesh, camera: Camera) -> tuple[float, float | None]:

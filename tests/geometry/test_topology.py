@@ -1,0 +1,114 @@
+"""Connectivity: the laws that decoder and encoder both stand on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from meshreel.geometry.topology import (
+    clean,
+    components,
+    drop_unreferenced,
+    face_normals,
+    subdivide_midpoint,
+    unique_edges,
+    vertex_normals,
+    weld,
+)
+from meshreel.types import Mesh
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
+SOLID = Mesh.of(CORNERS, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+FACES = st.integers(1, 12).flatmap(
+    lambda count: st.tuples(
+        st.just(count), st.lists(st.lists(st.integers(0, count - 1), min_size=3, max_size=3), max_size=20)
+    )
+)
+
+
+def area(mesh: Mesh) -> float:
+    return float(face_normals(mesh)[1].sum())
+
+
+def test_edges_are_sorted_unique_and_found_again_from_the_faces() -> None:
+    edges, of_faces = unique_edges(SOLID.faces)
+    assert edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
+    for face, its in zip(SOLID.faces, of_faces, strict=True):
+        assert [set(edges[e]) for e in its] == [set(face[[0, 1]]), set(face[[1, 2]]), set(face[[2, 0]])]
+
+
+@pytest.mark.parametrize("levels", [0, 1, 3])
+def test_subdivision_keeps_the_surface_its_sides_and_its_vertices(levels: int) -> None:
+    fine = subdivide_midpoint(SOLID, levels)
+    assert len(fine.faces) == 4 * 4**levels
+    assert len(fine.vertices) - len(unique_edges(fine.faces)[0]) + len(fine.faces) == 2  # Euler: still a sphere
+    np.testing.assert_array_equal(fine.vertices[:4], SOLID.vertices)
+    assert area(fine) == pytest.approx(area(SOLID), rel=1e-12)
+    coarse = np.repeat(face_normals(SOLID)[0], 4**levels, axis=0)
+    np.testing.assert_allclose(face_normals(fine)[0], coarse, atol=1e-12)
+
+
+def test_new_vertices_are_midpoints_in_the_order_of_their_edges() -> None:
+    edges, _ = unique_edges(SOLID.faces)
+    midpoints = (CORNERS[edges[:, 0]] + CORNERS[edges[:, 1]]) / 2
+    np.testing.assert_array_equal(subdivide_midpoint(SOLID).vertices[4:], midpoints)
+
+
+def test_normals_have_unit_length_and_are_zero_without_area() -> None:
+    flat = Mesh.of([[0, 0, 0], [2, 0, 0], [0, 3, 0], [1, 0, 0], [9, 9, 9]], [[0, 1, 2], [0, 3, 1]])
+    normals, areas = face_normals(flat)
+    np.testing.assert_array_equal(normals, [[0, 0, 1], [0, 0, 0]])
+    np.testing.assert_array_equal(areas, [3, 0])
+    np.testing.assert_array_equal(vertex_normals(flat)[[0, 1, 2]], [[0, 0, 1]] * 3)
+    np.testing.assert_array_equal(vertex_normals(flat)[[3, 4]], np.zeros((2, 3)))
+
+
+def test_vertex_normals_weigh_faces_by_area() -> None:
+    corner = Mesh.of([[0, 0, 0], [2, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2], [0, 2, 3]])  # areas 1 and 1/2
+    np.testing.assert_allclose(vertex_normals(corner)[0], np.array([1, 0, 2]) / 5**0.5, atol=1e-15)
+
+
+def test_welding_merges_equal_positions_and_drops_what_collapses() -> None:
+    soup = Mesh.of(CORNERS[SOLID.faces.reshape(-1)], np.arange(12).reshape(4, 3))
+    whole = weld(soup)
+    assert len(whole.vertices) == 4
+    np.testing.assert_array_equal(whole.vertices[whole.faces], soup.vertices[soup.faces])
+    twice = Mesh.of([[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3], [1, 2, 3]])
+    assert weld(twice).faces.tolist() == [[0, 1, 2], [0, 1, 2]]
+    assert weld(Mesh.empty()).is_empty
+
+
+def test_cleaning_leaves_each_face_with_an_area_once_and_no_loose_vertex() -> None:
+    flat = [[0, 0, 1], [2, 2, 2], [3, 4, 4], [1, 0, 2], [0, 5, 1]]  # the last two: a repeated face, a zero area
+    points = np.concatenate([CORNERS, [[7, 7, 7]], [[0.5, 0, 0]]])
+    mesh = clean(Mesh.of(points, np.concatenate([flat[:3], SOLID.faces, flat[3:]])))
+    np.testing.assert_array_equal(mesh.vertices, CORNERS)
+    np.testing.assert_array_equal(mesh.faces, SOLID.faces)
+    again = clean(mesh)
+    np.testing.assert_array_equal(again.faces, mesh.faces)
+
+
+def test_vertices_that_no_face_uses_go_and_the_others_keep_their_order() -> None:
+    mesh = drop_unreferenced(Mesh.of(np.arange(18.0).reshape(6, 3), [[5, 1, 3]]))
+    assert mesh.vertices[:, 0].tolist() == [3, 9, 15] and mesh.faces.tolist() == [[2, 0, 1]]
+
+
+@settings(max_examples=100, deadline=None)
+@given(FACES)
+def test_components_are_those_of_a_search_in_the_order_of_their_first_vertex(
+    drawn: tuple[int, list[list[int]]],
+) -> None:
+    count, faces = drawn
+    expected, label = [-1] * count, 0
+    for first in range(count):
+        if expected[first] >= 0:
+            continue
+        found = {first}
+        while more := {v for face in faces if found & set(face) for v in face} - found:
+            found |= more
+        for v in found:
+            expected[v] = label
+        label += 1
+    assert components(np.array(faces, dtype=np.int32).reshape(-1, 3), count).tolist() == expected
