@@ -10,7 +10,10 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from .coding.intra import decode_intra, encode_intra
+from .coding.mesh import MAX_BITS
 from .geometry.decimate import decimate
 from .metrics.distance import surface_errors
 from .types import Mesh
@@ -53,18 +56,17 @@ def measure(originals: Sequence[Mesh], decoded: Sequence[Mesh]) -> Quality:
 def cheapest_intra(
     frames: Sequence[Mesh], target: Quality, most_bytes: float, options: IntraOptions
 ) -> tuple[bytes, Quality] | None:
-    """The smallest `draco` payload under `most_bytes` that reaches the target, with its quality.
+    """A `draco` payload under `most_bytes` that reaches the target in distance and angle, with its quality.
 
-    Candidates are tried on the middle frame, cheapest first; the first that also holds on all frames is taken.
+    Candidates are tried on the middle frame and ordered by their size there; the first that holds on all is taken.
     """
     middle = frames[len(frames) // 2]
     budget = most_bytes / len(frames)
-    for size, fraction, step, levels in sorted(_on_one_frame(middle, target, budget, options)):
-        del size
+    for _, fraction, step, levels in sorted(_on_one_frame(middle, target, budget, options)):
         meshes = [_reduced(frame, fraction) for frame in frames]
         payload = encode_intra(meshes, step, levels)
         if len(payload) >= most_bytes:
-            return None
+            continue
         quality = measure(frames, decode_intra(payload))
         if quality.reaches(target):
             return payload, quality
@@ -73,8 +75,14 @@ def cheapest_intra(
 
 def finest_intra(frames: Sequence[Mesh], step: float) -> tuple[bytes, Quality]:
     """The `draco` payload with every vertex kept: what remains when nothing cheaper reaches a target."""
-    payload = encode_intra(frames, step, 0)
+    payload = encode_intra(frames, coarse_enough(frames, step), 0)
     return payload, measure(frames, decode_intra(payload))
+
+
+def coarse_enough(frames: Sequence[Mesh], step: float) -> float:
+    """The lattice step, or the finest one that these frames' extent allows Draco."""
+    extent = max((float(np.ptp(f.vertices, axis=0).max()) for f in frames if not f.is_empty), default=0.0)
+    return max(step, extent / 2 ** (MAX_BITS - 1))
 
 
 def _on_one_frame(
@@ -83,16 +91,17 @@ def _on_one_frame(
     """Bytes, fraction, step and levels of what reaches the target on one frame and is below the budget."""
     for fraction in sorted(options.fractions):
         reduced = _reduced(frame, fraction)
-        sizes = [len(encode_intra([reduced], step * target.distance, 0)) for step in options.steps]
+        steps = [coarse_enough([frame], step * target.distance) for step in options.steps]
+        sizes = [len(encode_intra([reduced], step, 0)) for step in steps]
         if min(sizes) > budget:
             return  # more vertices cost more
         for levels in options.levels:
-            for step, size in zip(options.steps, sizes, strict=True):
+            for step, size in zip(steps, sizes, strict=True):
                 if size > budget:
                     break  # finer steps cost more
-                payload = encode_intra([reduced], step * target.distance, levels)
+                payload = encode_intra([reduced], step, levels)
                 if measure([frame], decode_intra(payload)).reaches(target):
-                    yield size, fraction, step * target.distance, levels
+                    yield size, fraction, step, levels
                     break
 
 

@@ -5,7 +5,7 @@ Reads beside encoder.py. Imports NumPy, DracoPy and the compiled core only: no O
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import overload
@@ -25,23 +25,45 @@ def open(source: str | Path | bytes | Source) -> Video:
     Raises FormatError where the header or the index are damaged, or of a version this reader does not know.
     """
     if isinstance(source, (str, Path)):
-        return Video(ReelReader(FileSource(source)))
+        file = FileSource(source)
+        try:
+            return Video(ReelReader(file), close=file.close)
+        except BaseException:
+            file.close()
+            raise
     return Video(ReelReader(BytesSource(source) if isinstance(source, bytes) else source))
 
 
 class Video(Sequence[Mesh]):
-    """Frames of a .reel file as a sequence of meshes; random access decodes one group and keeps it."""
+    """Frames of a .reel file as a sequence of meshes; random access decodes one group and keeps it.
 
-    def __init__(self, reader: ReelReader, components: int | None = None) -> None:
+    A file stays open until `close`, or until the end of a `with` block.
+    """
+
+    def __init__(
+        self, reader: ReelReader, components: int | None = None, close: Callable[[], None] | None = None
+    ) -> None:
         self.reader = reader
         self.components = components
+        self._close = close
         self._group: tuple[int, list[Mesh]] = (-1, [])
 
     def at(self, components: int | None) -> Video:
         """The same video with at most this many displacement components a group: fewer bytes, still valid."""
         if components is not None and components < 0:
             raise InputError(f"components must not be negative, got {components}")
-        return Video(self.reader, components)
+        return Video(self.reader, components, self._close)
+
+    def close(self) -> None:
+        """Closes the file; frames of other groups than the last one decoded can no longer be read."""
+        if self._close is not None:
+            self._close()
+
+    def __enter__(self) -> Video:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     @property
     def frame_rate(self) -> float:

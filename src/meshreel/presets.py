@@ -37,7 +37,7 @@ def preset_options(
         quality=quality,
         group_size=group_size,
         target=Quality(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
-        track=TrackOptions(centers=centers),
+        track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
         displacements=DisplacementOptions(step=step, basis_size=basis_size),
     )

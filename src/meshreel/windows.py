@@ -38,7 +38,7 @@ class EncoderOptions:
     group_size: int = 10  # most frames in a group, the paper's GoF
     reference_bits: int = 14  # of the reference's lattice (paper: qp = 14)
     levels: int = 1  # midpoint subdivisions of the decoded reference
-    target: Quality = Quality(0.0007, 6.0, 0.0014)  # what every frame should be worth, relative to its own diagonal
+    target: Quality = Quality(0.0005, 7.0, 0.0008)  # what every frame should be worth, relative to its own diagonal
     track: TrackOptions = field(default_factory=TrackOptions)
     reference: ReferenceOptions = field(default_factory=ReferenceOptions)
     fit: FitOptions = field(default_factory=FitOptions)
@@ -91,12 +91,14 @@ def encode_window(frames: Sequence[Mesh], options: EncoderOptions, stages: Stage
     else:
         centers = track_centers(frames, options.track)
         stages.add("track", len(frames))
-        groups = _encode_span(frames, centers, options, options.groups.depth)
+        groups = _encode_span(frames, centers, options, options.groups.depth, stages)
     stages.add("code", len(frames))
     return groups
 
 
-def analyze(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions) -> tuple[CodedReference, Fit]:
+def analyze(
+    frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, stages: Stages
+) -> tuple[CodedReference, Fit]:
     """The reference of a group as decoded, and its fit to every frame (paper, sections 3.3.1 and 3.3.2).
 
     Raises NoReferenceError where no surface can be made of the frames.
@@ -104,20 +106,24 @@ def analyze(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions) -
     reference = extract_reference(frames, centers, options.reference)
     if reference.mesh.is_empty:
         raise NoReferenceError("no surface is common to the frames")
+    stages.add("reference", len(frames))
     coded = code_reference(reference.mesh, options.reference_bits, options.levels)
     if coded.base.is_empty:
         raise NoReferenceError("the reference mesh has no faces left after Draco")
     predictions = predict(reference, coded.base, centers, options.reference.deform)
     fit = fit_frames(coded.base.faces, predictions, frames, replace(options.fit, key=reference.key))
+    stages.add("fit", len(frames))
     return coded, fit
 
 
-def _encode_span(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, depth: int) -> list[EncodedGroup]:
+def _encode_span(
+    frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, depth: int, stages: Stages
+) -> list[EncodedGroup]:
     """Groups of a run of frames: cut where the fit fails, `depth` times at most, then the cheaper of both forms."""
     if len(frames) == 1:
         return [_intra_only(frames, options)]
     try:
-        reference, fit = analyze(frames, centers, options)
+        reference, fit = analyze(frames, centers, options, stages)
     except NoReferenceError:
         return [_intra_only(frames, options)]
     residuals = np.array([residual.rms for residual in fit.residuals])
@@ -130,7 +136,11 @@ def _encode_span(frames: Sequence[Mesh], centers: Centers, options: EncoderOptio
         known = replace(centers, positions=centers.positions[:cut])
         anew = track_centers(tail, options.track)  # centers that were lost before the cut would spoil what follows
         quick = replace(options, reference=options.reference.fewer_trials())
-        return [*_encode_span(head, known, quick, depth - 1), *_encode_span(tail, anew, quick, depth - 1)]
+        again = Stages(None, len(frames))  # these frames have been through the stages once
+        return [
+            *_encode_span(head, known, quick, depth - 1, again),
+            *_encode_span(tail, anew, quick, depth - 1, again),
+        ]
     group = _laplacian(frames, reference, fit, options.displacements)
     return [group if options.displacements.basis_size is not None else _cheaper(frames, group, options)]
 

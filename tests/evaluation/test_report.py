@@ -35,6 +35,8 @@ def row(sequence, codec, mbps, db, **changed):
         "peer": {"frame_ms": 4.0, "qp": 9},
         "decode_over_peer": 5.0,
         "bridges": [0] * 10,
+        "degenerate_faces": [0] * 10,
+        "per_frame": [{"d2_psnr_paper": db}] * 10,
     }
     return base | changed
 
@@ -75,7 +77,7 @@ def judged(rows):
 
 def test_good_rows_keep_every_promise():
     promises = judged(GOOD)
-    assert len(promises) == 11
+    assert len(promises) == 14
     assert all(promise.met for promise in promises.values()), promises
 
 

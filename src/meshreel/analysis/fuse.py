@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from ..errors import InputError
 from ..geometry.decimate import decimate
+from ..geometry.holes import close_holes
 from ..geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
 from ..geometry.topology import clean, components, face_normals, subdivide_midpoint, unique_edges, vertex_normals
 from ..types import Mesh
@@ -37,6 +38,7 @@ class FuseOptions:
     reach: float = 1.5  # no surface farther than this from every point
     torn: float = 3.0  # a length that grows beyond this factor, plus half a center spacing, tears
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
+    hole: float = 0.08  # holes with a shorter perimeter are closed, as share of the mesh's diagonal: cuts leave them
     poisson: PoissonOptions = field(default_factory=PoissonOptions)
 
     def __post_init__(self) -> None:
@@ -117,7 +119,8 @@ class Group:
         bad = self._parting(edges, bind(mesh, pose, self.kin, self.deform), pose)
         for moved in self.sent(mesh, pose):
             bad |= self._torn(mesh.vertices, moved, edges)
-        return drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), self.fuse.smallest)
+        whole = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), self.fuse.smallest)
+        return close_holes(whole, self.fuse.hole * mesh.diagonal)
 
     def _moved(
         self, t: int, pose: Float64[np.ndarray, "K 3"]

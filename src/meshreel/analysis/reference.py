@@ -32,7 +32,7 @@ PROBES = 4000  # vertices of a frame that are measured in a trial
 class ReferenceOptions:
     """How the reference mesh is made and its pose chosen."""
 
-    vertices: int = 3000  # of the reference mesh
+    vertices: int = 2000  # of the reference mesh
     keys: int = 3  # frames tried as the one whose surface, and whose pose, is taken first
     canonical_keys: int = 2  # the best so many of them are tried with the MDS pose too
     canonical_gain: float = 0.85  # MDS must fit to this share of the best frame pose: it takes more components

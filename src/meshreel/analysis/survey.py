@@ -5,6 +5,7 @@ In -> out: MeshSequence -> Survey. Errors of any frame surface here, before minu
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol, runtime_checkable
@@ -16,6 +17,8 @@ from ..errors import InputError
 from ..geometry.topology import clean
 from ..types import Mesh, MeshSequence
 
+LARGEST_RATIO = 10.0  # of the diagonals of two frames in one window
+
 
 @dataclass(frozen=True, slots=True)
 class Survey:
@@ -23,7 +26,7 @@ class Survey:
 
     low: Float64[np.ndarray, "3"]  # corner of the sequence's bounding box, m
     high: Float64[np.ndarray, "3"]  # the opposite corner, m
-    empty: tuple[bool, ...]  # which frames have no surface
+    diagonals: tuple[float, ...]  # of each frame's bounding box, m; 0 for a frame without surface
 
     @property
     def center(self) -> Float64[np.ndarray, "3"]:
@@ -41,14 +44,22 @@ class Survey:
         return Mesh.of((mesh.vertices - self.center) / self.diagonal, mesh.faces)
 
     def windows(self, size: int) -> list[range]:
-        """Runs of at most `size` frames, each all empty or all with a surface, of even lengths."""
-        edges = [0, *(i for i in range(1, len(self.empty)) if self.empty[i] != self.empty[i - 1]), len(self.empty)]
+        """Runs of at most `size` frames, each all empty or all of about one scale, of even lengths."""
         windows = []
-        for start, stop in pairwise(edges):
+        for start, stop in pairwise([0, *self._breaks(), len(self.diagonals)]):
             parts = -(-(stop - start) // size)
             cuts = [start + (stop - start) * k // parts for k in range(parts + 1)]
             windows += [range(a, b) for a, b in pairwise(cuts)]
         return windows
+
+    def _breaks(self) -> Iterator[int]:
+        """Frames that cannot be in a window with the one before: with and without surface, or of another scale."""
+        least = most = self.diagonals[0]
+        for number, diagonal in enumerate(self.diagonals):
+            least, most = min(least, diagonal), max(most, diagonal)
+            if most > LARGEST_RATIO * least:
+                yield number
+                least = most = diagonal
 
 
 @runtime_checkable
@@ -62,18 +73,18 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     """The survey of a sequence, one frame in memory at a time. Raises InputError where there are no frames."""
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
-    low, high, empty = np.full(3, np.inf), np.full(3, -np.inf), []
+    low, high, diagonals = np.full(3, np.inf), np.full(3, -np.inf), []
     for number, mesh in enumerate(sequence):
         _check(mesh, f"frame {number}")
         mesh = clean(mesh)
-        empty.append(mesh.is_empty)
+        diagonals.append(0.0 if mesh.is_empty else mesh.diagonal)
         if not mesh.is_empty:
             low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
         if stages is not None:
             stages.add("survey", 1)
-    if all(empty):
+    if not np.isfinite(low).all():
         low, high = np.zeros(3), np.zeros(3)
-    return Survey(low, high, tuple(empty))
+    return Survey(low, high, tuple(diagonals))
 
 
 def _check(mesh: Mesh, where: str) -> None:

@@ -56,7 +56,9 @@ class TrackOptions:
 
 
 def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:
-    """Trajectories of at most `options.centers` volume centers through normalised frames, each with faces.
+    """Trajectories of about `options.centers` volume centers through normalised frames, each with faces.
+
+    Fewer where there are fewer samples, more where there are so many bodies that each gets its least.
 
     Bodies are the connected components of the first frame, without specks; each gets centers by its volume.
     """
@@ -106,8 +108,8 @@ def _spread_over_bodies(
 def _shares(sizes: Int64[np.ndarray, " B"], centers: int) -> Int64[np.ndarray, " B"]:
     """Centers of each body: by volume, a few at least, never more than it has samples."""
     counts = np.maximum(np.floor(centers * sizes / sizes.sum()).astype(np.int64), FEWEST_CENTERS)
-    counts[0] += centers - counts.sum()  # the largest body, which comes first, takes what rounding left
-    return np.minimum(np.maximum(counts, 1), sizes)
+    counts[0] = max(counts[0] + centers - counts.sum(), FEWEST_CENTERS)  # the largest body takes what rounding left
+    return np.minimum(counts, sizes)
 
 
 def _follow(

@@ -50,7 +50,8 @@ def command(
     quality
         0 (small) to 100 (fine).
     basis_size
-        Exactly this many KLT components per group; by rate-distortion where it is not given.
+        Exactly this many KLT components per group, and no per-frame Draco where that is cheaper; both by
+        rate-distortion where it is not given.
     centers
         Volume centers to track, the paper's K.
     group_size

@@ -28,7 +28,7 @@ LARGE = 1000  # vertices of a component that deserves all six anchors
 class DisplacementOptions:
     """How displacements are coded; lengths relative to the sequence's diagonal."""
 
-    step: float = 1.2e-3  # quantiser step of a component; the error is about half of it a component
+    step: float = 8e-4  # quantiser step of a component; the error is about half of it a component
     basis_size: int | None = None  # exactly so many components; None: as many as pay
     price: float = 0.5  # of one bit, in squared steps
     anchor_rule: AnchorRule = AnchorRule.FARTHEST

@@ -1,4 +1,4 @@
-"""Triangles that bridge bodies: decoded faces between vertices that belong to different bodies of the original frame.
+"""Triangles that should not be: those that bridge bodies which the original frame has apart, and those without area.
 
 In -> out: an original frame and its decoded one -> a count; 0 where all is well, and where the original is one piece.
 """
@@ -9,8 +9,14 @@ import numpy as np
 from jaxtyping import Int64
 
 from ..geometry.nearest import Surface
-from ..geometry.topology import components, drop_unreferenced, weld
+from ..geometry.topology import components, drop_unreferenced, face_normals, weld
 from ..types import Mesh
+
+
+def count_degenerate(mesh: Mesh) -> int:
+    """Faces with less than a thousandth of the median area."""
+    areas = face_normals(mesh)[1]
+    return int((areas < 1e-3 * np.median(areas)).sum()) if len(areas) else 0
 
 
 def count_bridges(original: Mesh, decoded: Mesh) -> int:

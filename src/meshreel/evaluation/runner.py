@@ -23,7 +23,7 @@ from .. import __version__
 from ..coding.mesh import encode_mesh
 from ..metrics.report import ComparisonOptions, compare_sequences
 from ..types import Mesh, MeshSequence
-from .bridges import count_bridges
+from .bridges import count_bridges, count_degenerate
 from .codec import Codec
 from .codecs import make_codec
 from .codecs.draco import lattice_step
@@ -78,7 +78,8 @@ def run_point(name: str, sequence: MeshSequence, codec: Codec, options: Comparis
         "machine": {"platform": platform.platform(), "python": platform.python_version(), "meshreel": __version__},
     }
     row |= compare_sequences(sequence, video, options).to_row()
-    return row | {"bridges": [count_bridges(a, b) for a, b in zip(sequence, video, strict=True)]}
+    row |= {"bridges": [count_bridges(a, b) for a, b in zip(sequence, video, strict=True)]}
+    return row | {"degenerate_faces": [count_degenerate(mesh) for mesh in video]}
 
 
 def measure_fresh_decode(data: bytes) -> Row:

@@ -1,0 +1,51 @@
+"""The survey: bounding box, scale, and windows that hold frames of one kind."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from meshreel.analysis.groups import GroupOptions, cut_at
+from meshreel.analysis.survey import survey
+from meshreel.types import Mesh, MeshList
+
+TRIANGLE = Mesh.of([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+
+
+def scaled(factor):
+    return Mesh.of(TRIANGLE.vertices * factor, TRIANGLE.faces)
+
+
+def test_windows_cover_every_frame_once_and_are_of_even_length():
+    windows = survey(MeshList((TRIANGLE,) * 23)).windows(10)
+    assert [i for window in windows for i in window] == list(range(23))
+    assert {len(window) for window in windows} == {7, 8}
+
+
+def test_a_window_is_all_empty_or_has_no_empty_frame():
+    windows = survey(MeshList((TRIANGLE, Mesh.empty(), Mesh.empty(), TRIANGLE))).windows(10)
+    assert [list(window) for window in windows] == [[0], [1, 2], [3]]
+
+
+def test_frames_of_very_different_scale_are_not_in_one_window():
+    windows = survey(MeshList((scaled(1), scaled(3), scaled(100), scaled(150)))).windows(10)
+    assert [list(window) for window in windows] == [[0, 1], [2, 3]]
+
+
+def test_normalised_frames_fit_a_box_of_diagonal_one_around_zero():
+    seen = survey(MeshList((scaled(7), scaled(9))))
+    vertices = seen.normalise(scaled(9)).vertices
+    assert np.allclose(vertices.min(axis=0) + vertices.max(axis=0), 0)
+    assert np.isclose(np.linalg.norm(np.ptp(vertices, axis=0)), 1)
+
+
+def test_frames_that_are_followed_are_not_cut():
+    assert cut_at(np.full(10, 0.9), GroupOptions()) is None
+    assert cut_at(np.array([5.0]), GroupOptions()) is None
+
+
+def test_a_group_is_cut_where_its_frames_stop_being_followed():
+    assert cut_at(np.array([0.5, 0.6, 0.5, 0.5, 4.0, 5.0, 4.5]), GroupOptions()) == 4
+
+
+def test_small_residuals_never_cut_however_uneven():
+    assert cut_at(np.array([0.01, 0.01, 0.9]), GroupOptions()) is None

@@ -1,0 +1,46 @@
+"""Small holes are closed, large ones stay open, and what was closed is not touched."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from meshreel.capture.procedural import deforming_sphere
+from meshreel.geometry.holes import close_holes
+from meshreel.geometry.topology import face_normals, unique_edges
+from meshreel.types import Mesh
+
+BALL = deforming_sphere(1, levels=3)[0]
+
+
+def open_edges(mesh):
+    edges, of_faces = unique_edges(mesh.faces)
+    return int((np.bincount(of_faces.reshape(-1), minlength=len(edges)) == 1).sum())
+
+
+def without_ring(mesh, vertex):
+    """The mesh without the faces at one vertex: a hole of one ring."""
+    return Mesh.of(mesh.vertices, mesh.faces[(mesh.faces != vertex).all(axis=1)])
+
+
+def test_a_closed_mesh_stays_as_it_is():
+    assert np.array_equal(close_holes(BALL, 1e9).faces, BALL.faces)
+
+
+def test_small_holes_are_closed_with_faces_that_look_outwards():
+    holed = without_ring(without_ring(BALL, 5), 200)
+    closed = close_holes(holed, 0.5 * np.pi)
+    assert open_edges(holed) > 0 and open_edges(closed) == 0
+    assert len(closed.vertices) == len(BALL.vertices) + 2
+    new = Mesh.of(closed.vertices, closed.faces[len(holed.faces) :])
+    outwards = new.vertices[new.faces].mean(axis=1) - BALL.vertices.mean(axis=0)
+    assert (np.einsum("fd,fd->f", face_normals(new)[0], outwards) > 0).all()
+
+
+def test_large_holes_stay_open():
+    above = BALL.vertices[:, 1] > BALL.vertices[:, 1].mean()
+    half = Mesh.of(BALL.vertices, BALL.faces[above[BALL.faces].all(axis=1)])
+    assert open_edges(close_holes(half, 0.1)) == open_edges(half) > 0
+
+
+def test_an_empty_mesh_has_no_holes():
+    assert close_holes(Mesh.empty(), 1.0).is_empty
