@@ -28,9 +28,9 @@ def open(source: str | Path | bytes | Source) -> Video:
         file = FileSource(source)
         try:
             return Video(ReelReader(file), close=file.close)
-        except BaseException:
+        except FormatError as error:
             file.close()
-            raise
+            raise FormatError(f"{source}: {error}") from error
     return Video(ReelReader(BytesSource(source) if isinstance(source, bytes) else source))
 
 

@@ -46,6 +46,8 @@ def command(
         Write a PNG: original, decoded, error heat map.
     """
     options = looking.options()
+    if sheet is not None and not sheet.parent.is_dir():
+        raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
     sequence = open_sequence(originals, reading.options())
     reel = is_reel(decoded)
     meshes = SequenceOptions(reading.fps, weld=weld)
