@@ -75,15 +75,17 @@ class Video(Sequence[Mesh]):
 
     def _frames(self, chunk: Chunk) -> list[Mesh]:
         """The decoded frames of a group, from the last call where it is the same group."""
-        if self._group[0] != chunk.number:
+        number, frames = self._group  # read once: threads may share a video
+        if number != chunk.number:
             layers = None if self.components is None else self.components + 1
             payload = self.reader.read_chunk(chunk.number, layers)
             try:
                 meshes = decode_group(payload, chunk.frame_count, self.components)
             except FormatError as error:
                 raise FormatError(f"{chunk}: {error}") from error
-            self._group = (chunk.number, [self._place(mesh) for mesh in meshes])
-        return self._group[1]
+            frames = [self._place(mesh) for mesh in meshes]
+            self._group = (chunk.number, frames)
+        return frames
 
     def _place(self, mesh: Mesh) -> Mesh:
         """A mesh in metres: the header's origin and scale undo the encoder's normalisation."""

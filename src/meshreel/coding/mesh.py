@@ -67,10 +67,13 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
     return mesh
 
 
-def check_growth(mesh: Mesh, levels: int) -> None:
-    """Raises FormatError where subdividing `levels` times would make an absurd mesh (over 64 million faces)."""
-    if len(mesh.faces) * 4**levels > MAX_FACES:
-        raise FormatError(f"{len(mesh.faces)} faces subdivided {levels} times exceed {MAX_FACES} faces")
+def check_growth(mesh: Mesh, levels: int, frames: int = 1) -> None:
+    """Raises FormatError where subdivision makes an absurd mesh, or frames (over 64 million faces or vertices)."""
+    if frames * max(len(mesh.faces) * 4**levels, len(mesh.vertices)) > MAX_FACES:
+        raise FormatError(
+            f"{len(mesh.faces)} faces of {len(mesh.vertices)} vertices, subdivided {levels} times, "
+            f"in {frames} frames: over {MAX_FACES}"
+        )
 
 
 def check_step(step: float) -> None:
