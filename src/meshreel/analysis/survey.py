@@ -24,6 +24,7 @@ class Survey:
     low: Float64[np.ndarray, "3"]  # corner of the sequence's bounding box, m
     high: Float64[np.ndarray, "3"]  # the opposite corner, m
     empty: tuple[bool, ...]  # which frames have no surface
+    flattened: tuple[int, ...] = ()  # frames that have faces, all without area: they count as empty
 
     @property
     def center(self) -> Float64[np.ndarray, "3"]:
@@ -62,18 +63,19 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     """The survey of a sequence, one frame in memory at a time. Raises InputError where there are no frames."""
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
-    low, high, empty = np.full(3, np.inf), np.full(3, -np.inf), []
+    low, high, empty, flattened = np.full(3, np.inf), np.full(3, -np.inf), list[bool](), list[int]()
     for number, mesh in enumerate(sequence):
         _check(mesh, f"frame {number}")
-        mesh = clean(mesh)
+        had_faces, mesh = not mesh.is_empty, clean(mesh)
         empty.append(mesh.is_empty)
+        flattened += [number] if had_faces and mesh.is_empty else []
         if not mesh.is_empty:
             low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
         if stages is not None:
             stages.add("survey", 1)
     if all(empty):
         low, high = np.zeros(3), np.zeros(3)
-    return Survey(low, high, tuple(empty))
+    return Survey(low, high, tuple(empty), tuple(flattened))
 
 
 def _check(mesh: Mesh, where: str) -> None:
