@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 
 import meshreel
+from meshreel.coding.entropy import encode_integers
 from meshreel.coding.group import decode_group
+from meshreel.coding.mesh import encode_mesh
+from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.errors import FormatError, InputError
+from meshreel.format.layout import AnchorRule, DisplacementHead, Form, LaplacianGroup
+from meshreel.format.records import pack
 from tests.golden import GOLDEN, frame_record
 
 MIXED = (GOLDEN / "mixed.reel").read_bytes()  # empty 0-1, laplacian 2-5, draco 6-8, empty 9
@@ -180,3 +185,33 @@ def test_a_truncated_head_a_future_version_and_another_file_are_refused():
 def test_a_missing_file_is_an_input_error(tmp_path):
     with pytest.raises(InputError, match=r"none\.reel"):
         meshreel.open(tmp_path / "none.reel")
+
+
+class Contended(meshreel.Video):
+    """As if another thread had always just put its own group in the place of the last one."""
+
+    @property
+    def _group(self):
+        return -1, []
+
+    @_group.setter
+    def _group(self, group):
+        pass
+
+
+def test_threads_that_share_a_video_get_the_frames_they_asked_for():
+    assert digests(Contended(ReelReader(BytesSource(MIXED)))) == WHOLE
+
+
+@pytest.mark.parametrize(("levels", "frames"), [(0, 65535), (8, 1000), (12, 4)])
+def test_frames_that_no_memory_holds_are_refused_before_they_are_made(levels, frames):
+    triangle = encode_mesh(meshreel.Mesh.of(np.eye(3) * 900, [[0, 1, 2]]), 1.0)
+    basis = encode_integers(np.zeros(3 * frames, np.int32))
+    head = DisplacementHead(frames, AnchorRule.SPREAD, 1, 1, 0, (), basis)
+    payload = pack(LaplacianGroup(Form.LAPLACIAN, levels, 1.0, triangle, pack(head)))
+    assert len(payload) < 300
+    if levels == 0:
+        assert len(decode_group(payload, frames)) == frames  # little enough
+        return
+    with pytest.raises(FormatError, match=f"in {frames} frames"):
+        decode_group(payload, frames)

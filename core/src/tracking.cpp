@@ -246,13 +246,13 @@ private:
     std::vector<double> self_, weights_;
 };
 
+bool in_range(double x) { return std::fabs(x) <= 1e100; }  // so are squares: among infinite distances no search ends
 bool sound(const meshreel_relaxation& p, const meshreel_relaxed& r) {
     if (!p.samples || !r.centers || !r.owners || p.sample_count < 1 || p.center_count < 1) return false;
     if (!(p.spread > 0) || !(p.rigidity >= 0) || p.max_rounds < 1) return false;
-    for (int64_t s = 0; s < 3 * p.sample_count; ++s)
-        if (!std::isfinite(p.samples[s])) return false;
+    for (int64_t s = 0; s < 3 * p.sample_count; ++s) if (!in_range(p.samples[s])) return false;
     for (int64_t i = 0; i < 3 * p.center_count; ++i)
-        if (!std::isfinite(r.centers[i]) || (p.previous && !std::isfinite(p.previous[i]))) return false;
+        if (!in_range(r.centers[i]) || (p.previous && !in_range(p.previous[i]))) return false;
     if (!p.previous) return true;
     const meshreel_neighbours& n = p.neighbours;
     if (!r.rotations || !n.offsets || n.offsets[0] != 0) return false;

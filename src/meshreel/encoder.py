@@ -39,6 +39,7 @@ class Summary:
 
     size: int  # bytes of the file
     groups: tuple[GroupSummary, ...]
+    warnings: tuple[str, ...] = ()  # what a user must know of frames that were not kept, a line each
 
     @property
     def frame_count(self) -> int:
@@ -68,7 +69,14 @@ def encode(
                 quality = group.quality.scaled(seen.diagonal)
                 groups.append(GroupSummary(group.form, group.frame_count, len(group.payload), quality))
         writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups))
-    return Summary(Path(path).stat().st_size, tuple(groups))
+    return Summary(Path(path).stat().st_size, tuple(groups), _warnings(seen))
+
+
+def _warnings(seen: Survey) -> tuple[str, ...]:
+    if not seen.flattened:
+        return ()
+    count, first = len(seen.flattened), seen.flattened[0]
+    return (f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)",)
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:

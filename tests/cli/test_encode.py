@@ -165,3 +165,24 @@ def test_a_file_that_is_there_stays_as_it_is_when_encoding_fails(run, balls, tmp
 def test_debug_shows_the_traceback(run, tmp_path):
     with pytest.raises(meshreel.InputError):
         run("encode", tmp_path / "none", "-o", tmp_path / "a.reel", "--debug")
+
+
+def test_frames_whose_faces_have_no_area_are_told(run, tmp_path):
+    obj(tmp_path, "f0.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
+    said = run("encode", tmp_path, "-o", tmp_path / "a.reel")
+    assert said.code == 0 and "1 empty" in said.out
+    assert "1 frames have faces, but none with an area" in said.err
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_any_name_that_a_file_may_have_can_be_the_output(run, tmp_path):
+    obj(tmp_path, "f0.obj", TRIANGLE + "f 1 2 3\n")
+    out = tmp_path / ("n" * 250 + ".reel")
+    assert run("encode", tmp_path, "-o", out).code == 0
+    assert out.exists()
+
+
+def test_a_size_that_no_header_holds_is_told_before_anything_is_coded(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("meshreel.encoder.encode_window", lambda *_: pytest.fail("coded"))
+    obj(tmp_path, "f0.obj", TRIANGLE.replace("1", "1e12") + "f 1 2 3\n")
+    assert failed(run("encode", tmp_path, "-o", tmp_path / "a.reel", "--scale", "1e9"), "Header.scale")

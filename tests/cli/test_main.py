@@ -75,3 +75,19 @@ def test_a_module_run_exits_with_the_code(tmp_path):
     answer = subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ)
     assert (answer.returncode, answer.stdout) == (2, "")
     assert answer.stderr.count("\n") == 1 and "none.reel" in answer.stderr
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_that_an_import_made_an_error_of_is_still_told_as_a_signal(run, monkeypatch, number, code):
+    def importing(*_):
+        try:
+            signal.raise_signal(number)
+        except BaseException as error:
+            raise ImportError("initialization failed") from error
+
+    before = signal.getsignal(number)
+    monkeypatch.setattr("meshreel.cli.info.describe_file", importing)
+    said = run("info", "a.reel")
+    assert (said.code, said.out, said.err.count("\n")) == (code, "", 1)
+    assert said.err in ("meshreel: interrupted\n", "meshreel: terminated\n")
+    assert signal.getsignal(number) is before

@@ -59,7 +59,9 @@ def test_an_index_that_contradicts_itself_is_refused(chunks, message):
         check_index(Index(chunks))
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{", "NaN", '{"a": Infinity}', "[" * 60000, "1" * 60000])
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", "NaN", '{"a": Infinity}', '{"a": 1e999}', '{"a": "\\ud800"}', "[" * 60000, "1" * 60000]
+)
 def test_metadata_that_is_no_json_object_is_refused(text):
     with pytest.raises(FormatError, match=r"Header\.metadata"):
         parse_metadata(text)

@@ -27,6 +27,7 @@ class Survey:
     low: Float64[np.ndarray, "3"]  # corner of the sequence's bounding box, m
     high: Float64[np.ndarray, "3"]  # the opposite corner, m
     diagonals: tuple[float, ...]  # of each frame's bounding box, m; 0 for a frame without surface
+    flattened: tuple[int, ...] = ()  # frames that have faces, all without area: they count as empty
 
     @property
     def center(self) -> Float64[np.ndarray, "3"]:
@@ -73,18 +74,20 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     """The survey of a sequence, one frame in memory at a time. Raises InputError where there are no frames."""
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
-    low, high, diagonals = np.full(3, np.inf), np.full(3, -np.inf), []
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    diagonals, flattened = list[float](), list[int]()
     for number, mesh in enumerate(sequence):
         _check(mesh, f"frame {number}")
-        mesh = clean(mesh)
+        had_faces, mesh = not mesh.is_empty, clean(mesh)
         diagonals.append(0.0 if mesh.is_empty else mesh.diagonal)
+        flattened += [number] if had_faces and mesh.is_empty else []
         if not mesh.is_empty:
             low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
         if stages is not None:
             stages.add("survey", 1)
     if not np.isfinite(low).all():
         low, high = np.zeros(3), np.zeros(3)
-    return Survey(low, high, tuple(diagonals))
+    return Survey(low, high, tuple(diagonals), tuple(flattened))
 
 
 def _check(mesh: Mesh, where: str) -> None:

@@ -50,8 +50,9 @@ def make_app() -> App:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; 0, or 2 after an error, 130 after an interrupt, 143 after SIGTERM. Exits where called bare."""
     tokens = list(sys.argv[1:] if arguments is None else arguments)
+    stopped: list[int] = []
     try:
-        with _sigterm_raises():
+        with _signals_raise(stopped):
             make_app()(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         code = 0
     except KeyboardInterrupt:
@@ -59,9 +60,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Terminated:
         code = _tell("terminated", TERMINATED)
     except Exception as error:
-        if "--debug" in tokens:
+        if stopped:  # a compiled module that is being imported makes an ImportError of a signal
+            code = _tell(*(("terminated", TERMINATED) if signal.SIGTERM in stopped else ("interrupted", INTERRUPTED)))
+        elif "--debug" in tokens:
             raise
-        code = _tell(f"error: {one_line(error)}", FAILED)
+        else:
+            code = _tell(f"error: {one_line(error)}", FAILED)
     if arguments is None:
         sys.exit(code)
     return code
@@ -89,16 +93,20 @@ def _tell(text: str, code: int) -> int:
 
 
 @contextmanager
-def _sigterm_raises() -> Iterator[None]:
+def _signals_raise(stopped: list[int]) -> Iterator[None]:
+    """SIGINT and SIGTERM become exceptions, and their numbers are put into `stopped`."""
+
+    def stop(number: int, _frame: FrameType | None) -> NoReturn:
+        stopped.append(number)
+        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread may set handlers
         return
-    before = signal.signal(signal.SIGTERM, _terminate)
+    heard = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, stop) for number in heard}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _terminate(_number: int, _frame: FrameType | None) -> NoReturn:
-    raise Terminated
+        for number, handler in before.items():
+            signal.signal(number, handler)

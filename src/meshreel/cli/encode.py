@@ -68,9 +68,10 @@ def command(
     sequence = open_sequence(source, reading.options())
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
         summary = encode(sequence, output, options, executor, progress)
-    common.warn(sequence.warnings)
+    warnings = (*sequence.warnings, *summary.warnings)
+    common.warn(warnings)
     row = summary_row(summary, sequence.frame_rate)
-    common.result({"output": str(output), "warnings": sequence.warnings} | row, f"{output}: {describe(row)}")
+    common.result({"output": str(output), "warnings": warnings} | row, f"{output}: {describe(row)}")
 
 
 def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:

@@ -60,6 +60,11 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
     return klt.inverse(weights, _read_basis(head, count))  # eq. 9
 
 
+def frames_of(data: bytes) -> int:
+    """The number of frames a payload claims, from its head alone."""
+    return _read_head(data)[0].frames
+
+
 def layer_sizes(data: bytes) -> list[int]:
     """Bytes of the head and of each component: any sum of the first k + 1 is a prefix that decodes k components."""
     head, offset = _read_head(data)

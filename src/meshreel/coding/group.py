@@ -17,7 +17,7 @@ from ..format.layout import DracoGroup, Form, LaplacianGroup
 from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh
-from .displacements import DisplacementOptions, decode_displacements, encode_displacements, layer_sizes
+from .displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
 from .intra import decode_empty, decode_intra
 from .mesh import check_growth, check_step, decode_mesh, encode_mesh
 
@@ -73,7 +73,7 @@ def decode_group(data: bytes, frame_count: int, components: int | None = None) -
 def _decode_laplacian(record: LaplacianGroup, components: int | None) -> list[Mesh]:
     check_step(record.step)
     reference = decode_mesh(record.reference, record.step)
-    check_growth(reference, record.levels)
+    check_growth(reference, record.levels, frames_of(record.displacements))
     base = subdivide_midpoint(reference, record.levels)
     field = decode_displacements(record.displacements, base, components)
     return [Mesh(np.ascontiguousarray(base.vertices + field[:, t]), base.faces) for t in range(field.shape[1])]

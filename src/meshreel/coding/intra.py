@@ -28,7 +28,7 @@ def decode_intra(data: bytes) -> list[Mesh]:
     meshes = []
     for frame in record.meshes:
         mesh = decode_mesh(frame, record.step)
-        check_growth(mesh, record.levels)
+        check_growth(mesh, record.levels, len(record.meshes))
         meshes.append(subdivide_midpoint(mesh, record.levels))
     return meshes
 

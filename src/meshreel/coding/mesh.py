@@ -15,7 +15,7 @@ from ..types import Mesh
 
 MAX_BITS = 21  # float32 positions inside Draco hold no more
 COMPRESSION_LEVEL = 7  # the paper's
-MAX_FACES = 16_000_000
+MAX_FACES = 64_000_000
 
 
 def encode_mesh(mesh: Mesh, step: float) -> bytes:
@@ -67,10 +67,13 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
     return mesh
 
 
-def check_growth(mesh: Mesh, levels: int) -> None:
-    """Raises FormatError where subdividing `levels` times would make an absurd mesh (over 16 million faces)."""
-    if len(mesh.faces) * 4**levels > MAX_FACES:
-        raise FormatError(f"{len(mesh.faces)} faces subdivided {levels} times exceed {MAX_FACES} faces")
+def check_growth(mesh: Mesh, levels: int, frames: int = 1) -> None:
+    """Raises FormatError where subdivision makes an absurd mesh, or frames (over 64 million faces or vertices)."""
+    if frames * max(len(mesh.faces) * 4**levels, len(mesh.vertices)) > MAX_FACES:
+        raise FormatError(
+            f"{len(mesh.faces)} faces of {len(mesh.vertices)} vertices, subdivided {levels} times, "
+            f"in {frames} frames: over {MAX_FACES}"
+        )
 
 
 def check_step(step: float) -> None:

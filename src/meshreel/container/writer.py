@@ -50,6 +50,7 @@ class ReelWriter:
             pack(self.header)
             check_header(self.header, len(self.header.intervals) + 1)  # now, not when all is coded
             parse_metadata(self.header.metadata)
+            check_header(self.header, len(self.header.intervals) + 1)  # now, not when all is encoded
             self._spool = _open_spool(self._target)
         return self
 
@@ -108,7 +109,7 @@ class ReelWriter:
         if not isinstance(self._target, Path):
             _copy(head, self._spool, self._target)
             return
-        partial = self._target.with_name(f".{self._target.name}.{uuid.uuid4().hex}.tmp")
+        partial = self._target.with_name(f".{uuid.uuid4().hex}.tmp")  # short: any name that may be final has room
         try:
             with partial.open("xb") as file:
                 _copy(head, self._spool, file)

@@ -48,6 +48,9 @@ def parse_metadata(text: str) -> dict[str, Any]:
     """The JSON object of Header.metadata."""
     try:
         metadata = json.loads(text, parse_constant=_refuse)
+        json.dumps(
+            metadata, allow_nan=False, ensure_ascii=False
+        ).encode()  # 1e999 and half a surrogate can be read only
     except (ValueError, RecursionError) as error:
         raise FormatError(f"Header.metadata: not JSON: {text!r:.40}") from error
     if not isinstance(metadata, dict):

@@ -5,7 +5,9 @@ Stored or deflated, the stream is read forward: memory holds one frame; going ba
 
 from __future__ import annotations
 
+import tokenize
 import zipfile
+import zlib
 from pathlib import Path
 from typing import IO
 
@@ -16,7 +18,10 @@ from ..errors import InputError
 from .meshes import Loaded, checked
 from .polygons import Polygons, Unreadable
 
-_DAMAGED = (OSError, ValueError, EOFError, zipfile.BadZipFile, NotImplementedError)  # what NumPy and zipfile raise
+_DAMAGED = (  # what NumPy and zipfile raise; RuntimeError: it is encrypted
+    *(OSError, ValueError, EOFError, SyntaxError, tokenize.TokenError, RecursionError),
+    *(zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError),
+)
 
 
 class Archive:
@@ -27,10 +32,11 @@ class Archive:
         self._stream: IO[bytes] | None = None
         try:
             with zipfile.ZipFile(path) as archive:
-                names = sorted(Path(name).stem for name in archive.namelist())
-                if not {"vertices", "faces"} <= set(names):
+                names = sorted(name.removesuffix(".npy") for name in archive.namelist())
+                if not {"vertices.npy", "faces.npy"} <= set(archive.namelist()):
                     raise InputError(f"{path}: has {', '.join(names) or 'nothing'}; save it as 'vertices' and 'faces'")
                 self._shape, self._dtype, self._begin = _head(archive, "vertices")
+                _head(archive, "faces")  # refuses more than there is before it is allocated
                 faces = np.load(path, allow_pickle=False)["faces"]
         except _DAMAGED as error:
             raise InputError(f"{path}: cannot be read as .npz ({error}); write it again with numpy.savez") from None
@@ -84,6 +90,7 @@ def _head(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtyp
         raise ValueError(f"'{name}' is in Fortran order; save numpy.ascontiguousarray of it")
     if (
         dtype.hasobject
+        or min(shape, default=0) < 0
         or begin + int(np.prod(shape, dtype=object)) * dtype.itemsize > archive.getinfo(member).file_size
     ):
         raise ValueError(f"'{name}' announces {dtype} {shape}, more than the file holds")

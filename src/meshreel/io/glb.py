@@ -39,13 +39,17 @@ def _json_chunk(data: bytes) -> dict[str, Any]:
         raise Unreadable(f"GLB announces {total} bytes but has {len(data)} (truncated?)")
     try:
         tree = json.loads(data[20 : 20 + length])
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise Unreadable(f"GLB scene description is no JSON ({error})") from None
     if not isinstance(tree, dict):
         raise Unreadable("GLB scene description is no JSON object")
-    for accessor in tree.get("accessors") or ():
-        if isinstance(accessor, dict) and not 0 <= accessor.get("count", 0) <= _DENSEST * len(data):
-            raise Unreadable(f"GLB announces {accessor['count']} values in {len(data)} bytes")
+    accessors = tree.get("accessors") or []
+    for accessor in accessors if isinstance(accessors, list) else [None]:
+        count = accessor.get("count", 0) if isinstance(accessor, dict) else None
+        if not isinstance(count, int):
+            raise Unreadable("GLB accessors are no list of objects with a whole count")
+        if not 0 <= count <= _DENSEST * len(data):
+            raise Unreadable(f"GLB announces {count} values in {len(data)} bytes")
     return tree
 
 

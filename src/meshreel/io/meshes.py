@@ -49,6 +49,8 @@ def read_mesh(path: Path, where: str | None = None) -> Loaded:
     if parse is None:
         raise InputError(f"{where}: {path.suffix or 'no'} extension is not one of {', '.join(EXTENSIONS)}; convert it")
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise OSError("it is a pipe or a device, which cannot be read twice")
         data = path.read_bytes()
     except OSError as error:
         raise InputError(

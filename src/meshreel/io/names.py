@@ -22,7 +22,11 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, 
     if not isinstance(source, str | Path):
         return tuple(Path(path) for path in source), ()
     path = Path(source)
-    if path.is_dir():
+    try:
+        is_folder = path.is_dir()
+    except OSError as error:  # a name too long, a folder above it that may not be entered
+        raise InputError(f"{source}: cannot be read ({error.strerror}); check the path and its rights") from None
+    if is_folder:
         return _ordered(path, _of_one_kind(path))
     if path.exists():
         return (path,), ()
@@ -37,7 +41,10 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, 
 def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
     fixed = next(k for k, part in enumerate(pattern.parts) if _MAGIC.search(part))
     root = Path(*pattern.parts[:fixed])
-    found = [path for path in root.glob(str(Path(*pattern.parts[fixed:]))) if _is_mesh(path)]
+    try:
+        found = [path for path in root.glob(str(Path(*pattern.parts[fixed:]))) if _is_mesh(path)]
+    except ValueError as error:
+        raise InputError(f"{pattern}: is no pattern ({error}); mend it, or name the folder") from None
     return root, found
 
 

@@ -20,6 +20,7 @@ _TYPES = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
+_DIGITS = 18  # of a number of rows: more is damage, and fits no machine's integers
 _INDICES = ("vertex_indices", "vertex_index")
 _DROPS = {
     "normals": {"nx", "ny", "nz"},
@@ -76,7 +77,7 @@ def _header(lines: list[str]) -> tuple[str, list[_Element]]:
         match words:
             case ["format", ("ascii" | "binary_little_endian" | "binary_big_endian") as encoding, _]:
                 pass
-            case ["element", name, rows] if rows.isdecimal():
+            case ["element", name, rows] if rows.isdecimal() and len(rows) <= _DIGITS:
                 elements.append(_Element(name, int(rows), ()))
             case ["property", "list", count, kind, name] if count in _TYPES and kind in _TYPES and elements:
                 elements[-1] = _with(elements[-1], _Property(name, _dtype(kind, encoding), _dtype(count, encoding)))
@@ -151,7 +152,7 @@ class _Binary:
         """The element's single values by name, and the wanted list's items (flat) and lengths."""
         if self._at + element.least_bytes > len(self._data):
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but the file is too short (truncated?)")
-        if element.rows == 0:
+        if element.rows == 0 or not element.properties:
             return {p.name: np.zeros(0) for p in element.properties}, np.zeros(0, np.int64), np.zeros(0, np.int64)
         lengths = self._lengths_of_first_row(element)
         fields = [(f"{k}", p.dtype, (n,)) for k, (p, n) in enumerate(zip(element.properties, lengths, strict=True))]

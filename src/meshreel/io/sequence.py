@@ -19,7 +19,7 @@ from .archive import Archive
 from .meshes import Loaded, read_mesh
 from .names import find_frames
 
-_FRAMES = re.compile(r"(-?\d+)?:(-?\d+)?")
+_FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
 # Between the diagonals of two frames: more than a person who crouches or a second one who enters.
 _SUSPICIOUS_RATIO = 20.0
 

@@ -6,6 +6,7 @@ In: a mesh and a path whose extension picks the format. Out: a file that `open_s
 from __future__ import annotations
 
 import json
+import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -31,7 +32,7 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """A file that takes its final name at the end of the block; on any failure nothing is left behind."""
-    temporary = path.with_name(f".{path.name}.part")
+    temporary = path.with_name(f".{uuid.uuid4().hex}.part")  # its own: two may write one name
     try:
         with temporary.open("wb") as file:
             yield file

@@ -172,7 +172,7 @@ def read_cameras(path: Path) -> list[PinholeCamera]:
     try:
         record = json.loads(path.read_text())
         return [_parse(entry) for entry in record.get("parameters", [record])]
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise InputError(f"{path}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
     except (KeyError, TypeError, ValueError, AttributeError, np.linalg.LinAlgError) as error:
         raise InputError(f"{path}: not Open3D pinhole camera JSON ({error!r})") from error
