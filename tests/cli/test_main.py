@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -91,3 +92,12 @@ def test_a_signal_that_an_import_made_an_error_of_is_still_told_as_a_signal(run,
     assert (said.code, said.out, said.err.count("\n")) == (code, "", 1)
     assert said.err in ("meshreel: interrupted\n", "meshreel: terminated\n")
     assert signal.getsignal(number) is before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX pipes")
+def test_a_reader_that_leaves_is_no_error():
+    closed = "import os; r, w = os.pipe(); os.close(r); os.dup2(w, 1)"
+    code = f"{closed}; from meshreel.cli import main; main()"
+    golden = Path(__file__).parents[2] / "conformance" / "v1" / "draco.reel"
+    done = subprocess.run([sys.executable, "-c", code, "info", golden, "--json"], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (141, "")

@@ -6,6 +6,8 @@ when it is called: `decode` and `info` work where the extra `encode` is not inst
 
 from __future__ import annotations
 
+import io
+import os
 import signal
 import sys
 import threading
@@ -23,6 +25,7 @@ from ..errors import MeshreelError
 FAILED = 2
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 TERMINATED = 143  # 128 + SIGTERM
+PIPE_CLOSED = 141  # 128 + SIGPIPE
 
 COMMANDS = {
     "encode": "Encode a sequence of meshes into one .reel file.",
@@ -48,9 +51,14 @@ def make_app() -> App:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command; 0, or 2 after an error, 130 after an interrupt, 143 after SIGTERM. Exits where called bare."""
+    """Runs one command; 0, or 2 after an error, 130 after an interrupt, 143 after SIGTERM, 141 where nobody reads.
+
+    Exits where called bare.
+    """
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     stopped: list[int] = []
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file name that the terminal cannot show is no failure
     try:
         with _signals_raise(stopped):
             make_app()(tokens, exit_on_error=False, print_error=False, result_action="return_value")
@@ -59,6 +67,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _tell("interrupted", INTERRUPTED)
     except Terminated:
         code = _tell("terminated", TERMINATED)
+    except BrokenPipeError:  # whoever read our output has left; nothing more can be said there
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  (or the interpreter complains at its end)
+        code = PIPE_CLOSED
     except Exception as error:
         if stopped:  # a compiled module that is being imported makes an ImportError of a signal
             code = _tell(*(("terminated", TERMINATED) if signal.SIGTERM in stopped else ("interrupted", INTERRUPTED)))
