@@ -32,7 +32,7 @@ def test_a_run_writes_rows_and_goes_on_where_it_was(run, tiny):
     assert first.code == 0 and "dancer draco qp 9:" in first.err and "not measured" in first.out
     second = run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--no-ssim", "--json")
     assert "(measured before)" in second.err.splitlines()[0]
-    assert second.row["rows"] == 2 and len(second.row["promises"]) == 11
+    assert second.row["rows"] == 2 and len(second.row["promises"]) == 14
     assert len(rows.read_text().splitlines()) == 2
     said = run("bench", "report", rows, "-o", tiny / "out", "--json")
     assert [path.rsplit("/", 1)[1] for path in said.row["files"]] == ["results.md", "dancer.png"]

@@ -11,7 +11,10 @@ from tests.cli.conftest import failed
 
 @pytest.mark.usefixtures("quick_presets")
 def test_the_demo_leaves_a_file_and_a_picture_and_tells_its_numbers(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.cli.demo.SoftBodiesOptions", lambda frames: SoftBodiesOptions(frames, 30.0, 0.06, 1))
+    def small(frames, begin):
+        return SoftBodiesOptions(frames, 30.0, 0.06, 1, begin=begin)
+
+    monkeypatch.setattr("meshreel.cli.demo.SoftBodiesOptions", small)
     said = run("demo", "-o", tmp_path / "demo", "--frames", "2", "--no-ssim", "--json")
     assert said.code == 0
     assert said.row["frames"] == 2 and said.row["d2_psnr_paper"] > 40
