@@ -1,6 +1,7 @@
-"""Runs the Python of a documentation page, in order, in the folder it is called from: `python run_page.py PAGE`.
+"""Runs the Python of a documentation page, in order, in the current folder: `python run_page.py PAGE [small]`.
 
-A process of its own, so that it runs as for a user, without the tests' type checks. Everything in the preset is small.
+A process of its own, so that it runs as for a user, without the tests' type checks. `small` is for pages that have no
+meshes of their own: it makes a folder `scan`, and everything in the preset is small.
 """
 
 from __future__ import annotations
@@ -17,8 +18,15 @@ def blocks(page: Path, language: str) -> str:
     return "\n".join(re.findall(rf"```{language}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
 
 
-def main(page: Path) -> None:
-    """Runs the page on a folder `scan`, made here."""
+def main(page: Path, given: bool) -> None:
+    """Runs the page, with meshes and small presets if these are to be given to it."""
+    if given:
+        give()
+    exec(compile(blocks(page, "python"), str(page), "exec"), {"__name__": "page"})
+
+
+def give() -> None:
+    """Makes a folder `scan`, and the presets small."""
     import meshreel
     from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
     from meshreel.io.write import write_mesh
@@ -27,7 +35,6 @@ def main(page: Path) -> None:
     Path("scan").mkdir()
     for number, mesh in enumerate(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.06))):
         write_mesh(mesh, Path("scan") / f"frame_{number:05}.ply")
-    exec(compile(blocks(page, "python"), str(page), "exec"), {"__name__": "page"})
 
 
 def small(preset_options: Any) -> Any:
@@ -48,4 +55,4 @@ def small(preset_options: Any) -> Any:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(Path(sys.argv[1]), sys.argv[2:] == ["small"])

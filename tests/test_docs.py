@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import meshreel
+from meshreel.format.layout import Form
 from tests.run_page import blocks
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -19,11 +20,17 @@ PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 RUN = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
 
 
-@pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
-def test_the_python_of_the_docs_runs(page: Path, tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "tests" / "run_page.py"), str(page)]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=_environment())
-    assert done.returncode == 0, done.stdout + done.stderr
+def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
+    _run_page(RUN[0], tmp_path, "small")
+
+
+def test_the_tutorial_runs_as_it_stands_and_shows_components(tmp_path: Path) -> None:
+    printed = _run_page(RUN[1], tmp_path)
+    with meshreel.open(tmp_path / "scan.reel") as video:
+        assert [group.form for group in video.reader.groups] == [Form.LAPLACIAN]
+    sizes, away = zip(*re.findall(r"(\d+) bytes, ([\d.]+) mm", printed), strict=True)
+    assert len(sizes) == 4 and sorted(sizes, key=int) == list(sizes) and len(set(sizes)) == 4
+    assert sorted(away, key=float, reverse=True) == list(away) and float(away[-1]) == 0 and len(set(away)) == 4
 
 
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
@@ -56,6 +63,14 @@ def test_the_pictures_are_small() -> None:
     sizes = [path.stat().st_size for path in (ROOT / "docs" / "pictures").iterdir()]
     assert max(sizes) <= 200_000
     assert sum(sizes) <= 1_500_000
+
+
+def _run_page(page: Path, folder: Path, *arguments: str) -> str:
+    """What the page prints."""
+    command = [sys.executable, str(ROOT / "tests" / "run_page.py"), str(page), *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=_environment())
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
 
 
 def _environment() -> dict[str, str]:
