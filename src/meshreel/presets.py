@@ -34,7 +34,7 @@ def preset_options(
     step = displacement_step(quality)
     return EncoderOptions(
         preset=preset,
-        quality=quality,
+        quality=float(quality),
         group_size=group_size,
         target=Quality(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
