@@ -127,7 +127,7 @@ def test_the_report_is_made_of_the_rows(tmp_path):
     assert page.count("| met |") == 14 and "MISSED" not in page
     assert "BD-rate by `d2_psnr_paper`: meshreel paper against decimated_draco_subdivided" in page
     assert "TSMC, released code: 2.23 Mbps 51.87 dB" in page
-    assert all((tmp_path / f"{name}.png").read_bytes()[:4] == b"\x89PNG" for name in ("dancer", "mitch"))
+    assert all((tmp_path / "results" / f"{name}.png").read_bytes()[:4] == b"\x89PNG" for name in ("dancer", "mitch"))
 
 
 def test_a_metric_that_was_not_measured_has_no_panel_and_no_number(tmp_path):

@@ -27,9 +27,10 @@ REFERENCED = ("d2_psnr_paper",)  # what reference curves have
 
 def write_report(rows: Sequence[Row], chosen: ModuleType, folder: Path) -> list[Path]:
     """Writes `results.md` and a plot per sequence into `folder`, as the experiment `chosen` judges; the paths."""
-    folder.mkdir(parents=True, exist_ok=True)
+    pictures = folder / "results"
+    pictures.mkdir(parents=True, exist_ok=True)
     names = list(dict.fromkeys(row["sequence"] for row in rows if row["kind"] == "quality"))
-    plots = [plot_curves(select(rows, n), chosen.references(n), folder / f"{n}.png") for n in names]
+    plots = [plot_curves(select(rows, n), chosen.references(n), pictures / f"{n}.png") for n in names]
     page = folder / "results.md"
     with replacing(page) as file:
         file.write(("\n".join(_page(rows, names, chosen)) + "\n").encode())
@@ -114,7 +115,7 @@ def _page(rows: Sequence[Row], names: Sequence[str], chosen: ModuleType) -> Iter
     yield from promise_table(chosen.promises(rows))
     for sequence in names:
         own = select(rows, sequence)
-        yield from ("", f"## {sequence}, {own[0]['frames']} frames", "", f"![{sequence}]({sequence}.png)", "")
+        yield from ("", f"## {sequence}, {own[0]['frames']} frames", "", f"![{sequence}](results/{sequence}.png)", "")
         yield from (*point_table(own), "", *bd_lines(own))
         for curve, points in chosen.references(sequence).items():
             told = "; ".join(f"{mbps:g} Mbps {psnr:g} dB" for mbps, psnr in points)
