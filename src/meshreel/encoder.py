@@ -73,10 +73,14 @@ def encode(
 
 
 def _warnings(seen: Survey) -> tuple[str, ...]:
-    if not seen.flattened:
-        return ()
-    count, first = len(seen.flattened), seen.flattened[0]
-    return (f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)",)
+    found = []
+    if seen.dropped:
+        found.append(f"{seen.dropped} faces without area or with the vertices of another face are not kept")
+    if seen.flattened:
+        count, first = len(seen.flattened), seen.flattened[0]
+        text = f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)"
+        found.append(text)
+    return tuple(found)
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:

@@ -38,6 +38,11 @@ def test_normalised_frames_fit_a_box_of_diagonal_one_around_zero():
     assert np.isclose(np.linalg.norm(np.ptp(vertices, axis=0)), 1)
 
 
+def test_faces_that_are_not_kept_are_counted():
+    doubled = Mesh.of(TRIANGLE.vertices, [[0, 1, 2], [2, 1, 0], [0, 0, 1]])
+    assert survey(MeshList((TRIANGLE, doubled))).dropped == 2
+
+
 def test_frames_that_are_followed_are_not_cut():
     assert cut_at(np.full(10, 0.9), GroupOptions()) is None
     assert cut_at(np.array([5.0]), GroupOptions()) is None

@@ -28,6 +28,7 @@ class Survey:
     high: Float64[np.ndarray, "3"]  # the opposite corner, m
     diagonals: tuple[float, ...]  # of each frame's bounding box, m; 0 for a frame without surface
     flattened: tuple[int, ...] = ()  # frames that have faces, all without area: they count as empty
+    dropped: int = 0  # faces without area, or the same three vertices as another, in all frames: they are not kept
 
     @property
     def center(self) -> Float64[np.ndarray, "3"]:
@@ -75,10 +76,11 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    diagonals, flattened = list[float](), list[int]()
+    diagonals, flattened, dropped = list[float](), list[int](), 0
     for number, mesh in enumerate(sequence):
         _check(mesh, f"frame {number}")
-        had_faces, mesh = not mesh.is_empty, clean(mesh)
+        had_faces, before, mesh = not mesh.is_empty, len(mesh.faces), clean(mesh)
+        dropped += before - len(mesh.faces)
         diagonals.append(0.0 if mesh.is_empty else mesh.diagonal)
         flattened += [number] if had_faces and mesh.is_empty else []
         if not mesh.is_empty:
@@ -87,7 +89,7 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
             stages.add("survey", 1)
     if not np.isfinite(low).all():
         low, high = np.zeros(3), np.zeros(3)
-    return Survey(low, high, tuple(diagonals), tuple(flattened))
+    return Survey(low, high, tuple(diagonals), tuple(flattened), dropped)
 
 
 def _check(mesh: Mesh, where: str) -> None:
