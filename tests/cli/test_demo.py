@@ -11,8 +11,8 @@ from tests.cli.conftest import failed
 
 @pytest.mark.usefixtures("quick_presets")
 def test_the_demo_leaves_a_file_and_a_picture_and_tells_its_numbers(run, tmp_path, monkeypatch):
-    def small(frames, begin):
-        return SoftBodiesOptions(frames, 30.0, 0.06, 1, begin=begin)
+    def small(frames, frame_rate, begin):
+        return SoftBodiesOptions(frames, frame_rate, 0.06, 1, begin=begin)
 
     monkeypatch.setattr("meshreel.cli.demo.SoftBodiesOptions", small)
     said = run("demo", "-o", tmp_path / "demo", "--frames", "2", "--no-ssim", "--json")
