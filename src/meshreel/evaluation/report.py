@@ -24,6 +24,8 @@ METRICS = (
 ANCHOR = "decimated_draco_subdivided"
 REFERENCED = ("d2_psnr_paper",)  # what reference curves have
 
+RATES = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20)  # Mbps, where the plots have ticks
+
 
 def write_report(rows: Sequence[Row], chosen: ModuleType, folder: Path) -> list[Path]:
     """Writes `results.md` and a plot per sequence into `folder`, as the experiment `chosen` judges; the paths."""
@@ -43,22 +45,32 @@ def plot_curves(rows: Sequence[Row], references: dict[str, list[tuple[float, flo
     from matplotlib.figure import Figure
 
     metrics = [(key, label) for key, label in METRICS if any(row.get(key) is not None for row in rows)]
-    figure = Figure(figsize=(5 * len(metrics), 4.2), layout="constrained")
+    figure = Figure(figsize=(5 * len(metrics), 4.6), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, len(metrics), squeeze=False)[0]
     for panel, (key, label) in zip(panels, metrics, strict=True):
-        for codec in dict.fromkeys(row["codec"] for row in rows):
-            points = sorted((r["mbps"], r[key]) for r in rows if r["codec"] == codec and r.get(key) is not None)
+        for codec in dict.fromkeys(map(curve_of, rows)):
+            points = sorted((r["mbps"], r[key]) for r in rows if curve_of(r) == codec and r.get(key) is not None)
             panel.plot([p[0] for p in points], [p[1] for p in points], marker="o", markersize=4, label=codec)
         for name, curve in references.items() if key in REFERENCED else ():
             panel.plot([p[0] for p in curve], [p[1] for p in curve], "k--", marker="x", label=name)
         panel.set(xlabel="Mbps", ylabel=label, xscale="log")
+        panel.set_xticks(RATES, [f"{rate:g}" for rate in RATES])
+        panel.minorticks_off()
+        shown = [rate for line in panel.lines for rate in line.get_xdata()]
+        panel.set_xlim(0.7 * min(shown), 1.4 * max(shown))
         panel.grid(alpha=0.3)
-    panels[0].legend(fontsize=8)
+    figure.legend(*panels[0].get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=4)
     figure.suptitle(rows[0]["sequence"])
     with replacing(path) as file:
         figure.savefig(file, format="png", dpi=110)
     return path
+
+
+def curve_of(row: Row) -> str:
+    """The curve that a point belongs to: a codec, and where the basis is fixed, the quality of the rest."""
+    options = row["options"]
+    return row["codec"] if options.get("basis_size") is None else f"{row['codec']}, quality {options['quality']:g}"
 
 
 def promise_table(promises: Sequence[Promise]) -> list[str]:
@@ -96,7 +108,7 @@ def point_table(rows: Sequence[Row]) -> list[str]:
 def bd_lines(rows: Sequence[Row]) -> Iterator[str]:
     """BD-rate of every codec against the subdivided anchor, by D2-PSNR and by normal error."""
     for key, sign in (("d2_psnr_paper", 1), ("symmetric_psnr", 1), ("normal_error_deg", -1)):
-        curves = {codec: _curve(rows, codec, key, sign) for codec in dict.fromkeys(row["codec"] for row in rows)}
+        curves = {codec: _curve(rows, codec, key, sign) for codec in dict.fromkeys(map(curve_of, rows))}
         if ANCHOR in curves:
             for codec, curve in curves.items():
                 if codec != ANCHOR:
@@ -104,7 +116,7 @@ def bd_lines(rows: Sequence[Row]) -> Iterator[str]:
 
 
 def _curve(rows: Sequence[Row], codec: str, key: str, sign: int) -> Curve:
-    points = [(r["mbps"], sign * r[key]) for r in rows if r["codec"] == codec and r.get(key) is not None]
+    points = [(r["mbps"], sign * r[key]) for r in rows if curve_of(r) == codec and r.get(key) is not None]
     return Curve(codec, [p[0] for p in points], [p[1] for p in points])
 
 
