@@ -1,7 +1,7 @@
 """Presets: one name and one quality from 0 to 100 set every option of the encoder.
 
-In -> out: what a user chooses -> EncoderOptions. The curves were fitted to measured rate-distortion points of captured
-performers (docs/results.md).
+In -> out: what a user chooses -> EncoderOptions. The curves were chosen after rate-distortion points of a captured
+dancer; what they give is in docs/results.md.
 """
 
 from __future__ import annotations

@@ -32,7 +32,6 @@ class FitOptions:
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # pairs farther apart do not count; of the diagonal
     smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weight of the shape: its Laplacian against the turned one
     agreement: float = 0.3  # least cosine between the normals of a pair
-    normal_weight: float = 0.0  # row weight of template edges lying in the frame's tangent plane
     anchor: float = 0.02  # row weight of the offset from the prediction
     components: int = 15  # of the trajectories, that the second fit starts from; 0: no second fit
     pull: float = 0.1  # row weight of the offset from these, in the second fit
@@ -48,10 +47,10 @@ class FitOptions:
             )
         if not -1 <= self.agreement < 1:
             raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
-        if min(self.anchor, self.pull) <= 0 or self.guard < 1 or min(self.normal_weight, self.components) < 0:
+        if min(self.anchor, self.pull) <= 0 or self.guard < 1 or self.components < 0:
             raise InputError(
-                f"anchor {self.anchor}, pull {self.pull}, guard {self.guard}, normal weight {self.normal_weight}, "
-                f"components {self.components}: give > 0, > 0, >= 1, >= 0, >= 0"
+                f"anchor {self.anchor}, pull {self.pull}, guard {self.guard}, "
+                f"components {self.components}: give > 0, > 0, >= 1, >= 0"
             )
         if self.iterations < 1 or not 0 <= self.tolerance < 1:
             raise InputError(f"{self.iterations} iterations, tolerance {self.tolerance}: give at least 1, and 0 to 1")
@@ -169,5 +168,5 @@ def _round(
     gate: float,
     options: FitOptions,
 ) -> Float64[np.ndarray, "V 3"]:
-    rows = match(template, x, target, MatchOptions(gate, options.agreement, options.normal_weight))
+    rows = match(template, x, target, MatchOptions(gate, options.agreement))
     return x + solve(template, rows, x, problem, (options.iterations, options.tolerance))

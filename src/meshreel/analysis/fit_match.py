@@ -18,8 +18,6 @@ from .fit_border import border_edges, match_borders, sample_border
 from .fit_rows import Rows
 from .fit_system import Template
 
-EDGES = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]])
-
 
 @dataclass(frozen=True, slots=True)
 class MatchOptions:
@@ -27,7 +25,6 @@ class MatchOptions:
 
     gate: float  # pairs farther apart count nothing; fraction of the bounding-box diagonal
     agreement: float  # least cosine between the normals of a pair
-    normal_weight: float  # row weight of "a template edge lies in the frame's tangent plane"
 
 
 class Target:
@@ -42,7 +39,7 @@ class Target:
 
     def normals_at(self, hits: Hits) -> Float64[np.ndarray, "N 3"]:
         """Unit interpolated normals at points of the surface."""
-        return _interpolated(self.normals, self.mesh.faces, hits)
+        return interpolated(self.normals, self.mesh.faces, hits)
 
 
 def match(template: Template, positions: Float64[np.ndarray, "V 3"], target: Target, options: MatchOptions) -> Rows:
@@ -83,18 +80,7 @@ def _from_template(template: Template, mesh: Mesh, target: Target, options: Matc
     weights *= _interpolated_scalar(target.inside, target.mesh.faces, hits)
     values = np.einsum("nd,nd->n", normals, hits.points)
     scale = np.where(np.arange(len(points)) < len(used), 1.0, 0.5)  # two faces a vertex
-    flat = _tangent_rows(faces[len(used) :], normals[len(used) :], weights[len(used) :], options.normal_weight)
-    return Rows(faces, corners, normals, values, weights * scale) + flat
-
-
-def _tangent_rows(faces: np.ndarray, normals: np.ndarray, weights: np.ndarray, strength: float) -> Rows:
-    return Rows(
-        np.repeat(faces, 3),
-        np.tile(EDGES, (len(faces), 1)),
-        np.repeat(normals, 3, axis=0),
-        np.zeros(3 * len(faces)),
-        np.repeat(weights * strength**2, 3),
-    )
+    return Rows(faces, corners, normals, values, weights * scale)
 
 
 def _pair_weights(
@@ -108,7 +94,8 @@ def _pair_weights(
     return np.where(agree & (distance < 1), np.exp(-2 * distance**2), 0.0)  # sigma = half the gate
 
 
-def _interpolated(values: Float64[np.ndarray, "V 3"], faces: np.ndarray, hits: Hits) -> Float64[np.ndarray, "N 3"]:
+def interpolated(values: Float64[np.ndarray, "V 3"], faces: np.ndarray, hits: Hits) -> Float64[np.ndarray, "N 3"]:
+    """Unit vectors of a mesh's vertices at points of its surface; zero where they cancel."""
     n = np.einsum("nk,nkd->nd", hits.barycentric, values[faces[hits.faces]])
     length = np.linalg.norm(n, axis=1)
     return n / np.where(length > 0, length, 1.0)[:, None]

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from ..geometry.nearest import Hits, Surface
+from ..geometry.nearest import Surface
 from ..geometry.topology import vertex_normals
 from ..types import Mesh
-from .fit_match import Target
+from .fit_match import Target, interpolated
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +41,8 @@ def measure(fitted: Mesh, target: Target) -> Residual:
     to_fit = np.linalg.norm(ahead.points - target.mesh.vertices, axis=1)
     to_frame = np.linalg.norm(back.points - fitted.vertices, axis=1)
     angles = (
-        _mean_angle(target.normals, _normals_at(normals, fitted, ahead))
-        + _mean_angle(normals, _normals_at(target.normals, target.mesh, back))
+        _mean_angle(target.normals, interpolated(normals, fitted.faces, ahead))
+        + _mean_angle(normals, target.normals_at(back))
     ) / 2
     quantile = max(float(np.quantile(to_fit, 0.95)), float(np.quantile(to_frame, 0.95)))
     return Residual(_rms(to_fit), _rms(to_frame), quantile, angles)
@@ -50,11 +50,6 @@ def measure(fitted: Mesh, target: Target) -> Residual:
 
 def _rms(distances: Float64[np.ndarray, " N"]) -> float:
     return float(np.sqrt(np.mean(distances**2)))
-
-
-def _normals_at(normals: Float64[np.ndarray, "V 3"], mesh: Mesh, hits: Hits) -> Float64[np.ndarray, "N 3"]:
-    n = np.einsum("nk,nkd->nd", hits.barycentric, normals[mesh.faces[hits.faces]])
-    return n / np.maximum(np.linalg.norm(n, axis=1), 1e-300)[:, None]
 
 
 def _mean_angle(one: Float64[np.ndarray, "N 3"], other: Float64[np.ndarray, "N 3"]) -> float:

@@ -2,8 +2,8 @@
 
 In: the frames and their tracked centers. Out: the mesh, the pose of the centers that it lies in, and the way back.
 
-Differs from the paper: the pose is not always that of MDS but the one, MDS or a frame's own, whose mesh fits the
-frames best when it is sent back to them.
+Differs from the paper: the pose is not always that of MDS but the one, MDS or a frame's own, whose mesh is nearest to
+the frames after a quick surface fit; MDS must gain something, since displacements from it need more components.
 """
 
 from __future__ import annotations
