@@ -27,7 +27,6 @@ class Border:
     points: Float64[np.ndarray, "N 3"]
     faces: Int64[np.ndarray, " N"]
     corners: Float64[np.ndarray, "N 3"]
-    tangents: Float64[np.ndarray, "N 3"]
     normals: Float64[np.ndarray, "N 3"]  # of the face
     outward: Float64[np.ndarray, "N 3"]  # in the face's plane, away from the surface
 
@@ -62,8 +61,7 @@ def sample_border(mesh: Mesh, edges: BorderEdges) -> Border:
     normals = face_normals(Mesh(mesh.vertices, mesh.faces[edges.faces]))[0]
     outward = np.cross(along, normals)  # counter-clockwise faces lie to the left of their edges
     points = np.einsum("nk,nkd->nd", corners, ends.repeat(SAMPLES, axis=0))
-    tangents, normals, outward = (x.repeat(SAMPLES, axis=0) for x in (along, normals, outward))
-    return Border(points, faces, corners, tangents, normals, outward)
+    return Border(points, faces, corners, normals.repeat(SAMPLES, axis=0), outward.repeat(SAMPLES, axis=0))
 
 
 def match_borders(template: Border, target: Border, gate: float, agreement: float) -> Rows:
