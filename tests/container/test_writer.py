@@ -163,9 +163,9 @@ def test_a_file_without_frames_is_an_input_error(tmp_path):
         ({"layers": (5, 5, 10)}, "must rise"),
         ({"layers": (0, 10)}, "must rise"),
         ({"layers": (5,)}, "payload's 10 bytes"),
-        ({"depends_on": (1,)}, "static chunks only"),
-        ({"depends_on": (2,)}, "static chunks only"),
-        ({"depends_on": (-1,)}, "static chunks only"),
+        ({"depends_on": (1,)}, "last group only"),
+        ({"depends_on": (2,)}, "last group only"),
+        ({"depends_on": (-1,)}, "last group only"),
     ],
 )
 def test_a_group_that_cannot_be_is_refused_and_the_file_goes_on(arguments, message):

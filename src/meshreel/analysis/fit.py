@@ -3,12 +3,13 @@
 In: the decoded, subdivided reference deformed to each frame; the frames. Out: its positions on every frame, and how
 well they fit. Coordinates are normalised: the sequence's bounding-box diagonal is 1.
 Between data and prediction stands a shape: the key frame's fit, turned as the body turns, so that detail and sliding
-along the surface stay the same over time and cost no rate; a second fit starts from the first's strongest components.
+along the surface stay the same over time and cost no rate. A second fit is drawn towards what the coder represents
+cheaply: the first's strongest components, or whatever coherent positions a caller makes of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,9 @@ from .fit_shape import doubtful, strongest_components, turned_laplacian
 from .fit_system import Problem, Template, solve
 
 
+Coherence = Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]
+
+
 @dataclass(frozen=True, slots=True)
 class FitOptions:
     """How a template is laid onto the frames; one entry per round in `gates` and `smoothing`.
@@ -33,8 +37,10 @@ class FitOptions:
     smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weight of the shape: its Laplacian against the turned one
     agreement: float = 0.3  # least cosine between the normals of a pair
     anchor: float = 0.02  # row weight of the offset from the prediction
-    components: int = 15  # of the trajectories, that the second fit starts from; 0: no second fit
-    pull: float = 0.1  # row weight of the offset from these, in the second fit
+    components: int = 15  # of the trajectories, that the second fit is drawn to; 0: no second fit
+    pull: float = 0.1  # row weight of the offset from the coherent positions, in the second fit
+    restart: bool = True  # the second fit starts from the coherent positions, and the key keeps its first fit
+    second_smoothing: float | None = None  # row weight of the coherent shape; None: the last of `smoothing`
     guard: float = 1.0  # factor on the smoothing where faces fold over or collapse
     key: int | None = None  # the frame to begin with; the middle one if None
     iterations: int = 40  # of the conjugate gradients, at most, a round
@@ -57,6 +63,14 @@ class FitOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class Guides:
+    """What a caller knows of the template beyond its connectivity."""
+
+    rest: Float64[np.ndarray, "V 3"] | None = None  # its shape; None: that of the key frame's own fit
+    coherence: Coherence | None = None  # fitted positions -> those that the second fit is drawn to; None: `components`
+
+
+@dataclass(frozen=True, slots=True)
 class Fit:
     """The template on every frame."""
 
@@ -69,6 +83,7 @@ def fit_frames(
     predictions: Float64[np.ndarray, "T V 3"],
     frames: Sequence[Mesh],
     options: FitOptions,
+    guides: Guides = Guides(),
 ) -> Fit:
     """The template's positions on each frame's surface, and what is left over.
 
@@ -83,7 +98,7 @@ def fit_frames(
     if len(faces) == 0 or count == 0:
         return Fit(predictions.copy(), (NOTHING,) * count)
     targets = [None if mesh.is_empty else Target(mesh) for mesh in frames]
-    positions = fit_targets(faces, predictions, targets, options)
+    positions = fit_targets(faces, predictions, targets, options, guides)
     residuals = [
         NOTHING if target is None else measure(Mesh.of(fitted, faces), target)
         for fitted, target in zip(positions, targets, strict=True)
@@ -96,12 +111,18 @@ def fit_targets(
     predictions: Float64[np.ndarray, "T V 3"],
     targets: Sequence[Target | None],
     options: FitOptions,
+    guides: Guides = Guides(),
 ) -> Float64[np.ndarray, "T V 3"]:
     """The template's positions on frames that are prepared already (None: an empty one); no residuals."""
     template = Template(faces, predictions.shape[1])
-    positions = _first_fit(template, predictions, targets, options)
+    key = _key(targets, options)
+    positions = _first_fit(template, predictions, targets, options, (key, guides.rest))
     if options.components and len(targets) > 1:
-        positions = _second_fit(template, positions, targets, options)
+        if guides.coherence is None:
+            coherent = strongest_components(positions, key, options.components)
+        else:
+            coherent = guides.coherence(positions)
+        positions = _second_fit(template, (positions, coherent), targets, options, key)
     return positions
 
 
@@ -110,11 +131,12 @@ def _first_fit(
     predictions: Float64[np.ndarray, "T V 3"],
     targets: Sequence[Target | None],
     options: FitOptions,
+    start: tuple[int, Float64[np.ndarray, "V 3"] | None],
 ) -> Float64[np.ndarray, "T V 3"]:
-    """Every frame from its prediction, the key frame first: its fit is the shape of the others."""
-    key = _key(targets, options)
+    """Every frame from its prediction, the key frame first: its fit is the shape of the others, unless one is given."""
+    key, given = start
     positions = predictions.copy()
-    rest = predictions[key]
+    rest = predictions[key] if given is None else given
     for at in [key] + [t for t in range(len(targets)) if t != key]:
         target = targets[at]
         if target is None:
@@ -126,26 +148,29 @@ def _first_fit(
             stiffness = smoothing * np.where(doubtful(template, rest, turns, x), guard, 1.0)
             x = _round(template, x, target, Problem(shape, stiffness, predictions[at], options.anchor), gate, options)
         positions[at] = x
-        rest = positions[key]
+        rest = positions[key] if given is None else given
     return positions
 
 
 def _second_fit(
     template: Template,
-    first: Float64[np.ndarray, "T V 3"],
+    before: tuple[Float64[np.ndarray, "T V 3"], Float64[np.ndarray, "T V 3"]],
     targets: Sequence[Target | None],
     options: FitOptions,
+    key: int,
 ) -> Float64[np.ndarray, "T V 3"]:
-    """The frames fitted again from the strongest components of the first fit's trajectories; the key keeps its fit."""
-    key = _key(targets, options)
+    """The frames fitted again, near the coherent positions that were made of the first fit."""
+    first, coherent = before
     positions = first.copy()
-    coherent = strongest_components(first, key, options.components)
+    smoothing = options.smoothing[-1] if options.second_smoothing is None else options.second_smoothing
     for at, target in enumerate(targets):
-        if target is None or at == key:
+        if target is None or (at == key and options.restart):
             continue
-        x = coherent[at]
-        _, turns = turned_laplacian(template, first[key], x)
-        stiffness = options.smoothing[-1] * np.where(doubtful(template, first[key], turns, x), options.guard, 1.0)
+        x = coherent[at] if options.restart else first[at]
+        stiffness = np.full(template.count, smoothing)
+        if options.guard > 1:
+            _, turns = turned_laplacian(template, first[key], x)
+            stiffness[doubtful(template, first[key], turns, x)] *= options.guard
         shape = template.laplacian @ coherent[at]
         for gate in options.gates[-2:]:
             x = _round(template, x, target, Problem(shape, stiffness, coherent[at], options.pull), gate, options)

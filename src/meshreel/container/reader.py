@@ -28,7 +28,7 @@ class Chunk:
     form: Form
     first_frame: int  # 0 for STATIC
     frame_count: int  # 0 for STATIC
-    depends_on: tuple[int, ...]  # numbers of STATIC chunks
+    depends_on: tuple[int, ...]  # numbers of STATIC chunks and, where it is predicted, of the group before it
     offset: int  # bytes from the start of the file
     layers: tuple[Layer, ...]
 

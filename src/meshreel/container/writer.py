@@ -44,6 +44,7 @@ class ReelWriter:
         self.header = header  # may be replaced until the block ends: what was measured goes into its metadata
         self._entries: list[IndexEntry] = []
         self.frame_count = 0  # so far
+        self.last_group: int | None = None  # number of the newest chunk of frames
 
     def __enter__(self) -> ReelWriter:
         with _as_input_error(self._target):
@@ -78,17 +79,20 @@ class ReelWriter:
         """The number of a new chunk of frames; the first comes right behind those of the group before.
 
         `layers` are the ends of the payload's layers, bytes, rising to its length; none: it is one layer. `depends_on`
-        are numbers of static chunks.
+        are numbers of static chunks and, where it is predicted from them, of the group before it.
         """
         if first_frame != self.frame_count:
             raise InputError(f"group at frame {first_frame}: frame {self.frame_count} comes next, add groups in order")
         if frame_count < 1:
             raise InputError(f"group at frame {first_frame}: {frame_count} frames, add at least one")
-        if any(not 0 <= chunk < len(self._entries) or self._entries[chunk].frames for chunk in depends_on):
-            raise InputError(f"group at frame {first_frame}: depends on {tuple(depends_on)}, name static chunks only")
+        if any(not 0 <= n < len(self._entries) or self._entries[n].frames and n != self.last_group for n in depends_on):
+            raise InputError(
+                f"group at frame {first_frame}: depends on {tuple(depends_on)}, name static chunks and the last group only"
+            )
         form = _form(payload)
         entry = IndexEntry(ChunkKind.GROUP, form, frame_count, tuple(depends_on), _layers(payload, layers))
-        return self._add(entry, payload)
+        self.last_group = self._add(entry, payload)
+        return self.last_group
 
     def _add(self, entry: IndexEntry, payload: bytes) -> int:
         pack(entry)  # refuses what does not fit its field

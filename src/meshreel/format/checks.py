@@ -31,15 +31,22 @@ def check_header(header: Header, frame_count: int) -> None:
 
 
 def check_index(index: Index) -> None:
-    """At least one frame, bytes in every layer, references only to earlier STATIC chunks."""
+    """At least one frame, bytes in every layer, references only to earlier STATIC chunks and the last GROUP."""
+    last_group = -1
     for number, entry in enumerate(index.chunks):
         if (entry.kind == ChunkKind.STATIC) != (entry.frames == 0):
             raise FormatError(f"chunk {number}: {entry.kind.name} of {entry.frames} frames")
         if not entry.layers or any(layer.size == 0 for layer in entry.layers):
             raise FormatError(f"chunk {number}: a chunk or a layer without bytes")
         for other in entry.depends_on:
-            if other >= number or index.chunks[other].kind != ChunkKind.STATIC:
-                raise FormatError(f"chunk {number}: depends on {other}, which is no static chunk before it")
+            if other >= number or (index.chunks[other].kind != ChunkKind.STATIC and other != last_group):
+                raise FormatError(
+                    f"chunk {number}: depends on {other}, which is neither a static chunk before it nor the last group"
+                )
+        if entry.kind == ChunkKind.GROUP:
+            last_group = number
+        elif last_group in entry.depends_on:
+            raise FormatError(f"chunk {number}: a static chunk that depends on group {last_group}")
     if sum(entry.frames for entry in index.chunks) == 0:
         raise FormatError("no frames: the index names no group")
 
