@@ -5,11 +5,13 @@ namespace nb = nanobind;
 
 void bind_entropy(nb::module_&);
 void bind_laplacian(nb::module_&);
+void bind_layers(nb::module_&);
 void bind_tracking(nb::module_&);
 
 NB_MODULE(_core, m) {
     m.doc() = "The arithmetic that must be fast, and bit-equal in every build.";
     bind_entropy(m);
     bind_laplacian(m);
+    bind_layers(m);
     bind_tracking(m);
 }

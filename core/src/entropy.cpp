@@ -4,34 +4,12 @@
 #include <new>
 #include <vector>
 
+#include "meshreel/escape.h"
 #include "meshreel/range_coder.h"
 #include "meshreel/weight_contexts.h"
 
 namespace meshreel::entropy {
 namespace {
-
-constexpr int kUnary = 20;  // magnitudes below have a model a step; above, an Exp-Golomb escape
-
-// Exp-Golomb with adaptive exponent and leading mantissa bits, for values 0 .. 2^32 - 2.
-struct EscapeModels {
-    Model exponent[32];
-    Model mantissa[32][4];
-};
-
-template <class Coder>
-uint64_t code_escape(Coder& coder, EscapeModels& models, uint64_t value) {
-    int length = 0;
-    while (length < 32 && coder.bit(models.exponent[length < 31 ? length : 31], (value + 1) >> (length + 1) != 0)) ++length;
-    uint64_t read = 1;
-    for (int k = length - 1; k >= 0; --k) {
-        const bool bit = (value + 1) >> k & 1;
-        const bool leading = k >= length - 2;
-        const uint64_t node = k == length - 1 ? 1 : 2 + (read & 1);
-        const bool coded = leading ? coder.bit(models.mantissa[length - 1][node], bit) : coder.raw_bit(bit);
-        read = read << 1 | static_cast<uint64_t>(coded);
-    }
-    return read - 1;
-}
 
 struct WeightModels {
     Model zero[kClasses];
@@ -50,8 +28,6 @@ int64_t code_weight(Coder& coder, WeightModels& models, int context, int64_t pre
     const bool negative = coder.bit(models.sign[sign_context(predicted, read)], value < 0);
     return negative ? -static_cast<int64_t>(read) : static_cast<int64_t>(read);
 }
-
-bool fits(int64_t value) { return value >= INT32_MIN && value <= INT32_MAX; }
 
 // One column through a coder, either way; false where the bytes are bad.
 template <class Coder>
@@ -106,9 +82,6 @@ bool are_causal(const meshreel_weights& weights) {
     }
     return true;
 }
-
-// A coded bit costs at least -log2(65520 / 65536) = 1 / 2840 bit: a stream can say no more than this many symbols.
-bool is_plausible(size_t count, size_t size) { return count / 22800 <= size + 3; }
 
 int copy_out(const std::vector<uint8_t>& bytes, uint8_t* out, size_t capacity) {
     if (bytes.size() > capacity) return MESHREEL_ENTROPY_OUT_TOO_SMALL;

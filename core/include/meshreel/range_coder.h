@@ -71,6 +71,7 @@ public:
     }
     bool raw_bit(bool value) { return code(1u << 15, value); }
     bool failed() const { return false; }
+    size_t position() const { return out_.size() - begin_; }  // bytes, those that are still to come left out
 
     bool finish() {
         const Tail tail = shortest_tail(low_, range_);
@@ -119,6 +120,7 @@ public:
         return value;
     }
     bool raw_bit(bool) { return decode(1u << 15); }
+    size_t position() const { return position_; }
     bool failed() const { return position_ > size_ + 3; }  // a whole stream is read at most 3 bytes past its end
 
     // True where the stream is exactly what the encoder writes for the symbols decoded: no byte missing, none left over.

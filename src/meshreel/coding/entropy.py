@@ -49,7 +49,7 @@ def encode_weights(symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours) ->
 def decode_weights(streams: Sequence[bytes], count: int, neighbours: Neighbours) -> Int32[np.ndarray, "N M"]:
     """The symbols of `count` vertices in the first len(streams) columns; FormatError where a stream is not one."""
     for column, stream in enumerate(streams):
-        _check_plausible(count, len(stream), f"weights, column {column}")
+        check_plausible(count, len(stream), f"weights, column {column}")
     columns = np.zeros((len(streams), count), np.int32)
     sizes = np.array([len(stream) for stream in streams], np.int64)
     failed = _core.decode_weights(b"".join(streams), sizes, columns, neighbours.indptr, neighbours.indices)
@@ -80,18 +80,18 @@ def encode_integers(values: Int32[np.ndarray, " N"]) -> bytes:
 
 def decode_integers(data: bytes, count: int) -> Int32[np.ndarray, " N"]:
     """The `count` values; FormatError where `data` is not exactly their stream."""
-    _check_plausible(count, len(data), "integers")
+    check_plausible(count, len(data), "integers")
     values = np.zeros(count, np.int32)
     if not _core.decode_integers(data, values):
         raise FormatError(f"integers: {len(data)} bytes are not a stream of {count} values; truncated or damaged")
     return values
 
 
-def _columns(symbols: Int32[np.ndarray, "N M"]) -> Int32[np.ndarray, "M N"]:
-    return np.array(symbols.T, dtype=np.int32, order="C")  # a copy: the core takes writable arrays
-
-
-def _check_plausible(count: int, size: int, what: str) -> None:
+def check_plausible(count: int, size: int, what: str) -> None:
     """Refuses a claim of more symbols than `size` bytes can say, before memory is allocated."""
     if not 0 <= count <= SYMBOLS_PER_BYTE * (size + 4) or (count > 0) != (size > 0):
         raise FormatError(f"{what}: {count} symbols cannot come from {size} bytes; the stream is damaged")
+
+
+def _columns(symbols: Int32[np.ndarray, "N M"]) -> Int32[np.ndarray, "M N"]:
+    return np.array(symbols.T, dtype=np.int32, order="C")  # a copy: the core takes writable arrays

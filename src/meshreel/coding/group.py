@@ -6,7 +6,6 @@ reference as decoded and subdivided, which both sides have.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
@@ -19,25 +18,10 @@ from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh
 from .displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
 from .intra import decode_empty, decode_intra
-from .mesh import check_growth, check_step, decode_mesh, encode_mesh
-
-
-@dataclass(frozen=True, slots=True)
-class CodedReference:
-    """A reference mesh as the decoder will have it."""
-
-    data: bytes  # Draco
-    step: float  # spacing of its lattice, normalised units
-    levels: int  # midpoint subdivisions after decoding
-    base: Mesh  # decoded and subdivided
-
-
-def code_reference(mesh: Mesh, bits: int, levels: int) -> CodedReference:
-    """The reference on a lattice of 2^bits cells along its longest side (the paper: 14 bits), coded and decoded."""
-    extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
-    step = float(np.float32(extent / (2**bits - 1)))
-    data = encode_mesh(mesh, step)
-    return CodedReference(data, step, levels, subdivide_midpoint(decode_mesh(data, step), levels))
+from .layers import LayersState, decode_layers, layers_parts
+from .mesh import check_growth, check_step, decode_mesh
+from .reference import CodedReference as CodedReference
+from .reference import code_reference as code_reference
 
 
 def encode_group(
@@ -51,23 +35,38 @@ def encode_group(
     return payload, tuple(accumulate(sizes[1:], initial=len(payload) - sum(sizes[1:])))
 
 
-def decode_group(data: bytes, frame_count: int, components: int | None = None) -> list[Mesh]:
+def decode_group(data: bytes, frame_count: int, layers: int | None = None) -> list[Mesh]:
     """The frames of a group in normalised units, of whatever form, from a whole payload or a prefix of its layers.
 
-    Raises FormatError where the bytes are damaged or hold another number of frames.
+    With `layers`, at most so many beyond the first: components of a `laplacian` group, levels of a `layers` group.
+    Raises FormatError where the bytes are damaged, hold another number of frames, or need another group.
+    """
+    return continue_group(data, frame_count, layers, None)[0]
+
+
+def continue_group(
+    data: bytes, frame_count: int, layers: int | None, previous: LayersState | None
+) -> tuple[list[Mesh], LayersState | None]:
+    """As `decode_group`, of a group that may be predicted from the one before; and what the next may be predicted from.
+
+    `previous` is what this gave for the group before, with the same `layers`. Only the form `layers` has such a state.
     """
     form = data[0] if data else None
+    state = None
     if form == Form.EMPTY:
         meshes = decode_empty(data, frame_count)
     elif form == Form.DRACO:
         meshes = decode_intra(data)
     elif form == Form.LAPLACIAN:
-        meshes = _decode_laplacian(unpack_all(LaplacianGroup, data), components)
+        meshes = _decode_laplacian(unpack_all(LaplacianGroup, data), layers)
+    elif form == Form.LAYERS:
+        faces, positions, state = decode_layers(data, layers, previous)
+        meshes = [Mesh(frame, faces) for frame in positions]
     else:
         raise FormatError(f"group form {form} is not known to this reader")
     if len(meshes) != frame_count:
         raise FormatError(f"a group of {len(meshes)} frames where the index says {frame_count}")
-    return meshes
+    return meshes, state
 
 
 def _decode_laplacian(record: LaplacianGroup, components: int | None) -> list[Mesh]:
@@ -86,6 +85,8 @@ def payload_parts(data: bytes) -> dict[str, int]:
         record = unpack_all(LaplacianGroup, data)
         head, *components = layer_sizes(record.displacements)
         parts = {"reference": len(record.reference), "basis": head, "displacements": sum(components)}
+    elif form == Form.LAYERS:
+        parts = layers_parts(data)
     elif form == Form.DRACO:
         parts = {"draco": sum(len(mesh) for mesh in unpack_all(DracoGroup, data).meshes)}
     else:

@@ -30,17 +30,26 @@ def fit(field: Float64[np.ndarray, "V T 3"]) -> Basis:
     """The full basis of a field, M = 3 T, by decreasing energy; each vector's largest entry is positive."""
     vertices, frames, _ = field.shape
     trajectories = field.reshape(vertices, 3 * frames)
-    mean = trajectories.mean(axis=0) if vertices else np.zeros(3 * frames)
+    return fit_about(trajectories.mean(axis=0) if vertices else np.zeros(3 * frames), trajectories)
+
+
+def fit_about(mean: Float64[np.ndarray, " C"], trajectories: Float64[np.ndarray, "V C"]) -> Basis:
+    """The full basis of trajectories of C numbers about a point that is given."""
     centered = trajectories - mean
-    energies, vectors = np.linalg.eigh(centered.T @ centered / max(vertices, 1))
+    energies, vectors = np.linalg.eigh(centered.T @ centered / max(len(trajectories), 1))
     energies, vectors = np.maximum(energies[::-1], 0.0), vectors[:, ::-1]
-    largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(3 * frames)] if frames else np.zeros(0)
+    largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(len(mean))] if len(mean) else np.zeros(0)
     return Basis(mean, np.ascontiguousarray(vectors * np.where(largest < 0, -1.0, 1.0)), energies.copy())
 
 
 def forward(field: Float64[np.ndarray, "V T 3"], basis: Basis) -> Float64[np.ndarray, "V M"]:
     """Weights of each vertex's trajectory in the basis, by least squares (eqs. 8 and 10)."""
-    centered = field.reshape(len(field), len(basis.mean)) - basis.mean
+    return project(field.reshape(len(field), len(basis.mean)), basis)
+
+
+def project(trajectories: Float64[np.ndarray, "V C"], basis: Basis) -> Float64[np.ndarray, "V M"]:
+    """Weights of trajectories of C numbers in the basis, by least squares."""
+    centered = trajectories - basis.mean
     gram = basis.vectors.T @ basis.vectors
     return np.ascontiguousarray(np.linalg.solve(gram, basis.vectors.T @ centered.T).T)
 
@@ -61,16 +70,16 @@ class BasisSymbols:
     bits: Int64[np.ndarray, " M+1"]  # of the mean, then of each vector; 0 to 30
 
 
-def quantize(basis: Basis, count: int, step: float) -> BasisSymbols:
+def quantize(basis: Basis, count: int, step: float, fineness: float = 16.0) -> BasisSymbols:
     """The first `count` vectors and the mean, each as fine as a weight's quantiser `step` (field's units) can show.
 
-    A vector's rounding is made good by those after it: each is made orthogonal to the rounded ones before.
+    Rounding moves a typical weight of a component by at most 1 / (2 fineness) of a step. A vector's rounding is made good by those after it: each is made orthogonal to the rounded ones before.
     """
     width = len(basis.mean)
-    bits, rows = [_bits_for(1.0, step)], np.zeros((count, width), dtype=np.int64)
+    bits, rows = [_bits_for(fineness / step)], np.zeros((count, width), dtype=np.int64)
     rounded = np.zeros((width, 0))
     for k in range(count):
-        bits.append(_bits_for(float(np.sqrt(basis.energies[k])), step))
+        bits.append(_bits_for(fineness * float(np.sqrt(basis.energies[k])) / step))
         direction = basis.vectors[:, k]
         if k:
             direction = direction - rounded @ np.linalg.lstsq(rounded, direction, rcond=None)[0]
@@ -88,6 +97,6 @@ def dequantize(symbols: BasisSymbols) -> Basis:
     return Basis(mean, np.ascontiguousarray(vectors.T), np.zeros(len(vectors)))
 
 
-def _bits_for(amplitude: float, step: float) -> int:
-    """Fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/32 of a step."""
-    return int(np.clip(np.ceil(np.log2(max(16.0 * amplitude / step, 1.0))), 5, 24))
+def _bits_for(parts: float) -> int:
+    """Fraction bits, 5 to 24, that make out so many parts of 1."""
+    return int(np.clip(np.ceil(np.log2(max(parts, 1.0))), 5, 24))

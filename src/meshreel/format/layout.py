@@ -29,7 +29,7 @@ class Form(IntEnum):
     """How a chunk is coded; its first byte."""
 
     LAPLACIAN = 1  # reference mesh and displacements
-    LAYERS = 2  # reserved
+    LAYERS = 2  # coarse mesh and its motion, then one scalar a vertex and level of subdivision
     DRACO = 3  # one Draco mesh a frame
     EMPTY = 4  # frames without a surface
 
@@ -139,6 +139,53 @@ class DisplacementHead:
     basis: Annotated[bytes, Blob(Varint()), "integers: 3 T of the mean, then 3 T of each component's direction"]
 
 
+class Presence(IntEnum):
+    """Whether something is there."""
+
+    ABSENT = 0
+    PRESENT = 1
+
+
+class Origin(IntEnum):
+    """What a coded field is counted from."""
+
+    ALONE = 0  # from nothing outside of its group
+    PREVIOUS = 1  # from the last frame of the group before
+
+
+@dataclass(frozen=True, slots=True)
+class CodedField:
+    """Trajectories in a basis: quantised weights of a causal graph's vertices."""
+
+    columns: Annotated[int, Varint(), "M, number of basis vectors"]
+    step_level: Annotated[int, U8, "k: the quantiser's step is 2^(-k/8)"]
+    basis: Annotated[bytes, Blob(Varint()), "integers: the basis"]
+    symbols: Annotated[bytes, Blob(Varint()), "one stream: the symbols of all columns"]
+
+
+@dataclass(frozen=True, slots=True)
+class LayersGroup:
+    """The start of a group of form LAYERS: its first layer. A LayersLevel for each level is behind it."""
+
+    form: Annotated[Form, Choice(U8, Form), "LAYERS"]
+    origin: Annotated[Origin, Choice(U8, Origin), "where the base mesh is from"]
+    frames: Annotated[int, U8, "T, above 0"]
+    levels: Annotated[int, U8, "L, midpoint subdivisions of the base mesh"]
+    step: Annotated[float, F64, "spacing of the base's lattice, above 0: decoded vertices are rounded to multiples"]
+    base: Annotated[bytes, Blob(Varint()), "the base mesh, Draco; no bytes where its origin is PREVIOUS"]
+    has_mean: Annotated[Presence, Choice(U8, Presence), "whether the basis of the motion has a mean"]
+    motion: Annotated[CodedField, Nested(CodedField), "the displacements of the base's vertices"]
+
+
+@dataclass(frozen=True, slots=True)
+class LayersLevel:
+    """One level of a group of form LAYERS."""
+
+    origin: Annotated[Origin, Choice(U8, Origin), "what its scalars are counted from"]
+    sibling_weight: Annotated[int, U8, "of the siblings' mean in a prediction, 64ths"]
+    scalars: Annotated[CodedField, Nested(CodedField), "the offsets of its new vertices"]
+
+
 @dataclass(frozen=True, slots=True)
 class DracoGroup:
     """The payload of a group of form DRACO."""
@@ -157,4 +204,4 @@ class EmptyGroup:
 
 
 RECORDS = (Preamble, Header, Index, IndexEntry, Layer, Checksum)
-PAYLOADS = (LaplacianGroup, DisplacementHead, Component, DracoGroup, EmptyGroup)
+PAYLOADS = (LaplacianGroup, DisplacementHead, Component, LayersGroup, LayersLevel, CodedField, DracoGroup, EmptyGroup)

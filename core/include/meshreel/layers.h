@@ -1,0 +1,60 @@
+// The arithmetic of the form LAYERS: a hierarchy over a mesh's vertices, prediction in it, subdivision along normals.
+//
+// All of it decides what a decoder shows, so: IEEE + - * / sqrt in a fixed order, no threads, no other functions. (Only
+// mr_predict_forward, an encoder's, takes logarithms.)
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum mr_layers_status {
+    MR_LAYERS_OK = 0,
+    MR_LAYERS_BAD_INPUT = 1,  // an index out of range, or a graph that is not causal
+    MR_LAYERS_NO_MEMORY = 2,
+    MR_LAYERS_OVERFLOW = 3,  // a symbol beyond 32 bits
+};
+
+// A causal graph: value v is predicted by sum_k weights[k] * value[near[k]], k in starts[v] .. starts[v + 1], near[k] < v.
+struct mr_graph {
+    size_t count;
+    const int64_t* starts;
+    const int32_t* near;
+    const double* weights;
+};
+
+// An order of a mesh's vertices, coarse to fine, and the graph that predicts each from those before it.
+typedef struct mr_hierarchy mr_hierarchy;
+int mr_hierarchy_create(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, mr_hierarchy** out);
+void mr_hierarchy_destroy(mr_hierarchy* hierarchy);
+const int32_t* mr_hierarchy_order(const mr_hierarchy* hierarchy);  // the vertex at each place
+struct mr_graph mr_hierarchy_graph(const mr_hierarchy* hierarchy);  // of places
+
+// decoded[c][v] = prediction + step * symbols[c][v]; values column after column.
+int mr_predict_inverse(const struct mr_graph* graph, const int32_t* symbols, size_t columns, double step, double* decoded);
+// Symbols so that `decoded` is near `values`; a magnitude is lowered where that saves more than `price` squared steps a bit.
+int mr_predict_forward(const struct mr_graph* graph, const double* values, size_t columns, double step, double price,
+                       int32_t* symbols, double* decoded);
+
+// out[t][v] = means[t] (0 where null) + the sum over k, in order, of vectors[k][t] * columns[k][v].
+void mr_transform_inverse(const double* columns, size_t count, size_t width, const double* vectors, size_t frames,
+                          const double* means, double* out);
+
+// The sorted edges of a mesh and its faces cut in four. `edges` has room for 3 face_count pairs; returns their number, or -1.
+int64_t mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer);
+// For each edge those that share a face with it and come before it, sorted; `near` has room for 3 face_count entries.
+int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts, int32_t* near);
+
+// Midpoints of the edges and, along the unit sum of both ends' normals, a direction (zero where there is none).
+int mr_edge_frames(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+                   size_t edge_count, double* midpoints, double* directions);
+// `positions` of one frame: vertices, then room for the edges' vertices, which become midpoint + scalar * direction.
+int mr_refine(double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+              size_t edge_count, const double* scalars);
+
+#ifdef __cplusplus
+}
+#endif

@@ -1,0 +1,184 @@
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <cstring>
+#include <memory>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include "meshreel/field_coder.h"
+#include "meshreel/layers.h"
+
+namespace nb = nanobind;
+
+namespace {
+
+template <class T, int N>
+using In = nb::ndarray<const T, nb::ndim<N>, nb::c_contig, nb::device::cpu>;
+template <class T, int N>
+using InOut = nb::ndarray<T, nb::ndim<N>, nb::c_contig, nb::device::cpu>;
+template <class T, int N>
+using Out = nb::ndarray<nb::numpy, T, nb::ndim<N>>;
+
+template <class T>
+struct Buffer {
+    explicit Buffer(size_t count) : owned(new T[count]) {}
+    Buffer(const T* from, size_t count) : Buffer(count) {
+        if (count > 0) std::memcpy(owned.get(), from, count * sizeof(T));
+    }
+    T* data() { return owned.get(); }
+    nb::capsule release() {
+        return nb::capsule(owned.release(), [](void* p) noexcept { delete[] static_cast<T*>(p); });
+    }
+    Out<T, 1> one(size_t n) {
+        T* p = data();
+        return Out<T, 1>(p, {n}, release());
+    }
+    Out<T, 2> two(size_t n, size_t m) {
+        T* p = data();
+        return Out<T, 2>(p, {n, m}, release());
+    }
+    std::unique_ptr<T[]> owned;
+};
+
+void check(int status) {
+    if (status == MR_LAYERS_NO_MEMORY) throw std::bad_alloc();
+    if (status == MR_LAYERS_OVERFLOW) throw nb::value_error("a symbol beyond 32 bits");
+    if (status != MR_LAYERS_OK) throw nb::value_error("an index is out of range, or the graph is not causal");
+}
+
+void expect(bool fits) {
+    if (!fits) throw nb::value_error("array sizes do not fit");
+}
+
+nb::tuple hierarchy(In<double, 2> positions, In<int32_t, 2> faces) {
+    expect(positions.shape(1) == 3 && faces.shape(1) == 3);
+    mr_hierarchy* made = nullptr;
+    check(mr_hierarchy_create(positions.data(), positions.shape(0), faces.data(), faces.shape(0), &made));
+    const std::unique_ptr<mr_hierarchy, void (*)(mr_hierarchy*)> owner(made, mr_hierarchy_destroy);
+    const mr_graph graph = mr_hierarchy_graph(made);
+    const size_t count = graph.count, links = static_cast<size_t>(graph.starts[count]);
+    return nb::make_tuple(Buffer<int32_t>(mr_hierarchy_order(made), count).one(count), Buffer<int64_t>(graph.starts, count + 1).one(count + 1),
+                          Buffer<int32_t>(graph.near, links).one(links), Buffer<double>(graph.weights, links).one(links));
+}
+
+mr_graph graph_of(const In<int64_t, 1>& starts, const In<int32_t, 1>& near, const In<double, 1>& weights, size_t count) {
+    expect(starts.shape(0) == count + 1 && near.shape(0) == weights.shape(0));
+    expect(starts.data()[count] == static_cast<int64_t>(near.shape(0)));
+    for (size_t v = 0; v < count; ++v) expect(starts.data()[v] <= starts.data()[v + 1]);
+    return {count, starts.data(), near.data(), weights.data()};
+}
+
+nb::tuple predict_forward(In<double, 2> values, In<int64_t, 1> starts, In<int32_t, 1> near, In<double, 1> weights, double step,
+                          double price) {
+    const size_t columns = values.shape(0), count = values.shape(1);
+    const mr_graph graph = graph_of(starts, near, weights, count);
+    Buffer<int32_t> symbols(columns * count);
+    Buffer<double> decoded(columns * count);
+    check(mr_predict_forward(&graph, values.data(), columns, step, price, symbols.data(), decoded.data()));
+    return nb::make_tuple(symbols.two(columns, count), decoded.two(columns, count));
+}
+
+Out<double, 2> predict_inverse(In<int32_t, 2> symbols, In<int64_t, 1> starts, In<int32_t, 1> near, In<double, 1> weights, double step) {
+    const size_t columns = symbols.shape(0), count = symbols.shape(1);
+    const mr_graph graph = graph_of(starts, near, weights, count);
+    Buffer<double> decoded(columns * count);
+    check(mr_predict_inverse(&graph, symbols.data(), columns, step, decoded.data()));
+    return decoded.two(columns, count);
+}
+
+Out<double, 2> transform_inverse(In<double, 2> columns, In<double, 2> vectors, In<double, 1> means) {
+    const size_t count = columns.shape(0), width = columns.shape(1), frames = vectors.shape(1);
+    expect(vectors.shape(0) == count && means.shape(0) == frames);
+    Buffer<double> out(frames * width);
+    mr_transform_inverse(columns.data(), count, width, vectors.data(), frames, means.data(), out.data());
+    return out.two(frames, width);
+}
+
+nb::tuple subdivide(In<int32_t, 2> faces, size_t vertices) {
+    expect(faces.shape(1) == 3);
+    const size_t face_count = faces.shape(0);
+    Buffer<int32_t> edges(6 * face_count), finer(12 * face_count);
+    const int64_t count = mr_subdivide(faces.data(), face_count, vertices, edges.data(), finer.data());
+    check(count < 0 ? MR_LAYERS_BAD_INPUT : MR_LAYERS_OK);
+    return nb::make_tuple(edges.two(static_cast<size_t>(count), 2), finer.two(4 * face_count, 3));
+}
+
+nb::tuple siblings(In<int32_t, 2> finer, size_t vertices, size_t edge_count) {
+    expect(finer.shape(1) == 3 && finer.shape(0) % 4 == 0);
+    const size_t face_count = finer.shape(0) / 4;
+    Buffer<int64_t> starts(edge_count + 1);
+    Buffer<int32_t> near(3 * face_count);
+    check(mr_siblings(finer.data(), face_count, vertices, edge_count, starts.data(), near.data()));
+    const size_t links = static_cast<size_t>(starts.data()[edge_count]);
+    return nb::make_tuple(starts.one(edge_count + 1), near.one(links));
+}
+
+nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t, 2> edges) {
+    expect(positions.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
+    const size_t count = edges.shape(0);
+    Buffer<double> midpoints(3 * count), directions(3 * count);
+    check(mr_edge_frames(positions.data(), positions.shape(0), faces.data(), faces.shape(0), edges.data(), count, midpoints.data(),
+                         directions.data()));
+    return nb::make_tuple(midpoints.two(count, 3), directions.two(count, 3));
+}
+
+// `positions` T x V x 3, of which the first `vertices` are known; the next are set from T x E scalars.
+void refine(InOut<double, 3> positions, size_t vertices, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars) {
+    const size_t frames = positions.shape(0), count = edges.shape(0);
+    expect(positions.shape(2) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
+    expect(positions.shape(1) >= vertices + count && scalars.shape(0) == frames && scalars.shape(1) == count);
+    for (size_t t = 0; t < frames; ++t)
+        check(mr_refine(positions.data() + 3 * t * positions.shape(1), vertices, faces.data(), faces.shape(0), edges.data(), count,
+                        scalars.data() + t * count));
+}
+
+meshreel_weights view(const InOut<int32_t, 2>& columns, const In<int64_t, 1>& starts, const In<int32_t, 1>& near) {
+    expect(starts.shape(0) == columns.shape(1) + 1);
+    return {columns.data(), columns.shape(1), columns.shape(0), starts.data(), near.data(), near.shape(0)};
+}
+
+void check_coded(int status) {
+    if (status == MESHREEL_ENTROPY_NO_MEMORY) throw std::bad_alloc();
+    if (status == MESHREEL_ENTROPY_BAD_INPUT) throw nb::value_error("the graph is not causal");
+}
+
+// The stream, and bytes of it that each column takes.
+nb::tuple encode_field(InOut<int32_t, 2> columns, In<int64_t, 1> starts, In<int32_t, 1> near) {
+    const meshreel_weights weights = view(columns, starts, near);
+    std::vector<uint8_t> bytes(2 * columns.size() + 16);
+    std::vector<size_t> ends(weights.columns);
+    size_t size = 0;
+    int status = meshreel_encode_field(&weights, bytes.data(), bytes.size(), &size, ends.data());
+    if (status == MESHREEL_ENTROPY_OUT_TOO_SMALL) {
+        bytes.resize(size);
+        status = meshreel_encode_field(&weights, bytes.data(), bytes.size(), &size, ends.data());
+    }
+    check_coded(status);
+    Buffer<int64_t> sizes(weights.columns);
+    for (size_t c = 0; c < weights.columns; ++c) sizes.data()[c] = static_cast<int64_t>(ends[c] - (c > 0 ? ends[c - 1] : 0));
+    return nb::make_tuple(nb::bytes(reinterpret_cast<const char*>(bytes.data()), size), sizes.one(weights.columns));
+}
+
+bool decode_field(const nb::bytes& data, InOut<int32_t, 2> columns, In<int64_t, 1> starts, In<int32_t, 1> near) {
+    const meshreel_weights weights = view(columns, starts, near);
+    const int status = meshreel_decode_field(&weights, reinterpret_cast<const uint8_t*>(data.c_str()), data.size());
+    check_coded(status);
+    return status == MESHREEL_ENTROPY_OK;
+}
+
+}  // namespace
+
+void bind_layers(nb::module_& m) {
+    m.def("hierarchy", &hierarchy);
+    m.def("predict_forward", &predict_forward);
+    m.def("predict_inverse", &predict_inverse);
+    m.def("transform_inverse", &transform_inverse);
+    m.def("subdivide", &subdivide);
+    m.def("siblings", &siblings);
+    m.def("edge_frames", &edge_frames);
+    m.def("refine", &refine);
+    m.def("encode_field", &encode_field);
+    m.def("decode_field", &decode_field);
+}

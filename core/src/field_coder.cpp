@@ -1,0 +1,162 @@
+#include "meshreel/field_coder.h"
+
+#include <array>
+#include <cstring>
+#include <new>
+#include <vector>
+
+#include "meshreel/escape.h"
+#include "meshreel/range_coder.h"
+
+namespace meshreel::entropy {
+namespace {
+
+constexpr int kClasses = 15;  // of expected magnitude
+constexpr int kClamp = 255;  // larger magnitudes say no more about the scale
+constexpr uint32_t kBegin[kClasses - 1] = {1, 5, 9, 14, 20, 28, 40, 64, 100, 160, 300, 600, 1200, 2400};  // sixteenths
+constexpr uint32_t kLastBegin = kBegin[kClasses - 2];
+constexpr uint64_t kFirstRatio = 1u << 11;
+
+constexpr std::array<uint8_t, kLastBegin + 1> class_table() {
+    std::array<uint8_t, kLastBegin + 1> table{};
+    uint8_t index = 0;
+    for (uint32_t e = 0; e <= kLastBegin; ++e) {
+        while (index < kClasses - 1 && e >= kBegin[index]) ++index;
+        table[e] = index;
+    }
+    return table;
+}
+constexpr auto kClassOf = class_table();
+
+// Magnitudes that have been coded: in this column at earlier places, in earlier columns at all of them.
+class Magnitudes {
+public:
+    explicit Magnitudes(const meshreel_weights& weights) : weights_(weights), now_(weights.count), past_(weights.count) {}
+
+    int class_at(size_t v) const {
+        const int64_t begin = weights_.starts[v], end = weights_.starts[v + 1];
+        uint32_t sum = 0;
+        for (int64_t k = begin; k < end; ++k) sum += now_[static_cast<size_t>(weights_.neighbours[k])];
+        const uint32_t count = static_cast<uint32_t>(end - begin);
+        uint32_t expected = count ? 16 * sum / count : v > 0 ? 16u * now_[v - 1] : 0u;
+        if (column_ > 0) expected = (2 * expected + 3 * static_cast<uint32_t>(past_[v] * ratio_ >> 16)) / 5;
+        return kClassOf[expected < kLastBegin ? expected : kLastBegin];
+    }
+
+    void learn(size_t v, int64_t value) {
+        const int64_t size = value < 0 ? -value : value;
+        now_[v] = static_cast<uint8_t>(size < kClamp ? size : kClamp);
+        seen_ += 16u * now_[v];
+        expected_ += past_[v];
+        if (++age_ == 64) rescale();
+    }
+
+    void next_column() {
+        for (size_t v = 0; v < weights_.count; ++v) past_[v] = past_[v] * 45 / 64 + 16u * 128u * now_[v] / 9;
+        ++column_;
+        seen_ = expected_ = 0;
+        age_ = 0;
+        ratio_ = kFirstRatio;
+    }
+
+private:
+    void rescale() {
+        age_ = 0;
+        ratio_ = ((seen_ << 16) + 1024 * kFirstRatio) / (expected_ + 1024);
+        if (ratio_ > 1u << 20) ratio_ = 1u << 20;
+        seen_ -= seen_ / 6;
+        expected_ -= expected_ / 6;
+    }
+
+    const meshreel_weights& weights_;
+    std::vector<uint8_t> now_;
+    std::vector<uint32_t> past_;
+    size_t column_ = 0;
+    uint64_t seen_ = 0, expected_ = 0, ratio_ = kFirstRatio;
+    uint32_t age_ = 0;
+};
+
+struct FieldModels {
+    Model zero[kClasses];
+    Model more[kClasses][kUnary];
+    EscapeModels escape;
+};
+
+template <class Coder>
+int64_t code_symbol(Coder& coder, FieldModels& models, int context, int64_t value) {
+    const uint64_t size = static_cast<uint64_t>(value < 0 ? -value : value);
+    if (!coder.bit(models.zero[context], size != 0)) return 0;
+    uint64_t read = 1;
+    while (read < kUnary && coder.bit(models.more[context][read], size > read)) ++read;
+    if (read == kUnary) read += code_escape(coder, models.escape, size - kUnary);
+    const bool negative = coder.raw_bit(value < 0);
+    return negative ? -static_cast<int64_t>(read) : static_cast<int64_t>(read);
+}
+
+// All columns through a coder, either way; false where the bytes are bad.
+template <class Coder>
+bool code_field(Coder& coder, const meshreel_weights& weights, size_t* ends) {
+    Magnitudes magnitudes(weights);
+    FieldModels models;
+    int32_t* symbol = weights.symbols;
+    for (size_t c = 0; c < weights.columns; ++c) {
+        for (size_t v = 0; v < weights.count; ++v, ++symbol) {
+            const int64_t value = code_symbol(coder, models, magnitudes.class_at(v), *symbol);
+            if (coder.failed() || !fits(value)) return false;
+            *symbol = static_cast<int32_t>(value);
+            magnitudes.learn(v, value);
+        }
+        magnitudes.next_column();
+        if (ends) ends[c] = coder.position();
+    }
+    return coder.finish();
+}
+
+bool are_causal(const meshreel_weights& weights) {
+    if (weights.starts[0] != 0 || weights.starts[weights.count] != static_cast<int64_t>(weights.neighbour_count)) return false;
+    for (size_t v = 0; v < weights.count; ++v) {
+        if (weights.starts[v] > weights.starts[v + 1] || weights.starts[v + 1] > static_cast<int64_t>(weights.neighbour_count)) return false;
+        for (int64_t k = weights.starts[v]; k < weights.starts[v + 1]; ++k)
+            if (weights.neighbours[k] < 0 || weights.neighbours[k] >= static_cast<int64_t>(v)) return false;
+    }
+    return true;
+}
+
+template <class Body>
+int guarded(Body body) {
+    try {
+        return body();
+    } catch (...) {
+        return MESHREEL_ENTROPY_NO_MEMORY;
+    }
+}
+
+}  // namespace
+}  // namespace meshreel::entropy
+
+using namespace meshreel::entropy;
+
+int meshreel_encode_field(const meshreel_weights* weights, uint8_t* out, size_t capacity, size_t* size, size_t* ends) {
+    if (!are_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
+    return guarded([&]() -> int {
+        std::vector<uint8_t> bytes;
+        RangeEncoder coder(bytes);
+        if (weights->count * weights->columns > 0) code_field(coder, *weights, ends);
+        *size = bytes.size();
+        if (bytes.size() > capacity) return MESHREEL_ENTROPY_OUT_TOO_SMALL;
+        if (!bytes.empty()) std::memcpy(out, bytes.data(), bytes.size());
+        return MESHREEL_ENTROPY_OK;
+    });
+}
+
+int meshreel_decode_field(const meshreel_weights* weights, const uint8_t* data, size_t size) {
+    if (!are_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
+    const size_t count = weights->count * weights->columns;
+    if (count == 0) return size == 0 ? MESHREEL_ENTROPY_OK : MESHREEL_ENTROPY_BAD_STREAM;
+    if (!is_plausible(count, size)) return MESHREEL_ENTROPY_BAD_STREAM;
+    return guarded([&]() -> int {
+        RangeDecoder coder(data, size);
+        std::memset(weights->symbols, 0, count * sizeof(int32_t));
+        return code_field(coder, *weights, nullptr) ? MESHREEL_ENTROPY_OK : MESHREEL_ENTROPY_BAD_STREAM;
+    });
+}

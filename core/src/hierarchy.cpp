@@ -1,0 +1,182 @@
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <vector>
+
+#include "meshreel/layers.h"
+
+struct mr_hierarchy {
+    std::vector<int32_t> order;
+    std::vector<int64_t> starts{0};
+    std::vector<int32_t> near;
+    std::vector<double> weights;
+};
+
+namespace {
+
+constexpr int64_t kMostNear = 24;  // a vertex with more neighbours stays: what is left costs no more than linear time
+constexpr size_t kLeastShare = 16;  // a round that removes less than this part of the linked vertices is the last
+constexpr double kSlope = 0.1;     // how far slopes are drawn to zero
+constexpr double kBlunt = 0.01;    // of the mean squared distance: bounds the pull of a near vertex
+
+struct Removal {
+    int32_t vertex;
+    size_t begin, end;  // of its ring
+};
+
+struct Adjacency {
+    std::vector<uint64_t> links;  // both directions of each edge, sorted: from << 32 | to
+    std::vector<size_t> starts;
+
+    void sort(size_t vertices) {
+        std::sort(links.begin(), links.end());
+        links.erase(std::unique(links.begin(), links.end()), links.end());
+        starts.assign(vertices + 1, 0);
+        for (const uint64_t link : links) ++starts[(link >> 32) + 1];
+        for (size_t v = 0; v < vertices; ++v) starts[v + 1] += starts[v];
+    }
+    int32_t to(size_t k) const { return static_cast<int32_t>(links[k] & 0xFFFFFFFFu); }
+};
+
+uint64_t link(int32_t from, int32_t to) { return static_cast<uint64_t>(static_cast<uint32_t>(from)) << 32 | static_cast<uint32_t>(to); }
+
+double squared_distance(const double* a, const double* b) {
+    const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return x * x + y * y + z * z;
+}
+
+// Weights that predict a smooth function at p from its values at the ring: the constant term of a local affine
+// regression, nearer vertices weighing more, slopes drawn to zero. They sum to one.
+void regression(const double* positions, int32_t v, const int32_t* ring, size_t count, double* w) {
+    const double* p = positions + 3 * static_cast<size_t>(v);
+    const auto place = [&](size_t j) { return positions + 3 * static_cast<size_t>(ring[j]); };
+    double spread = 0.0;
+    for (size_t j = 0; j < count; ++j) spread += squared_distance(place(j), p);
+    const double blunt = kBlunt * (spread / static_cast<double>(count));
+    double total = 0.0, energy = 0.0, s[3] = {0.0, 0.0, 0.0}, m[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+    for (size_t j = 0; j < count; ++j) {
+        const double* r = place(j);
+        const double x = r[0] - p[0], y = r[1] - p[1], z = r[2] - p[2];
+        const double far = x * x + y * y + z * z;
+        const double g = 1.0 / (far + blunt);
+        w[j] = g;
+        total += g;
+        energy += g * far;
+        s[0] += g * x, s[1] += g * y, s[2] += g * z;
+        m[0] += g * x * x, m[1] += g * x * y, m[2] += g * x * z, m[3] += g * y * y, m[4] += g * y * z, m[5] += g * z * z;
+    }
+    const double draw = kSlope * energy;
+    const double d0 = m[0] + draw, l10 = m[1] / d0, l20 = m[2] / d0;  // L D L^T
+    const double d1 = (m[3] + draw) - l10 * m[1], l21 = (m[4] - l20 * m[1]) / d1;
+    const double d2 = (m[5] + draw) - l20 * m[2] - l21 * l21 * d1;
+    const double y0 = s[0], y1 = s[1] - l10 * y0, y2 = s[2] - l20 * y0 - l21 * y1;
+    const double b2 = y2 / d2, b1 = y1 / d1 - l21 * b2, b0 = y0 / d0 - l10 * b1 - l20 * b2;
+    const double alpha = 1.0 / (total - (s[0] * b0 + s[1] * b1 + s[2] * b2));
+    bool good = true;
+    for (size_t j = 0; j < count; ++j) {
+        const double* r = place(j);
+        w[j] = w[j] * alpha * (1.0 - (b0 * (r[0] - p[0]) + b1 * (r[1] - p[1]) + b2 * (r[2] - p[2])));
+        good = good && std::fabs(w[j]) <= 4.0;
+    }
+    if (!good)
+        for (size_t j = 0; j < count; ++j) w[j] = 1.0 / static_cast<double>(count);
+}
+
+// Rounds in which vertices that no neighbour's removal forbids leave, each merged into its nearest neighbour.
+void remove_vertices(const double* positions, size_t vertices, Adjacency& mesh, std::vector<Removal>& removals,
+                     std::vector<int32_t>& rings) {
+    std::vector<int32_t> heir(vertices);
+    for (size_t v = 0; v < vertices; ++v) heir[v] = static_cast<int32_t>(v);
+    for (;;) {
+        size_t linked = 0, removed = 0;
+        for (size_t v = 0; v < vertices; ++v) {
+            const size_t begin = mesh.starts[v], end = mesh.starts[v + 1];
+            if (begin == end) continue;
+            ++linked;
+            if (end - begin > kMostNear) continue;
+            bool stays = false;
+            for (size_t k = begin; k < end; ++k) stays = stays || heir[static_cast<size_t>(mesh.to(k))] != mesh.to(k);
+            if (stays) continue;
+            const auto distance = [&](size_t k) { return squared_distance(positions + 3 * static_cast<size_t>(mesh.to(k)), positions + 3 * v); };
+            size_t nearest = begin;
+            for (size_t k = begin + 1; k < end; ++k)
+                if (distance(k) < distance(nearest)) nearest = k;
+            heir[v] = mesh.to(nearest);
+            removals.push_back({static_cast<int32_t>(v), rings.size(), rings.size() + (end - begin)});
+            for (size_t k = begin; k < end; ++k) rings.push_back(mesh.to(k));
+            ++removed;
+        }
+        if (removed == 0) return;
+        std::vector<uint64_t> links;
+        links.reserve(mesh.links.size());
+        for (const uint64_t old : mesh.links) {
+            const int32_t a = heir[static_cast<size_t>(old >> 32)], b = heir[static_cast<size_t>(old & 0xFFFFFFFFu)];
+            if (a != b) links.push_back(link(a, b));
+        }
+        mesh.links.swap(links);
+        mesh.sort(vertices);
+        if (removed * kLeastShare < linked) return;
+    }
+}
+
+void build(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, mr_hierarchy& out) {
+    Adjacency mesh;
+    mesh.links.reserve(6 * face_count);
+    for (size_t f = 0; f < face_count; ++f)
+        for (int c = 0; c < 3; ++c) {
+            const int32_t a = faces[3 * f + static_cast<size_t>(c)], b = faces[3 * f + static_cast<size_t>((c + 1) % 3)];
+            if (a != b) mesh.links.push_back(link(a, b)), mesh.links.push_back(link(b, a));
+        }
+    mesh.sort(vertices);
+    std::vector<Removal> removals;
+    std::vector<int32_t> rings;
+    remove_vertices(positions, vertices, mesh, removals, rings);
+    std::vector<int32_t> place(vertices, 0);
+    for (const Removal& removal : removals) place[static_cast<size_t>(removal.vertex)] = -1;
+    for (size_t v = 0; v < vertices; ++v) {
+        if (place[v] < 0) continue;  // a root: the one before it predicts it
+        const int32_t at = static_cast<int32_t>(out.order.size());
+        place[v] = at;
+        out.order.push_back(static_cast<int32_t>(v));
+        if (at > 0) out.near.push_back(at - 1), out.weights.push_back(1.0);
+        out.starts.push_back(static_cast<int64_t>(out.near.size()));
+    }
+    double w[kMostNear];
+    for (auto removal = removals.rbegin(); removal != removals.rend(); ++removal) {
+        const size_t count = removal->end - removal->begin;
+        regression(positions, removal->vertex, &rings[removal->begin], count, w);
+        place[static_cast<size_t>(removal->vertex)] = static_cast<int32_t>(out.order.size());
+        out.order.push_back(removal->vertex);
+        for (size_t j = 0; j < count; ++j) {
+            out.near.push_back(place[static_cast<size_t>(rings[removal->begin + j])]);
+            out.weights.push_back(w[j]);
+        }
+        out.starts.push_back(static_cast<int64_t>(out.near.size()));
+    }
+}
+
+}  // namespace
+
+int mr_hierarchy_create(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, mr_hierarchy** out) {
+    if (vertices > INT32_MAX) return MR_LAYERS_BAD_INPUT;
+    for (size_t k = 0; k < 3 * face_count; ++k)
+        if (faces[k] < 0 || static_cast<size_t>(faces[k]) >= vertices) return MR_LAYERS_BAD_INPUT;
+    mr_hierarchy* made = nullptr;
+    try {
+        made = new mr_hierarchy;
+        build(positions, vertices, faces, face_count, *made);
+    } catch (const std::bad_alloc&) {
+        delete made;
+        return MR_LAYERS_NO_MEMORY;
+    }
+    *out = made;
+    return MR_LAYERS_OK;
+}
+
+void mr_hierarchy_destroy(mr_hierarchy* hierarchy) { delete hierarchy; }
+
+const int32_t* mr_hierarchy_order(const mr_hierarchy* hierarchy) { return hierarchy->order.data(); }
+
+mr_graph mr_hierarchy_graph(const mr_hierarchy* hierarchy) {
+    return {hierarchy->order.size(), hierarchy->starts.data(), hierarchy->near.data(), hierarchy->weights.data()};
+}

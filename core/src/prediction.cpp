@@ -1,0 +1,85 @@
+#include <algorithm>
+#include <cmath>
+
+#include "meshreel/layers.h"
+
+namespace {
+
+bool is_causal(const mr_graph& graph) {
+    if (graph.starts[0] != 0) return false;
+    for (size_t v = 0; v < graph.count; ++v) {
+        if (graph.starts[v] > graph.starts[v + 1]) return false;
+        for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k)
+            if (graph.near[k] < 0 || static_cast<size_t>(graph.near[k]) >= v) return false;
+    }
+    return true;
+}
+
+double predicted(const mr_graph& graph, size_t v, const double* values) {
+    double sum = 0.0;
+    for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k) sum += graph.weights[k] * values[graph.near[k]];
+    return sum;
+}
+
+// Bits that a unit of magnitude costs where magnitudes follow a two-sided geometric law of this mean.
+double slope(double mean) { return -std::log2(mean / (1.0 + std::sqrt(1.0 + mean * mean))); }
+
+// Magnitude of `size` steps: the nearest, or one less where `threshold` squared steps of error more are worth it.
+double lowered(double size, double threshold) {
+    const double nearest = std::floor(size + 0.5);
+    if (nearest < 1.0) return 0.0;
+    const double above = size - (nearest - 1.0), below = size - nearest;
+    return above * above - below * below < threshold ? nearest - 1.0 : nearest;
+}
+
+// One column; `mean` is what magnitudes are expected to be, and becomes what they are. False where a symbol has no room.
+bool forward(const mr_graph& graph, const double* values, double step, double price, double& mean, int32_t* symbols, double* decoded) {
+    double total = 0.0;
+    for (size_t v = 0; v < graph.count; ++v) {
+        double around = 2.0 * mean, weight = 2.0;
+        for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k, weight += 1.0) around += std::fabs(static_cast<double>(symbols[graph.near[k]]));
+        const double guess = predicted(graph, v, decoded);
+        const double wanted = (values[v] - guess) / step;
+        const double threshold = price > 0.0 ? price * slope(std::max(around / weight, 1e-3)) : 0.0;
+        const double size = lowered(std::fabs(wanted), threshold);
+        if (!(size <= 2147483647.0)) return false;
+        symbols[v] = static_cast<int32_t>(wanted < 0.0 ? -size : size);
+        decoded[v] = guess + step * static_cast<double>(symbols[v]);
+        total += size;
+    }
+    mean = graph.count > 0 ? total / static_cast<double>(graph.count) : 0.0;
+    return true;
+}
+
+}  // namespace
+
+int mr_predict_inverse(const mr_graph* graph, const int32_t* symbols, size_t columns, double step, double* decoded) {
+    if (!is_causal(*graph)) return MR_LAYERS_BAD_INPUT;
+    for (size_t c = 0; c < columns; ++c, symbols += graph->count, decoded += graph->count)
+        for (size_t v = 0; v < graph->count; ++v) decoded[v] = predicted(*graph, v, decoded) + step * static_cast<double>(symbols[v]);
+    return MR_LAYERS_OK;
+}
+
+int mr_predict_forward(const mr_graph* graph, const double* values, size_t columns, double step, double price, int32_t* symbols,
+                       double* decoded) {
+    if (!is_causal(*graph)) return MR_LAYERS_BAD_INPUT;
+    for (size_t c = 0; c < columns; ++c, values += graph->count, symbols += graph->count, decoded += graph->count) {
+        double mean = 1.0;
+        if (!forward(*graph, values, step, 0.0, mean, symbols, decoded)) return MR_LAYERS_OVERFLOW;
+        for (int pass = 0; pass < 2 && price > 0.0; ++pass)
+            if (!forward(*graph, values, step, price, mean, symbols, decoded)) return MR_LAYERS_OVERFLOW;
+    }
+    return MR_LAYERS_OK;
+}
+
+void mr_transform_inverse(const double* columns, size_t count, size_t width, const double* vectors, size_t frames, const double* means,
+                          double* out) {
+    for (size_t t = 0; t < frames; ++t, out += width) {
+        for (size_t v = 0; v < width; ++v) out[v] = means ? means[t] : 0.0;
+        for (size_t k = 0; k < count; ++k) {
+            const double factor = vectors[k * frames + t];
+            const double* column = columns + k * width;
+            for (size_t v = 0; v < width; ++v) out[v] += factor * column[v];
+        }
+    }
+}

@@ -1,0 +1,71 @@
+"""Causal graphs: which values predict which, and how much each weighs; the same on both sides, from decoded meshes only.
+
+In -> out: a base mesh -> an order of its vertices, coarse to fine, and their predictors; the connectivity of a level ->
+that of the next, with each new vertex's siblings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int32, Int64
+
+from .. import _core
+from ..errors import FormatError
+from ..types import Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class Graph:
+    """Value v is predicted by the sum of weights[k] * value[near[k]], k in starts[v] .. starts[v + 1], near[k] < v."""
+
+    starts: Int64[np.ndarray, " S"]  # S = V + 1
+    near: Int32[np.ndarray, " E"]
+    weights: Float64[np.ndarray, " E"]
+
+
+@dataclass(frozen=True, slots=True)
+class Hierarchy:
+    """A base mesh's vertices from the coarsest shape to the last detail."""
+
+    order: Int32[np.ndarray, " V"]  # the vertex at each place
+    graph: Graph  # of places
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """One midpoint subdivision: what it does to the connectivity."""
+
+    coarse: Int32[np.ndarray, "F 3"]
+    edges: Int32[np.ndarray, "E 2"]  # sorted; edge e has the vertex `vertices + e` in its middle
+    faces: Int32[np.ndarray, "4F 3"]
+    vertices: int  # of the coarser mesh
+    starts: Int64[np.ndarray, " S"]  # S = E + 1
+    siblings: Int32[np.ndarray, " N"]  # of edge e: those before it that share a face with it
+
+    def graph(self, sibling_weight: int) -> Graph:
+        """Each new vertex's scalar is predicted by sibling_weight / 64 of the mean of its siblings'."""
+        counts = np.diff(self.starts)
+        shares = sibling_weight / (64.0 * np.maximum(counts, 1))
+        return Graph(self.starts, self.siblings, np.repeat(shares, counts))
+
+
+def hierarchy(base: Mesh) -> Hierarchy:
+    """The order and the predictors of a base mesh's vertices. Raises FormatError where a face names none of them."""
+    _check(base.faces, len(base.vertices))
+    order, starts, near, weights = _core.hierarchy(base.vertices, base.faces)
+    return Hierarchy(order, Graph(starts, near, weights))
+
+
+def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
+    """The next level's connectivity, its vertices in the order of `geometry.topology.subdivide_midpoint`."""
+    _check(faces, vertices)
+    edges, finer = _core.subdivide(faces, vertices)
+    starts, siblings = _core.siblings(finer, vertices, len(edges))
+    return Level(faces, edges, finer, vertices, starts, siblings)
+
+
+def _check(faces: Int32[np.ndarray, "F 3"], vertices: int) -> None:
+    if len(faces) and (faces.min() < 0 or faces.max() >= vertices):
+        raise FormatError(f"a face names vertex {int(faces.max())} or {int(faces.min())} of {vertices}")

@@ -1,0 +1,194 @@
+"""The `layers` form: a coarse mesh and its motion, then for each midpoint subdivision one scalar a new vertex and frame.
+
+In -> out: a base mesh as coded and the wanted places of its subdivided vertices in every frame <-> bytes, of which every
+prefix of layers decodes to a coarser mesh. T = 1 is the intra form. A group may be predicted from the one before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import accumulate
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from ..errors import FormatError, InputError
+from ..format.layout import Form, LayersGroup, LayersLevel, Origin, Presence
+from ..format.records import pack, unpack
+from ..types import Mesh
+from .details import Hook, decode_level, encode_level, refine, wanted_scalars
+from .fields import Rate
+from .graph import Level, subdivide
+from .mesh import check_growth, check_step, decode_mesh
+from .reference import CodedReference
+from .steps import LEVELS, level_of, step_of
+from .trajectories import decode_trajectories, encode_trajectories
+
+MOST_FRAMES = 255
+MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
+
+
+@dataclass(frozen=True, slots=True)
+class LayersOptions:
+    """How a group of layers is coded; lengths relative to the sequence's diagonal."""
+
+    step: float = 2e-3  # quantiser step of the base's motion
+    detail_ratios: tuple[float, ...] = (0.8,)  # steps of the levels, in base steps; the last holds for all that follow
+    price: float = 0.12  # of a bit, squared steps
+
+    def __post_init__(self) -> None:
+        finest, coarsest = step_of(LEVELS - 1), step_of(0)
+        if not self.detail_ratios or min(self.detail_ratios) <= 0:
+            raise InputError(f"detail ratios {self.detail_ratios}: give one or more, above 0")
+        for ratio in (1.0, *self.detail_ratios):
+            if not finest <= self.step * ratio <= coarsest:
+                raise InputError(f"step {self.step} x {ratio}: give a fraction in {finest:.2g} .. {coarsest:g}")
+        if not 0 <= self.price < 1:
+            raise InputError(f"price {self.price}: give squared steps a bit, in [0, 1)")
+
+    def rate(self, level: int) -> Rate:
+        """Step and price of a level; 0 is the base."""
+        ratio = 1.0 if level == 0 else self.detail_ratios[min(level, len(self.detail_ratios)) - 1]
+        return Rate(level_of(self.step * ratio), self.price)
+
+
+@dataclass(frozen=True, slots=True)
+class LayersState:
+    """What the next group may be predicted from."""
+
+    faces: Int32[np.ndarray, "F 3"]  # of the base
+    base: Float64[np.ndarray, "V 3"]  # its vertices in the last frame
+    scalars: tuple[Float64[np.ndarray, " E"], ...]  # of the last frame, for each level decoded
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedLayers:
+    """A group's payload, and the group as it decodes."""
+
+    payload: bytes
+    layers: tuple[int, ...]  # where each ends
+    positions: Float64[np.ndarray, "T V 3"]
+    state: LayersState
+    bits: dict[str, int]  # of each part
+
+
+def encode_layers(
+    reference: CodedReference,
+    positions: Float64[np.ndarray, "T V 3"],
+    options: LayersOptions = LayersOptions(),
+    previous: LayersState | None = None,
+    hook: Hook | None = None,
+) -> EncodedLayers:
+    """The payload of a group whose subdivided base should lie at `positions`; predicted from `previous` if given.
+
+    With `previous`, the base mesh is its, and of `reference` only the number of levels counts.
+    """
+    frames, levels = len(positions), reference.levels
+    base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
+    _check_input(positions, base)
+    field, known = encode_trajectories(positions[:, : len(base.vertices)], base, options.rate(0))
+    origin = Origin.ALONE if previous is None else Origin.PREVIOUS
+    data = reference.data if previous is None else b""
+    head = LayersGroup(
+        Form.LAYERS, origin, frames, levels, reference.step, data, Presence(field.has_mean), field.record
+    )
+    parts, bits = [pack(head)], {"base mesh": 8 * len(data), "motion basis": field.basis_bits, "motion": field.symbol_bits}
+    scalars: list[Float64[np.ndarray, "T E"]] = []
+    faces = base.faces
+    for number in range(1, levels + 1):
+        level = subdivide(faces, known.shape[1])
+        count = known.shape[1] + len(level.edges)
+        if positions.shape[1] < count:
+            raise InputError(f"{positions.shape[1]} vertices where level {number} has {count}")
+        aim = wanted_scalars(positions[:, :count], known, level, None if hook is None else (number, hook))
+        coded = encode_level(aim, level, options.rate(number), _before(previous, number))
+        parts.append(pack(coded.record))
+        bits[f"level {number} basis"], bits[f"level {number}"] = coded.field.basis_bits, coded.field.symbol_bits
+        scalars.append(coded.scalars)
+        known, faces = _refined(known, level, coded.scalars), level.faces
+    payload = b"".join(parts)
+    bits["head"] = 8 * len(payload) - sum(bits.values())
+    state = _state(base, known, scalars)
+    return EncodedLayers(payload, tuple(accumulate(map(len, parts))), known, state, bits)
+
+
+def decode_layers(
+    data: bytes, levels: int | None = None, previous: LayersState | None = None
+) -> tuple[Int32[np.ndarray, "F 3"], Float64[np.ndarray, "T V 3"], LayersState]:
+    """Faces, places of the vertices in every frame, and what the next group may be predicted from.
+
+    With `levels`, so many subdivisions at most, for which `data` may end behind theirs.
+    """
+    head, offset = unpack(LayersGroup, data)
+    base = _base(head, previous)
+    known = decode_trajectories(head.motion, base, head.frames, head.has_mean == Presence.PRESENT)
+    faces, scalars = base.faces, list[Float64[np.ndarray, "T E"]]()
+    for number in range(1, head.levels + 1 if levels is None else min(levels, head.levels) + 1):
+        record, offset = unpack(LayersLevel, data, offset)
+        level = subdivide(faces, known.shape[1])
+        if 3 * head.frames * (known.shape[1] + len(level.edges)) > MOST_NUMBERS:
+            raise FormatError(f"{head.frames} frames of {len(level.faces)} faces exceed {MOST_NUMBERS} numbers")
+        scalars.append(decode_level(record, level, head.frames, _before(previous, number)))
+        known, faces = _refined(known, level, scalars[-1]), level.faces
+    if levels is None and offset != len(data):
+        raise FormatError(f"layers: {len(data) - offset} bytes too many")
+    if not np.isfinite(known).all():
+        raise FormatError("layers: vertices that are not finite")
+    return faces, known, _state(base, known, scalars)
+
+
+def layers_parts(data: bytes) -> dict[str, int]:
+    """Bytes of a payload by what they are for. Raises FormatError on damaged bytes."""
+    head, offset = unpack(LayersGroup, data)
+    parts = {"base mesh": len(head.base), "base motion": len(head.motion.basis) + len(head.motion.symbols)}
+    for number in range(1, head.levels + 1):
+        start = offset
+        _, offset = unpack(LayersLevel, data, offset)
+        parts[f"level {number}"] = offset - start
+    if offset != len(data):
+        raise FormatError(f"layers: {len(data) - offset} bytes too many")
+    return parts
+
+
+def _base(head: LayersGroup, previous: LayersState | None) -> Mesh:
+    check_step(head.step)
+    if head.frames == 0:
+        raise FormatError("layers: a group of 0 frames")
+    if head.origin == Origin.ALONE:
+        base = decode_mesh(head.base, head.step)
+    elif previous is None:
+        raise FormatError("layers: a group that is predicted from one which is not at hand")
+    elif head.base:
+        raise FormatError(f"layers: a base mesh of {len(head.base)} bytes in a group that has another's")
+    else:
+        base = Mesh(previous.base, previous.faces)
+    check_growth(base, head.levels, head.frames)
+    return base
+
+
+def _check_input(positions: Float64[np.ndarray, "T V 3"], base: Mesh) -> None:
+    if not 0 < len(positions) <= MOST_FRAMES:
+        raise InputError(f"a group of {len(positions)} frames: give 1 to {MOST_FRAMES}")
+    if positions.shape[1] < len(base.vertices):
+        raise InputError(f"{positions.shape[1]} places for the {len(base.vertices)} vertices of the base mesh")
+    if not np.isfinite(positions).all() or np.abs(positions).max(initial=0.0) > 1e3:
+        raise InputError("places must be finite and in units of the diagonal; normalise the sequence first")
+
+
+def _before(previous: LayersState | None, number: int) -> Float64[np.ndarray, " E"] | None:
+    """The last frame's scalars of a level of the group before, where it has them."""
+    return previous.scalars[number - 1] if previous is not None and number <= len(previous.scalars) else None
+
+
+def _refined(
+    known: Float64[np.ndarray, "T V 3"], level: Level, scalars: Float64[np.ndarray, "T E"]
+) -> Float64[np.ndarray, "T W 3"]:
+    positions = np.empty((len(known), known.shape[1] + len(level.edges), 3))
+    positions[:, : known.shape[1]] = known
+    refine(positions, level, scalars)
+    return positions
+
+
+def _state(base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "T E"]]) -> LayersState:
+    last = positions[-1, : len(base.vertices)].copy()
+    return LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))

@@ -1,0 +1,34 @@
+"""A reference mesh as the decoder will have it: coded by Draco, decoded, subdivided."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.topology import subdivide_midpoint
+from ..types import Mesh
+from .mesh import decode_mesh, encode_mesh
+
+
+@dataclass(frozen=True, slots=True)
+class CodedReference:
+    """A reference mesh as the decoder will have it."""
+
+    data: bytes  # Draco
+    step: float  # spacing of its lattice, normalised units
+    levels: int  # midpoint subdivisions after decoding
+    base: Mesh  # decoded and subdivided
+
+    @property
+    def mesh(self) -> Mesh:
+        """Decoded, not subdivided."""
+        return decode_mesh(self.data, self.step)
+
+
+def code_reference(mesh: Mesh, bits: int, levels: int) -> CodedReference:
+    """The reference on a lattice of 2^bits cells along its longest side (the paper: 14 bits), coded and decoded."""
+    extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
+    step = float(np.float32(extent / (2**bits - 1)))
+    data = encode_mesh(mesh, step)
+    return CodedReference(data, step, levels, subdivide_midpoint(decode_mesh(data, step), levels))

@@ -1,0 +1,44 @@
+"""Base motion <-> CodedField: the first layer of the form `layers`.
+
+In: the places of the base mesh's vertices in every frame. Out: their displacements from the base as decoded, predicted
+in a hierarchy that both sides build from it (docs/decisions).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import FormatError
+from ..format.layout import CodedField
+from ..types import Mesh
+from .fields import EncodedField, Rate, decode_field, encode_field
+from .graph import Hierarchy, hierarchy
+
+
+def encode_trajectories(
+    positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate
+) -> tuple[EncodedField, Float64[np.ndarray, "T V 3"]]:
+    """The coded motion of the base's vertices, and their places as decoded."""
+    places = hierarchy(base)
+    offsets = np.moveaxis(positions - base.vertices, 0, 1)[places.order]
+    field = encode_field(offsets.reshape(len(base.vertices), -1), places.graph, rate, True)
+    return field, _placed(field.decoded, base, places)
+
+
+def decode_trajectories(record: CodedField, base: Mesh, frames: int, has_mean: bool) -> Float64[np.ndarray, "T V 3"]:
+    """Where the base's vertices are in every frame. Raises FormatError on damaged records."""
+    places = hierarchy(base)
+    return _placed(decode_field(record, places.graph, 3 * frames, has_mean), base, places)
+
+
+def _placed(
+    rows: Float64[np.ndarray, "C V"], base: Mesh, places: Hierarchy
+) -> Float64[np.ndarray, "T V 3"]:
+    frames = len(rows) // 3
+    positions = np.empty((frames, len(base.vertices), 3))
+    moved = np.moveaxis(rows.reshape(frames, 3, -1), 1, 2)
+    positions[:, places.order] = moved + base.vertices[places.order]
+    if not np.isfinite(positions).all():
+        raise FormatError("a motion that is not finite")
+    return positions
