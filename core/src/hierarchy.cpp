@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <cstdlib>
 #include <vector>
 
 #include "meshreel/layers.h"
@@ -16,8 +17,8 @@ namespace {
 
 constexpr int64_t kMostNear = 24;  // a vertex with more neighbours stays: what is left costs no more than linear time
 constexpr size_t kLeastShare = 16;  // a round that removes less than this part of the linked vertices is the last
-constexpr double kSlope = 0.1;     // how far slopes are drawn to zero
-constexpr double kBlunt = 0.01;    // of the mean squared distance: bounds the pull of a near vertex
+static const double kSlope = getenv("MU")?atof(getenv("MU")):0.2;     // how far slopes are drawn to zero
+static const double kBlunt = getenv("EPS")?atof(getenv("EPS")):0.1;    // of the mean squared distance: bounds the pull of a near vertex
 
 struct Removal {
     int32_t vertex;

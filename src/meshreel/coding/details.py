@@ -21,7 +21,7 @@ from .fields import EncodedField, Rate, decode_field, encode_field
 from .graph import Level
 
 MOST_SLANT = 0.3  # cosine between direction and surface below which the tangent plane says nothing
-SIBLING_WEIGHTS = (29, 0)  # tried, 64ths
+SIBLING_WEIGHTS = (36,)  # tried, 64ths
 
 Hook = Callable[
     [int, int, Float64[np.ndarray, "E 3"], Float64[np.ndarray, "E 3"]], Float64[np.ndarray, " E"]

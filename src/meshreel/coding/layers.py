@@ -33,7 +33,7 @@ class LayersOptions:
     """How a group of layers is coded; lengths relative to the sequence's diagonal."""
 
     step: float = 2e-3  # quantiser step of the base's motion
-    detail_ratios: tuple[float, ...] = (0.8,)  # steps of the levels, in base steps; the last holds for all that follow
+    detail_ratios: tuple[float, ...] = (0.8, 1.1)  # steps of the levels, in base steps; the last holds for all that follow
     price: float = 0.12  # of a bit, squared steps
 
     def __post_init__(self) -> None:
