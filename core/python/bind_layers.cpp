@@ -88,6 +88,13 @@ Out<double, 2> predict_inverse(In<int32_t, 2> symbols, In<int64_t, 1> starts, In
     return decoded.two(columns, count);
 }
 
+Out<double, 2> orthonormal_inverse(In<int32_t, 1> symbols, size_t count, size_t width) {
+    expect(count <= width && symbols.shape(0) == count * width - count * (count > 0 ? count - 1 : 0) / 2);
+    Buffer<double> vectors(count * width);
+    check(mr_orthonormal_inverse(symbols.data(), count, width, vectors.data()));
+    return vectors.two(count, width);
+}
+
 Out<double, 2> transform_inverse(In<double, 2> columns, In<double, 2> vectors, In<double, 1> means) {
     const size_t count = columns.shape(0), width = columns.shape(1), frames = vectors.shape(1);
     expect(vectors.shape(0) == count && means.shape(0) == frames);
@@ -174,6 +181,7 @@ void bind_layers(nb::module_& m) {
     m.def("hierarchy", &hierarchy);
     m.def("predict_forward", &predict_forward);
     m.def("predict_inverse", &predict_inverse);
+    m.def("orthonormal_inverse", &orthonormal_inverse);
     m.def("transform_inverse", &transform_inverse);
     m.def("subdivide", &subdivide);
     m.def("siblings", &siblings);

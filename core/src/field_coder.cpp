@@ -1,5 +1,6 @@
 #include "meshreel/field_coder.h"
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <new>
@@ -28,31 +29,45 @@ constexpr std::array<uint8_t, kLastBegin + 1> class_table() {
 }
 constexpr auto kClassOf = class_table();
 
-// Magnitudes that have been coded: in this column at earlier places, in earlier columns at all of them.
+// What has been coded, as the context of what comes next: in this column at earlier places, in earlier columns here.
 class Magnitudes {
 public:
-    explicit Magnitudes(const meshreel_weights& weights) : weights_(weights), now_(weights.count), past_(weights.count) {}
+    explicit Magnitudes(const meshreel_weights& weights)
+        : count_(weights.count), sums_(count_), shares_(count_), past_(count_), now_(count_), starts_(count_ + 1) {
+        for (size_t k = 0; k < weights.neighbour_count; ++k) ++starts_[static_cast<size_t>(weights.neighbours[k]) + 1];
+        for (size_t v = 0; v < count_; ++v) starts_[v + 1] += starts_[v];
+        followers_.resize(weights.neighbour_count);
+        std::vector<size_t> next(starts_.begin(), starts_.end() - 1);
+        for (size_t v = 0; v < count_; ++v) {
+            const int64_t begin = weights.starts[v], end = weights.starts[v + 1];
+            shares_[v] = end > begin ? (16u << 16) / static_cast<uint32_t>(end - begin) : 0;
+            for (int64_t k = begin; k < end; ++k) followers_[next[static_cast<size_t>(weights.neighbours[k])]++] = static_cast<int32_t>(v);
+        }
+    }
 
     int class_at(size_t v) const {
-        const int64_t begin = weights_.starts[v], end = weights_.starts[v + 1];
-        uint32_t sum = 0;
-        for (int64_t k = begin; k < end; ++k) sum += now_[static_cast<size_t>(weights_.neighbours[k])];
-        const uint32_t count = static_cast<uint32_t>(end - begin);
-        uint32_t expected = count ? 16 * sum / count : v > 0 ? 16u * now_[v - 1] : 0u;
+        uint32_t expected = static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
+        if (shares_[v] == 0 && v > 0) expected = 16u * now_[v - 1];
         if (column_ > 0) expected = (2 * expected + 3 * static_cast<uint32_t>(past_[v] * ratio_ >> 16)) / 5;
         return kClassOf[expected < kLastBegin ? expected : kLastBegin];
     }
 
     void learn(size_t v, int64_t value) {
-        const int64_t size = value < 0 ? -value : value;
-        now_[v] = static_cast<uint8_t>(size < kClamp ? size : kClamp);
-        seen_ += 16u * now_[v];
         expected_ += past_[v];
+        if (value != 0) {
+            const int64_t size = value < 0 ? -value : value;
+            now_[v] = static_cast<uint8_t>(size < kClamp ? size : kClamp);
+            seen_ += 16u * now_[v];
+            for (size_t k = starts_[v]; k < starts_[v + 1]; ++k) sums_[static_cast<size_t>(followers_[k])] += now_[v];
+        }
         if (++age_ == 64) rescale();
     }
 
+    // Ends a column: it joins the past, in which each step back weighs 45 / 64.
     void next_column() {
-        for (size_t v = 0; v < weights_.count; ++v) past_[v] = past_[v] * 45 / 64 + 16u * 128u * now_[v] / 9;
+        for (size_t v = 0; v < count_; ++v) past_[v] = past_[v] * 45 / 64 + 16u * 128u * now_[v] / 9;
+        std::fill(now_.begin(), now_.end(), static_cast<uint8_t>(0));
+        std::fill(sums_.begin(), sums_.end(), 0u);
         ++column_;
         seen_ = expected_ = 0;
         age_ = 0;
@@ -60,6 +75,7 @@ public:
     }
 
 private:
+    // The past says where a column is large; how large against the past is learned, with a memory of 400 places.
     void rescale() {
         age_ = 0;
         ratio_ = ((seen_ << 16) + 1024 * kFirstRatio) / (expected_ + 1024);
@@ -68,9 +84,13 @@ private:
         expected_ -= expected_ / 6;
     }
 
-    const meshreel_weights& weights_;
-    std::vector<uint8_t> now_;
+    size_t count_;
+    std::vector<uint32_t> sums_;    // of the magnitudes at the neighbours of each place, as far as they are known
+    std::vector<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16; 0 where there are none
     std::vector<uint32_t> past_;
+    std::vector<uint8_t> now_;
+    std::vector<size_t> starts_;  // of the places that have each place as a neighbour
+    std::vector<int32_t> followers_;
     size_t column_ = 0;
     uint64_t seen_ = 0, expected_ = 0, ratio_ = kFirstRatio;
     uint32_t age_ = 0;

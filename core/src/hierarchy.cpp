@@ -16,29 +16,53 @@ namespace {
 
 constexpr int64_t kMostNear = 24;  // a vertex with more neighbours stays: what is left costs no more than linear time
 constexpr size_t kLeastShare = 16;  // a round that removes less than this part of the linked vertices is the last
-constexpr double kSlope = 0.1;     // how far slopes are drawn to zero
-constexpr double kBlunt = 0.01;    // of the mean squared distance: bounds the pull of a near vertex
+constexpr double kSlope = 0.2;     // how far slopes are drawn to zero
+constexpr double kBlunt = 0.1;    // of the mean squared distance: bounds the pull of a near vertex
 
 struct Removal {
     int32_t vertex;
     size_t begin, end;  // of its ring
 };
 
-struct Adjacency {
-    std::vector<uint64_t> links;  // both directions of each edge, sorted: from << 32 | to
-    std::vector<size_t> starts;
-
-    void sort(size_t vertices) {
-        std::sort(links.begin(), links.end());
-        links.erase(std::unique(links.begin(), links.end()), links.end());
-        starts.assign(vertices + 1, 0);
-        for (const uint64_t link : links) ++starts[(link >> 32) + 1];
-        for (size_t v = 0; v < vertices; ++v) starts[v + 1] += starts[v];
-    }
-    int32_t to(size_t k) const { return static_cast<int32_t>(links[k] & 0xFFFFFFFFu); }
+struct Link {
+    int32_t from, to;
 };
 
-uint64_t link(int32_t from, int32_t to) { return static_cast<uint64_t>(static_cast<uint32_t>(from)) << 32 | static_cast<uint32_t>(to); }
+// Both directions of each edge, sorted by `from`, then by `to`, none twice.
+struct Adjacency {
+    std::vector<Link> links;
+    std::vector<size_t> starts;  // where each vertex's begin
+
+    // Sorts links that are in any order: by counting, so that no mesh takes more than linear time.
+    void sort(size_t vertices) {
+        spare_.resize(links.size());
+        const auto place = [&](const std::vector<Link>& in, std::vector<Link>& out, int32_t Link::*key) {
+            starts.assign(vertices + 1, 0);
+            for (const Link& link : in) ++starts[static_cast<size_t>(link.*key)];
+            size_t sum = 0;
+            for (size_t& start : starts) {
+                const size_t count = start;
+                start = sum;
+                sum += count;
+            }
+            for (const Link& link : in) out[starts[static_cast<size_t>(link.*key)]++] = link;
+        };
+        place(links, spare_, &Link::to);
+        place(spare_, links, &Link::from);
+        size_t kept = 0;
+        starts.assign(vertices + 1, 0);
+        for (const Link& link : links) {
+            if (kept > 0 && links[kept - 1].from == link.from && links[kept - 1].to == link.to) continue;
+            links[kept++] = link;
+            ++starts[static_cast<size_t>(link.from) + 1];
+        }
+        links.resize(kept);
+        for (size_t v = 0; v < vertices; ++v) starts[v + 1] += starts[v];
+    }
+
+private:
+    std::vector<Link> spare_;
+};
 
 double squared_distance(const double* a, const double* b) {
     const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
@@ -95,25 +119,25 @@ void remove_vertices(const double* positions, size_t vertices, Adjacency& mesh, 
             ++linked;
             if (end - begin > kMostNear) continue;
             bool stays = false;
-            for (size_t k = begin; k < end; ++k) stays = stays || heir[static_cast<size_t>(mesh.to(k))] != mesh.to(k);
+            for (size_t k = begin; k < end && !stays; ++k) stays = heir[static_cast<size_t>(mesh.links[k].to)] != mesh.links[k].to;
             if (stays) continue;
-            const auto distance = [&](size_t k) { return squared_distance(positions + 3 * static_cast<size_t>(mesh.to(k)), positions + 3 * v); };
-            size_t nearest = begin;
-            for (size_t k = begin + 1; k < end; ++k)
-                if (distance(k) < distance(nearest)) nearest = k;
-            heir[v] = mesh.to(nearest);
             removals.push_back({static_cast<int32_t>(v), rings.size(), rings.size() + (end - begin)});
-            for (size_t k = begin; k < end; ++k) rings.push_back(mesh.to(k));
+            double least = 0.0;
+            for (size_t k = begin; k < end; ++k) {
+                const int32_t u = mesh.links[k].to;
+                const double distance = squared_distance(positions + 3 * static_cast<size_t>(u), positions + 3 * v);
+                if (k == begin || distance < least) least = distance, heir[v] = u;
+                rings.push_back(u);
+            }
             ++removed;
         }
         if (removed == 0) return;
-        std::vector<uint64_t> links;
-        links.reserve(mesh.links.size());
-        for (const uint64_t old : mesh.links) {
-            const int32_t a = heir[static_cast<size_t>(old >> 32)], b = heir[static_cast<size_t>(old & 0xFFFFFFFFu)];
-            if (a != b) links.push_back(link(a, b));
+        size_t kept = 0;
+        for (const Link& old : mesh.links) {
+            const Link link{heir[static_cast<size_t>(old.from)], heir[static_cast<size_t>(old.to)]};
+            if (link.from != link.to) mesh.links[kept++] = link;
         }
-        mesh.links.swap(links);
+        mesh.links.resize(kept);
         mesh.sort(vertices);
         if (removed * kLeastShare < linked) return;
     }
@@ -125,7 +149,7 @@ void build(const double* positions, size_t vertices, const int32_t* faces, size_
     for (size_t f = 0; f < face_count; ++f)
         for (int c = 0; c < 3; ++c) {
             const int32_t a = faces[3 * f + static_cast<size_t>(c)], b = faces[3 * f + static_cast<size_t>((c + 1) % 3)];
-            if (a != b) mesh.links.push_back(link(a, b)), mesh.links.push_back(link(b, a));
+            if (a != b) mesh.links.push_back({a, b}), mesh.links.push_back({b, a});
         }
     mesh.sort(vertices);
     std::vector<Removal> removals;

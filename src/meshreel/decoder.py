@@ -6,16 +6,18 @@ Reads beside encoder.py. Imports NumPy, DracoPy and the compiled core only: no O
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import overload
 
 import numpy as np
 
-from .coding.group import decode_group
+from .coding.group import continue_group
+from .coding.layers import LayersState
 from .container.reader import Chunk, ReelReader
 from .container.sources import BytesSource, FileSource, Source
 from .errors import FormatError, InputError
+from .format.layout import ChunkKind
 from .types import Mesh
 
 
@@ -34,25 +36,36 @@ def open(source: str | Path | bytes | Source) -> Video:
     return Video(ReelReader(BytesSource(source) if isinstance(source, bytes) else source))
 
 
+@dataclass(frozen=True, slots=True)
+class _Decoded:
+    """The last group decoded: its chunk, its frames, and what a group that is predicted from it needs."""
+
+    number: int
+    frames: list[Mesh]
+    state: LayersState | None
+
+
 class Video(Sequence[Mesh]):
-    """Frames of a .reel file as a sequence of meshes; random access decodes one group and keeps it.
+    """Frames of a .reel file as a sequence of meshes; random access decodes one group, and those it depends on.
 
     A file stays open until `close`, or until the end of a `with` block.
     """
 
-    def __init__(
-        self, reader: ReelReader, components: int | None = None, close: Callable[[], None] | None = None
-    ) -> None:
+    def __init__(self, reader: ReelReader, quality: int | None = None, close: Callable[[], None] | None = None) -> None:
         self.reader = reader
-        self.components = components
+        self.quality = quality
         self._close = close
-        self._group: tuple[int, list[Mesh]] = (-1, [])
+        self._group = _Decoded(-1, [], None)
 
-    def at(self, components: int | None) -> Video:
-        """The same video with at most this many displacement components a group: fewer bytes, still valid."""
-        if components is not None and components < 0:
-            raise InputError(f"components must not be negative, got {components}")
-        return Video(self.reader, components, self._close)
+    def at(self, quality: int | None) -> Video:
+        """The same video from at most this many layers of a group beyond the first: fewer bytes, still valid.
+
+        A layer is one subdivision of a group of form LAYERS, whose mesh is coarser without it, and one displacement
+        component of a group of form LAPLACIAN. None: all of them.
+        """
+        if quality is not None and quality < 0:
+            raise InputError(f"quality must not be negative, got {quality}: give a number of layers, or None for all")
+        return Video(self.reader, quality, self._close)
 
     def close(self) -> None:
         """Closes the file; frames of other groups than the last one decoded can no longer be read."""
@@ -97,17 +110,30 @@ class Video(Sequence[Mesh]):
 
     def _frames(self, chunk: Chunk) -> list[Mesh]:
         """The decoded frames of a group, from the last call where it is the same group."""
-        number, frames = self._group  # together: another thread may put its own group there
-        if number != chunk.number:
-            layers = None if self.components is None else self.components + 1
-            payload = self.reader.read_chunk(chunk.number, layers)
-            try:
-                meshes = decode_group(payload, chunk.frame_count, self.components)
-            except FormatError as error:
-                raise FormatError(f"{chunk}: {error}") from error
-            frames = [self._place(mesh) for mesh in meshes]
-            self._group = (chunk.number, frames)
-        return frames
+        known = self._group  # one value: another thread may put its own group there
+        if known.number == chunk.number:
+            return known.frames
+        chain = [chunk]
+        while (before := self._group_before(chain[-1])) is not None and before != known.number:
+            chain.append(self.reader.chunks[before])
+        state = known.state if before is not None else None
+        for link in reversed(chain):
+            meshes, state = self._decode(link, state)
+        known = _Decoded(chunk.number, [self._place(mesh) for mesh in meshes], state)
+        self._group = known
+        return known.frames
+
+    def _group_before(self, chunk: Chunk) -> int | None:
+        """The number of the group that a chunk is predicted from."""
+        chunks = self.reader.chunks
+        return next((n for n in chunk.depends_on if chunks[n].kind == ChunkKind.GROUP), None)
+
+    def _decode(self, chunk: Chunk, before: LayersState | None) -> tuple[list[Mesh], LayersState | None]:
+        payload = self.reader.read_chunk(chunk.number, None if self.quality is None else self.quality + 1)
+        try:
+            return continue_group(payload, chunk.frame_count, self.quality, before)
+        except FormatError as error:
+            raise FormatError(f"{chunk}: {error}") from error
 
     def _place(self, mesh: Mesh) -> Mesh:
         """A mesh in metres: the header's origin and scale undo the encoder's normalisation."""

@@ -9,17 +9,18 @@ from __future__ import annotations
 import json
 import math
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from .analysis.survey import Survey, survey
 from .choice import Quality
 from .container.writer import ReelWriter
 from .format.layout import Form, Header
-from .types import MeshSequence
+from .layered import encode_segment
+from .types import Mesh, MeshSequence
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
 
 
@@ -65,7 +66,8 @@ def encode(
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
         for encoded in _encoded_windows(sequence, seen, options, (executor, stages)):
             for group in encoded:
-                writer.add_group(writer.frame_count, group.frame_count, group.payload, group.layers)
+                before = () if writer.last_group is None or not group.predicted else (writer.last_group,)
+                writer.add_group(writer.frame_count, group.frame_count, group.payload, group.layers, before)
                 quality = group.quality.scaled(seen.diagonal)
                 groups.append(GroupSummary(group.form, group.frame_count, len(group.payload), quality))
         writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups))
@@ -98,22 +100,49 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
 
 def _encoded_windows(
     sequence: MeshSequence, seen: Survey, options: EncoderOptions, run: tuple[Executor | None, Stages]
-) -> Iterator[list[EncodedGroup]]:
-    """The groups of each window in order; a few windows ahead where an executor has workers for them."""
+) -> Iterator[Iterable[EncodedGroup]]:
+    """The groups of each run of frames that needs no other, in order; with an executor, a few runs ahead."""
     executor, stages = run
-    windows = ([seen.normalise(sequence[i]) for i in window] for window in seen.windows(options.group_size))
+    layered = options.form == Form.LAYERS
+    size = max(1, round(options.key_interval * sequence.frame_rate)) if layered else options.group_size
+    windows = (_Normalised(sequence, seen, window) for window in seen.windows(size))
+    encode_one = encode_segment if layered else encode_window
     if executor is None:
         for frames in windows:
-            yield encode_window(frames, options, stages)
+            yield encode_one(frames, options, stages)
         return
     ahead = 2 * getattr(executor, "_max_workers", 8)
     waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()
     for frames in windows:
-        waiting.append((len(frames), executor.submit(encode_window, frames, options)))
+        waiting.append((len(frames), executor.submit(_encode_all, layered, list(frames), options)))
         if len(waiting) > ahead:
             yield _arrived(waiting, stages)
     while waiting:
         yield _arrived(waiting, stages)
+
+
+def _encode_all(layered: bool, frames: list[Mesh], options: EncoderOptions) -> list[EncodedGroup]:
+    """In a worker: the groups of a run of frames."""
+    return list(encode_segment(frames, options) if layered else encode_window(frames, options))
+
+
+class _Normalised(Sequence[Mesh]):
+    """Frames of a sequence in normalised coordinates, read when they are asked for."""
+
+    def __init__(self, sequence: MeshSequence, seen: Survey, window: range) -> None:
+        self._sequence, self._seen, self._window = sequence, seen, window
+
+    def __len__(self) -> int:
+        return len(self._window)
+
+    @overload
+    def __getitem__(self, index: int) -> Mesh: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Mesh]: ...
+    def __getitem__(self, index: int | slice) -> Mesh | list[Mesh]:
+        if isinstance(index, slice):
+            return [self[i] for i in range(*index.indices(len(self)))]
+        return self._seen.normalise(self._sequence[self._window[index]])
 
 
 def _arrived(waiting: deque[tuple[int, Future[list[EncodedGroup]]]], stages: Stages) -> list[EncodedGroup]:

@@ -6,24 +6,30 @@ dancer; what they give is in docs/results.md.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from .analysis.fit import FitOptions
 from .analysis.reference import ReferenceOptions
+from .analysis.template import TemplateOptions
 from .analysis.track import TrackOptions
 from .choice import Quality
 from .coding.displacements import DisplacementOptions
+from .coding.layers import LayersOptions
 from .errors import InputError
+from .format.layout import Form
 from .windows import EncoderOptions
 
-PRESETS = ("paper",)
+PRESETS = ("best", "paper")
 
 
 def preset_options(
-    preset: str = "paper",
+    preset: str = "best",
     quality: float = 50.0,
     basis_size: int | None = None,
-    group_size: int = 10,
+    group_size: int | None = None,
     centers: int = 2000,
 ) -> EncoderOptions:
-    """The encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
+    """The encoder's options for a preset at a quality; `basis_size` fixes the components of a group (`paper` only).
 
     Raises InputError for an unknown preset or values out of range.
     """
@@ -31,16 +37,42 @@ def preset_options(
         raise InputError(f"no preset is called {preset!r}; known: {', '.join(PRESETS)}")
     if not 0 <= quality <= 100:
         raise InputError(f"quality must be in 0 to 100, got {quality:g}")
+    if preset == "best" and basis_size is not None:
+        raise InputError(f"basis size {basis_size}: preset `best` chooses the components; use preset `paper`")
+    track = TrackOptions(centers=centers, samples=max(45_000, 4 * centers))
+    make = _best if preset == "best" else _paper
+    size = {"best": 16, "paper": 10}[preset] if group_size is None else group_size
+    options = replace(make(float(quality)), preset=preset, quality=float(quality), group_size=size, track=track)
+    return (
+        options
+        if basis_size is None
+        else replace(options, displacements=replace(options.displacements, basis_size=basis_size))
+    )
+
+
+def _paper(quality: float) -> EncoderOptions:
     step = displacement_step(quality)
     return EncoderOptions(
-        preset=preset,
-        quality=float(quality),
-        group_size=group_size,
         target=Quality(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
-        track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
-        displacements=DisplacementOptions(step=step, basis_size=basis_size),
+        displacements=DisplacementOptions(step=step),
     )
+
+
+def _best(quality: float) -> EncoderOptions:
+    step = motion_step(quality)
+    return EncoderOptions(
+        form=Form.LAYERS,
+        target=Quality(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
+        template=TemplateOptions(error=0.35 * step),
+        layers=LayersOptions(step=step, detail_ratios=(0.6, 0.8), price=0.08),
+        fit=FitOptions(restart=False, pull=0.3, second_smoothing=0.7),
+    )
+
+
+def motion_step(quality: float) -> float:
+    """Quantiser step of the base's motion as a fraction of the diagonal: .0022 at 50, halved every 25 points."""
+    return 0.0022 * 2 ** ((50 - quality) / 25)
 
 
 def displacement_step(quality: float) -> float:

@@ -16,11 +16,13 @@ import numpy as np
 from .analysis.fit import Fit, FitOptions, fit_frames
 from .analysis.groups import GroupOptions, cut_at
 from .analysis.reference import ReferenceOptions, extract_reference, predict
+from .analysis.template import TemplateOptions
 from .analysis.track import TrackOptions, track_centers
 from .choice import IntraOptions, Quality, cheapest_intra, finest_intra, measure
 from .coding.displacements import DisplacementOptions
 from .coding.group import CodedReference, code_reference, decode_group, encode_group
 from .coding.intra import encode_empty
+from .coding.layers import LayersOptions
 from .errors import InputError, NoReferenceError
 from .format.layout import Form
 from .types import Centers, Mesh
@@ -45,6 +47,10 @@ class EncoderOptions:
     groups: GroupOptions = field(default_factory=GroupOptions)
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)
     intra: IntraOptions = field(default_factory=IntraOptions)
+    form: Form = Form.LAPLACIAN  # of the groups that a template follows
+    key_interval: float = 4.0  # s, at most, from one random-access point to the next (form LAYERS)
+    template: TemplateOptions = field(default_factory=TemplateOptions)
+    layers: LayersOptions = field(default_factory=LayersOptions)
 
     def __post_init__(self) -> None:
         if not 0 <= self.quality <= 100:
@@ -62,8 +68,9 @@ class EncodedGroup:
     form: Form
     frame_count: int
     payload: bytes
-    layers: tuple[int, ...]  # k + 1 layers decode with k components
+    layers: tuple[int, ...]  # k + 1 layers decode with k components, or to k levels
     quality: Quality
+    predicted: bool = False  # from the group before
 
 
 class Stages:
@@ -83,7 +90,7 @@ class Stages:
 
 def encode_window(frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> list[EncodedGroup]:
     """The groups of a window: one, or more where one reference cannot follow. Frames are all empty or none is."""
-    stages = stages or Stages(None, len(frames))
+    stages, frames = stages or Stages(None, len(frames)), list(frames)
     if frames[0].is_empty:
         groups = [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), Quality(0.0, 0.0, 0.0))]
     elif len(frames) == 1:
@@ -127,7 +134,7 @@ def _encode_span(
     except NoReferenceError:
         return [_intra_only(frames, options)]
     residuals = np.array([residual.rms for residual in fit.residuals])
-    target = _target(frames, options)
+    target = target_of(frames, options)
     cut = cut_at(residuals / target.distance, options.groups)
     if cut is not None:
         if depth == 0:
@@ -162,12 +169,12 @@ def _cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOption
 
 def _intra_only(frames: Sequence[Mesh], options: EncoderOptions) -> EncodedGroup:
     """The `draco` form at the target's quality."""
-    target = _target(frames, options)
+    target = target_of(frames, options)
     payload, quality = cheapest_intra(frames, target, np.inf, options.intra) or finest_intra(frames, target.distance)
     return EncodedGroup(Form.DRACO, len(frames), payload, (), quality)
 
 
-def _target(frames: Sequence[Mesh], options: EncoderOptions) -> Quality:
+def target_of(frames: Sequence[Mesh], options: EncoderOptions) -> Quality:
     """What these frames should be worth, normalised: relative to the smallest of them, so that none is lost."""
     diagonal = min(frame.diagonal for frame in frames)
     return options.target.scaled(diagonal or 1.0)

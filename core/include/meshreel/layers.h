@@ -39,6 +39,10 @@ int mr_predict_inverse(const struct mr_graph* graph, const int32_t* symbols, siz
 int mr_predict_forward(const struct mr_graph* graph, const double* values, size_t columns, double step, double price,
                        int32_t* symbols, double* decoded);
 
+// Orthonormal vectors of `width` numbers. The k-th is said by width - k integers: its direction where those before it,
+// turned onto the first k axes by reflections, leave room for it. MR_LAYERS_BAD_INPUT where all of these are zero.
+int mr_orthonormal_inverse(const int32_t* symbols, size_t count, size_t width, double* vectors);
+
 // out[t][v] = means[t] (0 where null) + the sum over k, in order, of vectors[k][t] * columns[k][v].
 void mr_transform_inverse(const double* columns, size_t count, size_t width, const double* vectors, size_t frames,
                           const double* means, double* out);

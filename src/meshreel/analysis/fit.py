@@ -22,7 +22,6 @@ from .fit_residual import NOTHING, Residual, measure
 from .fit_shape import doubtful, strongest_components, turned_laplacian
 from .fit_system import Problem, Template, solve
 
-
 Coherence = Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]
 
 

@@ -42,5 +42,11 @@ def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int |
     return 1 + int(np.argmin(spread))
 
 
+def leading(residuals: Float64[np.ndarray, " T"], usual: float, options: GroupOptions) -> int:
+    """How many of the first frames are followed, where `usual` is what a good fit leaves or the target, the larger."""
+    lost = np.flatnonzero(residuals > options.limit * usual)
+    return int(lost[0]) if len(lost) else len(residuals)
+
+
 def _scatter(values: Float64[np.ndarray, " n"]) -> float:
     return float(((values - values.mean()) ** 2).sum())

@@ -21,7 +21,7 @@ from .fields import EncodedField, Rate, decode_field, encode_field
 from .graph import Level
 
 MOST_SLANT = 0.3  # cosine between direction and surface below which the tangent plane says nothing
-SIBLING_WEIGHTS = (29, 0)  # tried, 64ths
+SIBLING_WEIGHTS = (36,)  # tried, 64ths
 
 Hook = Callable[
     [int, int, Float64[np.ndarray, "E 3"], Float64[np.ndarray, "E 3"]], Float64[np.ndarray, " E"]
@@ -105,9 +105,7 @@ def _to_tangent_planes(
     away = target[level.vertices :] - midpoints
     slant = (directions * normals).sum(axis=1)
     steep = slant >= MOST_SLANT
-    return np.where(
-        steep, (away * normals).sum(axis=1) / np.where(steep, slant, 1.0), (away * directions).sum(axis=1)
-    )
+    return np.where(steep, (away * normals).sum(axis=1) / np.where(steep, slant, 1.0), (away * directions).sum(axis=1))
 
 
 def _cost(field: EncodedField, offsets: Float64[np.ndarray, "E T"], rate: Rate) -> float:

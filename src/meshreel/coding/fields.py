@@ -9,17 +9,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32
+from jaxtyping import Bool, Float64, Int64
 
 from .. import _core
 from ..errors import FormatError, InputError
 from ..format.layout import CodedField
-from . import entropy, klt
+from . import entropy, klt, orthonormal
 from .graph import Graph
 from .steps import LEVELS, step_of
 
 MOST_BITS = 30
-FINENESS = 4.0  # a basis vector's rounding moves its column's typical weight by 1 / (2 FINENESS) steps
+LEAST_SCALE = 6.0
+FINENESS = 20.0  # a basis vector's rounding turns its column's typical weight away by about 1 / FINENESS of a step
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +53,22 @@ def encode_field(
     """The columns that pay, quantised in a closed loop."""
     width = trajectories.shape[1]
     mean = trajectories.mean(axis=0) if may_have_mean and len(trajectories) else np.zeros(width)
-    worth = rate.price * rate.step**2 * width * np.log2(2 + 16 * np.abs(mean).max(initial=0) / rate.step)
-    has_mean = bool(len(trajectories) * (mean**2).sum() > worth)
-    basis = klt.fit_about(mean if has_mean else np.zeros(width), trajectories)
+    bits = _mean_bits(rate.step)
+    mean = np.rint(np.ldexp(mean, bits))
+    worth = rate.price * rate.step**2 * np.log2(2 * np.abs(mean) + 1).sum()
+    has_mean = bool(len(trajectories) * (np.ldexp(mean, -bits) ** 2).sum() > worth)
+    side = np.append(bits, mean).astype(np.int32) if has_mean else np.zeros(0, np.int32)
+    centered = trajectories - (np.ldexp(mean, -bits) if has_mean else 0.0)
+    basis = klt.fit_about(np.zeros(width), centered)
     kept = np.flatnonzero(basis.energies > (0.2 * rate.step) ** 2)
-    coded = _Columns(trajectories, _only(basis, kept), graph, rate)
+    coded = _Columns(centered, _only(basis, kept), graph, rate)
     while not (pays := coded.pays()).all():
         kept = kept[pays]
-        coded = _Columns(trajectories, _only(basis, kept), graph, rate)
-    packed = _pack_basis(coded.basis, has_mean)
+        coded = _Columns(centered, _only(basis, kept), graph, rate)
+    packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
     record = CodedField(len(kept), rate.step_level, packed, coded.stream)
-    sizes = (8 * len(packed), 8 * len(coded.stream))
-    return EncodedField(record, has_mean, _transform(coded.decoded, klt.dequantize(coded.basis)), *sizes)
+    decoded = _core.transform_inverse(coded.decoded, coded.vectors, np.ldexp(mean, -bits) * has_mean)
+    return EncodedField(record, has_mean, decoded, 8 * len(packed), 8 * len(coded.stream))
 
 
 def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "C V"]:
@@ -71,24 +76,25 @@ def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -
     count = len(graph.starts) - 1
     if record.columns > width or record.step_level >= LEVELS:
         raise FormatError(f"{record.columns} columns of {width} numbers at step level {record.step_level}")
-    basis = _unpack_basis(record, width, has_mean)
+    mean, vectors = _read_basis(record, width, has_mean)
     entropy.check_plausible(count * record.columns, len(record.symbols), "symbols")
     symbols = np.empty((record.columns, count), np.int32)
     if not _core.decode_field(record.symbols, symbols, graph.starts, graph.near):
         raise FormatError(f"{len(record.symbols)} bytes of symbols are truncated or damaged")
     columns = _core.predict_inverse(symbols, graph.starts, graph.near, graph.weights, step_of(record.step_level))
-    return _transform(columns, basis)
+    return _core.transform_inverse(columns, vectors, mean)
 
 
 class _Columns:
     """Columns of a field in the basis as transmitted, quantised and coded."""
 
-    def __init__(
-        self, trajectories: Float64[np.ndarray, "V C"], basis: klt.Basis, graph: Graph, rate: Rate
-    ) -> None:
+    def __init__(self, trajectories: Float64[np.ndarray, "V C"], basis: klt.Basis, graph: Graph, rate: Rate) -> None:
         self.rate = rate
-        self.basis = klt.quantize(basis, len(basis.energies), rate.step, FINENESS)
-        self.weights = np.ascontiguousarray(klt.project(trajectories, klt.dequantize(self.basis)).T)
+        count, width = len(basis.energies), trajectories.shape[1]
+        scales = FINENESS * np.sqrt(width / 12 * basis.energies) / rate.step
+        self.basis = orthonormal.forward(np.ascontiguousarray(basis.vectors.T), np.clip(scales, LEAST_SCALE, 2.0**24))
+        self.vectors = orthonormal.inverse(self.basis, count, width)
+        self.weights = np.ascontiguousarray(self.vectors @ trajectories.T)
         if np.abs(self.weights).max(initial=0) > 1e9 * rate.step:
             raise InputError(f"a trajectory {np.abs(self.weights).max():g} long is too long for step {rate.step:g}")
         self.symbols, self.decoded = _core.predict_forward(
@@ -98,32 +104,33 @@ class _Columns:
 
     def pays(self) -> Bool[np.ndarray, " M"]:
         """True for the columns whose absence would cost more than they do."""
-        bits = 8.0 * self.sizes + np.log2(2.0 * np.abs(self.basis.vectors) + 1).sum(axis=1)
+        count, width = self.vectors.shape
+        basis_bits = np.log2(2.0 * np.abs(self.basis) + 1)
+        rows = np.repeat(np.arange(count), width - np.arange(count))
+        bits = 8.0 * self.sizes + np.bincount(rows, basis_bits, count)
         saved = (self.weights**2).sum(axis=1) - ((self.weights - self.decoded) ** 2).sum(axis=1)
         return saved > self.rate.price * self.rate.step**2 * bits
 
 
-def _only(basis: klt.Basis, kept: Int32[np.ndarray, " M"]) -> klt.Basis:
+def _only(basis: klt.Basis, kept: Int64[np.ndarray, " M"]) -> klt.Basis:
     return klt.Basis(basis.mean, np.ascontiguousarray(basis.vectors[:, kept]), basis.energies[kept])
 
 
-def _transform(columns: Float64[np.ndarray, "M V"], basis: klt.Basis) -> Float64[np.ndarray, "C V"]:
-    return _core.transform_inverse(columns, np.ascontiguousarray(basis.vectors.T), basis.mean)
+def _mean_bits(step: float) -> int:
+    """Fraction bits, at most 30, at which the mean's rounding is a sixteenth of a step."""
+    return int(np.clip(np.ceil(np.log2(8.0 / step)), 0, MOST_BITS))
 
 
-def _pack_basis(basis: klt.BasisSymbols, has_mean: bool) -> bytes:
-    """One integer stream: the bits, each less those before it, then the mean where there is one, then the vectors."""
-    bits = basis.bits if has_mean else basis.bits[1:]
-    values = [np.diff(bits, prepend=0), basis.mean if has_mean else basis.mean[:0], basis.vectors.reshape(-1)]
-    return entropy.encode_integers(np.concatenate(values).astype(np.int32))
-
-
-def _unpack_basis(record: CodedField, width: int, has_mean: bool) -> klt.Basis:
-    rows = record.columns + has_mean
-    values = entropy.decode_integers(record.basis, rows * (1 + width)).astype(np.int64)
-    bits = np.cumsum(values[:rows])
-    if len(bits) and (bits.min() < 0 or bits.max() > MOST_BITS):
-        raise FormatError(f"a basis of {bits.min()} to {bits.max()} bits")
-    table = values[rows:].reshape(rows, width)
-    mean, bits = (table[0], bits) if has_mean else (np.zeros(width, np.int64), np.concatenate([[0], bits]))
-    return klt.dequantize(klt.BasisSymbols(mean, table[int(has_mean) :], bits))
+def _read_basis(
+    record: CodedField, width: int, has_mean: bool
+) -> tuple[Float64[np.ndarray, " C"], Float64[np.ndarray, "M C"]]:
+    """Mean and vectors."""
+    head = (1 + width) * has_mean
+    count = orthonormal.symbol_count(record.columns, width)
+    values = entropy.decode_integers(record.basis, head + count)
+    mean = np.zeros(width)
+    if has_mean:
+        if not 0 <= values[0] <= MOST_BITS:
+            raise FormatError(f"a mean of {values[0]} bits")
+        mean = np.ldexp(values[1:head].astype(np.float64), -int(values[0]))
+    return mean, orthonormal.inverse(np.ascontiguousarray(values[head:]), record.columns, width)

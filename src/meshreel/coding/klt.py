@@ -44,12 +44,7 @@ def fit_about(mean: Float64[np.ndarray, " C"], trajectories: Float64[np.ndarray,
 
 def forward(field: Float64[np.ndarray, "V T 3"], basis: Basis) -> Float64[np.ndarray, "V M"]:
     """Weights of each vertex's trajectory in the basis, by least squares (eqs. 8 and 10)."""
-    return project(field.reshape(len(field), len(basis.mean)), basis)
-
-
-def project(trajectories: Float64[np.ndarray, "V C"], basis: Basis) -> Float64[np.ndarray, "V M"]:
-    """Weights of trajectories of C numbers in the basis, by least squares."""
-    centered = trajectories - basis.mean
+    centered = field.reshape(len(field), len(basis.mean)) - basis.mean
     gram = basis.vectors.T @ basis.vectors
     return np.ascontiguousarray(np.linalg.solve(gram, basis.vectors.T @ centered.T).T)
 
@@ -70,16 +65,16 @@ class BasisSymbols:
     bits: Int64[np.ndarray, " M+1"]  # of the mean, then of each vector; 0 to 30
 
 
-def quantize(basis: Basis, count: int, step: float, fineness: float = 16.0) -> BasisSymbols:
+def quantize(basis: Basis, count: int, step: float) -> BasisSymbols:
     """The first `count` vectors and the mean, each as fine as a weight's quantiser `step` (field's units) can show.
 
-    Rounding moves a typical weight of a component by at most 1 / (2 fineness) of a step. A vector's rounding is made good by those after it: each is made orthogonal to the rounded ones before.
+    A vector's rounding is made good by those after it: each is made orthogonal to the rounded ones before.
     """
     width = len(basis.mean)
-    bits, rows = [_bits_for(fineness / step)], np.zeros((count, width), dtype=np.int64)
+    bits, rows = [_bits_for(1.0, step)], np.zeros((count, width), dtype=np.int64)
     rounded = np.zeros((width, 0))
     for k in range(count):
-        bits.append(_bits_for(fineness * float(np.sqrt(basis.energies[k])) / step))
+        bits.append(_bits_for(float(np.sqrt(basis.energies[k])), step))
         direction = basis.vectors[:, k]
         if k:
             direction = direction - rounded @ np.linalg.lstsq(rounded, direction, rcond=None)[0]
@@ -97,6 +92,6 @@ def dequantize(symbols: BasisSymbols) -> Basis:
     return Basis(mean, np.ascontiguousarray(vectors.T), np.zeros(len(vectors)))
 
 
-def _bits_for(parts: float) -> int:
-    """Fraction bits, 5 to 24, that make out so many parts of 1."""
-    return int(np.clip(np.ceil(np.log2(max(parts, 1.0))), 5, 24))
+def _bits_for(amplitude: float, step: float) -> int:
+    """Fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/32 of a step."""
+    return int(np.clip(np.ceil(np.log2(max(16.0 * amplitude / step, 1.0))), 5, 24))

@@ -33,7 +33,10 @@ class LayersOptions:
     """How a group of layers is coded; lengths relative to the sequence's diagonal."""
 
     step: float = 2e-3  # quantiser step of the base's motion
-    detail_ratios: tuple[float, ...] = (0.8,)  # steps of the levels, in base steps; the last holds for all that follow
+    detail_ratios: tuple[float, ...] = (
+        0.8,
+        1.1,
+    )  # steps of the levels, in base steps; the last holds for all that follow
     price: float = 0.12  # of a bit, squared steps
 
     def __post_init__(self) -> None:
@@ -92,7 +95,10 @@ def encode_layers(
     head = LayersGroup(
         Form.LAYERS, origin, frames, levels, reference.step, data, Presence(field.has_mean), field.record
     )
-    parts, bits = [pack(head)], {"base mesh": 8 * len(data), "motion basis": field.basis_bits, "motion": field.symbol_bits}
+    parts, bits = (
+        [pack(head)],
+        {"base mesh": 8 * len(data), "motion basis": field.basis_bits, "motion": field.symbol_bits},
+    )
     scalars: list[Float64[np.ndarray, "T E"]] = []
     faces = base.faces
     for number in range(1, levels + 1):
@@ -189,6 +195,8 @@ def _refined(
     return positions
 
 
-def _state(base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "T E"]]) -> LayersState:
+def _state(
+    base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "T E"]]
+) -> LayersState:
     last = positions[-1, : len(base.vertices)].copy()
     return LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))

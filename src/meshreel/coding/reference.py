@@ -29,6 +29,11 @@ class CodedReference:
 def code_reference(mesh: Mesh, bits: int, levels: int) -> CodedReference:
     """The reference on a lattice of 2^bits cells along its longest side (the paper: 14 bits), coded and decoded."""
     extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
-    step = float(np.float32(extent / (2**bits - 1)))
+    return code_on_lattice(mesh, extent / (2**bits - 1), levels)
+
+
+def code_on_lattice(mesh: Mesh, step: float, levels: int) -> CodedReference:
+    """The reference on a lattice of about this spacing (rounded to float32), coded and decoded."""
+    step = float(np.float32(step))
     data = encode_mesh(mesh, step)
     return CodedReference(data, step, levels, subdivide_midpoint(decode_mesh(data, step), levels))

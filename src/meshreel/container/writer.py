@@ -85,7 +85,9 @@ class ReelWriter:
             raise InputError(f"group at frame {first_frame}: frame {self.frame_count} comes next, add groups in order")
         if frame_count < 1:
             raise InputError(f"group at frame {first_frame}: {frame_count} frames, add at least one")
-        if any(not 0 <= n < len(self._entries) or self._entries[n].frames and n != self.last_group for n in depends_on):
+        if any(
+            not 0 <= n < len(self._entries) or (self._entries[n].frames and n != self.last_group) for n in depends_on
+        ):
             raise InputError(
                 f"group at frame {first_frame}: depends on {tuple(depends_on)}, name static chunks and the last group only"
             )

@@ -85,7 +85,11 @@ class IndexEntry:
     kind: Annotated[ChunkKind, Choice(U8, ChunkKind), "what it is for"]
     form: Annotated[Form, Choice(U8, Form), "how it is coded; equal to its first byte"]
     frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC"]
-    depends_on: Annotated[tuple[int, ...], List(U8, Varint()), "numbers of the chunks before it that it needs: STATIC ones, and the GROUP right before it"]
+    depends_on: Annotated[
+        tuple[int, ...],
+        List(U8, Varint()),
+        "numbers of the chunks before it that it needs: STATIC ones, and the GROUP right before it",
+    ]
     layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]
 
 

@@ -1,0 +1,44 @@
+"""Orthonormal bases <-> integers: each vector is said in the space that those before it leave.
+
+In: M orthonormal vectors of C numbers. Out: C + (C - 1) + ... integers, M terms; from them, exactly orthonormal vectors
+again. A third to a half of the integers that the vectors' own numbers would take.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from .. import _core
+from ..errors import FormatError
+
+
+def forward(vectors: Float64[np.ndarray, "M C"], scales: Float64[np.ndarray, " M"]) -> Int32[np.ndarray, " N"]:
+    """The integers of vectors whose k-th is as fine as 1 / scales[k]. Encoder."""
+    width = vectors.shape[1]
+    free = np.eye(width)  # columns: an orthonormal basis of what the vectors so far leave
+    rows = []
+    for vector, scale in zip(vectors, scales.tolist(), strict=True):
+        inside = free.T @ vector
+        length = float(np.linalg.norm(inside))
+        symbols = np.rint(inside * (scale / length if length > 1e-6 else 0.0)).astype(np.int32)
+        if not symbols.any():
+            symbols[int(np.abs(inside).argmax())] = 1
+        rows.append(symbols)
+        mirror = symbols / np.linalg.norm(symbols.astype(np.float64))
+        mirror[0] += -1.0 if mirror[0] < 0 else 1.0
+        free = (free - np.outer(free @ mirror, 2.0 / (mirror @ mirror) * mirror))[:, 1:]
+    return np.concatenate([np.zeros(0, np.int32), *rows])
+
+
+def inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64[np.ndarray, "M C"]:
+    """The vectors that the integers stand for. Raises FormatError where one of them has no direction."""
+    try:
+        return _core.orthonormal_inverse(symbols, count, width)
+    except ValueError as error:
+        raise FormatError("a basis vector without a direction") from error
+
+
+def symbol_count(count: int, width: int) -> int:
+    """How many integers say `count` vectors."""
+    return count * width - count * (count - 1) // 2

@@ -1,0 +1,121 @@
+"""A segment of frames becomes groups of layers: a key frame's base mesh follows the others for as long as it can.
+
+In -> out: frames in normalised coordinates, asked for in order -> payloads with what was measured on them. The first
+group of a segment stands alone; the next ones are predicted from the one before while its template still fits.
+Frames that no template follows are coded one by one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float64
+
+from .analysis.correspond import from_key, from_last
+from .analysis.fit import Fit, Guides, fit_frames
+from .analysis.groups import cut_at, leading
+from .analysis.template import base_mesh, shared_detail
+from .choice import measure
+from .coding.intra import encode_empty
+from .coding.layers import LayersState, encode_layers
+from .coding.reference import CodedReference, code_on_lattice
+from .format.layout import Form
+from .types import Mesh
+from .windows import EncodedGroup, EncoderOptions, Quality, Stages, target_of
+
+SHORTEST = 4  # frames that a group predicted from the one before must follow, or a new key frame is taken
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A template at the end of a group: what the next group may begin with."""
+
+    reference: CodedReference
+    state: LayersState  # as decoded
+    positions: Float64[np.ndarray, "V 3"]  # its fit to the last frame
+    frame: Mesh  # the last frame
+    residual: float  # what its fits usually leave, RMS
+
+
+def encode_segment(
+    frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None
+) -> Iterator[EncodedGroup]:
+    """The groups of a segment, frames all empty or none is; only those of one group are held at a time."""
+    stages = stages or Stages(None, len(frames))
+    if frames[0].is_empty:
+        yield EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), Quality(0.0, 0.0, 0.0))
+        return
+    at, before = 0, None
+    while at < len(frames):
+        ahead = [frames[number] for number in range(at, min(at + options.group_size, len(frames)))]
+        group, before = _next_group(ahead, before, options)
+        stages.add("code", group.frame_count)
+        at += group.frame_count
+        yield group
+
+
+def _next_group(
+    ahead: Sequence[Mesh], before: Followed | None, options: EncoderOptions
+) -> tuple[EncodedGroup, Followed | None]:
+    """The group that begins with the first of these frames."""
+    if before is not None:
+        found = _continued(ahead, before, options)
+        if found is not None:
+            return found
+    while True:
+        found = _alone(ahead, options)
+        if isinstance(found, int):
+            ahead = ahead[:found]
+        else:
+            return found
+
+
+def _continued(
+    ahead: Sequence[Mesh], before: Followed, options: EncoderOptions
+) -> tuple[EncodedGroup, Followed | None] | None:
+    """A group predicted from the one before, as long as its template fits; None where that is not long."""
+    base = before.reference.base
+    template = replace(options.template, levels=before.reference.levels)
+    predictions = from_last(Mesh(before.positions, base.faces), before.frame, ahead, options.track)
+    guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), template))
+    fit = fit_frames(base.faces, predictions, ahead, options.fit, guides)
+    residuals = np.array([residual.rms for residual in fit.residuals])
+    count = leading(residuals, max(before.residual, target_of(ahead, options).distance), options.groups)
+    if count < min(SHORTEST, len(ahead)):
+        return None
+    return _coded(ahead[:count], before.reference, Fit(fit.positions[:count], fit.residuals[:count]), before, options)
+
+
+def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup, Followed | None] | int:
+    """A group with a key frame of its own, or the number of frames to try instead."""
+    key = len(ahead) // 2
+    base = base_mesh(ahead[key], options.template)
+    lattice = options.layers.step * (0.33 if len(ahead) > 1 else 0.8)
+    reference = code_on_lattice(base, lattice, options.template.levels)
+    count = len(reference.mesh.vertices)
+    predictions = from_key(reference.base, key, ahead, options.track)
+    guides = Guides(None, shared_detail(reference.mesh.faces, count, options.template))
+    fit = fit_frames(reference.base.faces, predictions, ahead, replace(options.fit, key=key), guides)
+    residuals = np.array([residual.rms for residual in fit.residuals])
+    cut = cut_at(residuals / target_of(ahead, options).distance, options.groups)
+    if cut is not None and len(ahead) > 1:
+        return cut
+    return _coded(ahead, reference, fit, None, options)
+
+
+def _coded(
+    frames: Sequence[Mesh], reference: CodedReference, fit: Fit, before: Followed | None, options: EncoderOptions
+) -> tuple[EncodedGroup, Followed | None]:
+    """The cheapest form of a group, and what the next may begin with."""
+    encoded = encode_layers(reference, fit.positions, options.layers, before.state if before else None)
+    decoded = [Mesh(positions, reference.base.faces) for positions in encoded.positions]
+    quality = measure(frames, decoded)
+    group = EncodedGroup(Form.LAYERS, len(frames), encoded.payload, encoded.layers, quality, before is not None)
+    followed = Followed(reference, encoded.state, fit.positions[-1], frames[-1], _usual(fit, before))
+    return group, followed
+
+
+def _usual(fit: Fit, before: Followed | None) -> float:
+    return before.residual if before else float(np.median([residual.rms for residual in fit.residuals]))
