@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .coding.intra import decode_intra, encode_intra
 from .coding.mesh import MAX_BITS
 from .geometry.decimate import decimate
-from .metrics.distance import surface_errors
+from .metrics.distance import PSNR_CEILING, surface_errors
 from .types import Mesh
 
 
@@ -26,14 +26,18 @@ class Quality:
     distance: float  # RMS over the frames of the symmetric surface distance, normalised units
     angle: float  # mean normal error over the frames, degrees
     worst: float  # the largest symmetric distance of a frame, normalised units
+    psnr: float = 0.0  # d2_psnr_paper, mean over the frames, dB; larger is better, unlike the others
 
     def scaled(self, factor: float) -> Quality:
         """The same with its distances multiplied by `factor`."""
-        return Quality(self.distance * factor, self.angle, self.worst * factor)
+        return replace(self, distance=self.distance * factor, worst=self.worst * factor)
 
     def reaches(self, other: Quality) -> bool:
         """True where neither distance nor normals are worse than the other's."""
         return self.distance <= other.distance and self.angle <= other.angle
+
+
+NO_ERROR = Quality(0.0, 0.0, 0.0, PSNR_CEILING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +54,9 @@ def measure(originals: Sequence[Mesh], decoded: Sequence[Mesh]) -> Quality:
     errors = [surface_errors(a, b) for a, b in zip(originals, decoded, strict=True)]
     distances = [e.symmetric_rms for e in errors]
     mean_square = sum(d * d for d in distances) / len(errors)
-    return Quality(math.sqrt(mean_square), sum(e.angle for e in errors) / len(errors), max(distances))
+    angle = sum(e.angle for e in errors) / len(errors)
+    psnr = sum(min(e.d2_psnr_paper, PSNR_CEILING) for e in errors) / len(errors)
+    return Quality(math.sqrt(mean_square), angle, max(distances), psnr)
 
 
 def cheapest_intra(

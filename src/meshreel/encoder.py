@@ -32,6 +32,7 @@ class GroupSummary:
     frame_count: int
     size: int  # bytes
     quality: Quality
+    predicted: bool = False  # from the group before
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,11 @@ class Summary:
     def frame_count(self) -> int:
         """Frames in all groups."""
         return sum(group.frame_count for group in self.groups)
+
+    @property
+    def psnr(self) -> float:
+        """d2_psnr_paper, mean over the frames, dB."""
+        return sum(group.frame_count * group.quality.psnr for group in self.groups) / self.frame_count
 
 
 def encode(
@@ -69,7 +75,7 @@ def encode(
                 before = () if writer.last_group is None or not group.predicted else (writer.last_group,)
                 writer.add_group(writer.frame_count, group.frame_count, group.payload, group.layers, before)
                 quality = group.quality.scaled(seen.diagonal)
-                groups.append(GroupSummary(group.form, group.frame_count, len(group.payload), quality))
+                groups.append(GroupSummary(group.form, group.frame_count, len(group.payload), quality, group.predicted))
         writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups))
     return Summary(Path(path).stat().st_size, tuple(groups), _warnings(seen))
 
@@ -161,6 +167,7 @@ def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[s
         "quality": options.quality,
         "rms_m": _rounded(mean_square**0.5),
         "worst_rms_m": _rounded(max(group.quality.worst for group in groups)),
+        "d2_psnr_paper": _rounded(sum(g.frame_count * g.quality.psnr for g in groups) / frames),
         "normal_error_deg": _rounded(sum(g.frame_count * g.quality.angle for g in groups) / frames),
     }
 

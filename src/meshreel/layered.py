@@ -17,13 +17,13 @@ from .analysis.correspond import from_key, from_last
 from .analysis.fit import Fit, Guides, fit_frames
 from .analysis.groups import cut_at, leading
 from .analysis.template import base_mesh, shared_detail
-from .choice import measure
+from .choice import NO_ERROR, measure
 from .coding.intra import encode_empty
 from .coding.layers import LayersState, encode_layers
 from .coding.reference import CodedReference, code_on_lattice
 from .format.layout import Form
 from .types import Mesh
-from .windows import EncodedGroup, EncoderOptions, Quality, Stages, target_of
+from .windows import EncodedGroup, EncoderOptions, Stages, target_of
 
 SHORTEST = 4  # frames that a group predicted from the one before must follow, or a new key frame is taken
 
@@ -45,7 +45,7 @@ def encode_segment(
     """The groups of a segment, frames all empty or none is; only those of one group are held at a time."""
     stages = stages or Stages(None, len(frames))
     if frames[0].is_empty:
-        yield EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), Quality(0.0, 0.0, 0.0))
+        yield EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)
         return
     at, before = 0, None
     while at < len(frames):
@@ -61,15 +61,13 @@ def _next_group(
 ) -> tuple[EncodedGroup, Followed | None]:
     """The group that begins with the first of these frames."""
     if before is not None:
-        found = _continued(ahead, before, options)
-        if found is not None:
-            return found
-    while True:
-        found = _alone(ahead, options)
-        if isinstance(found, int):
-            ahead = ahead[:found]
-        else:
-            return found
+        continued = _continued(ahead, before, options)
+        if continued is not None:
+            return continued
+    found = _alone(ahead, options)
+    while isinstance(found, int):
+        found = _alone(ahead[:found], options)
+    return found
 
 
 def _continued(

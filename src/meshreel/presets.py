@@ -27,9 +27,10 @@ def preset_options(
     quality: float = 50.0,
     basis_size: int | None = None,
     group_size: int | None = None,
-    centers: int = 2000,
+    centers: int | None = None,
+    key_interval: float | None = None,
 ) -> EncoderOptions:
-    """The encoder's options for a preset at a quality; `basis_size` fixes the components of a group (`paper` only).
+    """The encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
 
     Raises InputError for an unknown preset or values out of range.
     """
@@ -39,15 +40,22 @@ def preset_options(
         raise InputError(f"quality must be in 0 to 100, got {quality:g}")
     if preset == "best" and basis_size is not None:
         raise InputError(f"basis size {basis_size}: preset `best` chooses the components; use preset `paper`")
-    track = TrackOptions(centers=centers, samples=max(45_000, 4 * centers))
-    make = _best if preset == "best" else _paper
-    size = {"best": 16, "paper": 10}[preset] if group_size is None else group_size
-    options = replace(make(float(quality)), preset=preset, quality=float(quality), group_size=size, track=track)
-    return (
-        options
-        if basis_size is None
-        else replace(options, displacements=replace(options.displacements, basis_size=basis_size))
+    if preset != "best" and key_interval is not None:
+        raise InputError(f"key interval {key_interval:g}: groups of preset `{preset}` all decode on their own")
+    centers = 2000 if centers is None else centers
+    options = replace(
+        _best(float(quality)) if preset == "best" else _paper(float(quality)),
+        preset=preset,
+        quality=float(quality),
+        track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
     )
+    if group_size is not None:
+        options = replace(options, group_size=group_size)
+    if basis_size is not None:
+        options = replace(options, displacements=replace(options.displacements, basis_size=basis_size))
+    if key_interval is not None:
+        options = replace(options, key_interval=key_interval)
+    return options
 
 
 def _paper(quality: float) -> EncoderOptions:
@@ -63,6 +71,7 @@ def _best(quality: float) -> EncoderOptions:
     step = motion_step(quality)
     return EncoderOptions(
         form=Form.LAYERS,
+        group_size=16,
         target=Quality(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
         template=TemplateOptions(error=0.35 * step),
         layers=LayersOptions(step=step, detail_ratios=(0.6, 0.8), price=0.08),

@@ -18,7 +18,7 @@ from .analysis.groups import GroupOptions, cut_at
 from .analysis.reference import ReferenceOptions, extract_reference, predict
 from .analysis.template import TemplateOptions
 from .analysis.track import TrackOptions, track_centers
-from .choice import IntraOptions, Quality, cheapest_intra, finest_intra, measure
+from .choice import NO_ERROR, IntraOptions, Quality, cheapest_intra, finest_intra, measure
 from .coding.displacements import DisplacementOptions
 from .coding.group import CodedReference, code_reference, decode_group, encode_group
 from .coding.intra import encode_empty
@@ -57,6 +57,8 @@ class EncoderOptions:
             raise InputError(f"quality must be in 0 to 100, got {self.quality:g}")
         if not 1 <= self.group_size <= MOST_FRAMES:
             raise InputError(f"group size must be in 1 to {MOST_FRAMES}, got {self.group_size}")
+        if not 0 < self.key_interval < float("inf"):
+            raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0")
         if not 1 <= self.reference_bits <= 20 or not 0 <= self.levels <= 4:
             raise InputError(f"reference bits {self.reference_bits}, levels {self.levels}: give 1 to 20 and 0 to 4")
 
@@ -92,7 +94,7 @@ def encode_window(frames: Sequence[Mesh], options: EncoderOptions, stages: Stage
     """The groups of a window: one, or more where one reference cannot follow. Frames are all empty or none is."""
     stages, frames = stages or Stages(None, len(frames)), list(frames)
     if frames[0].is_empty:
-        groups = [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), Quality(0.0, 0.0, 0.0))]
+        groups = [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
     elif len(frames) == 1:
         groups = [_intra_only(frames, options)]
     else:

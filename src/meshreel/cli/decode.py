@@ -19,7 +19,7 @@ def command(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     format: Literal["ply", "obj", "glb"] = "ply",
-    components: int | None = None,
+    layers: int | None = None,
     common: Common = Common(),
 ) -> None:
     """Decode a .reel file into a directory of meshes.
@@ -32,12 +32,13 @@ def command(
         The directory to write frame_00000.ply and so on into; made if needed.
     format
         Of the mesh files.
-    components
-        Use at most this many KLT components per group: a coarser, still valid shape.
+    layers
+        Use at most this many layers of a group beyond its first (subdivisions, or KLT components): a coarser, still
+        valid shape.
     """
-    if components is not None and components < 0:
-        raise InputError(f"--components must not be negative, got {components}")
-    video = open_video(file).at(components)
+    if layers is not None and layers < 0:
+        raise InputError(f"--layers must not be negative, got {layers}")
+    video = open_video(file).at(layers)
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:

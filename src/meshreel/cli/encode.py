@@ -16,6 +16,8 @@ from ..encoder import Summary, encode
 from ..errors import InputError
 from ..io.sequence import open_sequence
 from ..presets import preset_options
+from ..rate_control import Goal, encode_to
+from ..windows import EncoderOptions
 from .console import Common
 from .reading import Reading
 
@@ -27,12 +29,15 @@ def command(
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    preset: Literal["paper"] = "paper",
+    preset: Literal["best", "paper"] = "best",
     quality: float = _CODE.quality,
+    target_psnr: float | None = None,
+    target_mbps: float | None = None,
     reading: Reading = Reading(),
-    basis_size: int | None = _CODE.displacements.basis_size,
-    centers: int = _CODE.track.centers,
-    group_size: int = _CODE.group_size,
+    basis_size: int | None = None,
+    centers: int | None = None,
+    group_size: int | None = None,
+    keyint: float | None = None,
     jobs: int = 1,
     common: Common = Common(),
 ) -> None:
@@ -46,16 +51,23 @@ def command(
     output
         The .reel file to write; it appears only when it is complete.
     preset
-        How to code: `paper` is section 3 of the TSMC paper.
+        How to code: `best` is what measures best, `paper` is section 3 of the TSMC paper.
     quality
         0 (small) to 100 (fine).
+    target_psnr
+        Instead of a quality: the D2-PSNR (one way, mean over the frames, as `compare` prints it) to meet within 0.3 dB.
+        Takes a few encodes.
+    target_mbps
+        Instead of a quality: the rate to meet within 5 %, Mbit/s. Takes a few encodes.
     basis_size
         Exactly this many KLT components per group, and no per-frame Draco where that is cheaper; both by
-        rate-distortion where it is not given.
+        rate-distortion where it is not given. Preset `paper` only.
     centers
-        Volume centers to track, the paper's K.
+        Volume centers to track, the paper's K (2000).
     group_size
-        Most frames in a group, the paper's GoF.
+        Most frames in a group, the paper's GoF (16; `paper`: 10).
+    keyint
+        Seconds, at most, from one frame that decodes on its own to the next (4). Preset `best` only.
     jobs
         Groups to encode side by side; the file is the same.
     """
@@ -63,14 +75,22 @@ def command(
         raise InputError(f"{output}: the output must end in .reel")
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
-    options = preset_options(preset, quality, basis_size, group_size, centers)
+
+    def options_at(quality: float) -> EncoderOptions:
+        return preset_options(preset, quality, basis_size, group_size, centers, keyint)
+
+    options = options_at(quality)
+    goal = None if target_psnr is None and target_mbps is None else Goal(target_psnr, target_mbps)
     source = inputs[0] if len(inputs) == 1 else inputs
     sequence = open_sequence(source, reading.options())
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
-        summary = encode(sequence, output, options, executor, progress)
+        if goal is None:
+            summary = encode(sequence, output, options, executor, progress)
+        else:
+            summary, quality = encode_to(sequence, output, goal, options_at, executor, progress)
     warnings = (*sequence.warnings, *summary.warnings)
     common.warn(warnings)
-    row = summary_row(summary, sequence.frame_rate)
+    row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
     common.result({"output": str(output), "warnings": warnings} | row, f"{output}: {describe(row)}")
 
 
@@ -86,6 +106,7 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
                 "form": group.form.name.lower(),
                 "frames": group.frame_count,
                 "bytes": group.size,
+                "predicted": group.predicted,
                 "rms_m": group.quality.distance,
                 "worst_rms_m": group.quality.worst,
                 "normal_error_deg": group.quality.angle,

@@ -11,6 +11,7 @@ from ..coding.group import payload_parts
 from ..container.reader import Chunk, ReelReader
 from ..container.sources import FileSource
 from ..errors import FormatError
+from ..format.layout import ChunkKind
 from .console import Common
 
 
@@ -61,7 +62,8 @@ def megabits(size: int, reader: ReelReader) -> float:
 
 def _describe_group(reader: ReelReader, chunk: Chunk) -> dict[str, Any]:
     row: dict[str, Any] = {"first_frame": chunk.first_frame, "frames": chunk.frame_count}
-    row |= {"form": chunk.form.name.lower(), "bytes": chunk.size, "components": len(chunk.layers) - 1}
+    row |= {"form": chunk.form.name.lower(), "bytes": chunk.size, "layers": len(chunk.layers) - 1}
+    row["predicted"] = any(reader.chunks[n].kind == ChunkKind.GROUP for n in chunk.depends_on)
     try:
         return row | {"parts": payload_parts(reader.read_chunk(chunk.number))}
     except FormatError as error:
@@ -76,10 +78,10 @@ def _rates(row: dict[str, Any]) -> Table:
 
 
 def _groups(row: dict[str, Any]) -> Table:
-    table = Table("group", "frames", "form", "components", "bytes", "parts")
+    table = Table("group", "frames", "form", "layers", "bytes", "parts")
     for number, group in enumerate(row["groups"]):
         parts = ", ".join(f"{name} {size}" for name, size in group["parts"].items())
         first, last = group["first_frame"], group["first_frame"] + group["frames"] - 1
-        components = str(group["components"]) if group["form"] == "laplacian" else ""
-        table.add_row(str(number), f"{first}-{last}", group["form"], components, str(group["bytes"]), parts)
+        form = group["form"] + (", predicted" if group["predicted"] else "")
+        table.add_row(str(number), f"{first}-{last}", form, str(group["layers"]), str(group["bytes"]), parts)
     return table

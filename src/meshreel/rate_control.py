@@ -1,0 +1,129 @@
+"""Encoding to a rate or to a PSNR: the quality that gives it is searched for, with whole encodes.
+
+In: a sequence and a goal. Out: a file that meets it. The rate is nearly exponential in the quality and the PSNR nearly
+linear, so that a few secant steps are enough.
+"""
+
+from __future__ import annotations
+
+import math
+import uuid
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+
+from .encoder import Summary, encode
+from .errors import InputError
+from .types import MeshSequence
+from .windows import EncoderOptions, Progress
+
+TRIALS = 8  # whole encodes, at most
+FIRST_QUALITY = 50.0
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What a file should be; exactly one of both."""
+
+    psnr: float | None = None  # d2_psnr_paper, mean over the frames, dB; reached within 0.3 dB
+    mbps: float | None = None  # of the whole file, Mbit/s; reached within 5 %
+
+    def __post_init__(self) -> None:
+        given = [value for value in (self.psnr, self.mbps) if value is not None]
+        if len(given) != 1 or not 0 < given[0] < math.inf:
+            raise InputError(f"targets {self.psnr} dB and {self.mbps} Mbps: give one of them, above 0")
+
+    @property
+    def tolerance(self) -> float:
+        """How near a measured value must be to the wanted one; a little less than what is promised."""
+        return 0.25 if self.mbps is None else math.log(1.04)
+
+    @property
+    def slope(self) -> float:
+        """How the measured value rises with the quality, about, before two are known."""
+        return 0.16 if self.mbps is None else math.log(2) / 22
+
+    @property
+    def wanted(self) -> float:
+        """The goal where it is linear in the quality: dB, or the logarithm of the rate."""
+        return math.log(self.mbps) if self.mbps is not None else float(self.psnr or 0.0)
+
+    def measured(self, summary: Summary, frame_rate: float) -> float:
+        """The same of a file."""
+        if self.mbps is None:
+            return summary.psnr
+        return math.log(summary.size * 8 * frame_rate / summary.frame_count / 1e6)
+
+    def told(self, value: float) -> str:
+        """A measured value for people."""
+        return f"{value:.2f} dB" if self.mbps is None else f"{math.exp(value):.4g} Mbps"
+
+
+def encode_to(
+    sequence: MeshSequence,
+    path: str | Path,
+    goal: Goal,
+    options_at: Callable[[float], EncoderOptions],
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> tuple[Summary, float]:
+    """Writes a file that meets the goal; gives its summary and the quality it took.
+
+    `options_at` makes the options of a quality from 0 to 100. Raises InputError, and leaves no file, where no quality
+    meets the goal.
+    """
+    search, path = Search(goal), Path(path)
+    partial = path.with_name(f".{uuid.uuid4().hex}.tmp")
+    try:
+        for _ in range(TRIALS):
+            quality = search.next()
+            if quality is None:
+                break
+            summary = encode(sequence, partial, options_at(quality), executor, progress)
+            value = goal.measured(summary, sequence.frame_rate)
+            if abs(value - goal.wanted) <= goal.tolerance:
+                partial.replace(path)
+                return summary, quality
+            search.learn(quality, value)
+    finally:
+        partial.unlink(missing_ok=True)
+    raise InputError(f"{path}: no quality gives {goal.told(goal.wanted)}; {search.found()}")
+
+
+class Search:
+    """A secant search over qualities for a value that rises with them, inside what is known to bracket it."""
+
+    def __init__(self, goal: Goal) -> None:
+        self._goal = goal
+        self._known: dict[float, float] = {}
+
+    def next(self) -> float | None:
+        """The quality to try; None where nothing is left."""
+        if not self._known:
+            return FIRST_QUALITY
+        wanted = self._goal.wanted
+        below = max((q for q, value in self._known.items() if value < wanted), default=None)
+        above = min((q for q, value in self._known.items() if value >= wanted), default=None)
+        if below is not None and above is not None:
+            low, high = sorted((below, above))
+            share = (wanted - self._known[below]) / max(self._known[above] - self._known[below], 1e-9)
+            return low + (high - low) * min(max(share, 0.1), 0.9) if high - low > 0.1 else None
+        last = above if below is None else below
+        assert last is not None
+        ahead = min(max(last + (wanted - self._known[last]) / self._slope(), 0.0), 100.0)
+        return None if ahead in self._known else ahead
+
+    def learn(self, quality: float, value: float) -> None:
+        """Takes in what a quality gave."""
+        self._known[quality] = value
+
+    def found(self) -> str:
+        """What was tried, for a message."""
+        tried = sorted(self._known.items())
+        return ", ".join(f"quality {quality:.4g} gives {self._goal.told(value)}" for quality, value in tried)
+
+    def _slope(self) -> float:
+        """From the two outermost qualities known, where there are two."""
+        (q0, v0), (q1, v1) = min(self._known.items()), max(self._known.items())
+        return max((v1 - v0) / (q1 - q0), 0.3 * self._goal.slope) if q1 > q0 else self._goal.slope
