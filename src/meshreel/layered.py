@@ -23,8 +23,11 @@ from .coding.layers import LayersState, encode_layers
 from .coding.reference import CodedReference, code_on_lattice
 from .format.layout import Form
 from .types import Mesh
-from .windows import EncodedGroup, EncoderOptions, Stages, target_of
+from .windows import EncodedGroup, EncoderOptions, Stages, cheaper, intra_only, laplacian, target_of
 
+LATTICE = 0.33  # spacing of the base's lattice, in steps: what it rounds away is coded again with the motion
+LATTICE_ALONE = 0.8  # the same for one frame, whose base need not move
+TOO_COARSE = 1.5  # targets that the layers' distance may be before the Laplacian form is tried
 SHORTEST = 4  # frames that a group predicted from the one before must follow, or a new key frame is taken
 
 
@@ -89,17 +92,22 @@ def _continued(
 def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup, Followed | None] | int:
     """A group with a key frame of its own, or the number of frames to try instead."""
     key = len(ahead) // 2
-    base = base_mesh(ahead[key], options.template)
-    lattice = options.layers.step * (0.33 if len(ahead) > 1 else 0.8)
-    reference = code_on_lattice(base, lattice, options.template.levels)
-    count = len(reference.mesh.vertices)
+    lattice = options.layers.step * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
+    reference = code_on_lattice(base_mesh(ahead[key], options.template), lattice, options.template.levels)
+    if reference.base.is_empty:
+        return 1 if len(ahead) > 1 else (intra_only(ahead, options), None)
     predictions = from_key(reference.base, key, ahead, options.track)
-    guides = Guides(None, shared_detail(reference.mesh.faces, count, options.template))
+    base = reference.mesh
+    guides = Guides(None, shared_detail(base.faces, len(base.vertices), options.template))
     fit = fit_frames(reference.base.faces, predictions, ahead, replace(options.fit, key=key), guides)
     residuals = np.array([residual.rms for residual in fit.residuals])
-    cut = cut_at(residuals / target_of(ahead, options).distance, options.groups)
-    if cut is not None and len(ahead) > 1:
-        return cut
+    target = target_of(ahead, options)
+    if len(ahead) > 1:
+        cut = cut_at(residuals / target.distance, options.groups)
+        if cut is not None:
+            return cut
+    elif residuals[0] > options.groups.limit * target.distance:
+        return intra_only(ahead, options), None
     return _coded(ahead, reference, fit, None, options)
 
 
@@ -111,8 +119,14 @@ def _coded(
     decoded = [Mesh(positions, reference.base.faces) for positions in encoded.positions]
     quality = measure(frames, decoded)
     group = EncodedGroup(Form.LAYERS, len(frames), encoded.payload, encoded.layers, quality, before is not None)
-    followed = Followed(reference, encoded.state, fit.positions[-1], frames[-1], _usual(fit, before))
-    return group, followed
+    if quality.distance > TOO_COARSE * target_of(frames, options).distance:
+        other = laplacian(frames, reference, fit, options.displacements)
+        if other.quality.reaches(quality) and len(other.payload) < len(group.payload):
+            group = other
+    group = cheaper(frames, group, options)
+    if group.form != Form.LAYERS:
+        return group, None
+    return group, Followed(reference, encoded.state, fit.positions[-1], frames[-1], _usual(fit, before))
 
 
 def _usual(fit: Fit, before: Followed | None) -> float:

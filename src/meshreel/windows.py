@@ -96,7 +96,7 @@ def encode_window(frames: Sequence[Mesh], options: EncoderOptions, stages: Stage
     if frames[0].is_empty:
         groups = [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
     elif len(frames) == 1:
-        groups = [_intra_only(frames, options)]
+        groups = [intra_only(frames, options)]
     else:
         centers = track_centers(frames, options.track)
         stages.add("track", len(frames))
@@ -130,17 +130,17 @@ def _encode_span(
 ) -> list[EncodedGroup]:
     """Groups of a run of frames: cut where the fit fails, `depth` times at most, then the cheaper of both forms."""
     if len(frames) == 1:
-        return [_intra_only(frames, options)]
+        return [intra_only(frames, options)]
     try:
         reference, fit = analyze(frames, centers, options, stages)
     except NoReferenceError:
-        return [_intra_only(frames, options)]
+        return [intra_only(frames, options)]
     residuals = np.array([residual.rms for residual in fit.residuals])
     target = target_of(frames, options)
     cut = cut_at(residuals / target.distance, options.groups)
     if cut is not None:
         if depth == 0:
-            return [_intra_only(frames, options)]
+            return [intra_only(frames, options)]
         head, tail = frames[:cut], frames[cut:]
         known = replace(centers, positions=centers.positions[:cut])
         anew = track_centers(tail, options.track)  # centers that were lost before the cut would spoil what follows
@@ -150,11 +150,11 @@ def _encode_span(
             *_encode_span(head, known, quick, depth - 1, again),
             *_encode_span(tail, anew, quick, depth - 1, again),
         ]
-    group = _laplacian(frames, reference, fit, options.displacements)
-    return [group if options.displacements.basis_size is not None else _cheaper(frames, group, options)]
+    group = laplacian(frames, reference, fit, options.displacements)
+    return [group if options.displacements.basis_size is not None else cheaper(frames, group, options)]
 
 
-def _laplacian(
+def laplacian(
     frames: Sequence[Mesh], reference: CodedReference, fit: Fit, options: DisplacementOptions
 ) -> EncodedGroup:
     field = np.ascontiguousarray(np.moveaxis(fit.positions, 0, 1) - reference.base.vertices[:, None])
@@ -163,13 +163,13 @@ def _laplacian(
     return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, quality)
 
 
-def _cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions) -> EncodedGroup:
+def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions) -> EncodedGroup:
     """The group, or its `draco` form where that is as good and smaller."""
     found = cheapest_intra(frames, group.quality, len(group.payload), options.intra)
     return group if found is None else EncodedGroup(Form.DRACO, len(frames), found[0], (), found[1])
 
 
-def _intra_only(frames: Sequence[Mesh], options: EncoderOptions) -> EncodedGroup:
+def intra_only(frames: Sequence[Mesh], options: EncoderOptions) -> EncodedGroup:
     """The `draco` form at the target's quality."""
     target = target_of(frames, options)
     payload, quality = cheapest_intra(frames, target, np.inf, options.intra) or finest_intra(frames, target.distance)

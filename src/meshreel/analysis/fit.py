@@ -35,6 +35,7 @@ class FitOptions:
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # pairs farther apart do not count; of the diagonal
     smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weight of the shape: its Laplacian against the turned one
     agreement: float = 0.3  # least cosine between the normals of a pair
+    centroids: bool = True  # the faces of the template look for the frame too; not worth the time where it is dense
     anchor: float = 0.02  # row weight of the offset from the prediction
     components: int = 15  # of the trajectories, that the second fit is drawn to; 0: no second fit
     pull: float = 0.1  # row weight of the offset from the coherent positions, in the second fit
@@ -192,5 +193,5 @@ def _round(
     gate: float,
     options: FitOptions,
 ) -> Float64[np.ndarray, "V 3"]:
-    rows = match(template, x, target, MatchOptions(gate, options.agreement))
+    rows = match(template, x, target, MatchOptions(gate, options.agreement, options.centroids))
     return x + solve(template, rows, x, problem, (options.iterations, options.tolerance))
