@@ -122,5 +122,4 @@ def _is_point(row: Row, measure: Measure, points: Curve) -> bool:
     quality = value(row, measure.key)
     if quality is None:
         return False
-    known = [rate for rate, q in zip(points.rates, points.qualities, strict=True) if q == measure.sign * quality]
-    return any(abs(row["mbps"] - rate) < 1e-9 * rate for rate in known)
+    return (row["mbps"], measure.sign * quality) in zip(points.rates, points.qualities, strict=True)

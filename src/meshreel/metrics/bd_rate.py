@@ -101,14 +101,13 @@ def hull(name: str, curves: Sequence[Curve]) -> Curve:
     be far under all that any of the codecs reaches.
     """
     rates = [rate for curve in curves for rate in curve.rates]
-    points = _front(Curve(name, rates, [quality for curve in curves for quality in curve.qualities]))
-    points[:, 1] = np.exp(points[:, 1])
-    kept: list[np.ndarray] = []
+    points = _best(Curve(name, rates, [quality for curve in curves for quality in curve.qualities]))
+    kept: list[tuple[float, float]] = []
     for point in points:
         while len(kept) > 1 and _cross(kept[-2], kept[-1], point) <= 0:
             kept.pop()
         kept.append(point)
-    return Curve(name, [float(p[1]) for p in kept], [float(p[0]) for p in kept])
+    return Curve(name, [p[1] for p in kept], [p[0] for p in kept])
 
 
 def gain_end(anchor: Curve, test: Curve) -> GainEnd:
@@ -127,11 +126,17 @@ def gain_end(anchor: Curve, test: Curve) -> GainEnd:
 
 def _front(curve: Curve) -> Float64[np.ndarray, "N 2"]:
     """(quality, ln rate) of the points that no other beats, both strictly growing."""
+    points = [(quality, math.log(rate)) for quality, rate in _best(curve)]
+    return np.array(points, dtype=np.float64).reshape(-1, 2)
+
+
+def _best(curve: Curve) -> list[tuple[float, float]]:
+    """(quality, rate) of the points that no other beats, both strictly growing."""
     kept: list[tuple[float, float]] = []
     for rate, quality in sorted(zip(curve.rates, curve.qualities, strict=True), key=lambda p: (p[0], -p[1])):
         if not kept or quality > kept[-1][0]:
-            kept.append((float(quality), math.log(rate)))
-    return np.array(kept, dtype=np.float64).reshape(-1, 2)
+            kept.append((float(quality), float(rate)))
+    return kept
 
 
 def _integral(points: Float64[np.ndarray, "N 2"], low: float, high: float) -> float:
@@ -146,9 +151,9 @@ def _log_rate(points: Float64[np.ndarray, "N 2"], at: Float64[np.ndarray, " Q"])
     return np.asarray(PchipInterpolator(points[:, 0], points[:, 1])(at), dtype=np.float64)
 
 
-def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+def _cross(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
     """Over 0 where the way from a over b to c turns upwards."""
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _range(name: str, points: Float64[np.ndarray, "N 2"]) -> str:

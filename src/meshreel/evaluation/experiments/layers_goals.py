@@ -116,11 +116,9 @@ def quick_decode(rows: Sequence[Row]) -> list[Promise]:
     def ratio(row: Row) -> tuple[str, bool]:
         plain, free = row["frame_ms"] / row["draco_ms"], row["frame_ms"] / row["subdivided_ms"]
         anchor = row["anchor"]
+        told = f"{plain:.2f} (of {row['draco_ms']:.2f} ms), with free subdivision {free:.2f}"
         equal = f"A2s at {anchor['mbps']:.3f} Mbps, {anchor['d2_psnr_paper']:.2f} dB"
-        told = (
-            f"{plain:.2f} ({row['draco_ms']:.2f} ms); with the subdivision {free:.2f} ({row['subdivided_ms']:.2f} ms)"
-        )
-        return f"{told}; {equal}", plain <= 1
+        return f"{told} (of {row['subdivided_ms']:.2f} ms); {equal}", plain <= 1
 
     return [
         of_row("decode, dancer, steady state, one thread", "<= 1.5 ms/frame at 16k vertices", row, time),
