@@ -21,8 +21,10 @@ def tiny(monkeypatch, tmp_path):
     points = [Point("dancer", "draco", {"qp": 9}), Point("dancer", "decimated_draco", {"levels": 1})]
     chosen = ModuleType("tiny")
     chosen.points = lambda small: points[: 1 if small else 2]
-    chosen.references, chosen.promises = targets.references, targets.promises
+    for name in ("references", "promises", "comparisons", "shown", "sections", "COMPARISON"):
+        setattr(chosen, name, getattr(targets, name))
     monkeypatch.setattr("meshreel.cli.bench.find_experiment", lambda _: chosen)
+    monkeypatch.setattr("meshreel.cli.bench.EXPERIMENTS", {"tiny": chosen})
     return tmp_path
 
 
@@ -35,12 +37,13 @@ def test_a_run_writes_rows_and_goes_on_where_it_was(run, tiny):
     assert second.row["rows"] == 2 and len(second.row["promises"]) == 14
     assert len(rows.read_text().splitlines()) == 2
     said = run("bench", "report", rows, "-o", tiny / "out", "--json")
-    assert [path.rsplit("/", 1)[1] for path in said.row["files"]] == ["results.md", "dancer.png"]
+    assert [path.rsplit("/", 1)[1] for path in said.row["files"]] == ["results.md", "tiny-dancer.png"]
     assert run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--quiet").err == ""
 
 
 def test_what_is_missing_is_told(run, tmp_path):
-    assert failed(run("bench", "run", "nothing", "-o", tmp_path / "r.jsonl"), "known: targets")
+    assert failed(run("bench", "run", "nothing", "-o", tmp_path / "r.jsonl"), "known: ablation, layers, targets")
     said = run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--data", tmp_path)
     assert failed(said, "dancer", "--data")
+    assert failed(run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--jobs", "0"), "--jobs", "0")
     assert failed(run("bench", "report", tmp_path / "none.jsonl", "-o", tmp_path), "none.jsonl", "bench run")

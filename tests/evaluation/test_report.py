@@ -117,22 +117,24 @@ def test_a_row_that_falls_short_is_missed(name, bad):
 
 
 def test_the_report_is_made_of_the_rows(tmp_path):
-    written = write_report(GOOD, TARGETS, tmp_path)
+    written = write_report(GOOD, {"targets": TARGETS}, tmp_path)
     assert {path.name for path in written} == {
         "results.md",
-        *(f"{name}.png" for name in ("dancer", "mitch", "basketball_player", "collision")),
+        *(f"targets-{name}.png" for name in ("dancer", "mitch", "basketball_player", "collision")),
     }
     page = (tmp_path / "results.md").read_text()
     assert "meshreel bench run targets" in page
     assert page.count("| met |") == 14 and "MISSED" not in page
     assert "BD-rate by `d2_psnr_paper`: meshreel paper against decimated_draco_subdivided" in page
     assert "TSMC, released code: 2.23 Mbps 51.87 dB" in page
-    assert all((tmp_path / "results" / f"{name}.png").read_bytes()[:4] == b"\x89PNG" for name in ("dancer", "mitch"))
+    assert all(
+        (tmp_path / "results" / f"targets-{name}.png").read_bytes()[:4] == b"\x89PNG" for name in ("dancer", "mitch")
+    )
 
 
 def test_a_metric_that_was_not_measured_has_no_panel_and_no_number(tmp_path):
     rows = [row("dancer", "draco", 4.0, 60.0, d2_psnr_paper_worst=None, peer={}, decode_over_peer=None)]
-    assert write_report(rows, TARGETS, tmp_path)
+    assert write_report(rows, {"targets": TARGETS}, tmp_path)
     assert "nan" not in (tmp_path / "results.md").read_text()
 
 
@@ -144,5 +146,5 @@ def test_points_are_told_apart_by_their_keys():
 
 
 def test_an_unknown_experiment_is_told():
-    with pytest.raises(InputError, match="known: targets"):
+    with pytest.raises(InputError, match="known: ablation, layers, targets"):
         experiment("all")

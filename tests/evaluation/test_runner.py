@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -15,8 +16,9 @@ from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import CODECS, make_codec
 from meshreel.evaluation.datasets import open_dataset
 from meshreel.evaluation.fresh import peak_rss_mb
+from meshreel.evaluation.peers import equal_anchor, run_fresh
 from meshreel.evaluation.rows import Point, read_rows
-from meshreel.evaluation.runner import run_fresh, run_point, run_points
+from meshreel.evaluation.runner import Bench, run_point, run_points
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Mesh, MeshList
@@ -94,14 +96,58 @@ def test_a_row_has_rate_times_memory_peer_and_every_metric():
 
 
 def test_points_that_have_rows_are_not_run_again(folder, tmp_path, monkeypatch):
-    points = [Point("ball", "draco", {"qp": qp}) for qp in (7, 8)]
+    points, bench = [Point("ball", "draco", {"qp": qp}) for qp in (7, 8)], Bench(folder, comparison=QUICK)
     told: list[bool] = []
-    first = run_points(points[:1], folder, tmp_path / "rows.jsonl", QUICK, lambda _, new: told.append(new))
-    rows = run_points(points, folder, tmp_path / "rows.jsonl", QUICK, lambda _, new: told.append(new))
+    first = run_points(points[:1], tmp_path / "rows.jsonl", bench, lambda _, new: told.append(new))
+    rows = run_points(points, tmp_path / "rows.jsonl", bench, lambda _, new: told.append(new))
     assert told == [True, False, True]
     assert rows[0] == json.loads(json.dumps(first[0])) and rows == read_rows(tmp_path / "rows.jsonl")
     monkeypatch.setattr(runner, "run_point", lambda *_: pytest.fail("measured again"))
-    assert run_points(points, folder, tmp_path / "rows.jsonl", QUICK, lambda *_: None) == rows
+    assert run_points(points, tmp_path / "rows.jsonl", bench, lambda *_: None) == rows
+
+
+def test_rows_of_another_experiment_are_another_matter(folder, tmp_path):
+    points, file = [Point("ball", "draco", {"qp": 7}, kind="curve")], tmp_path / "rows.jsonl"
+    for name in ("targets", "layers", "layers"):
+        [row] = run_points(points, file, Bench(folder, name, QUICK), lambda *_: None)
+        assert row["experiment"] == name
+    assert len(read_rows(file)) == 2
+
+
+def test_points_measured_side_by_side_keep_their_order_and_later_ones_see_them(folder, tmp_path):
+    anchor = Point("ball", "decimated_draco", {"fraction": 1.0, "qp": 12, "levels": 1}, kind="curve")
+    coarse = Point("ball", "decimated_draco", {"fraction": 0.5, "qp": 6, "levels": 0}, kind="curve")
+    pair = Point("ball", coarse.codec, coarse.options, kind="decode")
+    bench = Bench(folder, "layers", QUICK)
+    with ThreadPoolExecutor(2) as executor:
+        rows = run_points([pair, anchor, coarse], tmp_path / "rows.jsonl", bench, lambda *_: None, executor)
+    assert [row["kind"] for row in rows] == ["decode", "curve", "curve"]
+    assert rows[0]["anchor"]["options"] == anchor.options and rows[0]["frames"] == 2
+    assert min(rows[0][name] for name in ("frame_ms", "draco_ms", "subdivided_ms")) > 0
+    json.dumps(rows, allow_nan=False)
+
+
+def test_a_pair_needs_a_row_of_its_own_and_an_anchor_as_good(folder, tmp_path):
+    pair = Point("ball", "draco", {"qp": 9}, kind="decode")
+    with pytest.raises(InputError, match="no quality row yet"):
+        run_points([pair], tmp_path / "rows.jsonl", Bench(folder, comparison=QUICK), lambda *_: None)
+    own = {"sequence": "ball", "codec": "draco", "frames": 2, "d2_psnr_paper": 60.0}
+    with pytest.raises(InputError, match="best 55"):
+        equal_anchor(own, [own | {"codec": "decimated_draco_subdivided", "d2_psnr_paper": 55.0}])
+
+
+def test_a_curve_row_has_rate_groups_and_a_few_metrics_of_each_frame(folder):
+    row = runner.measure_point(Point("ball", "draco", {"qp": 9}, kind="curve"), Bench(folder, comparison=QUICK))
+    assert row["mbps"] > 0 and set(row["per_frame"][0]) < set(runner.CURVE_METRICS)
+    assert [group["frames"] for group in row["groups"]] == [1, 1] and "decode" not in row
+    assert sum(group["bytes"] for group in row["groups"]) < row["bytes"]
+
+
+def test_a_floor_row_says_what_draco_would_cost_each_group(folder):
+    wasteful = Point("ball", "draco", {"qp": 14}, kind="floor")
+    row = runner.measure_point(wasteful, Bench(folder, comparison=QUICK))
+    assert len(row["groups"]) == 2 and all("draco_bytes" in group for group in row["groups"])
+    assert all(g["draco_bytes"] is None or g["draco_bytes"] < g["bytes"] for g in row["groups"])
 
 
 def test_an_encode_is_measured_in_a_process_of_its_own(tmp_path):

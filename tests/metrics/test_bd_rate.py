@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.errors import InputError
-from meshreel.metrics.bd_rate import Curve, bd_rate
+from meshreel.metrics.bd_rate import Curve, bd_rate, gain_end, hull
 
 # The points of VCEG-M33's often reprinted example, and those in the README of FAU's `bjontegaard` package.
 VCEG = (
@@ -77,6 +77,42 @@ def test_points_that_another_beats_are_dropped_and_counted():
     assert result.points == (3, 3)
     assert result.percent == pytest.approx(bd_rate(clean, _curve("b", [2, 4, 8], [50, 53, 56])).percent)
     assert result.percent == pytest.approx(100)
+
+
+def test_the_hull_keeps_what_no_mixture_of_others_beats():
+    found = hull("all", [_curve("a", [1, 2, 8], [50, 52, 60]), _curve("b", [2, 3, 5], [54, 54.1, 53])])
+    assert (list(found.rates), list(found.qualities)) == ([1, 2, 8], [50, 54, 60])
+    assert hull("none", []).rates == []
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.tuples(st.floats(0.1, 10), st.floats(40, 80)), min_size=2, max_size=20))
+def test_the_hull_is_convex_and_no_point_is_under_it(points: list[tuple[float, float]]):
+    found = hull("all", [_curve("a", [p[0] for p in points], [p[1] for p in points])])
+    slopes = np.diff(found.rates) / np.diff(found.qualities)
+    assert (np.diff(slopes) >= -1e-9).all() and (slopes > 0).all()
+    for rate, quality in points:
+        if found.qualities[0] <= quality <= found.qualities[-1]:
+            assert rate >= np.interp(quality, found.qualities, found.rates) - 1e-9
+
+
+def test_a_gain_ends_where_the_curves_cross():
+    anchor, test = _curve("a", [1, 4], [50, 60]), _curve("b", [0.5, 8], [50, 60])
+    found = gain_end(anchor, test)
+    assert found.reached and found.quality == pytest.approx(55, abs=0.01) and found.where == "the curves cross"
+
+
+def test_a_gain_that_goes_on_says_whose_points_end_first():
+    anchor = _curve("a", [1, 4], [50, 60])
+    short, long = gain_end(anchor, _curve("b", [0.5, 1], [50, 57])), gain_end(anchor, _curve("b", [0.5, 3], [50, 70]))
+    assert (short.quality, short.reached, long.quality, long.reached) == (57, False, 60, False)
+    assert "the codec's best point" in short.where and "the anchors' best point" in long.where
+
+
+def test_no_gain_and_no_overlap_have_no_end():
+    anchor = _curve("a", [1, 4], [50, 60])
+    for other in (_curve("b", [2, 8], [50, 60]), _curve("b", [1, 2], [70, 80]), _curve("b", [], [])):
+        assert gain_end(anchor, other).quality is None and "no gain" in gain_end(anchor, other).where
 
 
 @pytest.mark.parametrize(

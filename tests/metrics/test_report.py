@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.metrics.cameras import Box, ViewOptions, views_around, write_cameras
+from meshreel.metrics.cameras import (
+    Box,
+    ParallelViewOptions,
+    ViewOptions,
+    parallel_views_around,
+    views_around,
+    write_cameras,
+)
 from meshreel.metrics.distance import PSNR_CEILING, surface_errors
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
 from meshreel.metrics.ssim import ssim_normals
@@ -33,6 +40,17 @@ def test_aggregates_are_the_mean_and_the_worst_of_the_frames():
     assert row["rms_forward_percent"] == pytest.approx(100 * row["rms_forward_m"] / BODY.diagonal)
     assert [f["d1_psnr"] for f in row["per_frame"]] == [e.d1_psnr for e in errors]
     assert row["frames_compared"] == 3 and "ssim" not in row
+
+
+def test_parallel_views_are_used_and_printed_where_they_are_asked_for():
+    comparison = compare_sequences(ORIGINALS, DECODED, ComparisonOptions(views=ParallelViewOptions(64)))
+    cameras = parallel_views_around(Box.of(ORIGINALS), 64)
+    expected = np.mean([ssim_normals(a, b, cameras).masked for a, b in zip(ORIGINALS, DECODED, strict=True)])
+    row = json.loads(json.dumps(comparison.to_row()))
+    assert row["ssim_masked"] == pytest.approx(expected)
+    assert [camera["size"] for camera in row["cameras"]] == [[64, 64]] * 4 and row["cameras"][0]["pixel_m"] > 0
+    with pytest.raises(InputError, match="8 x 8"):
+        ParallelViewOptions(4)
 
 
 def test_ssim_uses_views_around_the_whole_sequence_and_prints_them():

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import App, Parameter
 from rich.table import Table
 
+from ..errors import InputError
+from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
 from ..evaluation.promises import Promise
 from ..evaluation.report import write_report
-from ..evaluation.rows import Row, read_rows
-from ..evaluation.runner import run_points
-from ..metrics.report import ComparisonOptions
+from ..evaluation.rows import Row, join_rows, read_rows
+from ..evaluation.runner import Bench, run_points
 from .console import Common
+from .encode import workers
 
 command = App(name="bench", help="Measure codecs against each other, and make tables and plots of the rows.")
 DATA = Path("../shared/data/performers")
@@ -31,16 +33,18 @@ def run(
     data: Path = DATA,
     small: bool = False,
     ssim: bool = True,
+    jobs: int = 1,
     common: Common = Common(),
 ) -> None:
     """Run an experiment and print what it promised and reached.
 
-    Every row is appended to the output as soon as it is there, and rows that are there are not run again.
+    Every row is appended to the output as soon as it is there, and rows that are there are not run again. Sequences
+    that take long to make are kept in a folder beside it, whose name ends in `.cache`.
 
     Parameters
     ----------
     experiment
-        Which one: `targets`.
+        Which one: `layers`, `ablation` or `targets`.
     output
         A JSON-lines file.
     data
@@ -49,10 +53,15 @@ def run(
         A few points on a few frames only: minutes.
     ssim
         Render and compare pictures too (slower).
+    jobs
+        Points to measure side by side, each in a process; the rows are the same but for times.
     """
+    if jobs < 1:
+        raise InputError(f"--jobs must be at least 1, got {jobs}")
     chosen = find_experiment(experiment)
     points = list(chosen.points(small))
-    with common.stages(len(points)) as progress:
+    bench = Bench(data, experiment, replace(chosen.COMPARISON, ssim=ssim), output.with_suffix(".cache"))
+    with common.stages(len(points)) as progress, workers(jobs) as executor:
 
         def tell(row: Row, new: bool) -> None:
             done[0] += 1
@@ -60,18 +69,17 @@ def run(
             common.note(f"{done[0]}/{len(points)} {describe(row)}{'' if new else ' (measured before)'}")
 
         done = [0]
-        rows = run_points(points, data, output, ComparisonOptions(ssim=ssim), tell)
+        rows = run_points(points, output, bench, tell, executor)
     reached = chosen.promises(rows)
     common.result({"output": str(output), "rows": len(rows)} | _promised(reached), promise_table(reached))
 
 
 @command.command
 def report(
-    rows: Path,
+    rows: list[Path],
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    experiment: str = "targets",
     common: Common = Common(),
 ) -> None:
     """Write results.md and plots from rows, and from nothing else.
@@ -79,15 +87,18 @@ def report(
     Parameters
     ----------
     rows
-        A JSON-lines file that `run` wrote.
+        JSON-lines files that `run` wrote, of any experiments; of a point that several have, the first counts.
     output
         The folder to write into.
-    experiment
-        Whose promises to judge.
     """
-    chosen, measured = find_experiment(experiment), read_rows(rows)
-    written = [str(path) for path in write_report(measured, chosen, output)]
-    reached = chosen.promises(measured)
+    measured = join_rows([read_rows(path) for path in rows])
+    written = [str(path) for path in write_report(measured, EXPERIMENTS, output)]
+    reached = [
+        promise
+        for name, chosen in EXPERIMENTS.items()
+        if (own := [row for row in measured if row.get("experiment", "targets") == name])
+        for promise in chosen.promises(own)
+    ]
     common.result({"files": written} | _promised(reached), promise_table(reached), *written)
 
 
@@ -95,6 +106,9 @@ def describe(row: Row) -> str:
     """A row in one line."""
     options = " ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
     head = f"{row['sequence']} {row['codec']} {options}:"
+    if row["kind"] == "decode":
+        peer = f"DracoPy {row['draco_ms']:.2f}, with subdivision {row['subdivided_ms']:.2f}"
+        return f"{head} {row['frame_ms']:.2f} ms/frame, {peer}"
     if row["kind"] == "memory":
         return f"{head} {row['frames']} frames, peak {row['peak_rss_mb']:.0f} MB"
     quality = f"{row['d2_psnr_paper']:.2f} dB, {row['normal_error_deg']:.2f} degrees"

@@ -1,7 +1,8 @@
 """Measures one thing in this process and prints it as JSON: the runner starts it as a fresh process.
 
 `decode FILE` gives times of decoding a .reel file; `draco FILE` the same of DracoPy on the frames in an .npz, the named
-peer; `encode NAME DATA FRAMES OPTIONS` encodes a sequence. Times are processor time; decoding starts from bytes. The
+peer; `pair FILE FILE` decodes two files by turns, the second with DracoPy alone too; `encode NAME DATA FRAMES OPTIONS`
+encodes a sequence. Times are processor time; decoding starts from bytes. The
 steady state is the best of three passes, each group's cost spread over its frames.
 """
 
@@ -19,6 +20,7 @@ from ..decoder import Video
 from ..decoder import open as open_video
 
 PASSES = 3
+PAIR_PASSES = 7
 
 
 def main(task: str, *arguments: str) -> None:
@@ -26,6 +28,7 @@ def main(task: str, *arguments: str) -> None:
     tasks: dict[str, Callable[..., dict[str, Any]]] = {
         "decode": measure_decode,
         "draco": measure_draco,
+        "pair": measure_pair,
         "encode": measure_encode,
     }
     row = tasks[task](*arguments)
@@ -59,16 +62,40 @@ def measure_draco(path: str) -> dict[str, Any]:
     return {"frame_ms": min(passes), "frames": len(frames)}
 
 
+def measure_pair(path: str, anchor: str) -> dict[str, Any]:
+    """ms a frame of the file at `path`, of the anchor's file, and of DracoPy alone on the anchor's meshes, by turns."""
+    import DracoPy
+
+    from ..format.layout import DracoGroup
+    from ..format.records import unpack_all
+
+    data, other = Path(path).read_bytes(), Path(anchor).read_bytes()
+    reader = open_video(other).reader
+    groups = [unpack_all(DracoGroup, reader.read_chunk(chunk.number)) for chunk in reader.groups]
+    meshes = [mesh for group in groups for mesh in group.meshes if mesh]
+    sizes = [len(mesh.vertices) for mesh in open_video(data)]
+    times: dict[str, list[float]] = {"frame_ms": [], "draco_ms": [], "subdivided_ms": []}
+    for _ in range(PAIR_PASSES):
+        times["frame_ms"].append(_pass_ms(open_video(data)))
+        start = time.process_time()
+        for mesh in meshes:
+            DracoPy.decode(mesh)
+        times["draco_ms"].append(1e3 * (time.process_time() - start) / len(sizes))
+        times["subdivided_ms"].append(_pass_ms(open_video(other)))
+    best = {name: min(passes) for name, passes in times.items()}
+    return best | {"frames": len(sizes), "vertices": sum(sizes) / len(sizes)}
+
+
 def measure_encode(name: str, data: str, frames: str, options: str) -> dict[str, Any]:
     """Bytes and CPU s a frame of encoding so many frames of a sequence; the memory is what it is run for."""
     from ..encoder import encode
-    from ..presets import preset_options
+    from .codecs.meshreel import MeshreelCodec
     from .datasets import open_dataset
 
     sequence = open_dataset(name, Path(data), int(frames))
     start = time.process_time()
     with tempfile.TemporaryDirectory() as folder:
-        summary = encode(sequence, Path(folder) / "video.reel", preset_options(**json.loads(options)))
+        summary = encode(sequence, Path(folder) / "video.reel", MeshreelCodec(**json.loads(options)).encoder_options)
     seconds = time.process_time() - start
     return {"frames": summary.frame_count, "bytes": summary.size, "encode_s": seconds / summary.frame_count}
 

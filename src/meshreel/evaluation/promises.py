@@ -44,3 +44,14 @@ def _told(measured: tuple[str, bool], rows: Sequence[Row]) -> tuple[str, bool]:
     """The same; a run on fewer frames than the target's says so."""
     frames = min(row["frames"] for row in rows)
     return (measured[0] if frames >= FRAMES else f"{measured[0]} ({frames} frames only)"), measured[1]
+
+
+def flat_memory(rows: Sequence[Row]) -> Promise:
+    """Whether the longest of some encodes needs no more memory than the shortest."""
+    text = "memory of an encode does not grow with the number of frames (collision)"
+    if len(rows) < 2:
+        return Promise(text, "within 10 %")
+    few, many = (pick(rows, key=lambda r: r["frames"]) for pick in (min, max))
+    growth = many["peak_rss_mb"] / few["peak_rss_mb"] - 1
+    value = f"{few['peak_rss_mb']:.0f} MB at {few['frames']} frames, {many['peak_rss_mb']:.0f} at {many['frames']}"
+    return Promise(text, "within 10 %", f"{value}: {100 * growth:+.1f} %", growth <= 0.1)

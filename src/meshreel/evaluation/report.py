@@ -1,7 +1,7 @@
 """Tables and plots made from rows: rate-distortion curves of every codec on every sequence, and Markdown.
 
-In -> out: JSON rows -> results.md and a PNG a sequence. Nothing is typed by hand: what is not in a row is not shown,
-but for reference curves, which are named as such.
+In -> out: JSON rows -> results.md, a part an experiment, and a PNG a sequence. Nothing is typed by hand: what is not in
+a row is not shown, but for reference curves, which are named as such.
 """
 
 from __future__ import annotations
@@ -11,31 +11,42 @@ from pathlib import Path
 from types import ModuleType
 
 from ..io.write import replacing
-from ..metrics.bd_rate import Curve, bd_rate
+from .curves import SSIM_WITHOUT_KEYS, curve_of, value
 from .promises import Promise
-from .rows import Row, select
+from .rows import CURVE_KINDS, Row, curve_rows
 
 METRICS = (
     ("d2_psnr_paper", "D2-PSNR, paper form (dB)"),
     ("symmetric_psnr", "symmetric distance PSNR (dB)"),
     ("normal_error_deg", "normal error (degrees)"),
     ("ssim_masked", "masked SSIM"),
+    (SSIM_WITHOUT_KEYS, "masked SSIM without key frames"),
 )
-ANCHOR = "decimated_draco_subdivided"
+FIRST = "targets"  # the experiment of rows that do not name theirs
 REFERENCED = ("d2_psnr_paper",)  # what reference curves have
 
 RATES = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20)  # Mbps, where the plots have ticks
 
 
-def write_report(rows: Sequence[Row], chosen: ModuleType, folder: Path) -> list[Path]:
-    """Writes `results.md` and a plot per sequence into `folder`, as the experiment `chosen` judges; the paths."""
+def write_report(rows: Sequence[Row], experiments: dict[str, ModuleType], folder: Path) -> list[Path]:
+    """Writes `results.md` and a plot per experiment and sequence into `folder`; the paths.
+
+    `experiments` are those that the rows may be of, by name, in the order of the page.
+    """
     pictures = folder / "results"
     pictures.mkdir(parents=True, exist_ok=True)
-    names = list(dict.fromkeys(row["sequence"] for row in rows if row["kind"] == "quality"))
-    plots = [plot_curves(select(rows, n), chosen.references(n), pictures / f"{n}.png") for n in names]
+    plots, lines = list[Path](), list[str]()
+    for name, chosen in experiments.items():
+        own = [row for row in rows if row.get("experiment", FIRST) == name]
+        if own:
+            plots += [
+                plot_curves(curve_rows(own, sequence), chosen.references(sequence), pictures / _plot(name, sequence))
+                for sequence in _sequences(own)
+            ]
+            lines += [*([""] if lines else []), *_page(own, name, chosen)]
     page = folder / "results.md"
     with replacing(page) as file:
-        file.write(("\n".join(_page(rows, names, chosen)) + "\n").encode())
+        file.write(("\n".join(lines) + "\n").encode())
     return [page, *plots]
 
 
@@ -44,13 +55,14 @@ def plot_curves(rows: Sequence[Row], references: dict[str, list[tuple[float, flo
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    metrics = [(key, label) for key, label in METRICS if any(row.get(key) is not None for row in rows)]
+    metrics = [(key, label) for key, label in METRICS if any(value(row, key) is not None for row in rows)]
     figure = Figure(figsize=(5 * len(metrics), 4.6), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, len(metrics), squeeze=False)[0]
     for panel, (key, label) in zip(panels, metrics, strict=True):
         for codec in dict.fromkeys(map(curve_of, rows)):
-            points = sorted((r["mbps"], r[key]) for r in rows if curve_of(r) == codec and r.get(key) is not None)
+            own = [(row["mbps"], value(row, key)) for row in rows if curve_of(row) == codec]
+            points = sorted(point for point in own if point[1] is not None)
             panel.plot([p[0] for p in points], [p[1] for p in points], marker="o", markersize=4, label=codec)
         for name, curve in references.items() if key in REFERENCED else ():
             panel.plot([p[0] for p in curve], [p[1] for p in curve], "k--", marker="x", label=name)
@@ -67,12 +79,6 @@ def plot_curves(rows: Sequence[Row], references: dict[str, list[tuple[float, flo
     return path
 
 
-def curve_of(row: Row) -> str:
-    """The curve that a point belongs to: a codec, and where the basis is fixed, the quality of the rest."""
-    options = row["options"]
-    return row["codec"] if options.get("basis_size") is None else f"{row['codec']}, quality {options['quality']:g}"
-
-
 def promise_table(promises: Sequence[Promise]) -> list[str]:
     """A Markdown table of targets."""
     lines = ["| target | bound | measured | |", "|---|---|---|---|"]
@@ -80,58 +86,47 @@ def promise_table(promises: Sequence[Promise]) -> list[str]:
 
 
 def point_table(rows: Sequence[Row]) -> list[str]:
-    """A Markdown table of operating points: rate, every metric, encode and decode times."""
-    keys = [key for key, _ in METRICS]
-    head = [
-        "codec",
-        "operating point",
-        "Mbps",
-        *keys,
-        "worst frame dB",
-        "encode s/frame",
-        "by stage",
-        "decode ms/frame",
-    ]
-    head += ["/ DracoPy", "decode peak MB"]
+    """A Markdown table of operating points: rate, every metric, groups, encode and decode times."""
+    head = ["codec", "operating point", "Mbps", *(key for key, _ in METRICS), "worst frame dB", "groups"]
+    head += ["encode s/frame", "by stage", "decode ms/frame", "/ DracoPy", "decode peak MB"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     for row in rows:
         point = ", ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
-        stages = ", ".join(f"{k} {v:.2g}" for k, v in row["encode_stages_s"].items())
-        cells = [row["codec"], point, _number(row["mbps"]), *(_number(row.get(key)) for key in keys)]
-        cells += [_number(row.get("d2_psnr_paper_worst")), _number(row["encode_s"]), stages]
-        decode = row["decode"]
-        cells += [_number(v) for v in (decode["frame_ms"], row["decode_over_peer"], decode["peak_rss_mb"])]
-        lines.append("| " + " | ".join(cells) + " |")
+        stages = ", ".join(f"{k} {v:.2g}" for k, v in row.get("encode_stages_s", {}).items())
+        decode = row.get("decode", {})
+        cells = [row["codec"], point, _number(row["mbps"]), *(_number(value(row, key)) for key, _ in METRICS)]
+        cells += [_number(row.get("d2_psnr_paper_worst")), _group_sizes(row), _number(row["encode_s"]), stages]
+        times = (decode.get("frame_ms"), row.get("decode_over_peer"), decode.get("peak_rss_mb"))
+        lines.append("| " + " | ".join([*cells, *map(_number, times)]) + " |")
     return lines
 
 
-def bd_lines(rows: Sequence[Row]) -> Iterator[str]:
-    """BD-rate of every codec against the subdivided anchor, by D2-PSNR and by normal error."""
-    for key, sign in (("d2_psnr_paper", 1), ("symmetric_psnr", 1), ("normal_error_deg", -1)):
-        curves = {codec: _curve(rows, codec, key, sign) for codec in dict.fromkeys(map(curve_of, rows))}
-        if ANCHOR in curves:
-            for codec, curve in curves.items():
-                if codec != ANCHOR:
-                    yield f"- BD-rate by `{key}`: {bd_rate(curves[ANCHOR], curve)}"
-
-
-def _curve(rows: Sequence[Row], codec: str, key: str, sign: int) -> Curve:
-    points = [(r["mbps"], sign * r[key]) for r in rows if curve_of(r) == codec and r.get(key) is not None]
-    return Curve(codec, [p[0] for p in points], [p[1] for p in points])
-
-
-def _page(rows: Sequence[Row], names: Sequence[str], chosen: ModuleType) -> Iterator[str]:
-    name = chosen.__name__.rsplit(".", 1)[-1]
+def _page(rows: Sequence[Row], name: str, chosen: ModuleType) -> Iterator[str]:
     yield from (f"# Results of `{name}`", "")
     yield from (f"Made by `meshreel bench run {name} -o ROWS.jsonl` and `meshreel bench report ROWS.jsonl`.", "")
-    yield from promise_table(chosen.promises(rows))
-    for sequence in names:
-        own = select(rows, sequence)
-        yield from ("", f"## {sequence}, {own[0]['frames']} frames", "", f"![{sequence}](results/{sequence}.png)", "")
-        yield from (*point_table(own), "", *bd_lines(own))
-        for curve, points in chosen.references(sequence).items():
-            told = "; ".join(f"{mbps:g} Mbps {psnr:g} dB" for mbps, psnr in points)
-            yield f"- Reference, not run here: {curve}: {told} (D2-PSNR, paper form)"
+    promises = chosen.promises(rows)
+    if promises:
+        yield from promise_table(promises)
+    for sequence in _sequences(rows):
+        own = curve_rows(rows, sequence)
+        picture = f"![{sequence}](results/{_plot(name, sequence)})"
+        yield from ("", f"## {sequence}, {own[0]['frames']} frames", "", picture, "")
+        yield from (*point_table(chosen.shown(own)), "", *chosen.comparisons(own))
+    yield from chosen.sections(rows)
+
+
+def _sequences(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(row["sequence"] for row in rows if row["kind"] in CURVE_KINDS))
+
+
+def _plot(name: str, sequence: str) -> str:
+    return f"{name}-{sequence}.png"
+
+
+def _group_sizes(row: Row) -> str:
+    """Frames of each group, as 5+5; how many where they are many."""
+    sizes = [str(group["frames"]) for group in row.get("groups", ())]
+    return "+".join(sizes) if len(sizes) < 8 else f"{len(sizes)} groups"
 
 
 def _number(value: int | float | None) -> str:

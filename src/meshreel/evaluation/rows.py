@@ -11,6 +11,7 @@ from typing import Any
 from ..errors import InputError
 
 Row = dict[str, Any]
+CURVE_KINDS = ("quality", "curve", "floor")  # rows that have a rate and metrics
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +22,9 @@ class Point:
     codec: str
     options: dict[str, Any] = field(default_factory=dict)
     frames: int | None = None  # the first so many; None: all
-    kind: str = "quality"  # "quality": rate, times, metrics; "memory": peak memory of an encode in a fresh process
+    # "quality": rate, times, metrics; "curve": rate and metrics only; "floor": quality, and each group against Draco;
+    # "memory": peak memory of an encode in a fresh process; "decode": decoding beside the anchor of equal quality
+    kind: str = "quality"
 
     @property
     def key(self) -> str:
@@ -47,11 +50,22 @@ def read_rows(path: Path) -> list[Row]:
     return rows
 
 
+def join_rows(files: Sequence[Sequence[Row]]) -> list[Row]:
+    """The rows of several files, each point of an experiment once: the first of a point counts."""
+    joined = {(row.get("experiment", "targets"), row["point"]): row for rows in reversed(files) for row in rows[::-1]}
+    return list(reversed(joined.values()))
+
+
 def append_row(path: Path, row: Row) -> None:
     """The row as one more line of the file, made if needed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a") as file:
         file.write(json.dumps(row, allow_nan=False) + "\n")
+
+
+def curve_rows(rows: Sequence[Row], sequence: str, codec: str | None = None) -> list[Row]:
+    """The rows of a sequence and, where it is given, of a codec that have a rate and metrics."""
+    return [row for kind in CURVE_KINDS for row in select(rows, sequence, codec, kind)]
 
 
 def select(rows: Sequence[Row], sequence: str, codec: str | None = None, kind: str = "quality") -> list[Row]:

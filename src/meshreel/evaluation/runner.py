@@ -7,20 +7,19 @@ carries DracoPy's decoding time of the same body from the same run, so that mach
 from __future__ import annotations
 
 import json
-import os
 import platform
-import subprocess
-import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from .. import __version__
 from ..coding.mesh import encode_mesh
+from ..decoder import open as open_video
 from ..metrics.report import ComparisonOptions, compare_sequences
 from ..types import Mesh, MeshSequence
 from .bridges import count_bridges, count_degenerate
@@ -29,46 +28,80 @@ from .codecs import make_codec
 from .codecs.draco import lattice_step
 from .datasets import open_dataset
 from .fresh import peak_rss_mb
+from .groups import group_records
+from .peers import cheapest_forms, measure_pair, run_fresh
 from .rows import Point, Row, append_row, read_rows
 
 PEER_QP = 9  # bits of the Draco meshes whose decoding is the yardstick
+AFTER = ("decode",)  # kinds of points that compare with rows measured before
+CURVE_METRICS = ("d2_psnr_paper", "d2_psnr", "symmetric_psnr", "normal_error_deg", "ssim_masked")  # kept of each frame
+Tell = Callable[[Row, bool], None]  # a row, and whether it is new
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """Where a run finds its sequences, and what it compares."""
+
+    data: Path  # the folder of the sequences
+    experiment: str = "targets"  # rows of other experiments in the same file are left alone
+    comparison: ComparisonOptions = field(default_factory=ComparisonOptions)
+    cache: Path | None = None  # sequences that take long to make are kept here
 
 
 def run_points(
-    points: Iterable[Point], data: Path, file: Path, options: ComparisonOptions, tell: Callable[[Row, bool], None]
+    points: Sequence[Point],
+    file: Path,
+    bench: Bench,
+    tell: Callable[[Row, bool], None],
+    executor: Executor | None = None,
 ) -> list[Row]:
     """Rows of all points, each appended to `file` as soon as it is there; `tell` hears each and whether it is new.
 
-    Points that have a row in the file already are not run again, so an interrupted sweep goes on where it was.
+    Points that have a row in the file already are not run again, so an interrupted sweep goes on where it was. With an
+    executor points are measured side by side, but for those that compare with other rows (`AFTER`): they come last.
     """
-    known = {row["point"]: row for row in read_rows(file)} if file.exists() else {}
-    rows = []
+    stored = read_rows(file) if file.exists() else []
+    known = {row["point"]: row for row in stored if row.get("experiment", "targets") == bench.experiment}
     for point in points:
-        row = known.get(point.key)
-        if row is None:
-            row = _run(point, data, options)
-            append_row(file, row)
-        tell(row, point.key not in known)
+        if point.key in known:
+            tell(known[point.key], False)
+    missing = [point for point in points if point.key not in known]
+    for row in _measured(missing, list(known.values()), bench, executor):
+        append_row(file, row)
+        known[row["point"]] = row
+        tell(row, True)
+    return [known[point.key] for point in points]
+
+
+def _measured(points: Sequence[Point], rows: list[Row], bench: Bench, executor: Executor | None) -> Iterator[Row]:
+    """A row a point, as each is there."""
+    first = [point for point in points if point.kind not in AFTER]
+    if executor is None:
+        found = (measure_point(point, bench) for point in first)
+    else:
+        found = (task.result() for task in as_completed([executor.submit(measure_point, p, bench) for p in first]))
+    for row in found:
         rows.append(row)
-    return rows
+        yield row
+    for point in points:
+        if point.kind in AFTER:
+            yield measure_point(point, bench, tuple(rows))
 
 
 def run_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
     """Encodes, decodes and compares; the row has rate, times by stage, memory and every metric."""
+    return _measured_codec(name, sequence, codec, options)[0]
+
+
+def _measured_codec(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> tuple[Row, bytes]:
+    """The row of `run_point` and the bytes it is about."""
     timer = StageTimer()
     data = codec.encode(sequence, timer)
     encode_s = timer.stop() / len(sequence)
     video = codec.decode(data)
     decode = measure_fresh_decode(data)
     peer = measure_peer(video)
-    row: Row = {
-        "sequence": name,
-        "codec": codec.name,
-        "options": codec.options,
-        "frames": len(sequence),
-        "frame_rate": sequence.frame_rate,
-        "bytes": len(data),
-        "mbps": len(data) * 8 * sequence.frame_rate / len(sequence) / 1e6,
+    row = _rate(name, sequence, codec, data) | {
         "encode_s": encode_s,
         "encode_stages_s": {stage: seconds / len(sequence) for stage, seconds in timer.seconds.items()},
         "encode_peak_rss_mb": peak_rss_mb(),  # of this process and all points before it
@@ -77,9 +110,41 @@ def run_point(name: str, sequence: MeshSequence, codec: Codec, options: Comparis
         "decode_over_peer": decode["frame_ms"] / peer["frame_ms"] if peer else None,
         "machine": {"platform": platform.platform(), "python": platform.python_version(), "meshreel": __version__},
     }
-    row |= compare_sequences(sequence, video, options).to_row()
+    row |= compare_sequences(sequence, video, options).to_row() | {"groups": group_records(data)}
     row |= {"bridges": [count_bridges(a, b) for a, b in zip(sequence, video, strict=True)]}
-    return row | {"degenerate_faces": [count_degenerate(mesh) for mesh in video]}
+    return row | {"degenerate_faces": [count_degenerate(mesh) for mesh in video]}, data
+
+
+def run_curve_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
+    """Rate, groups and metrics only: a point of an anchor's sweep, or of an ablation."""
+    start = time.process_time()
+    data = codec.encode(sequence)
+    row = _rate(name, sequence, codec, data) | {"encode_s": (time.process_time() - start) / len(sequence)}
+    measured = compare_sequences(sequence, codec.decode(data), options).to_row()
+    frames = [{key: frame[key] for key in CURVE_METRICS if key in frame} for frame in measured["per_frame"]]
+    return row | measured | {"per_frame": frames, "groups": group_records(data)}
+
+
+def run_floor_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
+    """A row of `run_point` whose groups know the bytes of the cheapest per-frame Draco form that is as good.
+
+    None there: no such form costs less than the group.
+    """
+    row, data = _measured_codec(name, sequence, codec, options)
+    cheapest = cheapest_forms(sequence, open_video(data))
+    return row | {"groups": [g | {"draco_bytes": b} for g, b in zip(row["groups"], cheapest, strict=True)]}
+
+
+def _rate(name: str, sequence: MeshSequence, codec: Codec, data: bytes) -> Row:
+    return {
+        "sequence": name,
+        "codec": codec.name,
+        "options": codec.options,
+        "frames": len(sequence),
+        "frame_rate": sequence.frame_rate,
+        "bytes": len(data),
+        "mbps": len(data) * 8 * sequence.frame_rate / len(sequence) / 1e6,
+    }
 
 
 def measure_fresh_decode(data: bytes) -> Row:
@@ -106,16 +171,6 @@ def measure_peer(video: Sequence[Mesh]) -> Row:
         return run_fresh("draco", str(path)) | {"qp": PEER_QP}
 
 
-def run_fresh(task: str, *arguments: str) -> Row:
-    """What `evaluation.fresh` measures, on one thread."""
-    command = [sys.executable, "-m", "meshreel.evaluation.fresh", task, *arguments]
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    answer = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
-    if answer.returncode != 0:
-        raise RuntimeError(f"measuring `{task}` in a fresh process failed: {answer.stderr.strip().splitlines()[-1:]}")
-    return dict(json.loads(answer.stdout))
-
-
 class StageTimer:
     """A progress callback that charges processor time to the stage that reports."""
 
@@ -134,13 +189,21 @@ class StageTimer:
         return time.process_time() - self._start
 
 
-def _run(point: Point, data: Path, options: ComparisonOptions) -> Row:
-    sequence = open_dataset(point.sequence, data, point.frames)
-    row: dict[str, Any]
+def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
+    """The row of a point, by its kind; `rows` are those measured before, for the kinds of `AFTER`."""
+    sequence = open_dataset(point.sequence, bench.data, point.frames, bench.cache)
+    row: Row
     if point.kind == "memory":
-        arguments = (point.sequence, str(data), str(len(sequence)), json.dumps(point.options))
-        row = run_fresh("encode", *arguments) | {"sequence": point.sequence, "codec": point.codec}
-        row |= {"options": point.options}
+        row = _memory(point, str(bench.data), len(sequence))
+    elif point.kind == "decode":
+        row = measure_pair(point, sequence, rows)
     else:
-        row = run_point(point.sequence, sequence, make_codec(point.codec, point.options), options)
-    return {"point": point.key, "kind": point.kind} | row
+        codec = make_codec(point.codec, point.options)
+        measure = {"quality": run_point, "curve": run_curve_point, "floor": run_floor_point}[point.kind]
+        row = measure(point.sequence, sequence, codec, bench.comparison)
+    return {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | row
+
+
+def _memory(point: Point, data: str, frames: int) -> Row:
+    row = run_fresh("encode", point.sequence, data, str(frames), json.dumps(point.options))
+    return row | {"sequence": point.sequence, "codec": point.codec, "options": point.options}

@@ -2,6 +2,7 @@
 
 Rate-distortion points of both -> BdRate. log rate is interpolated over quality by PCHIP and averaged over the range
 of quality that both curves reach (Bjontegaard, VCEG-M33; PCHIP as in the JCT-VC common test conditions, JCTVC-L1100).
+Several anchors are one by their hull. Where a gain ends is told too: a mean hides a curve that crosses.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+
+_GRID = 2001  # qualities at which two curves are compared
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,19 +73,87 @@ def bd_rate(anchor: Curve, test: Curve) -> BdRate:
     return BdRate(anchor.name, test.name, 100 * math.expm1(mean), low, high, counts)
 
 
+@dataclass(frozen=True, slots=True)
+class GainEnd:
+    """Up to which quality a codec needs less rate than its anchor, going down from the best that both reach."""
+
+    quality: float | None  # where the curves cross; None: there is no gain at all, or no overlap
+    reached: bool  # False: at the end of the overlap the gain goes on, and `quality` is that end
+    anchor_best: float  # best quality of the anchor; over it there is nothing to gain against
+    test_best: float
+
+    @property
+    def where(self) -> str:
+        """In words, without a number: what ends there."""
+        if self.quality is None:
+            return "no gain at any common quality"
+        if self.reached:
+            return "the curves cross"
+        return (
+            "the codec's best point, still a gain" if self.test_best <= self.anchor_best else "the anchors' best point"
+        )
+
+
+def hull(name: str, curves: Sequence[Curve]) -> Curve:
+    """All curves' points on their lower convex hull in (quality, rate): the strongest anchor they make.
+
+    Not in (quality, ln rate): there curves of dB bend the other way, and a chord from the first point to the last would
+    be far under all that any of the codecs reaches.
+    """
+    rates = [rate for curve in curves for rate in curve.rates]
+    points = _best(Curve(name, rates, [quality for curve in curves for quality in curve.qualities]))
+    kept: list[tuple[float, float]] = []
+    for point in points:
+        while len(kept) > 1 and _cross(kept[-2], kept[-1], point) <= 0:
+            kept.pop()
+        kept.append(point)
+    return Curve(name, [p[1] for p in kept], [p[0] for p in kept])
+
+
+def gain_end(anchor: Curve, test: Curve) -> GainEnd:
+    """The highest quality, within the overlap, at which `test` still needs less rate than `anchor`."""
+    a, b = _front(anchor), _front(test)
+    best = [float(points[-1, 0]) if len(points) else math.nan for points in (a, b)]
+    low, high = (max(a[0, 0], b[0, 0]), min(best)) if len(a) and len(b) else (0.0, 0.0)
+    if low >= high:
+        return GainEnd(None, False, *best)
+    at = np.linspace(low, high, _GRID)
+    gains = np.flatnonzero(_log_rate(b, at) < _log_rate(a, at))
+    if len(gains) == 0:
+        return GainEnd(None, False, *best)
+    return GainEnd(float(at[gains[-1]]), bool(gains[-1] < _GRID - 1), *best)
+
+
 def _front(curve: Curve) -> Float64[np.ndarray, "N 2"]:
     """(quality, ln rate) of the points that no other beats, both strictly growing."""
+    points = [(quality, math.log(rate)) for quality, rate in _best(curve)]
+    return np.array(points, dtype=np.float64).reshape(-1, 2)
+
+
+def _best(curve: Curve) -> list[tuple[float, float]]:
+    """(quality, rate) of the points that no other beats, both strictly growing."""
     kept: list[tuple[float, float]] = []
     for rate, quality in sorted(zip(curve.rates, curve.qualities, strict=True), key=lambda p: (p[0], -p[1])):
         if not kept or quality > kept[-1][0]:
-            kept.append((float(quality), math.log(rate)))
-    return np.array(kept, dtype=np.float64).reshape(-1, 2)
+            kept.append((float(quality), float(rate)))
+    return kept
 
 
 def _integral(points: Float64[np.ndarray, "N 2"], low: float, high: float) -> float:
     from scipy.interpolate import PchipInterpolator
 
     return float(PchipInterpolator(points[:, 0], points[:, 1]).integrate(low, high))
+
+
+def _log_rate(points: Float64[np.ndarray, "N 2"], at: Float64[np.ndarray, " Q"]) -> Float64[np.ndarray, " Q"]:
+    from scipy.interpolate import PchipInterpolator
+
+    return np.asarray(PchipInterpolator(points[:, 0], points[:, 1])(at), dtype=np.float64)
+
+
+def _cross(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Over 0 where the way from a over b to c turns upwards."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _range(name: str, points: Float64[np.ndarray, "N 2"]) -> str:

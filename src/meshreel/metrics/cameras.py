@@ -112,6 +112,17 @@ class ViewOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class ParallelViewOptions:
+    """How four small parallel views stand around a bounding box: quick, and the rate-distortion study's."""
+
+    size: int = 512  # pixels, width and height
+    up: str = "y"  # the axis that points up: y or z
+
+    def __post_init__(self) -> None:
+        ViewOptions(self.size, self.size, up=self.up)
+
+
+@dataclass(frozen=True, slots=True)
 class Box:
     """An axis-aligned bounding box, m."""
 
@@ -190,8 +201,15 @@ def write_cameras(path: Path, cameras: list[PinholeCamera]) -> None:
         file.write((json.dumps(record, indent=1) + "\n").encode())
 
 
-def camera_record(camera: PinholeCamera) -> dict[str, Any]:
-    """The camera as Open3D's JSON has it: matrices column by column."""
+def camera_record(camera: PinholeCamera | OrthographicCamera) -> dict[str, Any]:
+    """The camera as Open3D's JSON has it: matrices column by column; a parallel one has its pixel's side instead."""
+    if isinstance(camera, OrthographicCamera):
+        return {
+            "class_name": "OrthographicCamera",
+            "extrinsic": camera.extrinsic.T.reshape(-1).tolist(),
+            "size": [camera.width, camera.height],
+            "pixel_m": camera.pixel,
+        }
     return {
         "class_name": "PinholeCameraParameters",
         "extrinsic": camera.extrinsic.T.reshape(-1).tolist(),

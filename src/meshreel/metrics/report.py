@@ -19,11 +19,22 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Mesh
-from .cameras import Box, PinholeCamera, ViewOptions, camera_record, read_cameras, views_around
+from .cameras import (
+    Box,
+    OrthographicCamera,
+    ParallelViewOptions,
+    PinholeCamera,
+    ViewOptions,
+    camera_record,
+    parallel_views_around,
+    read_cameras,
+    views_around,
+)
 from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
 from .ssim import ssim_normals
 
 Row = dict[str, Any]
+Cameras = Sequence[PinholeCamera] | Sequence[OrthographicCamera]
 _LARGER_IS_BETTER = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "ssim", "ssim_masked")
 _PSNRS = _LARGER_IS_BETTER[:4]
 
@@ -33,7 +44,7 @@ class ComparisonOptions:
     """What is measured."""
 
     cameras: Path | None = None  # Open3D pinhole JSON; None: four views around the originals
-    views: ViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
+    views: ViewOptions | ParallelViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
     ssim: bool = True  # rendering and SSIM cost some 2 s a frame at 1920 x 1080
     keys: Sequence[int] = ()  # key frames: aggregates are also given without them
 
@@ -48,7 +59,7 @@ class Comparison:
 
     frames: tuple[Row, ...]  # metrics of each frame; inf and nan are kept here
     empty: tuple[bool, ...]  # frames that are empty on both sides
-    cameras: tuple[PinholeCamera, ...]
+    cameras: tuple[PinholeCamera | OrthographicCamera, ...]
     keys: tuple[int, ...]
 
     def to_row(self) -> Row:
@@ -77,7 +88,7 @@ def compare_sequences(
 ) -> Comparison:
     """Every metric of `decoded` against `originals`, frame by frame (two MeshSequences of equal length)."""
     options = options or ComparisonOptions()
-    cameras = _cameras(originals, options) if options.ssim else []
+    cameras: Cameras = _cameras(originals, options) if options.ssim else []
     rows: list[Row] = []
     empty: list[bool] = []
     others = iter(decoded)
@@ -94,7 +105,7 @@ def compare_sequences(
     return Comparison(tuple(rows), tuple(empty), tuple(cameras), tuple(options.keys))
 
 
-def frame_row(original: Mesh, decoded: Mesh, cameras: Sequence[PinholeCamera]) -> Row:
+def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras) -> Row:
     """The metrics of one frame by name; SSIM where there are cameras."""
     row = _distance_row(surface_errors(original, decoded))
     if cameras:
@@ -135,9 +146,11 @@ def _distance_row(errors: SurfaceErrors) -> Row:
     return row
 
 
-def _cameras(originals: Iterable[Mesh], options: ComparisonOptions) -> list[PinholeCamera]:
+def _cameras(originals: Iterable[Mesh], options: ComparisonOptions) -> Cameras:
     if options.cameras is not None:
         return read_cameras(options.cameras)
+    if isinstance(options.views, ParallelViewOptions):
+        return parallel_views_around(Box.of(originals), options.views.size, options.views.up)
     return views_around(Box.of(originals), options.views)
 
 

@@ -12,34 +12,50 @@ from ...decoder import open as open_video
 from ...encoder import encode
 from ...presets import preset_options
 from ...types import Mesh, MeshSequence
+from ...windows import EncoderOptions
 from ..codec import Progress
+from ..variants import find_variant
 
 
 @dataclass(frozen=True, slots=True)
 class MeshreelCodec:
-    """A preset at a quality; `basis_size` fixes the number of components m."""
+    """A preset at a quality; what is None is the preset's own.
+
+    `basis_size` fixes the number of components m; a `variant` (`..variants`) changes one thing of the preset.
+    """
 
     preset: str = "paper"
     quality: float = 50.0  # 0 to 100
     basis_size: int | None = None
-    group_size: int = 10
-    centers: int = 2000
+    group_size: int | None = None
+    centers: int | None = None
+    variant: str | None = None
+
+    def __post_init__(self) -> None:
+        find_variant(self.variant)
 
     @property
     def name(self) -> str:
-        """What rows and plots call it; points with a fixed m are a curve of their own."""
-        return f"meshreel {self.preset}" + ("" if self.basis_size is None else " m")
+        """What rows and plots call it; points with a fixed m or a variant are a curve of their own."""
+        changed = "" if self.variant is None else f", {self.variant}"
+        return f"meshreel {self.preset}{changed}" + ("" if self.basis_size is None else " m")
 
     @property
     def options(self) -> dict[str, Any]:
         """The operating point, ready for JSON."""
         return asdict(self)
 
+    @property
+    def encoder_options(self) -> EncoderOptions:
+        """What the encoder is given."""
+        chosen = {name: value for name, value in asdict(self).items() if value is not None and name != "variant"}
+        return find_variant(self.variant)(preset_options(**chosen))
+
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """The .reel file."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "video.reel"
-            encode(sequence, path, preset_options(**self.options), progress=progress)
+            encode(sequence, path, self.encoder_options, progress=progress)
             return path.read_bytes()
 
     def decode(self, data: bytes) -> Sequence[Mesh]:

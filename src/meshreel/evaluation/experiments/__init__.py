@@ -1,13 +1,14 @@
-"""The experiments by name; each module declares its points, reference curves and what is promised of the rows."""
+"""The experiments by name; each module declares its points, reference curves, what is promised, and more."""
 
 from __future__ import annotations
 
 from types import ModuleType
 
 from ...errors import InputError
-from . import targets
+from . import ablation, layers, targets
 
-EXPERIMENTS: dict[str, ModuleType] = {"targets": targets}
+# In the order of the report. Each module has points, references, promises, comparisons, shown, sections, COMPARISON.
+EXPERIMENTS: dict[str, ModuleType] = {"layers": layers, "ablation": ablation, "targets": targets}
 
 
 def experiment(name: str) -> ModuleType:

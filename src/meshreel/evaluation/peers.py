@@ -1,0 +1,106 @@
+"""Measurements against a peer of equal quality: decoding times side by side, and what per-frame Draco would cost.
+
+In -> out: a codec's point and the anchors' rows, or a decoded video -> numbers for a row. Both sides of a ratio are
+measured in one fresh process, by turns.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..analysis.survey import Survey, survey
+from ..choice import IntraOptions, cheapest_intra, measure
+from ..decoder import Video
+from ..errors import InputError
+from ..types import Mesh, MeshSequence
+from .codecs import make_codec
+from .rows import Point, Row
+
+ANCHOR = "decimated_draco_subdivided"  # A2s
+EQUAL = "d2_psnr_paper"  # quality that is to be equal
+
+
+def measure_pair(point: Point, sequence: MeshSequence, rows: Sequence[Row]) -> Row:
+    """Decoding of a point, ms a frame, beside that of the anchor's smallest stream that is at least as good.
+
+    `draco_ms` is DracoPy alone on the anchor's meshes; `subdivided_ms` decodes the anchor's file, free subdivision
+    included. Raises InputError where no row of the point, or none of a good enough anchor, was measured.
+    """
+    codec = make_codec(point.codec, point.options)
+    anchor = equal_anchor(_own_row(codec.name, codec.options, point, rows), rows)
+    streams = [codec.encode(sequence), make_codec("decimated_draco", anchor["options"]).encode(sequence)]
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [Path(folder) / "codec.reel", Path(folder) / "anchor.reel"]
+        for path, data in zip(paths, streams, strict=True):
+            path.write_bytes(data)
+        times = run_fresh("pair", *map(str, paths))
+    equal = {"options": anchor["options"], "mbps": anchor["mbps"], EQUAL: anchor[EQUAL]}
+    return {
+        "sequence": point.sequence,
+        "codec": codec.name,
+        "options": codec.options,
+        "bytes": len(streams[0]),
+        "anchor": equal,
+    } | times
+
+
+def equal_anchor(row: Row, rows: Sequence[Row]) -> Row:
+    """Of the anchor's rows on the same frames that are at least as good as `row`, the smallest; InputError for none."""
+    same = [
+        r for r in rows if r["sequence"] == row["sequence"] and r["codec"] == ANCHOR and r["frames"] == row["frames"]
+    ]
+    good = [r for r in same if r[EQUAL] >= row[EQUAL]]
+    if not good:
+        best = max((r[EQUAL] for r in same), default=0.0)
+        raise InputError(
+            f"{row['sequence']}: no anchor point reaches {row[EQUAL]:.2f} dB (best {best:.2f}); add a finer one"
+        )
+    return min(good, key=lambda r: r["mbps"])
+
+
+def cheapest_forms(sequence: MeshSequence, video: Video) -> list[int | None]:
+    """For each group, bytes of the cheapest per-frame Draco form at its quality; None where none costs less."""
+    seen, found = survey(sequence), list[int | None]()
+    for chunk in video.reader.groups:
+        numbers = range(chunk.first_frame, chunk.first_frame + chunk.frame_count)
+        frames = [seen.normalise(sequence[i]) for i in numbers]
+        if frames[0].is_empty:
+            found.append(None)
+            continue
+        quality = measure(frames, [_normalised(video[i], seen) for i in numbers])
+        form = cheapest_intra(frames, quality, chunk.size, IntraOptions())
+        found.append(None if form is None else len(form[0]))
+    return found
+
+
+def run_fresh(task: str, *arguments: str) -> Row:
+    """What `evaluation.fresh` measures, on one thread."""
+    command = [sys.executable, "-m", "meshreel.evaluation.fresh", task, *arguments]
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    answer = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    if answer.returncode != 0:
+        raise RuntimeError(f"measuring `{task}` in a fresh process failed: {answer.stderr.strip().splitlines()[-1:]}")
+    return dict(json.loads(answer.stdout))
+
+
+def _own_row(name: str, options: Row, point: Point, rows: Sequence[Row]) -> Row:
+    own = [r for r in rows if r["sequence"] == point.sequence and r["codec"] == name and r["options"] == options]
+    own = [r for r in own if EQUAL in r]
+    if not own:
+        raise InputError(
+            f"{point.sequence}: {name} {options} has no quality row yet; put that point into the experiment"
+        )
+    return own[0]
+
+
+def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
+    """A decoded mesh in the encoder's coordinates."""
+    return Mesh(np.ascontiguousarray((mesh.vertices - seen.center) / seen.diagonal), mesh.faces)

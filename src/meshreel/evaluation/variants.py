@@ -1,0 +1,34 @@
+"""Presets with one part switched off or replaced, by name: what an ablation compares with the whole.
+
+In -> out: EncoderOptions -> EncoderOptions. A variant is one line of VARIANTS; `experiments.ablation` runs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..errors import InputError
+from ..windows import EncoderOptions
+
+Change = Callable[[EncoderOptions], EncoderOptions]
+
+VARIANTS: dict[str, Change] = {
+    "no second fit": lambda o: replace(o, fit=replace(o.fit, components=0)),
+    "groups not cut": lambda o: replace(o, groups=replace(o.groups, limit=1e9, tolerance=1e9)),
+    "groups of 5": lambda o: replace(o, group_size=5),
+    "one key tried": lambda o: replace(o, reference=o.reference.fewer_trials()),
+}
+
+
+def find_variant(name: str | None) -> Change:
+    """The change called `name`; None changes nothing. Raises InputError for an unknown one."""
+    if name is None:
+        return _as_it_is
+    if name not in VARIANTS:
+        raise InputError(f"no variant is called {name!r}; known: {', '.join(sorted(VARIANTS))}")
+    return VARIANTS[name]
+
+
+def _as_it_is(options: EncoderOptions) -> EncoderOptions:
+    return options
