@@ -1,0 +1,301 @@
+"""Embedded deformation: a key frame's mesh followed through the frames around it, outward, frame by frame.
+
+In: the key frame's clean mesh, then any neighbour frame of any connectivity. Out: where its points are in each frame.
+A graph of nodes on the mesh is moved by point-to-plane ICP, few nodes first, as rigid as can be, from the neighbour
+frame's result with extrapolated velocity. Coordinates are normalised: the sequence's diagonal is 1.
+In place of the paper's volume tracking (section 3.1) where docs/decisions/0011-correspondence.md says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from ..errors import InputError
+from ..geometry.nearest import Surface
+from ..geometry.topology import clean, vertex_normals
+from ..types import Mesh
+from .embedded_graph import Binding, Graph, area_samples, build_graph, farthest_first
+from .embedded_solve import Level, Planes, Pose, moved, turned
+from .fit_match import Target
+
+NORMAL_REACH = 0.01  # in a search, distance that a difference of 1 between unit normals counts as
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """Rounds of one graph; one entry per round in `gates` and `rigidity`."""
+
+    nodes: int
+    gates: tuple[float, ...]  # pairs farther apart do not count; of the diagonal
+    rigidity: tuple[float, ...]  # squared row weight of an edge against the data of a node
+
+    def __post_init__(self) -> None:
+        if self.nodes < 1:
+            raise InputError(f"nodes is {self.nodes}; give at least 1")
+        if len(self.gates) != len(self.rigidity) or not self.gates or min(self.gates + self.rigidity) <= 0:
+            raise InputError(
+                f"gates {self.gates}, rigidity {self.rigidity}: give each round a positive value of both"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class EmbeddedOptions:
+    """How the key mesh follows a frame; lengths in units of the sequence's bounding-box diagonal."""
+
+    coarse: Stage = Stage(200, (0.06, 0.045, 0.03, 0.024), (3.0, 1.0, 0.5, 0.3))
+    fine: Stage = Stage(900, (0.024, 0.018, 0.012, 0.012), (1.0, 0.5, 0.3, 0.3))
+    samples: int = 4000  # points of the key mesh, and of a frame, that are matched
+    neighbours: int = 4  # nodes that move a point
+    agreement: float = 0.3  # least cosine between the normals of a pair
+    damping: float = 0.01  # squared row weight of a node's step against its data
+    iterations: int = 60  # of the conjugate gradients, at most, a round
+    tolerance: float = 1e-2  # their relative residual
+
+    def __post_init__(self) -> None:
+        if self.coarse.nodes > self.fine.nodes:
+            raise InputError(f"{self.coarse.nodes} coarse nodes and {self.fine.nodes} fine ones: give fewer coarse ones")
+        if self.samples < 3 or self.neighbours < 1 or self.iterations < 1:
+            raise InputError(
+                f"samples {self.samples}, neighbours {self.neighbours}, iterations {self.iterations}: give >= 3, 1, 1"
+            )
+        if not -1 <= self.agreement < 1:
+            raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
+        if not (self.damping > 0 and 0 <= self.tolerance < 1):
+            raise InputError(f"damping {self.damping}, tolerance {self.tolerance}: give > 0, and 0 to 1")
+
+
+class Tracker:
+    """Follows a key frame's mesh outward, one frame at a time, in either direction."""
+
+    def __init__(self, key_mesh: Mesh, key: int, options: EmbeddedOptions | None = None) -> None:
+        self.options, self.key = options or EmbeddedOptions(), key
+        self.mesh = clean(key_mesh)
+        if self.mesh.is_empty:
+            raise InputError(f"the key frame {key} is empty; choose one that has a surface")
+        if not np.isfinite(self.mesh.vertices).all():
+            raise InputError(f"the key frame {key} has coordinates that are not finite; repair it first")
+        o = self.options
+        self._normals = vertex_normals(self.mesh)
+        self._samples = area_samples(self.mesh, o.samples)
+        nodes = farthest_first(self.mesh, self._samples, o.fine.nodes)
+        self._graph = build_graph(self.mesh, nodes)
+        self._coarse = build_graph(self.mesh, nodes[: o.coarse.nodes])
+        self._fine = Level(*self._rest(self._graph))
+        self._few = self._rest(self._coarse)
+        cells = self._coarse.cells[nodes]
+        self._nodes_by_few = self._coarse.bind(self._graph.nodes, cells, o.neighbours)
+        self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, o.neighbours)
+        self._poses = {key: Pose.rest(self._graph.nodes)}
+        self._residuals = {key: 0.0}
+
+    def step(self, frame: int, mesh: Mesh | Target) -> float:
+        """Registers a frame, from the nearest one on its side of the key that is known; its residual.
+
+        Infinite for an empty frame, which gets its neighbour's pose. A frame may be registered again.
+        """
+        if frame == self.key:
+            raise InputError(f"frame {frame} is the key: it needs no registration")
+        start = self._known(frame)
+        pose, residual = self._poses[start], np.inf
+        target = mesh if isinstance(mesh, Target) else None if mesh.is_empty else Target(mesh)
+        if target is not None:
+            found = self._follow(frame, _Frame(target, self.options))
+            pose = found if found.is_finite else pose
+            residual = self._measure(pose, target)
+        self._poses[frame], self._residuals[frame] = pose, residual
+        return residual
+
+    def residual(self, frame: int) -> float:
+        """Symmetric RMS distance of the moved key mesh and a registered frame: the worse of both directions."""
+        return self._residuals[frame]
+
+    def motion(self, frames: Sequence[int]) -> Motion:
+        """The motion through some registered frames, in the order asked for."""
+        rotations = np.stack([self._poses[frame].rotations for frame in frames])
+        positions = np.stack([self._poses[frame].positions for frame in frames])
+        residuals = np.array([self._residuals[frame] for frame in frames])
+        return Motion(self.mesh, self._graph, rotations, positions, residuals, self.options.neighbours)
+
+    def _rest(
+        self, graph: Graph
+    ) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, "E 2"], Float64[np.ndarray, "S 3"], Binding]:
+        points = self.mesh.vertices[self._samples]
+        return graph.nodes, graph.edges, points, graph.bind(points, graph.cells[self._samples], self.options.neighbours)
+
+    def _known(self, frame: int) -> int:
+        """The registered frame from which this one is begun: the nearest between it and the key."""
+        low, high = sorted((frame, self.key))
+        return min((f for f in self._poses if low <= f <= high and f != frame), key=lambda f: abs(f - frame))
+
+    def _follow(self, frame: int, target: _Frame) -> Pose:
+        pose = self._start(frame, target)
+        pose = self._coarse_rounds(pose, target)
+        return self._rounds(self._fine, pose, target, self.options.fine)
+
+    def _start(self, frame: int, target: _Frame) -> Pose:
+        """The neighbour's pose, moved on as it moved before if that is nearer to the frame."""
+        last = self._known(frame)
+        side = 1 if frame > last else -1
+        before = [f for f in self._poses if (last - f) * side > 0]
+        if not before:
+            return self._poses[last]
+        first = max(before, key=lambda f: f * side)
+        ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
+        here = self._poses[last]
+        gate = self.options.coarse.gates[0]
+        scores = [self._planes(self._fine, pose, target, gate).weights.sum() for pose in (ahead, here)]
+        return ahead if scores[0] >= scores[1] else here
+
+    def _coarse_rounds(self, pose: Pose, target: _Frame) -> Pose:
+        """The pose carried by a few nodes whose rest is that pose: what is known of the detail stays."""
+        nodes, edges, _, binding = self._few
+        fine = self._fine
+        points = moved(fine.samples, fine.nodes, fine.binding, pose)
+        rest = pose.positions[: len(nodes)]
+        level = Level(rest, edges, points, binding)
+        normals = turned(self._normals[self._samples], fine.binding, pose)
+        carried = self._rounds(level, Pose.rest(rest), target, self.options.coarse, normals)
+        if not carried.is_finite:
+            return pose
+        positions = moved(pose.positions, rest, self._nodes_by_few, carried)
+        axes = [turned(pose.rotations[:, :, k], self._nodes_by_few, carried) for k in range(3)]
+        return Pose(Rotation.from_matrix(np.stack(axes, axis=2)).as_matrix(), positions)
+
+    def _rounds(
+        self,
+        level: Level,
+        pose: Pose,
+        target: _Frame,
+        stage: Stage,
+        normals: Float64[np.ndarray, "S 3"] | None = None,
+    ) -> Pose:
+        o = self.options
+        for gate, rigidity in zip(stage.gates, stage.rigidity, strict=True):
+            planes = self._planes(level, pose, target, gate, normals)
+            following = level.step(pose, planes, rigidity, o.damping, (o.iterations, o.tolerance))
+            if not following.is_finite:
+                break
+            pose = following
+        return pose
+
+    def _planes(
+        self,
+        level: Level,
+        pose: Pose,
+        target: _Frame,
+        gate: float,
+        normals: Float64[np.ndarray, "S 3"] | None = None,
+    ) -> Planes:
+        points = moved(level.samples, level.nodes, level.binding, pose)
+        own = self._normals[self._samples] if normals is None else normals
+        return target.planes(points, turned(own, level.binding, pose), gate)
+
+    def _measure(self, pose: Pose, target: Target) -> float:
+        """Root mean square distance over samples of both surfaces; the larger of both directions."""
+        mesh = Mesh(moved(self.mesh.vertices, self._graph.nodes, self._all, pose), self.mesh.faces)
+        theirs = target.mesh.vertices[area_samples(target.mesh, self.options.samples)]
+        gaps = (_gaps(target.surface, mesh.vertices[self._samples]), _gaps(Surface(mesh), theirs))
+        return float(np.sqrt(max(np.mean(gap) for gap in gaps)))
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Where points of the key mesh are in T frames."""
+
+    mesh: Mesh  # the key frame's
+    graph: Graph
+    rotations: Float64[np.ndarray, "T N 3 3"]
+    positions: Float64[np.ndarray, "T N 3"]
+    residuals: Float64[np.ndarray, " T"]  # symmetric RMS; 0 at the key, infinite at an empty frame
+    neighbours: int = 4
+
+    def move(
+        self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None
+    ) -> Float64[np.ndarray, "T P 3"]:
+        """Points on or near the key mesh, in each frame; their normals keep them off a near sheet that faces away."""
+        own = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
+        asked = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
+        vertices = cKDTree(own[:, : asked.shape[1]]).query(asked)[1].reshape(-1)
+        binding = self.graph.bind(points, self.graph.cells[vertices], self.neighbours)
+        poses = (Pose(r, p) for r, p in zip(self.rotations, self.positions, strict=True))
+        return np.stack([moved(points, self.graph.nodes, binding, pose) for pose in poses])
+
+
+def register(key_mesh: Mesh, frames: Sequence[Mesh], key: int, options: EmbeddedOptions | None = None) -> Motion:
+    """The motion of the key frame's mesh through all frames, outward from the key."""
+    if not 0 <= key < len(frames):
+        raise InputError(f"key {key} is not one of {len(frames)} frames: give 0 to {len(frames) - 1}")
+    tracker = Tracker(key_mesh, key, options)
+    for frame in [*range(key + 1, len(frames)), *range(key - 1, -1, -1)]:
+        tracker.step(frame, frames[frame])
+    return tracker.motion(range(len(frames)))
+
+
+class _Frame:
+    """A frame to be followed: its surface, and samples of it for the way back."""
+
+    def __init__(self, target: Target, options: EmbeddedOptions) -> None:
+        self._target, self._options = target, options
+        chosen = area_samples(target.mesh, options.samples)
+        chosen = chosen[target.inside[chosen] > 0]
+        self._points, self._normals = target.mesh.vertices[chosen], target.normals[chosen]
+
+    def planes(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
+        """Rows that pull the samples to the frame's surface, and the frame's samples' planes to the samples."""
+        return self._towards(points, normals, gate) + self._back(points, normals, gate)
+
+    def _towards(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
+        target = self._target
+        hits = target.surface.closest(points)
+        planes = target.normals_at(hits)
+        inside = np.einsum("nk,nk->n", hits.barycentric, target.inside[target.mesh.faces[hits.faces]])
+        weights = self._weights(points - hits.points, planes, normals, gate) * inside
+        return _kept(np.arange(len(points)), planes, hits.points, weights)
+
+    def _back(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
+        tree = cKDTree(np.concatenate([points, NORMAL_REACH * normals], axis=1))
+        found = tree.query(np.concatenate([self._points, NORMAL_REACH * self._normals], axis=1))[1]
+        along = np.einsum("nd,nd->n", points[found] - self._points, self._normals)
+        weights = self._weights(along[:, None] * self._normals, self._normals, normals[found], gate)
+        return _kept(found, self._normals, self._points, weights)
+
+    def _weights(
+        self,
+        gaps: Float64[np.ndarray, "N 3"],
+        planes: Float64[np.ndarray, "N 3"],
+        normals: Float64[np.ndarray, "N 3"],
+        gate: float,
+    ) -> Float64[np.ndarray, " N"]:
+        distance = np.linalg.norm(gaps, axis=1) / gate
+        agree = np.einsum("nd,nd->n", planes, normals) > self._options.agreement
+        return np.where(agree & (distance < 1), np.exp(-2 * distance**2), 0.0)  # sigma = half the gate
+
+
+def _kept(
+    samples: Int64[np.ndarray, " N"],
+    normals: Float64[np.ndarray, "N 3"],
+    points: Float64[np.ndarray, "N 3"],
+    weights: Float64[np.ndarray, " N"],
+) -> Planes:
+    keep = np.flatnonzero(weights > 0)
+    values = np.einsum("nd,nd->n", normals[keep], points[keep])
+    return Planes(samples[keep], normals[keep], values, weights[keep])
+
+
+def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:
+    """The pose that goes on from `last` by `ratio` times the step from `first`."""
+    turn = Rotation.from_matrix(last.rotations @ first.rotations.transpose(0, 2, 1)).as_rotvec()
+    rotations = Rotation.from_rotvec(ratio * turn).as_matrix() @ last.rotations
+    return Pose(rotations, last.positions + ratio * (last.positions - first.positions))
+
+
+def _gaps(surface: Surface, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+    """Squared distances."""
+    offsets = surface.closest(points).points - points
+    return np.einsum("nd,nd->n", offsets, offsets)

@@ -1,0 +1,222 @@
+"""Gauss-Newton steps of an embedded deformation: point-to-plane rows against as-rigid-as-possible rows.
+
+In: a level (nodes, edges, bound samples), a pose of its nodes, planes. Out: the next pose. A point p bound to nodes j
+goes to sum w_j (R_j (p - g_j) + t_j) (Sumner et al. 2007). The normal equations are not assembled: conjugate gradients
+multiply with the rows and with their transpose.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+from scipy import sparse
+from scipy.spatial.transform import Rotation
+
+from .embedded_graph import Binding
+
+LARGEST_TURN = 0.5  # rad, of a node in one step
+STILL = 1e-4  # squared row weight of a turn times its lever: fixes what neither data nor neighbours do
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Where the nodes are and how they are turned, relative to their rest."""
+
+    rotations: Float64[np.ndarray, "N 3 3"]
+    positions: Float64[np.ndarray, "N 3"]
+
+    @staticmethod
+    def rest(nodes: Float64[np.ndarray, "N 3"]) -> Pose:
+        """The nodes in their own places, not turned."""
+        return Pose(np.tile(np.eye(3), (len(nodes), 1, 1)), nodes.copy())
+
+    @property
+    def is_finite(self) -> bool:
+        """False where a solve blew up."""
+        return bool(np.isfinite(self.rotations).all() and np.isfinite(self.positions).all())
+
+
+@dataclass(frozen=True, slots=True)
+class Planes:
+    """N rows w * (n . x_s - value) = 0 on samples."""
+
+    samples: Int64[np.ndarray, " N"]
+    normals: Float64[np.ndarray, "N 3"]
+    values: Float64[np.ndarray, " N"]
+    weights: Float64[np.ndarray, " N"]  # squared row weights
+
+    def __add__(self, other: Planes) -> Planes:
+        return Planes(
+            np.concatenate([self.samples, other.samples]),
+            np.concatenate([self.normals, other.normals]),
+            np.concatenate([self.values, other.values]),
+            np.concatenate([self.weights, other.weights]),
+        )
+
+
+def moved(
+    points: Float64[np.ndarray, "P 3"], nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose
+) -> Float64[np.ndarray, "P 3"]:
+    """Bound points, which lie in the rest of the nodes, in a pose of the nodes."""
+    offsets = pose.positions - np.einsum("nij,nj->ni", pose.rotations, nodes)
+    affine = np.concatenate([pose.rotations, offsets[:, :, None]], axis=2).reshape(-1, 12)
+    blended = _blend(affine, binding).reshape(-1, 3, 4)
+    return np.einsum("pij,pj->pi", blended[:, :, :3], points) + blended[:, :, 3]
+
+
+def turned(vectors: Float64[np.ndarray, "P 3"], binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3"]:
+    """Unit vectors (normals) of bound points, turned with their nodes."""
+    blended = _blend(pose.rotations.reshape(-1, 9), binding).reshape(-1, 3, 3)
+    result = np.einsum("pij,pj->pi", blended, vectors)
+    length = np.linalg.norm(result, axis=1, keepdims=True)
+    return result / np.where(length > 0, length, 1.0)
+
+
+def _blend(rows: Float64[np.ndarray, "N n"], binding: Binding) -> Float64[np.ndarray, "P n"]:
+    points, count = binding.indices.shape
+    starts = np.arange(points + 1) * count
+    shares = sparse.csr_array((binding.weights.reshape(-1), binding.indices.reshape(-1), starts), (points, len(rows)))
+    return shares @ rows
+
+
+class Level:
+    """Nodes in a rest pose, the edges that keep them rigid, and the samples that are bound to them."""
+
+    def __init__(
+        self,
+        nodes: Float64[np.ndarray, "N 3"],
+        edges: Int64[np.ndarray, "E 2"],
+        samples: Float64[np.ndarray, "S 3"],
+        binding: Binding,
+    ) -> None:
+        self.nodes, self.edges, self.samples, self.binding = nodes, edges, samples, binding
+        i, j = edges.T
+        self._arms = nodes[j] - nodes[i]
+        lever = np.bincount(i, np.einsum("ed,ed->e", self._arms, self._arms), len(nodes))
+        degree = np.maximum(np.bincount(i, minlength=len(nodes)), 1)
+        usual = float(np.median(lever[lever > 0] / degree[lever > 0])) if (lever > 0).any() else 1e-4
+        self._lever = np.maximum(lever / degree, 0.1 * usual)
+        self._columns = _edge_columns(edges)
+
+    def step(self, pose: Pose, planes: Planes, rigidity: float, place: float, limits: tuple[int, float]) -> Pose:
+        """The pose after one Gauss-Newton step.
+
+        `rigidity` and `place` (towards this pose) are squared row weights in units of the mean data weight of a node.
+        """
+        count = len(self.nodes)
+        scale = max(float(planes.weights.sum()) / count, 1e-12)
+        data, miss = self._data_rows(pose, planes)
+        rigid, bend = self._rigid_rows(pose, np.sqrt(rigidity * scale))
+        rows = sparse.vstack([data, rigid], format="csr")
+        right = rows.T @ np.concatenate([miss, bend])
+        prior = np.empty((count, 6))
+        prior[:, :3] = (STILL * scale * self._lever)[:, None]
+        prior[:, 3:] = place * scale
+        x = _conjugate_gradients(rows, prior.reshape(-1), right, limits).reshape(count, 6)
+        turn = x[:, :3]
+        angle = np.linalg.norm(turn, axis=1, keepdims=True)
+        turn = turn * np.minimum(1.0, LARGEST_TURN / np.maximum(angle, 1e-12))
+        return Pose(Rotation.from_rotvec(turn).as_matrix() @ pose.rotations, pose.positions + x[:, 3:])
+
+    def _data_rows(self, pose: Pose, planes: Planes) -> tuple[sparse.csr_array, Float64[np.ndarray, " N"]]:
+        indices, weights = self.binding.indices[planes.samples], self.binding.weights[planes.samples]
+        arms = np.einsum(
+            "nkij,nkj->nki", pose.rotations[indices], self.samples[planes.samples][:, None] - self.nodes[indices]
+        )
+        root = np.sqrt(planes.weights)
+        place = np.einsum("nk,nkd->nd", weights, arms + pose.positions[indices])
+        miss = root * (planes.values - np.einsum("nd,nd->n", planes.normals, place))
+        scaled = root[:, None] * weights
+        normals = np.broadcast_to(planes.normals[:, None], arms.shape)
+        values = np.concatenate([_cross(arms, normals), normals], axis=2) * scaled[:, :, None]
+        columns = 6 * indices[:, :, None] + np.arange(6)
+        starts = np.arange(len(root) + 1) * (6 * indices.shape[1])
+        shape = (len(root), 6 * len(self.nodes))
+        return sparse.csr_array((values.reshape(-1), columns.reshape(-1), starts), shape), miss
+
+    def _rigid_rows(self, pose: Pose, root: float) -> tuple[sparse.csr_array, Float64[np.ndarray, " E3"]]:
+        i, j = self.edges.T
+        e = np.einsum("eij,ej->ei", pose.rotations[i], self._arms)
+        miss = -root * (e + pose.positions[i] - pose.positions[j])
+        zero, one = np.zeros(len(e)), np.ones(len(e))
+        values = np.stack(  # of turn x e + step_i - step_j: per axis two turns and two steps
+            [
+                np.stack([e[:, 2], -e[:, 1], one, -one], axis=1),
+                np.stack([-e[:, 2], e[:, 0], one, -one], axis=1),
+                np.stack([e[:, 1], -e[:, 0], one, -one], axis=1),
+            ],
+            axis=1,
+        )
+        del zero
+        starts = np.arange(3 * len(e) + 1) * 4
+        shape = (3 * len(e), 6 * len(self.nodes))
+        rows = sparse.csr_array((root * values.reshape(-1), self._columns.reshape(-1), starts), shape)
+        return rows, miss.reshape(-1)
+
+
+def _edge_columns(edges: Int64[np.ndarray, "E 2"]) -> Int64[np.ndarray, "E 3 4"]:
+    i, j = 6 * edges[:, :1], 6 * edges[:, 1:]
+    turns = np.array([[1, 2], [0, 2], [0, 1]])
+    axes = np.arange(3)
+    columns = np.empty((len(edges), 3, 4), np.int64)
+    columns[:, :, :2] = i[:, :, None] + turns
+    columns[:, :, 2] = i + 3 + axes
+    columns[:, :, 3] = j + 3 + axes
+    return columns
+
+
+def _cross(a: Float64[np.ndarray, "... 3"], b: Float64[np.ndarray, "... 3"]) -> Float64[np.ndarray, "... 3"]:
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+def _conjugate_gradients(
+    rows: sparse.csr_array,
+    prior: Float64[np.ndarray, " M"],
+    right: Float64[np.ndarray, " M"],
+    limits: tuple[int, float],
+) -> Float64[np.ndarray, " M"]:
+    """x of (rows^T rows + prior) x = right, preconditioned by 6 x 6 blocks; limits = (iterations, relative residual)."""
+    inverse = _inverse_blocks(rows, prior)
+    back = sparse.csr_array(rows.T)
+
+    def apply(x: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
+        return back @ (rows @ x) + prior * x
+
+    def precondition(r: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
+        return np.matmul(inverse, r.reshape(-1, 6, 1)).reshape(-1)
+
+    x, r = np.zeros_like(right), right.copy()
+    z = precondition(r)
+    p, rz = z.copy(), float(r @ z)
+    enough = limits[1] ** 2 * rz
+    for _ in range(limits[0]):
+        if not rz > enough:
+            break
+        ap = apply(p)
+        step = rz / float(p @ ap)
+        x += step * p
+        r -= step * ap
+        z = precondition(r)
+        rz, before = float(r @ z), rz
+        p = z + rz / before * p
+    return x
+
+
+def _inverse_blocks(rows: sparse.csr_array, prior: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, "N 6 6"]:
+    """Inverses of the diagonal blocks of rows^T rows + prior."""
+    count = len(prior) // 6
+    entry_row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+    groups, place = np.unique(entry_row * count + rows.indices // 6, return_inverse=True)
+    parts = np.zeros((len(groups), 6))
+    parts[place, rows.indices % 6] = rows.data
+    outer = (parts[:, :, None] * parts[:, None, :]).reshape(-1, 36)
+    gather = sparse.csr_array(
+        (np.ones(len(groups)), (groups % count, np.arange(len(groups)))), shape=(count, len(groups))
+    )
+    blocks = (gather @ outer).reshape(-1, 6, 6)
+    blocks[:, range(6), range(6)] += prior.reshape(-1, 6)
+    return np.linalg.inv(blocks)
