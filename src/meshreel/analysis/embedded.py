@@ -21,7 +21,7 @@ from ..geometry.nearest import Surface
 from ..geometry.topology import clean, vertex_normals
 from ..types import Mesh
 from .embedded_graph import Binding, Graph, area_samples, build_graph, farthest_first
-from .embedded_solve import Level, Planes, Pose, moved, turned
+from .embedded_solve import Level, Planes, Pose, moved, rotation, turned
 from .fit_match import Target
 
 NORMAL_REACH = 0.01  # in a search, distance that a difference of 1 between unit normals counts as
@@ -48,11 +48,13 @@ class Stage:
 class EmbeddedOptions:
     """How the key mesh follows a frame; lengths in units of the sequence's bounding-box diagonal."""
 
-    coarse: Stage = Stage(200, (0.06, 0.045, 0.03, 0.024), (3.0, 1.0, 0.5, 0.3))
-    fine: Stage = Stage(900, (0.024, 0.018, 0.012, 0.012), (1.0, 0.5, 0.3, 0.3))
+    coarse: Stage = Stage(200, (0.1, 0.08, 0.06, 0.06, 0.045, 0.03, 0.024), (10.0, 3.0, 3.0, 1.0, 0.5, 0.2, 0.1))
+    fine: Stage = Stage(900, (0.024, 0.018, 0.012, 0.012), (0.3, 0.1, 0.1, 0.05))
     samples: int = 4000  # points of the key mesh, and of a frame, that are matched
     neighbours: int = 4  # nodes that move a point
     agreement: float = 0.3  # least cosine between the normals of a pair
+    torn: tuple[float, float] = (0.5, 0.15)  # share of its length by which an edge misses that then counts a quarter
+    doubt: float = 0.0015  # a residual above it is tried again: from another start, and with edges that tear
     damping: float = 0.01  # squared row weight of a node's step against its data
     iterations: int = 60  # of the conjugate gradients, at most, a round
     tolerance: float = 1e-2  # their relative residual
@@ -105,9 +107,7 @@ class Tracker:
         pose, residual = self._poses[start], np.inf
         target = mesh if isinstance(mesh, Target) else None if mesh.is_empty else Target(mesh)
         if target is not None:
-            found = self._follow(frame, _Frame(target, self.options))
-            pose = found if found.is_finite else pose
-            residual = self._measure(pose, target)
+            pose, residual = self._follow(frame, target)
         self._poses[frame], self._residuals[frame] = pose, residual
         return residual
 
@@ -133,39 +133,47 @@ class Tracker:
         low, high = sorted((frame, self.key))
         return min((f for f in self._poses if low <= f <= high and f != frame), key=lambda f: abs(f - frame))
 
-    def _follow(self, frame: int, target: _Frame) -> Pose:
-        pose = self._start(frame, target)
-        pose = self._coarse_rounds(pose, target)
-        return self._rounds(self._fine, pose, target, self.options.fine)
+    def _follow(self, frame: int, target: Target) -> tuple[Pose, float]:
+        """The best of some ways to go on, by residual: if the first is good enough, no other is tried."""
+        there, best = _Frame(target, self.options), (self._poses[self._known(frame)], np.inf)
+        starts = self._starts(frame, there)
+        for start, torn in [(starts[0], self.options.torn[0]), (starts[0], self.options.torn[1]), (starts[-1], self.options.torn[0])]:
+            pose = self._rounds(self._fine, self._coarse_rounds(start, there, torn), there, self.options.fine, torn)
+            residual = self._measure(pose, target)
+            if residual < best[1]:
+                best = pose, residual
+            if residual < self.options.doubt:
+                break
+        return best
 
-    def _start(self, frame: int, target: _Frame) -> Pose:
-        """The neighbour's pose, moved on as it moved before if that is nearer to the frame."""
+    def _starts(self, frame: int, target: _Frame) -> list[Pose]:
+        """The neighbour's pose, and that moved on as it moved before; the one that is nearer to the frame first."""
         last = self._known(frame)
         side = 1 if frame > last else -1
         before = [f for f in self._poses if (last - f) * side > 0]
         if not before:
-            return self._poses[last]
+            return [self._poses[last]]
         first = max(before, key=lambda f: f * side)
         ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
-        here = self._poses[last]
-        gate = self.options.coarse.gates[0]
-        scores = [self._planes(self._fine, pose, target, gate).weights.sum() for pose in (ahead, here)]
-        return ahead if scores[0] >= scores[1] else here
+        gate = self.options.coarse.gates[-1]
+        return sorted(
+            [ahead, self._poses[last]], key=lambda pose: -self._planes(self._fine, pose, target, gate).weights.sum()
+        )
 
-    def _coarse_rounds(self, pose: Pose, target: _Frame) -> Pose:
+    def _coarse_rounds(self, pose: Pose, target: _Frame, torn: float) -> Pose:
         """The pose carried by a few nodes whose rest is that pose: what is known of the detail stays."""
         nodes, edges, _, binding = self._few
         fine = self._fine
         points = moved(fine.samples, fine.nodes, fine.binding, pose)
         rest = pose.positions[: len(nodes)]
         level = Level(rest, edges, points, binding)
+        held = Level(nodes, edges, points, binding).holds(Pose(pose.rotations[: len(nodes)], rest), torn)
         normals = turned(self._normals[self._samples], fine.binding, pose)
-        carried = self._rounds(level, Pose.rest(rest), target, self.options.coarse, normals)
+        carried = self._rounds(level, Pose.rest(rest), target, self.options.coarse, torn, normals, held)
         if not carried.is_finite:
             return pose
         positions = moved(pose.positions, rest, self._nodes_by_few, carried)
-        axes = [turned(pose.rotations[:, :, k], self._nodes_by_few, carried) for k in range(3)]
-        return Pose(Rotation.from_matrix(np.stack(axes, axis=2)).as_matrix(), positions)
+        return Pose(rotation(self._nodes_by_few, carried) @ pose.rotations, positions)
 
     def _rounds(
         self,
@@ -173,12 +181,14 @@ class Tracker:
         pose: Pose,
         target: _Frame,
         stage: Stage,
+        torn: float,
         normals: Float64[np.ndarray, "S 3"] | None = None,
+        held: float | Float64[np.ndarray, " E"] = 1.0,
     ) -> Pose:
         o = self.options
         for gate, rigidity in zip(stage.gates, stage.rigidity, strict=True):
             planes = self._planes(level, pose, target, gate, normals)
-            following = level.step(pose, planes, rigidity, o.damping, (o.iterations, o.tolerance))
+            following = level.step(pose, planes, rigidity * held * level.holds(pose, torn), o.damping, (o.iterations, o.tolerance))
             if not following.is_finite:
                 break
             pose = following
@@ -245,6 +255,7 @@ class _Frame:
         chosen = area_samples(target.mesh, options.samples)
         chosen = chosen[target.inside[chosen] > 0]
         self._points, self._normals = target.mesh.vertices[chosen], target.normals[chosen]
+        self._spacing = float(np.sqrt(target.surface.areas.sum() / options.samples))
 
     def planes(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
         """Rows that pull the samples to the frame's surface, and the frame's samples' planes to the samples."""
@@ -255,24 +266,26 @@ class _Frame:
         hits = target.surface.closest(points)
         planes = target.normals_at(hits)
         inside = np.einsum("nk,nk->n", hits.barycentric, target.inside[target.mesh.faces[hits.faces]])
-        weights = self._weights(points - hits.points, planes, normals, gate) * inside
+        weights = self._weights(np.linalg.norm(points - hits.points, axis=1), planes, normals, gate) * inside
         return _kept(np.arange(len(points)), planes, hits.points, weights)
 
     def _back(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
         tree = cKDTree(np.concatenate([points, NORMAL_REACH * normals], axis=1))
         found = tree.query(np.concatenate([self._points, NORMAL_REACH * self._normals], axis=1))[1]
         along = np.einsum("nd,nd->n", points[found] - self._points, self._normals)
-        weights = self._weights(along[:, None] * self._normals, self._normals, normals[found], gate)
+        beyond = np.linalg.norm(points[found] - self._points, axis=1) - self._spacing
+        gaps = np.maximum(np.abs(along), beyond)
+        weights = self._weights(gaps, self._normals, normals[found], gate)
         return _kept(found, self._normals, self._points, weights)
 
     def _weights(
         self,
-        gaps: Float64[np.ndarray, "N 3"],
+        gaps: Float64[np.ndarray, " N"],
         planes: Float64[np.ndarray, "N 3"],
         normals: Float64[np.ndarray, "N 3"],
         gate: float,
     ) -> Float64[np.ndarray, " N"]:
-        distance = np.linalg.norm(gaps, axis=1) / gate
+        distance = gaps / gate
         agree = np.einsum("nd,nd->n", planes, normals) > self._options.agreement
         return np.where(agree & (distance < 1), np.exp(-2 * distance**2), 0.0)  # sigma = half the gate
 

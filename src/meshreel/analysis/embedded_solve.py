@@ -74,6 +74,13 @@ def turned(vectors: Float64[np.ndarray, "P 3"], binding: Binding, pose: Pose) ->
     return result / np.where(length > 0, length, 1.0)
 
 
+def rotation(binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 3"]:
+    """The rotation of each bound point: the nearest one to the blend of its nodes'."""
+    u, _, vt = np.linalg.svd(_blend(pose.rotations.reshape(-1, 9), binding).reshape(-1, 3, 3))
+    u[:, :, 2] *= np.where(np.linalg.det(u @ vt) < 0, -1.0, 1.0)[:, None]
+    return u @ vt
+
+
 def _blend(rows: Float64[np.ndarray, "N n"], binding: Binding) -> Float64[np.ndarray, "P n"]:
     points, count = binding.indices.shape
     starts = np.arange(points + 1) * count
@@ -100,7 +107,7 @@ class Level:
         self._lever = np.maximum(lever / degree, 0.1 * usual)
         self._columns = _edge_columns(edges)
 
-    def step(self, pose: Pose, planes: Planes, rigidity: float, place: float, limits: tuple[int, float]) -> Pose:
+    def step(self, pose: Pose, planes: Planes, rigidity: Float64[np.ndarray, " E"], place: float, limits: tuple[int, float]) -> Pose:
         """The pose after one Gauss-Newton step.
 
         `rigidity` and `place` (towards this pose) are squared row weights in units of the mean data weight of a node.
@@ -136,11 +143,20 @@ class Level:
         shape = (len(root), 6 * len(self.nodes))
         return sparse.csr_array((values.reshape(-1), columns.reshape(-1), starts), shape), miss
 
-    def _rigid_rows(self, pose: Pose, root: float) -> tuple[sparse.csr_array, Float64[np.ndarray, " E3"]]:
+    def holds(self, pose: Pose, torn: float) -> Float64[np.ndarray, " E"]:
+        """How much each edge still counts: 1 where it is as at rest, a quarter where it misses `torn` of its length."""
+        i, j = self.edges.T
+        gap = np.einsum("eij,ej->ei", pose.rotations[i], self._arms) + pose.positions[i] - pose.positions[j]
+        share = np.einsum("ed,ed->e", gap, gap) / np.maximum(np.einsum("ed,ed->e", self._arms, self._arms), 1e-18)
+        return 1 / np.square(1 + share / torn**2)  # Geman and McClure
+
+    def _rigid_rows(
+        self, pose: Pose, root: Float64[np.ndarray, " E"]
+    ) -> tuple[sparse.csr_array, Float64[np.ndarray, " E3"]]:
         i, j = self.edges.T
         e = np.einsum("eij,ej->ei", pose.rotations[i], self._arms)
-        miss = -root * (e + pose.positions[i] - pose.positions[j])
-        zero, one = np.zeros(len(e)), np.ones(len(e))
+        miss = -root[:, None] * (e + pose.positions[i] - pose.positions[j])
+        one = np.ones(len(e))
         values = np.stack(  # of turn x e + step_i - step_j: per axis two turns and two steps
             [
                 np.stack([e[:, 2], -e[:, 1], one, -one], axis=1),
@@ -149,10 +165,9 @@ class Level:
             ],
             axis=1,
         )
-        del zero
         starts = np.arange(3 * len(e) + 1) * 4
         shape = (3 * len(e), 6 * len(self.nodes))
-        rows = sparse.csr_array((root * values.reshape(-1), self._columns.reshape(-1), starts), shape)
+        rows = sparse.csr_array(((root[:, None, None] * values).reshape(-1), self._columns.reshape(-1), starts), shape)
         return rows, miss.reshape(-1)
 
 
