@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -20,11 +20,12 @@ from ..errors import InputError
 from ..geometry.nearest import Surface
 from ..geometry.topology import clean, vertex_normals
 from ..types import Mesh
-from .embedded_graph import Binding, Graph, area_samples, build_graph, farthest_first
-from .embedded_solve import Level, Planes, Pose, moved, rotation, turned
+from .embedded_graph import Graph, area_samples, build_graph, farthest_first
+from .embedded_match import NORMAL_REACH, Followed
+from .embedded_solve import Level, Planes, Pose, Rest, moved, rotation, turned
 from .fit_match import Target
 
-NORMAL_REACH = 0.01  # in a search, distance that a difference of 1 between unit normals counts as
+UNUSUAL = 1.25  # times the median residual so far: tried again
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +40,7 @@ class Stage:
         if self.nodes < 1:
             raise InputError(f"nodes is {self.nodes}; give at least 1")
         if len(self.gates) != len(self.rigidity) or not self.gates or min(self.gates + self.rigidity) <= 0:
-            raise InputError(
-                f"gates {self.gates}, rigidity {self.rigidity}: give each round a positive value of both"
-            )
+            raise InputError(f"gates {self.gates}, rigidity {self.rigidity}: give each round a positive value of both")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,9 @@ class EmbeddedOptions:
 
     def __post_init__(self) -> None:
         if self.coarse.nodes > self.fine.nodes:
-            raise InputError(f"{self.coarse.nodes} coarse nodes and {self.fine.nodes} fine ones: give fewer coarse ones")
+            raise InputError(
+                f"{self.coarse.nodes} coarse nodes and {self.fine.nodes} fine ones: give fewer coarse ones"
+            )
         if self.samples < 3 or self.neighbours < 1 or self.iterations < 1:
             raise InputError(
                 f"samples {self.samples}, neighbours {self.neighbours}, iterations {self.iterations}: give >= 3, 1, 1"
@@ -70,6 +71,8 @@ class EmbeddedOptions:
             raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
         if not (self.damping > 0 and 0 <= self.tolerance < 1):
             raise InputError(f"damping {self.damping}, tolerance {self.tolerance}: give > 0, and 0 to 1")
+        if not (min(self.torn) > 0 and self.doubt >= 0):
+            raise InputError(f"torn {self.torn}, doubt {self.doubt}: give > 0, and >= 0")
 
 
 class Tracker:
@@ -83,29 +86,26 @@ class Tracker:
         if not np.isfinite(self.mesh.vertices).all():
             raise InputError(f"the key frame {key} has coordinates that are not finite; repair it first")
         o = self.options
-        self._normals = vertex_normals(self.mesh)
         self._samples = area_samples(self.mesh, o.samples)
         nodes = farthest_first(self.mesh, self._samples, o.fine.nodes)
-        self._graph = build_graph(self.mesh, nodes)
-        self._coarse = build_graph(self.mesh, nodes[: o.coarse.nodes])
-        self._fine = Level(*self._rest(self._graph))
-        self._few = self._rest(self._coarse)
-        cells = self._coarse.cells[nodes]
-        self._nodes_by_few = self._coarse.bind(self._graph.nodes, cells, o.neighbours)
+        self._graph, coarse = build_graph(self.mesh, nodes), build_graph(self.mesh, nodes[: o.coarse.nodes])
+        self._fine, self._few = Level(self._rest(self._graph)), self._rest(coarse)
+        self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes], o.neighbours)
         self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, o.neighbours)
-        self._poses = {key: Pose.rest(self._graph.nodes)}
+        self._poses = {key: Pose.at(self._graph.nodes)}
         self._residuals = {key: 0.0}
 
     def step(self, frame: int, mesh: Mesh | Target) -> float:
-        """Registers a frame, from the nearest one on its side of the key that is known; its residual.
+        """Registers a frame, from the nearest one between it and the key that is known; its residual.
 
         Infinite for an empty frame, which gets its neighbour's pose. A frame may be registered again.
         """
         if frame == self.key:
-            raise InputError(f"frame {frame} is the key: it needs no registration")
-        start = self._known(frame)
-        pose, residual = self._poses[start], np.inf
+            raise InputError(f"frame {frame} is the key: it needs no registration; step to another")
         target = mesh if isinstance(mesh, Target) else None if mesh.is_empty else Target(mesh)
+        if target is not None and not np.isfinite(target.mesh.vertices).all():
+            raise InputError(f"frame {frame} has coordinates that are not finite; repair it first")
+        pose, residual = self._poses[self._known(frame)], np.inf
         if target is not None:
             pose, residual = self._follow(frame, target)
         self._poses[frame], self._residuals[frame] = pose, residual
@@ -122,11 +122,10 @@ class Tracker:
         residuals = np.array([self._residuals[frame] for frame in frames])
         return Motion(self.mesh, self._graph, rotations, positions, residuals, self.options.neighbours)
 
-    def _rest(
-        self, graph: Graph
-    ) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, "E 2"], Float64[np.ndarray, "S 3"], Binding]:
-        points = self.mesh.vertices[self._samples]
-        return graph.nodes, graph.edges, points, graph.bind(points, graph.cells[self._samples], self.options.neighbours)
+    def _rest(self, graph: Graph) -> Rest:
+        points, normals = self.mesh.vertices[self._samples], vertex_normals(self.mesh)[self._samples]
+        binding = graph.bind(points, graph.cells[self._samples], self.options.neighbours)
+        return Rest(graph.nodes, graph.edges, points, normals, binding)
 
     def _known(self, frame: int) -> int:
         """The registered frame from which this one is begun: the nearest between it and the key."""
@@ -134,19 +133,23 @@ class Tracker:
         return min((f for f in self._poses if low <= f <= high and f != frame), key=lambda f: abs(f - frame))
 
     def _follow(self, frame: int, target: Target) -> tuple[Pose, float]:
-        """The best of some ways to go on, by residual: if the first is good enough, no other is tried."""
-        there, best = _Frame(target, self.options), (self._poses[self._known(frame)], np.inf)
+        """The best of some ways to go on, by residual: where the first is good enough, no other is tried."""
+        o, last = self.options, self._known(frame)
+        there = Followed(target, o.samples, o.agreement)
+        usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # noise is not failure
         starts = self._starts(frame, there)
-        for start, torn in [(starts[0], self.options.torn[0]), (starts[0], self.options.torn[1]), (starts[-1], self.options.torn[0])]:
-            pose = self._rounds(self._fine, self._coarse_rounds(start, there, torn), there, self.options.fine, torn)
+        best = self._poses[last], np.inf
+        for start, torn in ((starts[0], o.torn[0]), (starts[0], o.torn[1]), (starts[-1], o.torn[0])):
+            pose = self._rounds(self._fine, self._carried(start, there, torn), there, o.fine, torn)
             residual = self._measure(pose, target)
             if residual < best[1]:
                 best = pose, residual
-            if residual < self.options.doubt:
-                break
-        return best
+            if residual < max(o.doubt, UNUSUAL * float(usual)):
+                return best
+        stay = self._poses[last], self._measure(self._poses[last], target)
+        return best if best[1] < stay[1] else stay
 
-    def _starts(self, frame: int, target: _Frame) -> list[Pose]:
+    def _starts(self, frame: int, target: Followed) -> list[Pose]:
         """The neighbour's pose, and that moved on as it moved before; the one that is nearer to the frame first."""
         last = self._known(frame)
         side = 1 if frame > last else -1
@@ -156,55 +159,30 @@ class Tracker:
         first = max(before, key=lambda f: f * side)
         ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
         gate = self.options.coarse.gates[-1]
-        return sorted(
-            [ahead, self._poses[last]], key=lambda pose: -self._planes(self._fine, pose, target, gate).weights.sum()
-        )
+        poses = [ahead, self._poses[last]]
+        return sorted(poses, key=lambda pose: -_planes(self._fine, pose, target, gate).weights.sum())
 
-    def _coarse_rounds(self, pose: Pose, target: _Frame, torn: float) -> Pose:
+    def _carried(self, pose: Pose, target: Followed, torn: float) -> Pose:
         """The pose carried by a few nodes whose rest is that pose: what is known of the detail stays."""
-        nodes, edges, _, binding = self._few
-        fine = self._fine
-        points = moved(fine.samples, fine.nodes, fine.binding, pose)
-        rest = pose.positions[: len(nodes)]
-        level = Level(rest, edges, points, binding)
-        held = Level(nodes, edges, points, binding).holds(Pose(pose.rotations[: len(nodes)], rest), torn)
-        normals = turned(self._normals[self._samples], fine.binding, pose)
-        carried = self._rounds(level, Pose.rest(rest), target, self.options.coarse, torn, normals, held)
-        if not carried.is_finite:
-            return pose
-        positions = moved(pose.positions, rest, self._nodes_by_few, carried)
+        few, fine = self._few, self._fine.rest
+        here = Pose(pose.rotations[: len(few.nodes)], pose.positions[: len(few.nodes)])
+        points, normals = moved(fine.points, fine.nodes, fine.binding, pose), turned(fine.normals, fine.binding, pose)
+        rest = Rest(here.positions, few.edges, points, normals, few.binding)
+        level = Level(rest, Level(few).holds(here, torn))
+        carried = self._rounds(level, Pose.at(here.positions), target, self.options.coarse, torn)
+        positions = moved(pose.positions, here.positions, self._nodes_by_few, carried)
         return Pose(rotation(self._nodes_by_few, carried) @ pose.rotations, positions)
 
-    def _rounds(
-        self,
-        level: Level,
-        pose: Pose,
-        target: _Frame,
-        stage: Stage,
-        torn: float,
-        normals: Float64[np.ndarray, "S 3"] | None = None,
-        held: float | Float64[np.ndarray, " E"] = 1.0,
-    ) -> Pose:
+    def _rounds(self, level: Level, pose: Pose, target: Followed, stage: Stage, torn: float) -> Pose:
         o = self.options
         for gate, rigidity in zip(stage.gates, stage.rigidity, strict=True):
-            planes = self._planes(level, pose, target, gate, normals)
-            following = level.step(pose, planes, rigidity * held * level.holds(pose, torn), o.damping, (o.iterations, o.tolerance))
+            planes = _planes(level, pose, target, gate)
+            stiffness = rigidity * level.holds(pose, torn)
+            following = level.step(pose, planes, stiffness, o.damping, (o.iterations, o.tolerance))
             if not following.is_finite:
                 break
             pose = following
         return pose
-
-    def _planes(
-        self,
-        level: Level,
-        pose: Pose,
-        target: _Frame,
-        gate: float,
-        normals: Float64[np.ndarray, "S 3"] | None = None,
-    ) -> Planes:
-        points = moved(level.samples, level.nodes, level.binding, pose)
-        own = self._normals[self._samples] if normals is None else normals
-        return target.planes(points, turned(own, level.binding, pose), gate)
 
     def _measure(self, pose: Pose, target: Target) -> float:
         """Root mean square distance over samples of both surfaces; the larger of both directions."""
@@ -247,58 +225,10 @@ def register(key_mesh: Mesh, frames: Sequence[Mesh], key: int, options: Embedded
     return tracker.motion(range(len(frames)))
 
 
-class _Frame:
-    """A frame to be followed: its surface, and samples of it for the way back."""
-
-    def __init__(self, target: Target, options: EmbeddedOptions) -> None:
-        self._target, self._options = target, options
-        chosen = area_samples(target.mesh, options.samples)
-        chosen = chosen[target.inside[chosen] > 0]
-        self._points, self._normals = target.mesh.vertices[chosen], target.normals[chosen]
-        self._spacing = float(np.sqrt(target.surface.areas.sum() / options.samples))
-
-    def planes(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
-        """Rows that pull the samples to the frame's surface, and the frame's samples' planes to the samples."""
-        return self._towards(points, normals, gate) + self._back(points, normals, gate)
-
-    def _towards(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
-        target = self._target
-        hits = target.surface.closest(points)
-        planes = target.normals_at(hits)
-        inside = np.einsum("nk,nk->n", hits.barycentric, target.inside[target.mesh.faces[hits.faces]])
-        weights = self._weights(np.linalg.norm(points - hits.points, axis=1), planes, normals, gate) * inside
-        return _kept(np.arange(len(points)), planes, hits.points, weights)
-
-    def _back(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
-        tree = cKDTree(np.concatenate([points, NORMAL_REACH * normals], axis=1))
-        found = tree.query(np.concatenate([self._points, NORMAL_REACH * self._normals], axis=1))[1]
-        along = np.einsum("nd,nd->n", points[found] - self._points, self._normals)
-        beyond = np.linalg.norm(points[found] - self._points, axis=1) - self._spacing
-        gaps = np.maximum(np.abs(along), beyond)
-        weights = self._weights(gaps, self._normals, normals[found], gate)
-        return _kept(found, self._normals, self._points, weights)
-
-    def _weights(
-        self,
-        gaps: Float64[np.ndarray, " N"],
-        planes: Float64[np.ndarray, "N 3"],
-        normals: Float64[np.ndarray, "N 3"],
-        gate: float,
-    ) -> Float64[np.ndarray, " N"]:
-        distance = gaps / gate
-        agree = np.einsum("nd,nd->n", planes, normals) > self._options.agreement
-        return np.where(agree & (distance < 1), np.exp(-2 * distance**2), 0.0)  # sigma = half the gate
-
-
-def _kept(
-    samples: Int64[np.ndarray, " N"],
-    normals: Float64[np.ndarray, "N 3"],
-    points: Float64[np.ndarray, "N 3"],
-    weights: Float64[np.ndarray, " N"],
-) -> Planes:
-    keep = np.flatnonzero(weights > 0)
-    values = np.einsum("nd,nd->n", normals[keep], points[keep])
-    return Planes(samples[keep], normals[keep], values, weights[keep])
+def _planes(level: Level, pose: Pose, target: Followed, gate: float) -> Planes:
+    rest = level.rest
+    points, normals = moved(rest.points, rest.nodes, rest.binding, pose), turned(rest.normals, rest.binding, pose)
+    return target.planes(points, normals, gate)
 
 
 def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:

@@ -100,9 +100,7 @@ def _cells(mesh: Mesh, edges: Int64[np.ndarray, "E 2"], nodes: Int64[np.ndarray,
     size = len(mesh.vertices)
     lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
     roads = sparse.csr_array((np.maximum(lengths, 1e-12), (edges[:, 0], edges[:, 1])), shape=(size, size))
-    away, _, source = csgraph.dijkstra(
-        roads, directed=False, indices=nodes, min_only=True, return_predecessors=True
-    )
+    away, _, source = csgraph.dijkstra(roads, directed=False, indices=nodes, min_only=True, return_predecessors=True)
     rank = np.full(size, -1)
     rank[nodes] = np.arange(len(nodes))
     cells = rank[np.maximum(source, 0)]

@@ -28,7 +28,7 @@ class Pose:
     positions: Float64[np.ndarray, "N 3"]
 
     @staticmethod
-    def rest(nodes: Float64[np.ndarray, "N 3"]) -> Pose:
+    def at(nodes: Float64[np.ndarray, "N 3"]) -> Pose:
         """The nodes in their own places, not turned."""
         return Pose(np.tile(np.eye(3), (len(nodes), 1, 1)), nodes.copy())
 
@@ -88,31 +88,45 @@ def _blend(rows: Float64[np.ndarray, "N n"], binding: Binding) -> Float64[np.nda
     return shares @ rows
 
 
-class Level:
+@dataclass(frozen=True, slots=True)
+class Rest:
     """Nodes in a rest pose, the edges that keep them rigid, and the samples that are bound to them."""
 
-    def __init__(
-        self,
-        nodes: Float64[np.ndarray, "N 3"],
-        edges: Int64[np.ndarray, "E 2"],
-        samples: Float64[np.ndarray, "S 3"],
-        binding: Binding,
-    ) -> None:
-        self.nodes, self.edges, self.samples, self.binding = nodes, edges, samples, binding
-        i, j = edges.T
-        self._arms = nodes[j] - nodes[i]
-        lever = np.bincount(i, np.einsum("ed,ed->e", self._arms, self._arms), len(nodes))
-        degree = np.maximum(np.bincount(i, minlength=len(nodes)), 1)
-        usual = float(np.median(lever[lever > 0] / degree[lever > 0])) if (lever > 0).any() else 1e-4
-        self._lever = np.maximum(lever / degree, 0.1 * usual)
-        self._columns = _edge_columns(edges)
+    nodes: Float64[np.ndarray, "N 3"]
+    edges: Int64[np.ndarray, "E 2"]
+    points: Float64[np.ndarray, "S 3"]
+    normals: Float64[np.ndarray, "S 3"]
+    binding: Binding
 
-    def step(self, pose: Pose, planes: Planes, rigidity: Float64[np.ndarray, " E"], place: float, limits: tuple[int, float]) -> Pose:
+
+class Level:
+    """A graph to be solved for; `held` says how much its edges count before anything else is known."""
+
+    def __init__(self, rest: Rest, held: Float64[np.ndarray, " E"] | None = None) -> None:
+        self.rest = rest
+        i, j = rest.edges.T
+        self._held = np.ones(len(i)) if held is None else held
+        self._arms = rest.nodes[j] - rest.nodes[i]
+        square = np.einsum("ed,ed->e", self._arms, self._arms)
+        self._lengths = np.maximum(square, 1e-18)  # squared
+        degree = np.maximum(np.bincount(i, minlength=len(rest.nodes)), 1)
+        lever = np.bincount(i, square, len(rest.nodes)) / degree
+        self._lever = np.maximum(lever, 0.1 * (float(np.median(square)) if len(square) else 1e-4))
+        self._columns = _edge_columns(rest.edges)
+
+    def step(
+        self,
+        pose: Pose,
+        planes: Planes,
+        rigidity: Float64[np.ndarray, " E"],
+        place: float,
+        limits: tuple[int, float],
+    ) -> Pose:
         """The pose after one Gauss-Newton step.
 
         `rigidity` and `place` (towards this pose) are squared row weights in units of the mean data weight of a node.
         """
-        count = len(self.nodes)
+        count = len(self.rest.nodes)
         scale = max(float(planes.weights.sum()) / count, 1e-12)
         data, miss = self._data_rows(pose, planes)
         rigid, bend = self._rigid_rows(pose, np.sqrt(rigidity * scale))
@@ -128,9 +142,11 @@ class Level:
         return Pose(Rotation.from_rotvec(turn).as_matrix() @ pose.rotations, pose.positions + x[:, 3:])
 
     def _data_rows(self, pose: Pose, planes: Planes) -> tuple[sparse.csr_array, Float64[np.ndarray, " N"]]:
-        indices, weights = self.binding.indices[planes.samples], self.binding.weights[planes.samples]
+        indices, weights = self.rest.binding.indices[planes.samples], self.rest.binding.weights[planes.samples]
         arms = np.einsum(
-            "nkij,nkj->nki", pose.rotations[indices], self.samples[planes.samples][:, None] - self.nodes[indices]
+            "nkij,nkj->nki",
+            pose.rotations[indices],
+            self.rest.points[planes.samples][:, None] - self.rest.nodes[indices],
         )
         root = np.sqrt(planes.weights)
         place = np.einsum("nk,nkd->nd", weights, arms + pose.positions[indices])
@@ -140,20 +156,20 @@ class Level:
         values = np.concatenate([_cross(arms, normals), normals], axis=2) * scaled[:, :, None]
         columns = 6 * indices[:, :, None] + np.arange(6)
         starts = np.arange(len(root) + 1) * (6 * indices.shape[1])
-        shape = (len(root), 6 * len(self.nodes))
+        shape = (len(root), 6 * len(self.rest.nodes))
         return sparse.csr_array((values.reshape(-1), columns.reshape(-1), starts), shape), miss
 
     def holds(self, pose: Pose, torn: float) -> Float64[np.ndarray, " E"]:
         """How much each edge still counts: 1 where it is as at rest, a quarter where it misses `torn` of its length."""
-        i, j = self.edges.T
+        i, j = self.rest.edges.T
         gap = np.einsum("eij,ej->ei", pose.rotations[i], self._arms) + pose.positions[i] - pose.positions[j]
-        share = np.einsum("ed,ed->e", gap, gap) / np.maximum(np.einsum("ed,ed->e", self._arms, self._arms), 1e-18)
-        return 1 / np.square(1 + share / torn**2)  # Geman and McClure
+        share = np.einsum("ed,ed->e", gap, gap) / self._lengths
+        return self._held / np.square(1 + share / torn**2)  # Geman and McClure
 
     def _rigid_rows(
         self, pose: Pose, root: Float64[np.ndarray, " E"]
     ) -> tuple[sparse.csr_array, Float64[np.ndarray, " E3"]]:
-        i, j = self.edges.T
+        i, j = self.rest.edges.T
         e = np.einsum("eij,ej->ei", pose.rotations[i], self._arms)
         miss = -root[:, None] * (e + pose.positions[i] - pose.positions[j])
         one = np.ones(len(e))
@@ -166,7 +182,7 @@ class Level:
             axis=1,
         )
         starts = np.arange(3 * len(e) + 1) * 4
-        shape = (3 * len(e), 6 * len(self.nodes))
+        shape = (3 * len(e), 6 * len(self.rest.nodes))
         rows = sparse.csr_array(((root[:, None, None] * values).reshape(-1), self._columns.reshape(-1), starts), shape)
         return rows, miss.reshape(-1)
 
@@ -194,7 +210,7 @@ def _conjugate_gradients(
     right: Float64[np.ndarray, " M"],
     limits: tuple[int, float],
 ) -> Float64[np.ndarray, " M"]:
-    """x of (rows^T rows + prior) x = right, preconditioned by 6 x 6 blocks; limits = (iterations, relative residual)."""
+    """x of (rows^T rows + prior) x = right, in 6 x 6 blocks; limits = (iterations, relative residual)."""
     inverse = _inverse_blocks(rows, prior)
     back = sparse.csr_array(rows.T)
 
