@@ -193,7 +193,10 @@ def test_normals_keep_a_point_off_a_near_sheet_that_faces_away() -> None:
     flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
 
     def sheets(gap: float) -> Mesh:
-        return Mesh.of(np.concatenate([flat + [0, 0, gap], flat]), np.concatenate([faces[:, ::-1], faces[:, ::-1] + 625][:1] + [faces + 625]))
+        return Mesh.of(
+            np.concatenate([flat + [0, 0, gap], flat]),
+            np.concatenate([faces[:, ::-1], faces[:, ::-1] + 625][:1] + [faces + 625]),
+        )
 
     frames = [sheets(0.01), sheets(0.02)]
     asked = np.array([[0.1, 0.1, 0.006]])
@@ -208,7 +211,7 @@ def test_the_same_input_gives_the_same_bits() -> None:
     points, normals = frames[0].vertices, vertex_normals(frames[0])
     one, two = (register(frames[0], frames, 0, SMALL) for _ in range(2))
     assert np.array_equal(one.move(points, normals), two.move(points, normals))
-    assert one.residuals[1] < 0.002
+    assert one.residuals[1] < 0.004
 
 
 @pytest.mark.parametrize(

@@ -130,7 +130,11 @@ class Tracker:
     def _known(self, frame: int) -> int:
         """The registered frame from which this one is begun: the nearest between it and the key."""
         low, high = sorted((frame, self.key))
-        return min((f for f in self._poses if low <= f <= high and f != frame), key=lambda f: abs(f - frame))
+        return min((f for f in self._followed() if low <= f <= high and f != frame), key=lambda f: abs(f - frame))
+
+    def _followed(self) -> list[int]:
+        """The frames that have a pose of their own: the key, and all that were not empty."""
+        return [frame for frame, residual in self._residuals.items() if residual < np.inf]
 
     def _follow(self, frame: int, target: Target) -> tuple[Pose, float]:
         """The best of some ways to go on, by residual: where the first is good enough, no other is tried."""
@@ -153,7 +157,7 @@ class Tracker:
         """The neighbour's pose, and that moved on as it moved before; the one that is nearer to the frame first."""
         last = self._known(frame)
         side = 1 if frame > last else -1
-        before = [f for f in self._poses if (last - f) * side > 0]
+        before = [f for f in self._followed() if (last - f) * side > 0]
         if not before:
             return [self._poses[last]]
         first = max(before, key=lambda f: f * side)

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from .embedded_graph import Binding
 
+Blocks = Float64[np.ndarray, "B 6 6"]  # of the nodes, on the diagonal of the normal equations
 LARGEST_TURN = 0.5  # rad, of a node in one step
 STILL = 1e-4  # squared row weight of a turn times its lever: fixes what neither data nor neighbours do
 
@@ -128,36 +129,21 @@ class Level:
         """
         count = len(self.rest.nodes)
         scale = max(float(planes.weights.sum()) / count, 1e-12)
-        data, miss = self._data_rows(pose, planes)
-        rigid, bend = self._rigid_rows(pose, np.sqrt(rigidity * scale))
-        rows = sparse.vstack([data, rigid], format="csr")
-        right = rows.T @ np.concatenate([miss, bend])
         prior = np.empty((count, 6))
         prior[:, :3] = (STILL * scale * self._lever)[:, None]
         prior[:, 3:] = place * scale
-        x = _conjugate_gradients(rows, prior.reshape(-1), right, limits).reshape(count, 6)
+        data, miss, blocks = self._data_rows(pose, planes)
+        rigid, bend, more = self._rigid_rows(pose, np.sqrt(rigidity * scale))
+        blocks += more
+        blocks[:, range(6), range(6)] += prior
+        rows = sparse.csr_array(sparse.vstack([data, rigid], format="csr"))
+        right = rows.T @ np.concatenate([miss, bend])
+        system = rows, np.linalg.inv(blocks), prior.reshape(-1)
+        x = _conjugate_gradients(system, right, limits).reshape(count, 6)
         turn = x[:, :3]
         angle = np.linalg.norm(turn, axis=1, keepdims=True)
         turn = turn * np.minimum(1.0, LARGEST_TURN / np.maximum(angle, 1e-12))
         return Pose(Rotation.from_rotvec(turn).as_matrix() @ pose.rotations, pose.positions + x[:, 3:])
-
-    def _data_rows(self, pose: Pose, planes: Planes) -> tuple[sparse.csr_array, Float64[np.ndarray, " N"]]:
-        indices, weights = self.rest.binding.indices[planes.samples], self.rest.binding.weights[planes.samples]
-        arms = np.einsum(
-            "nkij,nkj->nki",
-            pose.rotations[indices],
-            self.rest.points[planes.samples][:, None] - self.rest.nodes[indices],
-        )
-        root = np.sqrt(planes.weights)
-        place = np.einsum("nk,nkd->nd", weights, arms + pose.positions[indices])
-        miss = root * (planes.values - np.einsum("nd,nd->n", planes.normals, place))
-        scaled = root[:, None] * weights
-        normals = np.broadcast_to(planes.normals[:, None], arms.shape)
-        values = np.concatenate([_cross(arms, normals), normals], axis=2) * scaled[:, :, None]
-        columns = 6 * indices[:, :, None] + np.arange(6)
-        starts = np.arange(len(root) + 1) * (6 * indices.shape[1])
-        shape = (len(root), 6 * len(self.rest.nodes))
-        return sparse.csr_array((values.reshape(-1), columns.reshape(-1), starts), shape), miss
 
     def holds(self, pose: Pose, torn: float) -> Float64[np.ndarray, " E"]:
         """How much each edge still counts: 1 where it is as at rest, a quarter where it misses `torn` of its length."""
@@ -166,25 +152,45 @@ class Level:
         share = np.einsum("ed,ed->e", gap, gap) / self._lengths
         return self._held / np.square(1 + share / torn**2)  # Geman and McClure
 
+    def _data_rows(self, pose: Pose, planes: Planes) -> tuple[sparse.csr_array, Float64[np.ndarray, " N"], Blocks]:
+        rest = self.rest
+        indices, weights = rest.binding.indices[planes.samples], rest.binding.weights[planes.samples]
+        arms = rest.points[planes.samples][:, None] - rest.nodes[indices]
+        arms = np.matmul(pose.rotations[indices], arms[..., None])[..., 0]
+        root = np.sqrt(planes.weights)
+        place = np.einsum("nk,nkd->nd", weights, arms + pose.positions[indices])
+        miss = root * (planes.values - np.einsum("nd,nd->n", planes.normals, place))
+        normals = np.broadcast_to(planes.normals[:, None], arms.shape)
+        values = np.concatenate([_cross(arms, normals), normals], axis=2) * (root[:, None] * weights)[:, :, None]
+        columns = 6 * indices[:, :, None] + np.arange(6)
+        starts = np.arange(len(root) + 1) * (6 * indices.shape[1])
+        shape = (len(root), 6 * len(rest.nodes))
+        rows = sparse.csr_array((values.reshape(-1), columns.reshape(-1), starts), shape)
+        return rows, miss, _outer_sums(values.reshape(-1, 6), indices.reshape(-1), len(rest.nodes))
+
     def _rigid_rows(
         self, pose: Pose, root: Float64[np.ndarray, " E"]
-    ) -> tuple[sparse.csr_array, Float64[np.ndarray, " E3"]]:
+    ) -> tuple[sparse.csr_array, Float64[np.ndarray, " E3"], Blocks]:
+        """Rows of turn x e + step_i - step_j, per axis two turns and two steps."""
         i, j = self.rest.edges.T
         e = np.einsum("eij,ej->ei", pose.rotations[i], self._arms)
         miss = -root[:, None] * (e + pose.positions[i] - pose.positions[j])
-        one = np.ones(len(e))
-        values = np.stack(  # of turn x e + step_i - step_j: per axis two turns and two steps
-            [
-                np.stack([e[:, 2], -e[:, 1], one, -one], axis=1),
-                np.stack([-e[:, 2], e[:, 0], one, -one], axis=1),
-                np.stack([e[:, 1], -e[:, 0], one, -one], axis=1),
-            ],
-            axis=1,
-        )
+        x, y, z = (root[:, None] * e).T
+        values = np.stack([z, -y, root, -root, -z, x, root, -root, y, -x, root, -root], axis=1).reshape(-1, 3, 4)
         starts = np.arange(3 * len(e) + 1) * 4
-        shape = (3 * len(e), 6 * len(self.rest.nodes))
-        rows = sparse.csr_array(((root[:, None, None] * values).reshape(-1), self._columns.reshape(-1), starts), shape)
-        return rows, miss.reshape(-1)
+        count = len(self.rest.nodes)
+        rows = sparse.csr_array((values.reshape(-1), self._columns.reshape(-1), starts), (3 * len(e), 6 * count))
+        own = np.zeros((len(e), 3, 6))
+        np.put_along_axis(own, self._columns[:, :, :3] - 6 * i[:, None, None], values[:, :, :3], axis=2)
+        blocks = _outer_sums(own.reshape(-1, 6), np.repeat(i, 3), count)
+        blocks[:, range(3, 6), range(3, 6)] += np.bincount(j, root**2, count)[:, None]
+        return rows, miss.reshape(-1), blocks
+
+
+def _outer_sums(vectors: Float64[np.ndarray, "M 6"], nodes: Int64[np.ndarray, " M"], count: int) -> Blocks:
+    """The sum of v v^T over the vectors of each node."""
+    gather = sparse.csr_array((np.ones(len(nodes)), nodes, np.arange(len(nodes) + 1)), (len(nodes), count))
+    return (gather.T @ (vectors[:, :, None] * vectors[:, None, :]).reshape(-1, 36)).reshape(-1, 6, 6)
 
 
 def _edge_columns(edges: Int64[np.ndarray, "E 2"]) -> Int64[np.ndarray, "E 3 4"]:
@@ -205,13 +211,15 @@ def _cross(a: Float64[np.ndarray, "... 3"], b: Float64[np.ndarray, "... 3"]) -> 
 
 
 def _conjugate_gradients(
-    rows: sparse.csr_array,
-    prior: Float64[np.ndarray, " M"],
+    system: tuple[sparse.csr_array, Blocks, Float64[np.ndarray, " M"]],
     right: Float64[np.ndarray, " M"],
     limits: tuple[int, float],
 ) -> Float64[np.ndarray, " M"]:
-    """x of (rows^T rows + prior) x = right, in 6 x 6 blocks; limits = (iterations, relative residual)."""
-    inverse = _inverse_blocks(rows, prior)
+    """x of (rows^T rows + prior) x = right; system = (rows, inverse 6 x 6 blocks of the matrix, prior).
+
+    Limits are iterations and relative residual.
+    """
+    rows, inverse, prior = system
     back = sparse.csr_array(rows.T)
 
     def apply(x: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
@@ -235,19 +243,3 @@ def _conjugate_gradients(
         rz, before = float(r @ z), rz
         p = z + rz / before * p
     return x
-
-
-def _inverse_blocks(rows: sparse.csr_array, prior: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, "N 6 6"]:
-    """Inverses of the diagonal blocks of rows^T rows + prior."""
-    count = len(prior) // 6
-    entry_row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
-    groups, place = np.unique(entry_row * count + rows.indices // 6, return_inverse=True)
-    parts = np.zeros((len(groups), 6))
-    parts[place, rows.indices % 6] = rows.data
-    outer = (parts[:, :, None] * parts[:, None, :]).reshape(-1, 36)
-    gather = sparse.csr_array(
-        (np.ones(len(groups)), (groups % count, np.arange(len(groups)))), shape=(count, len(groups))
-    )
-    blocks = (gather @ outer).reshape(-1, 6, 6)
-    blocks[:, range(6), range(6)] += prior.reshape(-1, 6)
-    return np.linalg.inv(blocks)
