@@ -81,12 +81,29 @@ def second_fit(rows: list[Row]) -> Table:
     ]
 
 
+def correspondence(rows: list[Row]) -> Table:
+    """Two rows a case: what each way leaves before and after the same fit, what its motion costs, and its time."""
+    heads = ["frames", "way", "> RMS before x 1000", "> after", "> worst frame", "> d2, dB", "> worst frame, dB"]
+    heads += ["> normals, degrees", "> bits, plain", "> bits, predicted", "> CPU s a frame"]
+    return heads, [
+        [
+            r["case"],
+            r["way"],
+            *(_thousandths(r[k]) for k in ("before_rms", "after_rms", "after_worst_rms")),
+            *(f"{r[k]:.2f}" for k in ("d2_psnr_paper", "worst_d2_psnr_paper", "after_normal_error_deg")),
+            *(f"{r[k]:.1f}" for k in ("bits_plain", "bits_predicted", "cpu_s_per_frame")),
+        ]
+        for r in rows
+    ]
+
+
 TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "noise": noise,
     "anchors": anchors,
     "floor": floor,
     "pose": pose,
     "second fit": second_fit,
+    "correspondence": correspondence,
 }
 
 
