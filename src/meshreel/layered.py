@@ -11,10 +11,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int32
 
 from .analysis.correspond import from_key, from_last
-from .analysis.fit import Fit, Guides, fit_frames
+from .analysis.fit import Guides, fit_targets, residuals
+from .analysis.fit_match import Target
 from .analysis.groups import cut_at, leading
 from .analysis.template import base_mesh, shared_detail
 from .choice import NO_ERROR, measure
@@ -38,8 +39,24 @@ class Followed:
     reference: CodedReference
     state: LayersState  # as decoded
     positions: Float64[np.ndarray, "V 3"]  # its fit to the last frame
-    frame: Mesh  # the last frame
     residual: float  # what its fits usually leave, RMS
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A template on some frames."""
+
+    positions: Float64[np.ndarray, "T V 3"]
+    residuals: Float64[np.ndarray, " T"]  # RMS, symmetric
+
+    @staticmethod
+    def of(faces: Int32[np.ndarray, "F 3"], positions: Float64[np.ndarray, "T V 3"], targets: list[Target]) -> Fitted:
+        """Positions with what they leave over."""
+        return Fitted(positions, np.array([residual.rms for residual in residuals(faces, positions, targets)]))
+
+    def first(self, count: int) -> Fitted:
+        """The first so many frames."""
+        return Fitted(self.positions[:count], self.residuals[:count])
 
 
 def encode_segment(
@@ -79,14 +96,14 @@ def _continued(
     """A group predicted from the one before, as long as its template fits; None where that is not long."""
     base = before.reference.base
     template = replace(options.template, levels=before.reference.levels)
-    predictions = from_last(Mesh(before.positions, base.faces), before.frame, ahead, options.track)
+    targets = [Target(frame) for frame in ahead]
+    predictions = from_last(Mesh(before.positions, base.faces), targets, options.embedded)
     guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), template))
-    fit = fit_frames(base.faces, predictions, ahead, options.fit, guides)
-    residuals = np.array([residual.rms for residual in fit.residuals])
-    count = leading(residuals, max(before.residual, target_of(ahead, options).distance), options.groups)
+    fitted = Fitted.of(base.faces, fit_targets(base.faces, predictions, targets, options.fit, guides), targets)
+    count = leading(fitted.residuals, max(before.residual, target_of(ahead, options).distance), options.groups)
     if count < min(SHORTEST, len(ahead)):
         return None
-    return _coded(ahead[:count], before.reference, Fit(fit.positions[:count], fit.residuals[:count]), before, options)
+    return _coded(ahead[:count], before.reference, fitted.first(count), before, options)
 
 
 def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup, Followed | None] | int:
@@ -96,23 +113,23 @@ def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup
     reference = code_on_lattice(base_mesh(ahead[key], options.template), lattice, options.template.levels)
     if reference.base.is_empty:
         return 1 if len(ahead) > 1 else (intra_only(ahead, options), None)
-    predictions = from_key(reference.base, key, ahead, options.track)
-    base = reference.mesh
+    base, faces, targets = reference.mesh, reference.base.faces, [Target(frame) for frame in ahead]
+    predictions = from_key(reference.base, key, targets, options.embedded)
     guides = Guides(None, shared_detail(base.faces, len(base.vertices), options.template))
-    fit = fit_frames(reference.base.faces, predictions, ahead, replace(options.fit, key=key), guides)
-    residuals = np.array([residual.rms for residual in fit.residuals])
+    fit = replace(options.fit, key=key)
+    fitted = Fitted.of(faces, fit_targets(faces, predictions, targets, fit, guides), targets)
     target = target_of(ahead, options)
     if len(ahead) > 1:
-        cut = cut_at(residuals / target.distance, options.groups)
+        cut = cut_at(fitted.residuals / target.distance, options.groups)
         if cut is not None:
             return cut
-    elif residuals[0] > options.groups.limit * target.distance:
+    elif fitted.residuals[0] > options.groups.limit * target.distance:
         return intra_only(ahead, options), None
-    return _coded(ahead, reference, fit, None, options)
+    return _coded(ahead, reference, fitted, None, options)
 
 
 def _coded(
-    frames: Sequence[Mesh], reference: CodedReference, fit: Fit, before: Followed | None, options: EncoderOptions
+    frames: Sequence[Mesh], reference: CodedReference, fit: Fitted, before: Followed | None, options: EncoderOptions
 ) -> tuple[EncodedGroup, Followed | None]:
     """The cheapest form of a group, and what the next may begin with."""
     encoded = encode_layers(reference, fit.positions, options.layers, before.state if before else None)
@@ -120,14 +137,11 @@ def _coded(
     quality = measure(frames, decoded)
     group = EncodedGroup(Form.LAYERS, len(frames), encoded.payload, encoded.layers, quality, before is not None)
     if quality.distance > TOO_COARSE * target_of(frames, options).distance:
-        other = laplacian(frames, reference, fit, options.displacements)
+        other = laplacian(frames, reference, fit.positions, options.displacements)
         if other.quality.reaches(quality) and len(other.payload) < len(group.payload):
             group = other
     group = cheaper(frames, group, options)
     if group.form != Form.LAYERS:
         return group, None
-    return group, Followed(reference, encoded.state, fit.positions[-1], frames[-1], _usual(fit, before))
-
-
-def _usual(fit: Fit, before: Followed | None) -> float:
-    return before.residual if before else float(np.median([residual.rms for residual in fit.residuals]))
+    usual = before.residual if before else float(np.median(fit.residuals))
+    return group, Followed(reference, encoded.state, fit.positions[-1], usual)

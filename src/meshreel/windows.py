@@ -12,7 +12,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from jaxtyping import Float64
 
+from .analysis.embedded import EmbeddedOptions
 from .analysis.fit import Fit, FitOptions, fit_frames
 from .analysis.groups import GroupOptions, cut_at
 from .analysis.reference import ReferenceOptions, extract_reference, predict
@@ -49,6 +51,7 @@ class EncoderOptions:
     intra: IntraOptions = field(default_factory=IntraOptions)
     form: Form = Form.LAPLACIAN  # of the groups that a template follows
     key_interval: float = 4.0  # s, at most, from one random-access point to the next (form LAYERS)
+    embedded: EmbeddedOptions = field(default_factory=EmbeddedOptions)
     template: TemplateOptions = field(default_factory=TemplateOptions)
     layers: LayersOptions = field(default_factory=LayersOptions)
 
@@ -150,14 +153,18 @@ def _encode_span(
             *_encode_span(head, known, quick, depth - 1, again),
             *_encode_span(tail, anew, quick, depth - 1, again),
         ]
-    group = laplacian(frames, reference, fit, options.displacements)
+    group = laplacian(frames, reference, fit.positions, options.displacements)
     return [group if options.displacements.basis_size is not None else cheaper(frames, group, options)]
 
 
 def laplacian(
-    frames: Sequence[Mesh], reference: CodedReference, fit: Fit, options: DisplacementOptions
+    frames: Sequence[Mesh],
+    reference: CodedReference,
+    positions: Float64[np.ndarray, "T V 3"],
+    options: DisplacementOptions,
 ) -> EncodedGroup:
-    field = np.ascontiguousarray(np.moveaxis(fit.positions, 0, 1) - reference.base.vertices[:, None])
+    """The `laplacian` form of a group."""
+    field = np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])
     payload, layers = encode_group(reference, field, options)
     quality = measure(frames, decode_group(payload, len(frames)))
     return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, quality)

@@ -99,11 +99,17 @@ def fit_frames(
         return Fit(predictions.copy(), (NOTHING,) * count)
     targets = [None if mesh.is_empty else Target(mesh) for mesh in frames]
     positions = fit_targets(faces, predictions, targets, options, guides)
-    residuals = [
+    return Fit(positions, residuals(faces, positions, targets))
+
+
+def residuals(
+    faces: Int32[np.ndarray, "F 3"], positions: Float64[np.ndarray, "T V 3"], targets: Sequence[Target | None]
+) -> tuple[Residual, ...]:
+    """What is left over of each frame."""
+    return tuple(
         NOTHING if target is None else measure(Mesh.of(fitted, faces), target)
         for fitted, target in zip(positions, targets, strict=True)
-    ]
-    return Fit(positions, tuple(residuals))
+    )
 
 
 def fit_targets(
