@@ -12,7 +12,8 @@ from typing import overload
 
 import numpy as np
 
-from .coding.group import decode_group
+from .coding.group import continue_group
+from .coding.layers import LayersState, needs_previous
 from .container.reader import Chunk, ReelReader
 from .container.sources import BytesSource, FileSource, Source
 from .errors import FormatError, InputError
@@ -47,6 +48,7 @@ class Video(Sequence[Mesh]):
         self.components = components
         self._close = close
         self._group: tuple[int, list[Mesh]] = (-1, [])
+        self._state: tuple[int, LayersState | None] = (-1, None)
 
     def at(self, components: int | None) -> Video:
         """The same video with at most this many displacement components a group: fewer bytes, still valid."""
@@ -99,15 +101,29 @@ class Video(Sequence[Mesh]):
         """The decoded frames of a group, from the last call where it is the same group."""
         number, frames = self._group  # together: another thread may put its own group there
         if number != chunk.number:
-            layers = None if self.components is None else self.components + 1
-            payload = self.reader.read_chunk(chunk.number, layers)
-            try:
-                meshes = decode_group(payload, chunk.frame_count, self.components)
-            except FormatError as error:
-                raise FormatError(f"{chunk}: {error}") from error
-            frames = [self._place(mesh) for mesh in meshes]
+            frames = [self._place(mesh) for mesh in self._decode(chunk)]
             self._group = (chunk.number, frames)
         return frames
+
+    def _decode(self, chunk: Chunk) -> list[Mesh]:
+        """The frames of a group, normalised; first those before it that it is predicted from, as far as needed."""
+        number, state = self._state
+        layers = None if self.components is None else self.components + 1
+        place = self.reader.groups.index(chunk)
+        waiting = [(chunk, self.reader.read_chunk(chunk.number, layers))]
+        while place > 0 and needs_previous(waiting[-1][1]):
+            place -= 1
+            before = self.reader.groups[place]
+            if before.number == number:
+                break
+            waiting.append((before, self.reader.read_chunk(before.number, layers)))
+        for group, payload in reversed(waiting):
+            try:
+                meshes, state = continue_group(payload, group.frame_count, self.components, state)
+            except FormatError as error:
+                raise FormatError(f"{group}: {error}") from error
+        self._state = (chunk.number, state)
+        return meshes
 
     def _place(self, mesh: Mesh) -> Mesh:
         """A mesh in metres: the header's origin and scale undo the encoder's normalisation."""

@@ -88,9 +88,7 @@ def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -
 class _Columns:
     """Columns of a field in the basis as transmitted, quantised and coded."""
 
-    def __init__(
-        self, trajectories: Float64[np.ndarray, "V C"], basis: klt.Basis, graph: Graph, rate: Rate
-    ) -> None:
+    def __init__(self, trajectories: Float64[np.ndarray, "V C"], basis: klt.Basis, graph: Graph, rate: Rate) -> None:
         self.rate = rate
         count, width = len(basis.energies), trajectories.shape[1]
         scales = FINENESS * np.sqrt(width / 12 * basis.energies) / rate.step

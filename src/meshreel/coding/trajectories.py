@@ -32,9 +32,7 @@ def decode_trajectories(record: CodedField, base: Mesh, frames: int, has_mean: b
     return _placed(decode_field(record, places.graph, 3 * frames, has_mean), base, places)
 
 
-def _placed(
-    rows: Float64[np.ndarray, "C V"], base: Mesh, places: Hierarchy
-) -> Float64[np.ndarray, "T V 3"]:
+def _placed(rows: Float64[np.ndarray, "C V"], base: Mesh, places: Hierarchy) -> Float64[np.ndarray, "T V 3"]:
     frames = len(rows) // 3
     positions = np.empty((frames, len(base.vertices), 3))
     moved = np.moveaxis(rows.reshape(frames, 3, -1), 1, 2)
