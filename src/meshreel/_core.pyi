@@ -98,6 +98,15 @@ def predict_forward(
     step: float,
     price: float,
 ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]: ...
+def predict_surface(
+    values: Float64[np.ndarray, "M V"],
+    graph: tuple[Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]],
+    vectors: Float64[np.ndarray, "M C"],
+    normals: Float64[np.ndarray, "V C"],
+    tangential: float,
+    step: float,
+    price: float,
+) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]: ...
 def predict_inverse(
     symbols: Int32[np.ndarray, "M V"],
     starts: Int64[np.ndarray, " V+1"],

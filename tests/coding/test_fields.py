@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from meshreel import _core
 from meshreel.coding import fields, orthonormal
-from meshreel.coding.fields import Rate, decode_field, encode_field
+from meshreel.coding.fields import Rate, Surface, decode_field, encode_field
 from meshreel.coding.graph import hierarchy, subdivide
 from meshreel.coding.steps import LEVELS
 from meshreel.errors import FormatError, InputError
+from meshreel.geometry.topology import vertex_normals
 
 from .bodies import ball, moving
 
@@ -20,6 +21,9 @@ REFERENCE = ball(1)
 MESH = REFERENCE.mesh
 GRAPH = hierarchy(MESH).graph
 COUNT = len(MESH.vertices)
+
+
+ROUND = Surface(np.tile(vertex_normals(MESH)[hierarchy(MESH).order], 4), 0.4)
 
 
 def trajectories(frames: int = 4) -> np.ndarray:
@@ -51,7 +55,7 @@ def test_a_vector_without_direction_is_refused() -> None:
 @pytest.mark.parametrize("mean", [False, True])
 def test_what_is_decoded_is_what_the_encoder_saw_and_near(level: int, mean: bool) -> None:
     rate, wanted = Rate(level, 0.1), trajectories()
-    coded = encode_field(wanted, GRAPH, rate, mean)
+    coded = encode_field(wanted, GRAPH, rate, ROUND if mean else None)
     decoded = decode_field(coded.record, GRAPH, wanted.shape[1], coded.has_mean)
     np.testing.assert_array_equal(decoded, coded.decoded)
     assert np.abs(decoded.T - wanted).max() < 4 * rate.step
@@ -61,15 +65,25 @@ def test_what_is_decoded_is_what_the_encoder_saw_and_near(level: int, mean: bool
 def test_without_a_price_errors_stay_below_half_a_step_a_column(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fields, "FINENESS", 1e4)
     rate, wanted = Rate(104, 0.0), trajectories()
-    coded = encode_field(wanted, GRAPH, rate, False)
+    coded = encode_field(wanted, GRAPH, rate)
     assert coded.record.columns == wanted.shape[1]
     assert np.linalg.norm(coded.decoded.T - wanted, axis=1).max() <= rate.step / 2 * wanted.shape[1] ** 0.5 + 1e-9
 
 
 def test_a_price_on_bits_saves_more_than_it_spoils() -> None:
     wanted = trajectories(8)
-    plain, priced = (encode_field(wanted, GRAPH, Rate(64, price), False) for price in (0.0, 0.12))
+    plain, priced = (encode_field(wanted, GRAPH, Rate(64, price)) for price in (0.0, 0.12))
     assert priced.symbol_bits < 0.95 * plain.symbol_bits
+
+
+def test_errors_move_to_where_they_do_not_show() -> None:
+    wanted, errors, bits = trajectories(), [], []
+    for tangential in (1.0, 0.3):
+        coded = encode_field(wanted, GRAPH, Rate(72, 0.12), Surface(ROUND.normals, tangential))
+        error = (coded.decoded.T - wanted).reshape(COUNT, -1, 3)
+        errors.append(((error * ROUND.normals.reshape(COUNT, -1, 3)).sum(axis=2) ** 2).mean())
+        bits.append(coded.symbol_bits)
+    assert errors[1] < errors[0] and bits[1] < 1.02 * bits[0]
 
 
 @settings(max_examples=60, deadline=None)
@@ -96,7 +110,7 @@ def test_zeros_cost_next_to_nothing() -> None:
 
 @pytest.mark.parametrize("change", [{"columns": 13}, {"step_level": LEVELS}, {"columns": 2**60}, {"symbols": b""}])
 def test_absurd_records_are_refused(change: dict[str, object]) -> None:
-    coded = encode_field(trajectories(), GRAPH, Rate(72, 0.1), True)
+    coded = encode_field(trajectories(), GRAPH, Rate(72, 0.1), ROUND)
     with pytest.raises(FormatError):
         decode_field(dataclasses.replace(coded.record, **change), GRAPH, 12, coded.has_mean)
     with pytest.raises(FormatError):
@@ -105,4 +119,4 @@ def test_absurd_records_are_refused(change: dict[str, object]) -> None:
 
 def test_trajectories_too_long_for_the_step_are_refused() -> None:
     with pytest.raises(InputError, match="too long"):
-        encode_field(1e4 * trajectories(), GRAPH, Rate(LEVELS - 1, 0.1), False)
+        encode_field(1e4 * trajectories(), GRAPH, Rate(LEVELS - 1, 0.1))

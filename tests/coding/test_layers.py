@@ -209,10 +209,13 @@ def test_places_that_do_not_fit_are_refused() -> None:
             encode_layers(BALL, bad)
 
 
-def test_options_name_what_is_wrong() -> None:
-    for bad in ({"step": 0.0}, {"step": 2.0}, {"detail_ratios": ()}, {"detail_ratios": (1e-9,)}, {"price": -1.0}):
-        with pytest.raises(InputError):
-            LayersOptions(**bad)
+WRONG = {"step": (0.0, 2.0), "detail_ratios": ((), (1e-9,)), "price": (-1.0, 1.0), "tangential": (0.0, 1.1)}
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in WRONG.items() for value in values])
+def test_options_name_what_is_wrong(name: str, value: object) -> None:
+    with pytest.raises(InputError):
+        LayersOptions(**{name: value})
 
 
 def test_the_parts_of_a_payload_are_told_apart() -> None:

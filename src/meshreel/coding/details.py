@@ -43,7 +43,7 @@ def encode_level(
     """The cheapest way to code the scalars of a level: alone or from the frame before; more or less of siblings."""
     follows = previous is not None and ((scalars - previous) ** 2).sum() < (scalars**2).sum()
     offsets = np.ascontiguousarray((scalars - previous if follows else scalars).T)
-    tried = [(weight, encode_field(offsets, level.graph(weight), rate, False)) for weight in SIBLING_WEIGHTS]
+    tried = [(weight, encode_field(offsets, level.graph(weight), rate)) for weight in SIBLING_WEIGHTS]
     weight, field = min(tried, key=lambda pair: _cost(pair[1], offsets, rate))
     record = LayersLevel(Origin.PREVIOUS if follows else Origin.ALONE, weight, field.record)
     return EncodedLevel(record, field, field.decoded + previous if follows else field.decoded)

@@ -38,6 +38,7 @@ class LayersOptions:
         1.1,
     )  # steps of the levels, in base steps; the last holds for all that follow
     price: float = 0.12  # of a bit, squared steps
+    tangential: float = 0.4  # weight of squared errors of the base's vertices along the surface, 0 to 1
 
     def __post_init__(self) -> None:
         finest, coarsest = step_of(LEVELS - 1), step_of(0)
@@ -48,6 +49,8 @@ class LayersOptions:
                 raise InputError(f"step {self.step} x {ratio}: give a fraction in {finest:.2g} .. {coarsest:g}")
         if not 0 <= self.price < 1:
             raise InputError(f"price {self.price}: give squared steps a bit, in [0, 1)")
+        if not 0 < self.tangential <= 1:
+            raise InputError(f"tangential {self.tangential}: give a weight in (0, 1]")
 
     def rate(self, level: int) -> Rate:
         """Step and price of a level; 0 is the base."""
@@ -95,7 +98,7 @@ def encode_layers(
     frames, levels = len(positions), reference.levels
     base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
     _check_input(positions, base)
-    field, known = encode_trajectories(positions[:, : len(base.vertices)], base, options.rate(0))
+    field, known = encode_trajectories(positions[:, : len(base.vertices)], base, options.rate(0), options.tangential)
     origin = Origin.ALONE if previous is None else Origin.PREVIOUS
     data = reference.data if previous is None else b""
     head = LayersGroup(
