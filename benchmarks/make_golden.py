@@ -16,6 +16,8 @@ from meshreel.capture.procedural import deforming_sphere
 from meshreel.coding.displacements import DisplacementOptions
 from meshreel.coding.group import code_reference, encode_group
 from meshreel.coding.intra import encode_empty, encode_intra
+from meshreel.coding.layers import LayersOptions, LayersState, encode_layers
+from meshreel.coding.reference import CodedReference
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import Video
 from meshreel.decoder import open as open_video
@@ -35,6 +37,8 @@ def main(folder: Path) -> None:
         "laplacian": (header(), [moving]),
         "draco": (header(), [still]),
         "empty": (header(), [nothing]),
+        "layers": (header(), layers_groups(ball(), (1, 10, 3))),
+        "layers_open": (header(), [nothing, *layers_groups(patches(), (4, 1)), *layers_groups(ball(), (2,))]),
         "mixed": (header(intervals=(40_000, 20_000, 33_333) * 3), [nothing, moving, still, (1, *nothing[1:])]),
     }
     for name, (head, groups) in files.items():
@@ -70,6 +74,37 @@ def laplacian_group() -> Group:
     field = 0.01 * ripple + 0.1 * points[:, None, :] * time[None, :, None] / FRAMES
     payload, layers = encode_group(reference, field, DisplacementOptions(step=0.002))
     return FRAMES, payload, layers
+
+
+def ball() -> CodedReference:
+    """A ball that is subdivided twice."""
+    mesh = deforming_sphere(1, levels=1)[0]
+    return code_reference(Mesh.of(0.25 * mesh.vertices, mesh.faces), 10, 2)
+
+
+def patches() -> CodedReference:
+    """Two bent squares with open borders, subdivided once."""
+    side = 6
+    x, y = (axis.reshape(-1) / side for axis in np.meshgrid(np.arange(side), np.arange(side)))
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1)
+    halves = ((corner, corner + 1, corner + side), (corner + 1, corner + side + 1, corner + side))
+    faces = np.concatenate([np.stack(half, axis=1) for half in halves])
+    points = 0.4 * np.stack([x, y, x * y], axis=1)
+    both = np.concatenate([points, points[:, [1, 2, 0]] - 0.3])
+    return code_reference(Mesh.of(both, np.concatenate([faces, faces + side * side])), 9, 1)
+
+
+def layers_groups(reference: CodedReference, sizes: tuple[int, ...]) -> list[Group]:
+    """Groups of so many frames of a mesh that stretches and ripples, each after the first predicted from the last."""
+    points, groups, first = reference.base.vertices, list[Group](), 0
+    state: LayersState | None = None
+    for frames in sizes:
+        time = (first + np.arange(frames))[:, None, None]
+        wanted = points * (1 + 0.01 * time) + 0.004 * np.sin(30 * points[:, [1, 2, 0]] + 0.2 * time)
+        coded = encode_layers(reference, wanted, LayersOptions(step=0.001), state)
+        groups.append((frames, coded.payload, coded.layers))
+        state, first = coded.state, first + frames
+    return groups
 
 
 def draco_group() -> Group:

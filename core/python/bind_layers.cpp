@@ -80,6 +80,21 @@ nb::tuple predict_forward(In<double, 2> values, In<int64_t, 1> starts, In<int32_
     return nb::make_tuple(symbols.two(columns, count), decoded.two(columns, count));
 }
 
+nb::tuple predict_surface(In<double, 2> values, nb::tuple graph_arrays, In<double, 2> vectors, In<double, 2> normals, double tangential,
+                          double step, double price) {
+    const size_t columns = values.shape(0), count = values.shape(1), width = vectors.shape(1);
+    expect(graph_arrays.size() == 3 && vectors.shape(0) == columns && normals.shape(0) == count && normals.shape(1) == width && width % 3 == 0);
+    const auto starts = nb::cast<In<int64_t, 1>>(graph_arrays[0]);
+    const auto near = nb::cast<In<int32_t, 1>>(graph_arrays[1]);
+    const auto weights = nb::cast<In<double, 1>>(graph_arrays[2]);
+    const mr_graph graph = graph_of(starts, near, weights, count);
+    const mr_surface surface{columns, width, vectors.data(), normals.data(), tangential};
+    Buffer<int32_t> symbols(columns * count);
+    Buffer<double> decoded(columns * count);
+    check(mr_predict_surface(&graph, &surface, values.data(), step, price, symbols.data(), decoded.data()));
+    return nb::make_tuple(symbols.two(columns, count), decoded.two(columns, count));
+}
+
 Out<double, 2> predict_inverse(In<int32_t, 2> symbols, In<int64_t, 1> starts, In<int32_t, 1> near, In<double, 1> weights, double step) {
     const size_t columns = symbols.shape(0), count = symbols.shape(1);
     const mr_graph graph = graph_of(starts, near, weights, count);
@@ -180,6 +195,7 @@ bool decode_field(const nb::bytes& data, InOut<int32_t, 2> columns, In<int64_t, 
 void bind_layers(nb::module_& m) {
     m.def("hierarchy", &hierarchy);
     m.def("predict_forward", &predict_forward);
+    m.def("predict_surface", &predict_surface);
     m.def("predict_inverse", &predict_inverse);
     m.def("orthonormal_inverse", &orthonormal_inverse);
     m.def("transform_inverse", &transform_inverse);

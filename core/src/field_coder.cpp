@@ -17,6 +17,7 @@ constexpr int kClamp = 255;  // larger magnitudes say no more about the scale
 constexpr uint32_t kBegin[kClasses - 1] = {1, 5, 9, 14, 20, 28, 40, 64, 100, 160, 300, 600, 1200, 2400};  // sixteenths
 constexpr uint32_t kLastBegin = kBegin[kClasses - 2];
 constexpr uint64_t kFirstRatio = 1u << 11;
+constexpr uint32_t kAlone = UINT32_MAX;  // a place that none predicts
 
 constexpr std::array<uint8_t, kLastBegin + 1> class_table() {
     std::array<uint8_t, kLastBegin + 1> table{};
@@ -40,14 +41,14 @@ public:
         std::vector<size_t> next(starts_.begin(), starts_.end() - 1);
         for (size_t v = 0; v < count_; ++v) {
             const int64_t begin = weights.starts[v], end = weights.starts[v + 1];
-            shares_[v] = end > begin ? (16u << 16) / static_cast<uint32_t>(end - begin) : 0;
+            shares_[v] = end > begin ? static_cast<uint32_t>((int64_t{16} << 16) / (end - begin)) : kAlone;
             for (int64_t k = begin; k < end; ++k) followers_[next[static_cast<size_t>(weights.neighbours[k])]++] = static_cast<int32_t>(v);
         }
     }
 
     int class_at(size_t v) const {
         uint32_t expected = static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
-        if (shares_[v] == 0 && v > 0) expected = 16u * now_[v - 1];
+        if (shares_[v] == kAlone) expected = v > 0 ? 16u * now_[v - 1] : 0u;
         if (column_ > 0) expected = (2 * expected + 3 * static_cast<uint32_t>(past_[v] * ratio_ >> 16)) / 5;
         return kClassOf[expected < kLastBegin ? expected : kLastBegin];
     }
@@ -86,7 +87,7 @@ private:
 
     size_t count_;
     std::vector<uint32_t> sums_;    // of the magnitudes at the neighbours of each place, as far as they are known
-    std::vector<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16; 0 where there are none
+    std::vector<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16, or kAlone
     std::vector<uint32_t> past_;
     std::vector<uint8_t> now_;
     std::vector<size_t> starts_;  // of the places that have each place as a neighbour

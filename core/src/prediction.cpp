@@ -2,8 +2,11 @@
 #include <cmath>
 
 #include "meshreel/layers.h"
+#include "prediction.h"
 
 namespace {
+
+using meshreel::lowered, meshreel::magnitude_around, meshreel::predicted, meshreel::slope;
 
 bool is_causal(const mr_graph& graph) {
     if (graph.starts[0] != 0) return false;
@@ -13,12 +16,6 @@ bool is_causal(const mr_graph& graph) {
             if (graph.near[k] < 0 || static_cast<size_t>(graph.near[k]) >= v) return false;
     }
     return true;
-}
-
-double predicted(const mr_graph& graph, size_t v, const double* values) {
-    double sum = 0.0;
-    for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k) sum += graph.weights[k] * values[graph.near[k]];
-    return sum;
 }
 
 // So many columns side by side: each is summed as if it were alone.
@@ -35,26 +32,13 @@ void inverse(const mr_graph& graph, const int32_t* symbols, double step, double*
     }
 }
 
-// Bits that a unit of magnitude costs where magnitudes follow a two-sided geometric law of this mean.
-double slope(double mean) { return -std::log2(mean / (1.0 + std::sqrt(1.0 + mean * mean))); }
-
-// Magnitude of `size` steps: the nearest, or one less where `threshold` squared steps of error more are worth it.
-double lowered(double size, double threshold) {
-    const double nearest = std::floor(size + 0.5);
-    if (nearest < 1.0) return 0.0;
-    const double above = size - (nearest - 1.0), below = size - nearest;
-    return above * above - below * below < threshold ? nearest - 1.0 : nearest;
-}
-
 // One column; `mean` is what magnitudes are expected to be, and becomes what they are. False where a symbol has no room.
 bool forward(const mr_graph& graph, const double* values, double step, double price, double& mean, int32_t* symbols, double* decoded) {
     double total = 0.0;
     for (size_t v = 0; v < graph.count; ++v) {
-        double around = 2.0 * mean, weight = 2.0;
-        for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k, weight += 1.0) around += std::fabs(static_cast<double>(symbols[graph.near[k]]));
         const double guess = predicted(graph, v, decoded);
         const double wanted = (values[v] - guess) / step;
-        const double threshold = price > 0.0 ? price * slope(std::max(around / weight, 1e-3)) : 0.0;
+        const double threshold = price > 0.0 ? price * slope(magnitude_around(graph, v, symbols, mean)) : 0.0;
         const double size = lowered(std::fabs(wanted), threshold);
         if (!(size <= 2147483647.0)) return false;
         symbols[v] = static_cast<int32_t>(wanted < 0.0 ? -size : size);

@@ -84,3 +84,59 @@ def motion_differences(
     covariances: Float64[np.ndarray, "K 9"],
     out: Float64[np.ndarray, " P"],
 ) -> None: ...
+
+# bind_layers.cpp
+
+def hierarchy(
+    positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Int32[np.ndarray, " V"], Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]: ...
+def predict_forward(
+    values: Float64[np.ndarray, "M V"],
+    starts: Int64[np.ndarray, " V+1"],
+    near: Int32[np.ndarray, " N"],
+    weights: Float64[np.ndarray, " N"],
+    step: float,
+    price: float,
+) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]: ...
+def predict_surface(
+    values: Float64[np.ndarray, "M V"],
+    graph: tuple[Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]],
+    vectors: Float64[np.ndarray, "M C"],
+    normals: Float64[np.ndarray, "V C"],
+    tangential: float,
+    step: float,
+    price: float,
+) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]: ...
+def predict_inverse(
+    symbols: Int32[np.ndarray, "M V"],
+    starts: Int64[np.ndarray, " V+1"],
+    near: Int32[np.ndarray, " N"],
+    weights: Float64[np.ndarray, " N"],
+    step: float,
+) -> Float64[np.ndarray, "M V"]: ...
+def orthonormal_inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64[np.ndarray, "M C"]: ...
+def transform_inverse(
+    columns: Float64[np.ndarray, "M V"], vectors: Float64[np.ndarray, "M C"], means: Float64[np.ndarray, " C"]
+) -> Float64[np.ndarray, "C V"]: ...
+def subdivide(
+    faces: Int32[np.ndarray, "F 3"], vertices: int
+) -> tuple[Int32[np.ndarray, "E 2"], Int32[np.ndarray, "4F 3"]]: ...
+def siblings(
+    finer: Int32[np.ndarray, "4F 3"], vertices: int, edge_count: int
+) -> tuple[Int64[np.ndarray, " E+1"], Int32[np.ndarray, " N"]]: ...
+def edge_frames(
+    positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], edges: Int32[np.ndarray, "E 2"]
+) -> tuple[Float64[np.ndarray, "E 3"], Float64[np.ndarray, "E 3"]]: ...
+def refine(
+    positions: Float64[np.ndarray, "T W 3"],
+    vertices: int,
+    faces: Int32[np.ndarray, "F 3"],
+    edges: Int32[np.ndarray, "E 2"],
+    scalars: Float64[np.ndarray, "T E"],
+) -> None: ...
+def encode_field(
+    columns: Int32[np.ndarray, "M V"], starts: Int64[np.ndarray, " V+1"], near: Int32[np.ndarray, " N"]
+) -> tuple[bytes, Int64[np.ndarray, " M"]]: ...
+def decode_field(
+    data: bytes, columns: Int32[np.ndarray, "M V"], starts: Int64[np.ndarray, " V+1"], near: Int32[np.ndarray, " N"]
+) -> bool: ...

@@ -12,8 +12,12 @@ import pytest
 
 from meshreel.coding import entropy, laplacian
 from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
+from meshreel.coding.layers import LayersOptions, LayersState, decode_layers, encode_layers
+from meshreel.coding.mesh import decode_mesh
+from meshreel.coding.reference import code_reference
 from meshreel.format import records
-from meshreel.format.layout import AnchorRule, DisplacementHead
+from meshreel.format.layout import AnchorRule, DisplacementHead, LayersGroup, LayersLevel, Origin
+from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "FORMAT.md"
@@ -26,8 +30,8 @@ def require(condition: bool) -> None:
 @pytest.fixture(scope="module")
 def decoder() -> dict[str, Any]:
     """What the document's Python defines."""
-    names: dict[str, Any] = {"np": np, "sqrt": math.sqrt, "require": require}
-    names |= {rule.name: rule for rule in AnchorRule}
+    names: dict[str, Any] = {"np": np, "math": math, "sqrt": math.sqrt, "require": require}
+    names |= {value.name: value for values in (AnchorRule, Origin) for value in values}
     for block in re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL):
         exec(block, names)
     return names
@@ -93,3 +97,37 @@ def test_the_document_finds_the_anchors(decoder: dict[str, Any], rule: AnchorRul
     for count in (0, 1, 2, 5, 40, len(base.vertices)):
         told = decoder["anchors"](rule, count, [tuple(face) for face in base.faces.tolist()], len(base.vertices))
         assert told == laplacian.anchors(rule, count, base.faces, len(base.vertices)).tolist()
+
+
+def told_by(decoder: dict[str, Any], payload: bytes, before: dict[str, Any] | None) -> tuple[np.ndarray, Any, Any]:
+    """What the document's decoder makes of a LAYERS payload: places, faces, and what it leaves behind."""
+    group, offset = records.unpack(LayersGroup, payload)
+    levels = []
+    for _ in range(group.levels):
+        level, offset = records.unpack(LayersLevel, payload, offset)
+        levels.append(level)
+    if group.origin == Origin.ALONE:
+        mesh = decode_mesh(group.base, group.step)
+        base, faces = [tuple(v) for v in mesh.vertices.tolist()], [tuple(f) for f in mesh.faces.tolist()]
+    else:
+        assert before is not None
+        base, faces = before["base"], before["faces"]
+    places, faces, left = decoder["decode_layers"](group, levels, base, faces, before)
+    return np.array(places), np.array(faces), left
+
+
+@pytest.mark.parametrize("frames", [1, 3])
+def test_the_document_decodes_layers_to_the_bit(decoder: dict[str, Any], frames: int) -> None:
+    reference = code_reference(body(), 9, 2)
+    generator = np.random.default_rng(5)
+    state: LayersState | None = None
+    left = None
+    for round_number in range(2):
+        shape = subdivide_midpoint(reference.mesh, 2).vertices
+        time = np.arange(frames)[:, None, None] + round_number * frames
+        wanted = shape * (1 + 0.02 * time) + 0.003 * generator.normal(size=(frames, *shape.shape))
+        payload = encode_layers(reference, wanted, LayersOptions(step=4e-3), state).payload
+        faces, positions, state = decode_layers(payload, None, state)
+        told, told_faces, left = told_by(decoder, payload, left)
+        np.testing.assert_array_equal(told_faces, faces)
+        np.testing.assert_array_equal(told, positions)

@@ -1,7 +1,7 @@
 // The arithmetic of the form LAYERS: a hierarchy over a mesh's vertices, prediction in it, subdivision along normals.
 //
 // All of it decides what a decoder shows, so: IEEE + - * / sqrt in a fixed order, no threads, no other functions. (Only
-// mr_predict_forward, an encoder's, takes logarithms.)
+// mr_predict_forward and mr_predict_surface, an encoder's, take logarithms.)
 #pragma once
 
 #include <stddef.h>
@@ -37,6 +37,18 @@ struct mr_graph mr_hierarchy_graph(const mr_hierarchy* hierarchy);  // of places
 int mr_predict_inverse(const struct mr_graph* graph, const int32_t* symbols, size_t columns, double step, double* decoded);
 // Symbols so that `decoded` is near `values`; a magnitude is lowered where that saves more than `price` squared steps a bit.
 int mr_predict_forward(const struct mr_graph* graph, const double* values, size_t columns, double step, double price,
+                       int32_t* symbols, double* decoded);
+
+// Where a field of places is seen from: errors of `columns` weights of `vectors` (rows of `width` numbers, three a frame)
+// count in full along the unit normals (`width` numbers for each of the graph's vertices), `tangential` times across them.
+struct mr_surface {
+    size_t columns, width;
+    const double* vectors;
+    const double* normals;
+    double tangential;
+};
+// As mr_predict_forward, in the metric of a surface. An encoder's.
+int mr_predict_surface(const struct mr_graph* graph, const struct mr_surface* surface, const double* values, double step, double price,
                        int32_t* symbols, double* decoded);
 
 // Orthonormal vectors of `width` numbers. The k-th is said by width - k integers: its direction where those before it,

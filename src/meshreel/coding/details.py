@@ -21,7 +21,7 @@ from .fields import EncodedField, Rate, decode_field, encode_field
 from .graph import Level
 
 MOST_SLANT = 0.3  # cosine between direction and surface below which the tangent plane says nothing
-SIBLING_WEIGHTS = (36,)  # tried, 64ths
+SIBLING_WEIGHTS = (36, 16)  # tried, 64ths
 
 Hook = Callable[
     [int, int, Float64[np.ndarray, "E 3"], Float64[np.ndarray, "E 3"]], Float64[np.ndarray, " E"]
@@ -40,14 +40,13 @@ class EncodedLevel:
 def encode_level(
     scalars: Float64[np.ndarray, "T E"], level: Level, rate: Rate, previous: Float64[np.ndarray, " E"] | None
 ) -> EncodedLevel:
-    """The cheapest way to code the scalars of a level: alone or from the last frame before, with or without siblings."""
-    origin, start = Origin.ALONE, np.zeros(scalars.shape[1])
-    if previous is not None and ((scalars - previous) ** 2).sum() < (scalars**2).sum():
-        origin, start = Origin.PREVIOUS, previous
-    offsets = np.ascontiguousarray((scalars - start).T)
-    tried = [(weight, encode_field(offsets, level.graph(weight), rate, False)) for weight in SIBLING_WEIGHTS]
+    """The cheapest way to code the scalars of a level: alone or from the frame before; more or less of siblings."""
+    follows = previous is not None and ((scalars - previous) ** 2).sum() < (scalars**2).sum()
+    offsets = np.ascontiguousarray((scalars - previous if follows else scalars).T)
+    tried = [(weight, encode_field(offsets, level.graph(weight), rate)) for weight in SIBLING_WEIGHTS]
     weight, field = min(tried, key=lambda pair: _cost(pair[1], offsets, rate))
-    return EncodedLevel(LayersLevel(origin, weight, field.record), field, field.decoded + start)
+    record = LayersLevel(Origin.PREVIOUS if follows else Origin.ALONE, weight, field.record)
+    return EncodedLevel(record, field, field.decoded + previous if follows else field.decoded)
 
 
 def decode_level(
@@ -56,7 +55,7 @@ def decode_level(
     """The scalars of a level. Raises FormatError on damaged records, or where they need a group that is not there."""
     scalars = decode_field(record.scalars, level.graph(record.sibling_weight), frames, False)
     if record.origin == Origin.ALONE:
-        return scalars + 0.0
+        return scalars
     if previous is None or len(previous) != scalars.shape[1]:
         raise FormatError("a level that is counted from a group which is not at hand, or not to this level")
     return scalars + previous

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float64, Int32, Int64
 
 from .. import _core
 from ..errors import FormatError, InputError
@@ -37,6 +37,14 @@ class Rate:
 
 
 @dataclass(frozen=True, slots=True)
+class Surface:
+    """Where a field of places is seen from: errors along the surface count less than those across it."""
+
+    normals: Float64[np.ndarray, "V C"]  # of each vertex in each frame, of unit length or zero
+    tangential: float  # weight of a squared error along the surface, 0 to 1
+
+
+@dataclass(frozen=True, slots=True)
 class EncodedField:
     """A field's record and what both sides know of it."""
 
@@ -48,11 +56,11 @@ class EncodedField:
 
 
 def encode_field(
-    trajectories: Float64[np.ndarray, "V C"], graph: Graph, rate: Rate, may_have_mean: bool
+    trajectories: Float64[np.ndarray, "V C"], graph: Graph, rate: Rate, surface: Surface | None = None
 ) -> EncodedField:
-    """The columns that pay, quantised in a closed loop."""
+    """The columns that pay, quantised in a closed loop; with a surface, of places on it, which have a mean."""
     width = trajectories.shape[1]
-    mean = trajectories.mean(axis=0) if may_have_mean and len(trajectories) else np.zeros(width)
+    mean = trajectories.mean(axis=0) if surface is not None and len(trajectories) else np.zeros(width)
     bits = _mean_bits(rate.step)
     mean = np.rint(np.ldexp(mean, bits))
     worth = rate.price * rate.step**2 * np.log2(2 * np.abs(mean) + 1).sum()
@@ -61,10 +69,10 @@ def encode_field(
     centered = trajectories - (np.ldexp(mean, -bits) if has_mean else 0.0)
     basis = klt.fit_about(np.zeros(width), centered)
     kept = np.flatnonzero(basis.energies > (0.2 * rate.step) ** 2)
-    coded = _Columns(centered, _only(basis, kept), graph, rate)
+    coded = _Columns(centered, _only(basis, kept), graph, (rate, surface))
     while not (pays := coded.pays()).all():
         kept = kept[pays]
-        coded = _Columns(centered, _only(basis, kept), graph, rate)
+        coded = _Columns(centered, _only(basis, kept), graph, (rate, surface))
     packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
     record = CodedField(len(kept), rate.step_level, packed, coded.stream)
     decoded = _core.transform_inverse(coded.decoded, coded.vectors, np.ldexp(mean, -bits) * has_mean)
@@ -88,7 +96,14 @@ def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -
 class _Columns:
     """Columns of a field in the basis as transmitted, quantised and coded."""
 
-    def __init__(self, trajectories: Float64[np.ndarray, "V C"], basis: klt.Basis, graph: Graph, rate: Rate) -> None:
+    def __init__(
+        self,
+        trajectories: Float64[np.ndarray, "V C"],
+        basis: klt.Basis,
+        graph: Graph,
+        terms: tuple[Rate, Surface | None],
+    ) -> None:
+        rate, surface = terms
         self.rate = rate
         count, width = len(basis.energies), trajectories.shape[1]
         scales = FINENESS * np.sqrt(width / 12 * basis.energies) / rate.step
@@ -97,10 +112,18 @@ class _Columns:
         self.weights = np.ascontiguousarray(self.vectors @ trajectories.T)
         if np.abs(self.weights).max(initial=0) > 1e9 * rate.step:
             raise InputError(f"a trajectory {np.abs(self.weights).max():g} long is too long for step {rate.step:g}")
-        self.symbols, self.decoded = _core.predict_forward(
-            self.weights, graph.starts, graph.near, graph.weights, rate.step, rate.price
-        )
+        self.symbols, self.decoded = self._quantized(graph, surface)
         self.stream, self.sizes = _core.encode_field(self.symbols, graph.starts, graph.near)
+
+    def _quantized(
+        self, graph: Graph, surface: Surface | None
+    ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]:
+        step, price = self.rate.step, self.rate.price
+        if surface is None:
+            return _core.predict_forward(self.weights, graph.starts, graph.near, graph.weights, step, price)
+        arrays = (graph.starts, graph.near, graph.weights)
+        normals, tangential = surface.normals, surface.tangential
+        return _core.predict_surface(self.weights, arrays, self.vectors, normals, tangential, step, price)
 
     def pays(self) -> Bool[np.ndarray, " M"]:
         """True for the columns whose absence would cost more than they do."""

@@ -1,4 +1,4 @@
-"""Causal graphs: which values predict which, and how much each weighs; the same on both sides, from decoded meshes only.
+"""Causal graphs: which values predict which and how much each weighs, from decoded meshes only: the same on both sides.
 
 In -> out: a base mesh -> an order of its vertices, coarse to fine, and their predictors; the connectivity of a level ->
 that of the next, with each new vertex's siblings.
@@ -39,7 +39,7 @@ class Level:
 
     coarse: Int32[np.ndarray, "F 3"]
     edges: Int32[np.ndarray, "E 2"]  # sorted; edge e has the vertex `vertices + e` in its middle
-    faces: Int32[np.ndarray, "4F 3"]
+    faces: Int32[np.ndarray, "G 3"]  # G = 4 F
     vertices: int  # of the coarser mesh
     starts: Int64[np.ndarray, " S"]  # S = E + 1
     siblings: Int32[np.ndarray, " N"]  # of edge e: those before it that share a face with it
@@ -55,7 +55,7 @@ def hierarchy(base: Mesh) -> Hierarchy:
     """The order and the predictors of a base mesh's vertices. Raises FormatError where a face names none of them."""
     _check(base.faces, len(base.vertices))
     order, starts, near, weights = _core.hierarchy(base.vertices, base.faces)
-    return Hierarchy(order, Graph(starts, near, weights))
+    return Hierarchy(order, Graph(starts.view(np.int64), near, weights))  # the core's int64 may be NumPy's longlong
 
 
 def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
@@ -63,7 +63,7 @@ def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
     _check(faces, vertices)
     edges, finer = _core.subdivide(faces, vertices)
     starts, siblings = _core.siblings(finer, vertices, len(edges))
-    return Level(faces, edges, finer, vertices, starts, siblings)
+    return Level(faces, edges, finer, vertices, starts.view(np.int64), siblings)
 
 
 def _check(faces: Int32[np.ndarray, "F 3"], vertices: int) -> None:

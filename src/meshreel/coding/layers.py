@@ -1,7 +1,7 @@
-"""The `layers` form: a coarse mesh and its motion, then for each midpoint subdivision one scalar a new vertex and frame.
+"""The `layers` form: a coarse mesh and its motion, then for each midpoint subdivision a scalar a new vertex and frame.
 
-In -> out: a base mesh as coded and the wanted places of its subdivided vertices in every frame <-> bytes, of which every
-prefix of layers decodes to a coarser mesh. T = 1 is the intra form. A group may be predicted from the one before.
+In -> out: a base mesh as coded and the wanted places of its subdivided vertices in every frame <-> bytes; every prefix
+of layers decodes to a coarser mesh. T = 1 is the intra form. A group may be predicted from the one before.
 """
 
 from __future__ import annotations
@@ -38,6 +38,7 @@ class LayersOptions:
         1.1,
     )  # steps of the levels, in base steps; the last holds for all that follow
     price: float = 0.12  # of a bit, squared steps
+    tangential: float = 0.4  # weight of squared errors of the base's vertices along the surface, 0 to 1
 
     def __post_init__(self) -> None:
         finest, coarsest = step_of(LEVELS - 1), step_of(0)
@@ -48,6 +49,8 @@ class LayersOptions:
                 raise InputError(f"step {self.step} x {ratio}: give a fraction in {finest:.2g} .. {coarsest:g}")
         if not 0 <= self.price < 1:
             raise InputError(f"price {self.price}: give squared steps a bit, in [0, 1)")
+        if not 0 < self.tangential <= 1:
+            raise InputError(f"tangential {self.tangential}: give a weight in (0, 1]")
 
     def rate(self, level: int) -> Rate:
         """Step and price of a level; 0 is the base."""
@@ -61,7 +64,12 @@ class LayersState:
 
     faces: Int32[np.ndarray, "F 3"]  # of the base
     base: Float64[np.ndarray, "V 3"]  # its vertices in the last frame
-    scalars: tuple[Float64[np.ndarray, " E"], ...]  # of the last frame, for each level decoded
+    scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each level decoded
+
+    @property
+    def levels(self) -> int:
+        """How many levels are known."""
+        return len(self.scalars)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +92,13 @@ def encode_layers(
 ) -> EncodedLayers:
     """The payload of a group whose subdivided base should lie at `positions`; predicted from `previous` if given.
 
-    With `previous`, the base mesh is its, and of `reference` only the number of levels counts.
+    With `previous`, the base mesh is that of its last frame, and of `reference` only the number of levels counts: give
+    that of the group whose base mesh was coded.
     """
     frames, levels = len(positions), reference.levels
     base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
     _check_input(positions, base)
-    field, known = encode_trajectories(positions[:, : len(base.vertices)], base, options.rate(0))
+    field, known = encode_trajectories(positions[:, : len(base.vertices)], base, options.rate(0), options.tangential)
     origin = Origin.ALONE if previous is None else Origin.PREVIOUS
     data = reference.data if previous is None else b""
     head = LayersGroup(
@@ -99,7 +108,7 @@ def encode_layers(
         [pack(head)],
         {"base mesh": 8 * len(data), "motion basis": field.basis_bits, "motion": field.symbol_bits},
     )
-    scalars: list[Float64[np.ndarray, "T E"]] = []
+    scalars: list[Float64[np.ndarray, "T _"]] = []
     faces = base.faces
     for number in range(1, levels + 1):
         level = subdivide(faces, known.shape[1])
@@ -126,9 +135,10 @@ def decode_layers(
     With `levels`, so many subdivisions at most, for which `data` may end behind theirs.
     """
     head, offset = unpack(LayersGroup, data)
+    previous = previous if head.origin == Origin.PREVIOUS else None
     base = _base(head, previous)
     known = decode_trajectories(head.motion, base, head.frames, head.has_mean == Presence.PRESENT)
-    faces, scalars = base.faces, list[Float64[np.ndarray, "T E"]]()
+    faces, scalars = base.faces, list[Float64[np.ndarray, "T _"]]()
     for number in range(1, head.levels + 1 if levels is None else min(levels, head.levels) + 1):
         record, offset = unpack(LayersLevel, data, offset)
         level = subdivide(faces, known.shape[1])
@@ -141,6 +151,11 @@ def decode_layers(
     if not np.isfinite(known).all():
         raise FormatError("layers: vertices that are not finite")
     return faces, known, _state(base, known, scalars)
+
+
+def needs_previous(data: bytes) -> bool:
+    """True where a payload decodes only with what the group before it leaves behind."""
+    return data[:1] == bytes([Form.LAYERS]) and unpack(LayersGroup, data)[0].origin == Origin.PREVIOUS
 
 
 def layers_parts(data: bytes) -> dict[str, int]:
@@ -196,7 +211,7 @@ def _refined(
 
 
 def _state(
-    base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "T E"]]
+    base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "T _"]]
 ) -> LayersState:
     last = positions[-1, : len(base.vertices)].copy()
     return LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))

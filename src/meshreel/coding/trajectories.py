@@ -11,18 +11,25 @@ from jaxtyping import Float64
 
 from ..errors import FormatError
 from ..format.layout import CodedField
+from ..geometry.topology import vertex_normals
 from ..types import Mesh
-from .fields import EncodedField, Rate, decode_field, encode_field
+from .fields import EncodedField, Rate, Surface, decode_field, encode_field
 from .graph import Hierarchy, hierarchy
 
 
 def encode_trajectories(
-    positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate
+    positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate, tangential: float
 ) -> tuple[EncodedField, Float64[np.ndarray, "T V 3"]]:
-    """The coded motion of the base's vertices, and their places as decoded."""
+    """The coded motion of the base's vertices, and their places as decoded.
+
+    `tangential` is the weight of a squared error along the surface: where on it a vertex lies hardly shows.
+    """
     places = hierarchy(base)
     offsets = np.moveaxis(positions - base.vertices, 0, 1)[places.order]
-    field = encode_field(offsets.reshape(len(base.vertices), -1), places.graph, rate, True)
+    frames = [vertex_normals(Mesh(np.ascontiguousarray(frame), base.faces)) for frame in positions]
+    normals = np.stack(frames, axis=1)[places.order].reshape(len(base.vertices), -1)
+    surface = Surface(np.ascontiguousarray(normals), tangential)
+    field = encode_field(offsets.reshape(len(base.vertices), -1), places.graph, rate, surface)
     return field, _placed(field.decoded, base, places)
 
 

@@ -1,0 +1,122 @@
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from meshreel import _core
+from meshreel.coding import fields, orthonormal
+from meshreel.coding.fields import Rate, Surface, decode_field, encode_field
+from meshreel.coding.graph import hierarchy, subdivide
+from meshreel.coding.steps import LEVELS
+from meshreel.errors import FormatError, InputError
+from meshreel.geometry.topology import vertex_normals
+
+from .bodies import ball, moving
+
+REFERENCE = ball(1)
+MESH = REFERENCE.mesh
+GRAPH = hierarchy(MESH).graph
+COUNT = len(MESH.vertices)
+
+
+ROUND = Surface(np.tile(vertex_normals(MESH)[hierarchy(MESH).order], 4), 0.4)
+
+
+def trajectories(frames: int = 4) -> np.ndarray:
+    offsets = moving(REFERENCE, frames)[:, :COUNT] - MESH.vertices
+    return np.ascontiguousarray(np.moveaxis(offsets, 0, 1)[hierarchy(MESH).order].reshape(COUNT, -1))
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(1, 40), st.integers(0, 40), st.integers(0, 2**32), st.sampled_from([2.0, 30.0, 5000.0, 2.0**24]))
+def test_a_basis_comes_back_orthonormal_and_near(width: int, count: int, seed: int, scale: float) -> None:
+    count = min(count, width)
+    wanted = np.linalg.qr(np.random.default_rng(seed).normal(size=(width, width)))[0][:count]
+    symbols = orthonormal.forward(wanted, np.full(count, scale))
+    assert len(symbols) == orthonormal.symbol_count(count, width)
+    found = orthonormal.inverse(symbols, count, width)
+    np.testing.assert_allclose(found @ found.T, np.eye(count), atol=1e-12)
+    if scale > 1000 and count < width:
+        np.testing.assert_allclose(found, wanted, atol=3 * width / scale)
+
+
+def test_a_vector_without_direction_is_refused() -> None:
+    with pytest.raises(FormatError):
+        orthonormal.inverse(np.array([3, 1, 0], np.int32), 2, 2)
+    with pytest.raises(FormatError):
+        orthonormal.inverse(np.array([3, 1, 0, 0], np.int32), 2, 2)
+
+
+@pytest.mark.parametrize("level", [40, 72, 100])
+@pytest.mark.parametrize("mean", [False, True])
+def test_what_is_decoded_is_what_the_encoder_saw_and_near(level: int, mean: bool) -> None:
+    rate, wanted = Rate(level, 0.1), trajectories()
+    coded = encode_field(wanted, GRAPH, rate, ROUND if mean else None)
+    decoded = decode_field(coded.record, GRAPH, wanted.shape[1], coded.has_mean)
+    np.testing.assert_array_equal(decoded, coded.decoded)
+    assert np.abs(decoded.T - wanted).max() < 4 * rate.step
+    assert coded.basis_bits + coded.symbol_bits == 8 * len(coded.record.basis + coded.record.symbols)
+
+
+def test_without_a_price_errors_stay_below_half_a_step_a_column(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fields, "FINENESS", 1e4)
+    rate, wanted = Rate(104, 0.0), trajectories()
+    coded = encode_field(wanted, GRAPH, rate)
+    assert coded.record.columns == wanted.shape[1]
+    assert np.linalg.norm(coded.decoded.T - wanted, axis=1).max() <= rate.step / 2 * wanted.shape[1] ** 0.5 + 1e-9
+
+
+def test_a_price_on_bits_saves_more_than_it_spoils() -> None:
+    wanted = trajectories(8)
+    plain, priced = (encode_field(wanted, GRAPH, Rate(64, price)) for price in (0.0, 0.12))
+    assert priced.symbol_bits < 0.95 * plain.symbol_bits
+
+
+def test_errors_move_to_where_they_do_not_show() -> None:
+    wanted, errors, bits = trajectories(), [], []
+    for tangential in (1.0, 0.3):
+        coded = encode_field(wanted, GRAPH, Rate(72, 0.12), Surface(ROUND.normals, tangential))
+        error = (coded.decoded.T - wanted).reshape(COUNT, -1, 3)
+        errors.append(((error * ROUND.normals.reshape(COUNT, -1, 3)).sum(axis=2) ** 2).mean())
+        bits.append(coded.symbol_bits)
+    assert errors[1] < errors[0] and bits[1] < 1.02 * bits[0]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**32), st.integers(1, 6), st.floats(0, 31))
+def test_any_symbols_come_back_from_one_stream(seed: int, columns: int, size: float) -> None:
+    generator = np.random.default_rng(seed)
+    level = subdivide(MESH.faces, COUNT)
+    sizes = np.exp2(generator.uniform(0, size, (columns, len(level.edges)))) - 1
+    symbols = np.rint(generator.choice([-1, 1], sizes.shape) * sizes * (generator.random(sizes.shape) < 0.5))
+    symbols = symbols.astype(np.int32)
+    stream, shares = _core.encode_field(symbols, level.starts, level.siblings)
+    assert abs(int(shares.sum()) - len(stream)) < 6
+    found = np.empty_like(symbols)
+    assert _core.decode_field(stream, found, level.starts, level.siblings)
+    np.testing.assert_array_equal(found, symbols)
+    for damaged in (stream[:-1], stream + b"\0"):
+        assert not _core.decode_field(damaged, found, level.starts, level.siblings)
+
+
+def test_zeros_cost_next_to_nothing() -> None:
+    stream, _ = _core.encode_field(np.zeros((4, COUNT), np.int32), GRAPH.starts, GRAPH.near)
+    assert len(stream) < 6
+
+
+@pytest.mark.parametrize("change", [{"columns": 13}, {"step_level": LEVELS}, {"columns": 2**60}, {"symbols": b""}])
+def test_absurd_records_are_refused(change: dict[str, object]) -> None:
+    coded = encode_field(trajectories(), GRAPH, Rate(72, 0.1), ROUND)
+    with pytest.raises(FormatError):
+        decode_field(dataclasses.replace(coded.record, **change), GRAPH, 12, coded.has_mean)
+    with pytest.raises(FormatError):
+        decode_field(coded.record, GRAPH, 12, not coded.has_mean)
+
+
+def test_trajectories_too_long_for_the_step_are_refused() -> None:
+    with pytest.raises(InputError, match="too long"):
+        encode_field(1e4 * trajectories(), GRAPH, Rate(LEVELS - 1, 0.1))
