@@ -137,23 +137,24 @@ nb::tuple siblings(In<int32_t, 2> finer, size_t vertices, size_t edge_count) {
     return nb::make_tuple(starts.one(edge_count + 1), near.one(links));
 }
 
-nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t, 2> edges) {
+nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t, 2> edges, int curvature) {
     expect(positions.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
     const size_t count = edges.shape(0);
     Buffer<double> midpoints(3 * count), directions(3 * count);
-    check(mr_edge_frames(positions.data(), positions.shape(0), faces.data(), faces.shape(0), edges.data(), count, midpoints.data(),
-                         directions.data()));
+    check(mr_edge_frames(positions.data(), positions.shape(0), faces.data(), faces.shape(0), edges.data(), count, curvature,
+                         midpoints.data(), directions.data()));
     return nb::make_tuple(midpoints.two(count, 3), directions.two(count, 3));
 }
 
 // `positions` T x V x 3, of which the first `vertices` are known; the next are set from T x E scalars.
-void refine(InOut<double, 3> positions, size_t vertices, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars) {
+void refine(InOut<double, 3> positions, size_t vertices, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars,
+            int curvature) {
     const size_t frames = positions.shape(0), count = edges.shape(0);
     expect(positions.shape(2) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
     expect(positions.shape(1) >= vertices + count && scalars.shape(0) == frames && scalars.shape(1) == count);
     for (size_t t = 0; t < frames; ++t)
         check(mr_refine(positions.data() + 3 * t * positions.shape(1), vertices, faces.data(), faces.shape(0), edges.data(), count,
-                        scalars.data() + t * count));
+                        scalars.data() + t * count, curvature));
 }
 
 meshreel_weights view(const InOut<int32_t, 2>& columns, const In<int64_t, 1>& starts, const In<int32_t, 1>& near) {

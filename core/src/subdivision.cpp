@@ -49,6 +49,8 @@ int64_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, i
     return count;
 }
 
+constexpr double kMostBend = 0.15;  // of an edge's length
+
 void normals_of(const double* p, size_t vertices, const int32_t* faces, size_t face_count, std::vector<double>& n) {
     n.assign(3 * vertices, 0.0);
     for (size_t f = 0; f < face_count; ++f) {
@@ -72,16 +74,24 @@ void normals_of(const double* p, size_t vertices, const int32_t* faces, size_t f
     }
 }
 
-// Calls visit(edge, midpoint, direction).
+// Calls visit(edge, curved midpoint, direction): on a circle through both ends with their normals, the arc's middle is
+// (n_b - n_a) . (b - a) / 8 above the chord's, for small angles.
 template <class Visit>
-void for_each_edge(const double* p, const std::vector<double>& n, const int32_t* edges, size_t edge_count, Visit visit) {
+void for_each_edge(const double* p, const std::vector<double>& n, const int32_t* edges, size_t edge_count, int curvature,
+                   Visit visit) {
+    const double share = curvature / 64.0;
     for (size_t e = 0; e < edge_count; ++e) {
         const size_t a = 3 * static_cast<size_t>(edges[2 * e]), b = 3 * static_cast<size_t>(edges[2 * e + 1]);
-        const double middle[3] = {(p[a] + p[b]) / 2.0, (p[a + 1] + p[b + 1]) / 2.0, (p[a + 2] + p[b + 2]) / 2.0};
+        const double ex = p[b] - p[a], ey = p[b + 1] - p[a + 1], ez = p[b + 2] - p[a + 2];
+        const double bend = ((n[b] - n[a]) * ex + (n[b + 1] - n[a + 1]) * ey + (n[b + 2] - n[a + 2]) * ez) / 8.0;
+        const double most = kMostBend * std::sqrt(ex * ex + ey * ey + ez * ez);
+        const double lift = share * (bend > most ? most : bend < -most ? -most : bend);
         const double x = n[a] + n[b], y = n[a + 1] + n[b + 1], z = n[a + 2] + n[b + 2];
         const double length = std::sqrt(x * x + y * y + z * z);
         const double scale = length > 0.0 ? 1.0 / length : 0.0;
         const double direction[3] = {x * scale, y * scale, z * scale};
+        const double middle[3] = {(p[a] + p[b]) / 2.0 + lift * direction[0], (p[a + 1] + p[b + 1]) / 2.0 + lift * direction[1],
+                                  (p[a + 2] + p[b + 2]) / 2.0 + lift * direction[2]};
         visit(e, middle, direction);
     }
 }
@@ -151,12 +161,12 @@ int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t
 }
 
 int mr_edge_frames(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
-                   size_t edge_count, double* midpoints, double* directions) {
+                   size_t edge_count, int curvature, double* midpoints, double* directions) {
     if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
     return guarded([&] {
         std::vector<double> normals;
         normals_of(positions, vertices, faces, face_count, normals);
-        for_each_edge(positions, normals, edges, edge_count, [&](size_t e, const double* middle, const double* direction) {
+        for_each_edge(positions, normals, edges, edge_count, curvature, [&](size_t e, const double* middle, const double* direction) {
             std::copy(middle, middle + 3, midpoints + 3 * e);
             std::copy(direction, direction + 3, directions + 3 * e);
         });
@@ -165,13 +175,13 @@ int mr_edge_frames(const double* positions, size_t vertices, const int32_t* face
 }
 
 int mr_refine(double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges, size_t edge_count,
-              const double* scalars) {
+              const double* scalars, int curvature) {
     if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
     return guarded([&] {
         std::vector<double> normals;
         normals_of(positions, vertices, faces, face_count, normals);
         double* out = positions + 3 * vertices;
-        for_each_edge(positions, normals, edges, edge_count, [&](size_t e, const double* middle, const double* direction) {
+        for_each_edge(positions, normals, edges, edge_count, curvature, [&](size_t e, const double* middle, const double* direction) {
             for (int k = 0; k < 3; ++k) out[3 * e + static_cast<size_t>(k)] = middle[k] + scalars[e] * direction[k];
         });
         return static_cast<int>(MR_LAYERS_OK);

@@ -125,7 +125,10 @@ def siblings(
     finer: Int32[np.ndarray, "4F 3"], vertices: int, edge_count: int
 ) -> tuple[Int64[np.ndarray, " E+1"], Int32[np.ndarray, " N"]]: ...
 def edge_frames(
-    positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], edges: Int32[np.ndarray, "E 2"]
+    positions: Float64[np.ndarray, "V 3"],
+    faces: Int32[np.ndarray, "F 3"],
+    edges: Int32[np.ndarray, "E 2"],
+    curvature: int,
 ) -> tuple[Float64[np.ndarray, "E 3"], Float64[np.ndarray, "E 3"]]: ...
 def refine(
     positions: Float64[np.ndarray, "T W 3"],
@@ -133,6 +136,7 @@ def refine(
     faces: Int32[np.ndarray, "F 3"],
     edges: Int32[np.ndarray, "E 2"],
     scalars: Float64[np.ndarray, "T E"],
+    curvature: int,
 ) -> None: ...
 def encode_field(
     columns: Int32[np.ndarray, "M V"], starts: Int64[np.ndarray, " V+1"], near: Int32[np.ndarray, " N"]

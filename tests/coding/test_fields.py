@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from meshreel import _core
 from meshreel.coding import fields, orthonormal
 from meshreel.coding.fields import Rate, Surface, decode_field, encode_field
-from meshreel.coding.graph import hierarchy, subdivide
+from meshreel.coding.graph import hierarchy
 from meshreel.coding.steps import LEVELS
 from meshreel.errors import FormatError, InputError
+from meshreel.geometry.levels import subdivide
 from meshreel.geometry.topology import vertex_normals
 
 from .bodies import ball, moving
@@ -91,16 +92,17 @@ def test_errors_move_to_where_they_do_not_show() -> None:
 def test_any_symbols_come_back_from_one_stream(seed: int, columns: int, size: float) -> None:
     generator = np.random.default_rng(seed)
     level = subdivide(MESH.faces, COUNT)
+    near = siblings(level)
     sizes = np.exp2(generator.uniform(0, size, (columns, len(level.edges)))) - 1
     symbols = np.rint(generator.choice([-1, 1], sizes.shape) * sizes * (generator.random(sizes.shape) < 0.5))
     symbols = symbols.astype(np.int32)
-    stream, shares = _core.encode_field(symbols, level.starts, level.siblings)
+    stream, shares = _core.encode_field(symbols, near.starts, near.near)
     assert abs(int(shares.sum()) - len(stream)) < 6
     found = np.empty_like(symbols)
-    assert _core.decode_field(stream, found, level.starts, level.siblings)
+    assert _core.decode_field(stream, found, near.starts, near.near)
     np.testing.assert_array_equal(found, symbols)
     for damaged in (stream[:-1], stream + b"\0"):
-        assert not _core.decode_field(damaged, found, level.starts, level.siblings)
+        assert not _core.decode_field(damaged, found, near.starts, near.near)
 
 
 def test_zeros_cost_next_to_nothing() -> None:

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.coding.graph import Graph, hierarchy, subdivide
+from meshreel.coding.graph import Graph, hierarchy, siblings
 from meshreel.errors import FormatError
+from meshreel.geometry.levels import subdivide
 from meshreel.geometry.topology import subdivide_midpoint, unique_edges
 from meshreel.types import Mesh
 
@@ -73,10 +74,11 @@ def test_subdivision_is_that_of_the_topology_module(mesh: Mesh) -> None:
     np.testing.assert_array_equal(level.faces, finer.faces)
     np.testing.assert_array_equal(level.edges, unique_edges(mesh.faces)[0].reshape(-1, 2))
     sides = unique_edges(mesh.faces)[1]
+    found = siblings(level)
     for edge in range(len(level.edges)):
-        siblings = level.siblings[level.starts[edge] : level.starts[edge + 1]]
+        near = found.near[found.starts[edge] : found.starts[edge + 1]]
         together = set(sides[(sides == edge).any(axis=1)].reshape(-1).tolist())
-        assert siblings.tolist() == sorted(other for other in together if other < edge)
+        assert near.tolist() == sorted(other for other in together if other < edge)
 
 
 def test_faces_that_name_no_vertex_are_refused() -> None:

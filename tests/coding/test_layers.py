@@ -9,14 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.coding import layers
-from meshreel.coding.details import wanted_scalars
-from meshreel.coding.graph import subdivide
 from meshreel.coding.group import continue_group, decode_group, payload_parts
-from meshreel.coding.layers import EncodedLayers, LayersOptions, decode_layers, encode_layers, needs_previous
+from meshreel.coding.layers import EncodedLayers, LayersOptions, decode_layers, encode_layers
 from meshreel.coding.reference import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin
 from meshreel.format.records import pack, unpack
+from meshreel.geometry.levels import heights, refine, subdivide
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
@@ -79,7 +78,8 @@ def test_every_prefix_of_layers_decodes_to_a_coarser_mesh() -> None:
 def test_a_group_predicted_from_the_one_before_is_smaller_and_exact() -> None:
     following = moving(BALL, 4, 4)
     alone, after = encode_layers(BALL, following), encode_layers(BALL, following, previous=CODED.state)
-    assert needs_previous(after.payload) and not needs_previous(alone.payload)
+    origins = [unpack(LayersGroup, group.payload)[0].origin for group in (after, alone)]
+    assert origins == [Origin.PREVIOUS, Origin.ALONE]
     assert len(after.payload) < 0.8 * len(alone.payload)
     assert_exact(after, CODED.state)
     state = None
@@ -133,24 +133,11 @@ def test_isolated_vertices_and_degenerate_faces_are_exact() -> None:
 
 
 def test_levels_without_anything_to_say_cost_a_few_bytes_and_still_subdivide() -> None:
-    coded = encode_layers(BALL, np.repeat(BALL.base.vertices[None], 3, axis=0), LayersOptions(step=0.05))
+    coded = encode_layers(
+        BALL, np.repeat(BALL.base.vertices[None], 3, axis=0), LayersOptions(step=0.05, curvatures=(0,))
+    )
     np.testing.assert_array_equal(coded.positions[0], BALL.base.vertices)
     assert coded.layers[2] - coded.layers[0] < 16
-
-
-def test_the_hook_aims_in_place_of_the_tangent_planes() -> None:
-    asked = []
-
-    def hook(level: int, frame: int, midpoints: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        asked.append((level, frame))
-        np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1)
-        return np.full(len(midpoints), 0.01)
-
-    coded = encode_layers(BALL, WANTED, LayersOptions(step=5e-4), hook=hook)
-    assert asked == [(level, frame) for level in (1, 2) for frame in range(4)]
-    assert np.median(coded.state.scalars[0]) == pytest.approx(0.01, abs=5e-4)
-    with pytest.raises(InputError, match="hook"):
-        encode_layers(BALL, WANTED, hook=lambda *_: np.full(480, np.nan))
 
 
 def test_scalars_aim_at_the_tangent_plane_of_the_wanted_surface() -> None:
@@ -159,9 +146,17 @@ def test_scalars_aim_at_the_tangent_plane_of_the_wanted_surface() -> None:
     finer = subdivide_midpoint(BALL.mesh).vertices
     radius = float(np.linalg.norm(coarse[0], axis=1).max())
     round_ball = finer * (radius / np.linalg.norm(finer, axis=1))[:, None]
-    scalars = wanted_scalars(round_ball[None], coarse, level)
+    scalars = heights(round_ball[None], coarse, level, 0)
     lifted = radius - np.linalg.norm(finer[len(coarse[0]) :], axis=1)
     np.testing.assert_allclose(scalars[0], lifted, atol=1e-3)
+
+
+def test_midpoints_curve_as_the_normals_say() -> None:
+    level = subdivide(BALL.mesh.faces, len(BALL.mesh.vertices))
+    coarse = BALL.mesh.vertices[None]
+    radii = [np.linalg.norm(refine(coarse, level, np.zeros((1, len(level.edges))), k)[0], axis=1) for k in (0, 64)]
+    flat, curved = (abs(np.median(radius[level.vertices :]) - np.median(radius[: level.vertices])) for radius in radii)
+    assert curved < flat / 4
 
 
 def test_every_truncation_and_a_byte_too_many_are_refused() -> None:
@@ -209,7 +204,13 @@ def test_places_that_do_not_fit_are_refused() -> None:
             encode_layers(BALL, bad)
 
 
-WRONG = {"step": (0.0, 2.0), "detail_ratios": ((), (1e-9,)), "price": (-1.0, 1.0), "tangential": (0.0, 1.1)}
+WRONG = {
+    "step": (0.0, 2.0),
+    "curvatures": ((), (256,)),
+    "detail_ratios": ((), (1e-9,)),
+    "price": (-1.0, 1.0),
+    "tangential": (0.0, 1.1),
+}
 
 
 @pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in WRONG.items() for value in values])

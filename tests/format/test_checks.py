@@ -49,9 +49,9 @@ def test_a_header_that_means_nothing_is_refused(change):
         ((replace(GROUP, frames=0),), "GROUP of 0 frames"),
         ((replace(GROUP, layers=()),), "without bytes"),
         ((replace(GROUP, layers=(Layer(3, 0), Layer(0, 0))),), "without bytes"),
-        ((GROUP, replace(GROUP, depends_on=(0,))), "no static chunk"),
-        ((replace(GROUP, depends_on=(0,)),), "no static chunk"),
-        ((replace(GROUP, depends_on=(1 << 60,)),), "no static chunk"),
+        ((GROUP, replace(GROUP, depends_on=(0,))), "neither a static chunk"),
+        ((replace(GROUP, depends_on=(0,)),), "neither a static chunk"),
+        ((replace(GROUP, depends_on=(1 << 60,)),), "neither a static chunk"),
     ],
 )
 def test_an_index_that_contradicts_itself_is_refused(chunks, message):

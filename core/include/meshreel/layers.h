@@ -64,12 +64,13 @@ int64_t mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, i
 // For each edge those that share a face with it and come before it, sorted; `near` has room for 3 face_count entries.
 int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts, int32_t* near);
 
-// Midpoints of the edges and, along the unit sum of both ends' normals, a direction (zero where there is none).
+// Midpoints of the edges, lifted by curvature / 64 of the bend that both ends' normals say, and along the unit sum of these
+// normals a direction (zero where there is none).
 int mr_edge_frames(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
-                   size_t edge_count, double* midpoints, double* directions);
+                   size_t edge_count, int curvature, double* midpoints, double* directions);
 // `positions` of one frame: vertices, then room for the edges' vertices, which become midpoint + scalar * direction.
 int mr_refine(double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
-              size_t edge_count, const double* scalars);
+              size_t edge_count, const double* scalars, int curvature);
 
 #ifdef __cplusplus
 }

@@ -5,7 +5,7 @@ In: a key frame; fitted positions of the subdivided base. Out: the base; positio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +13,13 @@ from jaxtyping import Float64, Int32
 
 from ..errors import InputError
 from ..geometry.decimate import decimate
-from ..geometry.levels import edge_frames, heights, levels_of, refine
+from ..geometry.levels import heights, levels_of, refine
 from ..geometry.nearest import Surface
 from ..types import Mesh
 
 FEWEST = 40  # vertices of a base mesh: below, a body has no limbs
 DECAY = 1.2  # the error of quadric decimation falls with this power of the number of vertices (measured on bodies)
+CURVATURE = 52  # of midpoints, 64ths: about what the coder has; what is left of the bend is detail
 ROUNDS = 2  # of the search for the number of vertices
 
 
@@ -28,14 +29,10 @@ class TemplateOptions:
 
     error: float = 9e-4  # RMS distance of the key frame's vertices to the base mesh to aim at, of the diagonal
     levels: int = 2  # midpoint subdivisions of the base
-    curvatures: tuple[float, ...] = (0.75, 0.9)  # of each level's midpoints, as the coder has them
 
     def __post_init__(self) -> None:
-        if self.error <= 0 or not 0 <= self.levels <= 4 or len(self.curvatures) < self.levels:
-            raise InputError(
-                f"template error {self.error:g}, {self.levels} levels of curvatures {self.curvatures}: "
-                "give > 0, 0 to 4, and one for each level"
-            )
+        if self.error <= 0 or not 0 <= self.levels <= 4:
+            raise InputError(f"template error {self.error:g}, {self.levels} levels: give > 0, and 0 to 4")
 
 
 def base_mesh(key: Mesh, options: TemplateOptions) -> Mesh:
@@ -64,18 +61,10 @@ def shared_detail(
 
     def coherent(positions: Float64[np.ndarray, "T V 3"]) -> Float64[np.ndarray, "T V 3"]:
         known = np.ascontiguousarray(positions[:, :count])
-        medians = [np.median(scalars, axis=0) for scalars in _details(positions)]
-        for level, curvature, scalars in zip(levels, options.curvatures, medians, strict=False):
-            known = refine(known, level, np.tile(scalars, (len(known), 1)), curvature)
+        for level in levels:
+            scalars = heights(positions[:, : level.count], positions[:, : level.vertices], level, CURVATURE)
+            known = refine(known, level, np.tile(np.median(scalars, axis=0), (len(known), 1)), CURVATURE)
         return known
-
-    def _details(positions: Float64[np.ndarray, "T V 3"]) -> Sequence[Float64[np.ndarray, "T E"]]:
-        found = []
-        for level, curvature in zip(levels, options.curvatures, strict=False):
-            coarse = np.ascontiguousarray(positions[:, : level.count])
-            midpoints, directions = edge_frames(coarse, level, curvature)
-            found.append(heights(midpoints, directions, positions[:, : level.count + len(level.edges)], level))
-        return found
 
     return coherent
 

@@ -13,6 +13,7 @@ from jaxtyping import Float64, Int32, Int64
 
 from .. import _core
 from ..errors import FormatError
+from ..geometry.levels import Level
 from ..types import Mesh
 
 
@@ -34,21 +35,17 @@ class Hierarchy:
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
-    """One midpoint subdivision: what it does to the connectivity."""
+class Siblings:
+    """For each new vertex of a level those before it that share a face of the coarser level with it."""
 
-    coarse: Int32[np.ndarray, "F 3"]
-    edges: Int32[np.ndarray, "E 2"]  # sorted; edge e has the vertex `vertices + e` in its middle
-    faces: Int32[np.ndarray, "G 3"]  # G = 4 F
-    vertices: int  # of the coarser mesh
     starts: Int64[np.ndarray, " S"]  # S = E + 1
-    siblings: Int32[np.ndarray, " N"]  # of edge e: those before it that share a face with it
+    near: Int32[np.ndarray, " N"]
 
-    def graph(self, sibling_weight: int) -> Graph:
-        """Each new vertex's scalar is predicted by sibling_weight / 64 of the mean of its siblings'."""
+    def graph(self, weight: int) -> Graph:
+        """Each new vertex's scalar is predicted by weight / 64 of the mean of its siblings'."""
         counts = np.diff(self.starts)
-        shares = sibling_weight / (64.0 * np.maximum(counts, 1))
-        return Graph(self.starts, self.siblings, np.repeat(shares, counts))
+        shares = weight / (64.0 * np.maximum(counts, 1))
+        return Graph(self.starts, self.near, np.repeat(shares, counts))
 
 
 def hierarchy(base: Mesh) -> Hierarchy:
@@ -58,12 +55,10 @@ def hierarchy(base: Mesh) -> Hierarchy:
     return Hierarchy(order, Graph(starts.view(np.int64), near, weights))  # the core's int64 may be NumPy's longlong
 
 
-def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
-    """The next level's connectivity, its vertices in the order of `geometry.topology.subdivide_midpoint`."""
-    _check(faces, vertices)
-    edges, finer = _core.subdivide(faces, vertices)
-    starts, siblings = _core.siblings(finer, vertices, len(edges))
-    return Level(faces, edges, finer, vertices, starts.view(np.int64), siblings)
+def siblings(level: Level) -> Siblings:
+    """The siblings of a level's new vertices."""
+    starts, near = _core.siblings(level.faces, level.vertices, len(level.edges))
+    return Siblings(starts.view(np.int64), near)
 
 
 def _check(faces: Int32[np.ndarray, "F 3"], vertices: int) -> None:

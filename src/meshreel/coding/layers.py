@@ -15,10 +15,10 @@ from jaxtyping import Float64, Int32
 from ..errors import FormatError, InputError
 from ..format.layout import Form, LayersGroup, LayersLevel, Origin, Presence
 from ..format.records import pack, unpack
+from ..geometry.levels import heights, refine, subdivide
 from ..types import Mesh
-from .details import Hook, decode_level, encode_level, refine, wanted_scalars
+from .details import decode_level, encode_level
 from .fields import Rate
-from .graph import Level, subdivide
 from .mesh import check_growth, check_step, decode_mesh
 from .reference import CodedReference
 from .steps import LEVELS, level_of, step_of
@@ -33,10 +33,8 @@ class LayersOptions:
     """How a group of layers is coded; lengths relative to the sequence's diagonal."""
 
     step: float = 2e-3  # quantiser step of the base's motion
-    detail_ratios: tuple[float, ...] = (
-        0.8,
-        1.1,
-    )  # steps of the levels, in base steps; the last holds for all that follow
+    detail_ratios: tuple[float, ...] = (0.8, 1.1)  # steps of the levels, in base steps; the last for all that follow
+    curvatures: tuple[int, ...] = (48, 58)  # of the levels' midpoints, 64ths; the last for all that follow
     price: float = 0.12  # of a bit, squared steps
     tangential: float = 0.4  # weight of squared errors of the base's vertices along the surface, 0 to 1
 
@@ -44,6 +42,8 @@ class LayersOptions:
         finest, coarsest = step_of(LEVELS - 1), step_of(0)
         if not self.detail_ratios or min(self.detail_ratios) <= 0:
             raise InputError(f"detail ratios {self.detail_ratios}: give one or more, above 0")
+        if not self.curvatures or not all(0 <= share <= 255 for share in self.curvatures):
+            raise InputError(f"curvatures {self.curvatures}: give one or more 64ths, 0 to 255")
         for ratio in (1.0, *self.detail_ratios):
             if not finest <= self.step * ratio <= coarsest:
                 raise InputError(f"step {self.step} x {ratio}: give a fraction in {finest:.2g} .. {coarsest:g}")
@@ -51,6 +51,10 @@ class LayersOptions:
             raise InputError(f"price {self.price}: give squared steps a bit, in [0, 1)")
         if not 0 < self.tangential <= 1:
             raise InputError(f"tangential {self.tangential}: give a weight in (0, 1]")
+
+    def curvature(self, level: int) -> int:
+        """How much the midpoints of a level are lifted, 64ths."""
+        return self.curvatures[min(level, len(self.curvatures)) - 1]
 
     def rate(self, level: int) -> Rate:
         """Step and price of a level; 0 is the base."""
@@ -88,7 +92,6 @@ def encode_layers(
     positions: Float64[np.ndarray, "T V 3"],
     options: LayersOptions = LayersOptions(),
     previous: LayersState | None = None,
-    hook: Hook | None = None,
 ) -> EncodedLayers:
     """The payload of a group whose subdivided base should lie at `positions`; predicted from `previous` if given.
 
@@ -112,15 +115,15 @@ def encode_layers(
     faces = base.faces
     for number in range(1, levels + 1):
         level = subdivide(faces, known.shape[1])
-        count = known.shape[1] + len(level.edges)
-        if positions.shape[1] < count:
-            raise InputError(f"{positions.shape[1]} vertices where level {number} has {count}")
-        aim = wanted_scalars(positions[:, :count], known, level, None if hook is None else (number, hook))
-        coded = encode_level(aim, level, options.rate(number), _before(previous, number))
+        if positions.shape[1] < level.count:
+            raise InputError(f"{positions.shape[1]} vertices where level {number} has {level.count}")
+        curvature = options.curvature(number)
+        aim = heights(positions[:, : level.count], known, level, curvature)
+        coded = encode_level(aim, level, options.rate(number), curvature, _before(previous, number))
         parts.append(pack(coded.record))
         bits[f"level {number} basis"], bits[f"level {number}"] = coded.field.basis_bits, coded.field.symbol_bits
         scalars.append(coded.scalars)
-        known, faces = _refined(known, level, coded.scalars), level.faces
+        known, faces = refine(known, level, coded.scalars, curvature), level.faces
     payload = b"".join(parts)
     bits["head"] = 8 * len(payload) - sum(bits.values())
     state = _state(base, known, scalars)
@@ -142,20 +145,15 @@ def decode_layers(
     for number in range(1, head.levels + 1 if levels is None else min(levels, head.levels) + 1):
         record, offset = unpack(LayersLevel, data, offset)
         level = subdivide(faces, known.shape[1])
-        if 3 * head.frames * (known.shape[1] + len(level.edges)) > MOST_NUMBERS:
+        if 3 * head.frames * level.count > MOST_NUMBERS:
             raise FormatError(f"{head.frames} frames of {len(level.faces)} faces exceed {MOST_NUMBERS} numbers")
         scalars.append(decode_level(record, level, head.frames, _before(previous, number)))
-        known, faces = _refined(known, level, scalars[-1]), level.faces
+        known, faces = refine(known, level, scalars[-1], record.curvature), level.faces
     if levels is None and offset != len(data):
         raise FormatError(f"layers: {len(data) - offset} bytes too many")
     if not np.isfinite(known).all():
         raise FormatError("layers: vertices that are not finite")
     return faces, known, _state(base, known, scalars)
-
-
-def needs_previous(data: bytes) -> bool:
-    """True where a payload decodes only with what the group before it leaves behind."""
-    return data[:1] == bytes([Form.LAYERS]) and unpack(LayersGroup, data)[0].origin == Origin.PREVIOUS
 
 
 def layers_parts(data: bytes) -> dict[str, int]:
@@ -199,15 +197,6 @@ def _check_input(positions: Float64[np.ndarray, "T V 3"], base: Mesh) -> None:
 def _before(previous: LayersState | None, number: int) -> Float64[np.ndarray, " E"] | None:
     """The last frame's scalars of a level of the group before, where it has them."""
     return previous.scalars[number - 1] if previous is not None and number <= len(previous.scalars) else None
-
-
-def _refined(
-    known: Float64[np.ndarray, "T V 3"], level: Level, scalars: Float64[np.ndarray, "T E"]
-) -> Float64[np.ndarray, "T W 3"]:
-    positions = np.empty((len(known), known.shape[1] + len(level.edges), 3))
-    positions[:, : known.shape[1]] = known
-    refine(positions, level, scalars)
-    return positions
 
 
 def _state(

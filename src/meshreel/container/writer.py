@@ -89,7 +89,8 @@ class ReelWriter:
             not 0 <= n < len(self._entries) or (self._entries[n].frames and n != self.last_group) for n in depends_on
         ):
             raise InputError(
-                f"group at frame {first_frame}: depends on {tuple(depends_on)}, name static chunks and the last group only"
+                f"group at frame {first_frame}: depends on {tuple(depends_on)}, "
+                "name static chunks and the last group only"
             )
         form = _form(payload)
         entry = IndexEntry(ChunkKind.GROUP, form, frame_count, tuple(depends_on), _layers(payload, layers))

@@ -186,6 +186,7 @@ class LayersLevel:
     """One level of a group of form LAYERS."""
 
     origin: Annotated[Origin, Choice(U8, Origin), "what its scalars are counted from"]
+    curvature: Annotated[int, U8, "share of the bend of its edges by which midpoints are lifted, 64ths"]
     sibling_weight: Annotated[int, U8, "of the siblings' mean in a prediction, 64ths"]
     scalars: Annotated[CodedField, Nested(CodedField), "the offsets of its new vertices"]
 

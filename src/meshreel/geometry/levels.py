@@ -1,61 +1,91 @@
-"""Midpoint subdivision as levels: temporary."""
+"""Midpoint subdivision as levels: connectivity, curved midpoints, and vertices placed along the normals there.
+
+In: faces and the coarser level's vertices in T frames. Out: the finer level's. Both sides of the coder and the analysis
+use it; the arithmetic is the core's, the same to the last bit everywhere.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float64, Int32
 
+from .. import _core
+from ..errors import FormatError
 from ..types import Mesh
-from .topology import subdivide_midpoint, unique_edges, vertex_normals
+from .topology import vertex_normals
+
+MOST_SLANT = 0.3  # cosine between direction and surface below which the tangent plane says nothing
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    count: int
-    faces: np.ndarray
-    edges: np.ndarray
-    finer: np.ndarray
+    """One midpoint subdivision: what it does to the connectivity."""
+
+    coarse: Int32[np.ndarray, "F 3"]
+    edges: Int32[np.ndarray, "E 2"]  # sorted; edge e has the vertex `vertices + e` in its middle
+    faces: Int32[np.ndarray, "G 3"]  # G = 4 F
+    vertices: int  # of the coarser mesh
+
+    @property
+    def count(self) -> int:
+        """Vertices of the finer mesh."""
+        return self.vertices + len(self.edges)
 
 
-def levels_of(faces, count, levels):
-    out = []
-    for _ in range(levels):
-        edges = unique_edges(faces)[0]
-        finer = subdivide_midpoint(Mesh.of(np.zeros((count, 3)), faces), 1).faces
-        out.append(Level(count, faces, edges, finer))
-        faces, count = finer, count + len(edges)
-    return tuple(out)
+def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
+    """The next level, its vertices in the order of `topology.subdivide_midpoint`.
+
+    Raises FormatError where a face names none of the vertices.
+    """
+    if len(faces) and (faces.min() < 0 or faces.max() >= vertices):
+        raise FormatError(f"a face names vertex {int(faces.max())} or {int(faces.min())} of {vertices}")
+    edges, finer = _core.subdivide(faces, vertices)
+    return Level(faces, edges, finer, vertices)
 
 
-def _frames(x, level, k):
-    N = vertex_normals(Mesh(np.ascontiguousarray(x), level.faces))
-    a, b = level.edges.T
-    n = N[a] + N[b]
-    n = n / np.maximum(np.linalg.norm(n, axis=1), 1e-30)[:, None]
-    e = x[b] - x[a]
-    L = np.linalg.norm(e, axis=1)
-    sag = np.clip(((N[b] - N[a]) * e).sum(1) / 8, -0.15 * L, 0.15 * L)
-    return (x[a] + x[b]) / 2 + (k * sag)[:, None] * n, n
+def levels_of(faces: Int32[np.ndarray, "F 3"], vertices: int, count: int) -> tuple[Level, ...]:
+    """So many levels, one on the other."""
+    levels = list[Level]()
+    for _ in range(count):
+        levels.append(subdivide(faces, vertices))
+        faces, vertices = levels[-1].faces, levels[-1].count
+    return tuple(levels)
 
 
-def edge_frames(positions, level, curvature):
-    r = [_frames(x, level, curvature) for x in positions]
-    return np.stack([a for a, _ in r]), np.stack([b for _, b in r])
+def heights(
+    wanted: Float64[np.ndarray, "T W 3"], known: Float64[np.ndarray, "T V 3"], level: Level, curvature: int
+) -> Float64[np.ndarray, "T E"]:
+    """Where each new vertex's line meets the wanted surface, from its curved midpoint; at most an edge's length away.
+
+    `wanted` are places of the finer level's vertices: the surface is the tangent plane there, or, where the line runs
+    along it, the place itself. `known` are the coarser level's, as both sides have them.
+    """
+    scalars = np.empty((len(wanted), len(level.edges)))
+    for t, (target, coarse) in enumerate(zip(wanted, known, strict=True)):
+        coarse = np.ascontiguousarray(coarse)
+        midpoints, directions = _core.edge_frames(coarse, level.coarse, level.edges, curvature)
+        normals = vertex_normals(Mesh(np.ascontiguousarray(target), level.faces))[level.vertices :]
+        away = target[level.vertices :] - midpoints
+        slant = (directions * normals).sum(axis=1)
+        steep = slant >= MOST_SLANT
+        met = (away * normals).sum(axis=1) / np.where(steep, slant, 1.0)
+        ends = coarse[level.edges]
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        scalars[t] = np.clip(np.where(steep, met, (away * directions).sum(axis=1)), -length, length)
+    return scalars
 
 
-def heights(mid, dirs, wanted, level):
-    out = np.zeros(mid.shape[:2])
-    for t in range(len(mid)):
-        Np = vertex_normals(Mesh(np.ascontiguousarray(wanted[t]), level.finer))[level.count :]
-        off = wanted[t][level.count :] - mid[t]
-        den = (dirs[t] * Np).sum(1)
-        s = np.where(den > 0.3, (off * Np).sum(1) / np.maximum(den, 0.3), (off * dirs[t]).sum(1))
-        L = np.linalg.norm(wanted[t][level.edges[:, 0]] - wanted[t][level.edges[:, 1]], axis=1)
-        out[t] = np.clip(s, -L, L)
-    return out
+def refine(
+    known: Float64[np.ndarray, "T V 3"], level: Level, scalars: Float64[np.ndarray, "T E"], curvature: int
+) -> Float64[np.ndarray, "T W 3"]:
+    """The finer level's vertices: the coarser one's, then curved midpoint + scalar x direction for each edge.
 
-
-def refine(positions, level, scalars, curvature):
-    m, d = edge_frames(positions, level, curvature)
-    return np.concatenate([positions, m + scalars[..., None] * d], axis=1)
+    The direction is the unit sum of the normals at both ends; `curvature` / 64 of the sagitta that they say is how far
+    the midpoint lies from the edge's.
+    """
+    positions = np.empty((len(known), level.count, 3))
+    positions[:, : level.vertices] = known
+    _core.refine(positions, level.vertices, level.coarse, level.edges, scalars, curvature)
+    return positions
