@@ -73,15 +73,15 @@ def _best(quality: float) -> EncoderOptions:
         form=Form.LAYERS,
         group_size=16,
         target=Quality(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
-        template=TemplateOptions(error=0.35 * step),
+        template=TemplateOptions(error=0.00088 * (step / 0.0012) ** 0.55),
         layers=LayersOptions(step=step, detail_ratios=(0.6, 0.8), price=0.08),
         fit=FitOptions(restart=False, pull=0.3, second_smoothing=0.7),
     )
 
 
 def motion_step(quality: float) -> float:
-    """Quantiser step of the base's motion as a fraction of the diagonal: .0022 at 50, halved every 25 points."""
-    return 0.0022 * 2 ** ((50 - quality) / 25)
+    """Quantiser step of the base's motion as a fraction of the diagonal: .0018 at 50, halved every 25 points."""
+    return 0.0018 * 2 ** ((50 - quality) / 25)
 
 
 def displacement_step(quality: float) -> float:
