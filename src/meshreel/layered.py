@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from .analysis.correspond import from_key, from_last
+from .analysis.correspond import choose_key, from_last
 from .analysis.fit import Guides, fit_targets, residuals
 from .analysis.fit_match import Target
 from .analysis.groups import cut_at, leading
@@ -52,7 +52,7 @@ class Fitted:
     @staticmethod
     def of(faces: Int32[np.ndarray, "F 3"], positions: Float64[np.ndarray, "T V 3"], targets: list[Target]) -> Fitted:
         """Positions with what they leave over."""
-        return Fitted(positions, np.array([residual.rms for residual in residuals(faces, positions, targets)]))
+        return Fitted(positions, np.array([residual.by_area for residual in residuals(faces, positions, targets)]))
 
     def first(self, count: int) -> Fitted:
         """The first so many frames."""
@@ -98,9 +98,13 @@ def _continued(
     template = replace(options.template, levels=before.reference.levels)
     targets = [Target(frame) for frame in ahead]
     predictions = from_last(Mesh(before.positions, base.faces), targets, options.embedded)
+    targets = targets[: len(predictions)]
+    if len(targets) < min(SHORTEST, len(ahead)):
+        return None
     guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), template))
     fitted = Fitted.of(base.faces, fit_targets(base.faces, predictions, targets, options.fit, guides), targets)
-    count = leading(fitted.residuals, max(before.residual, target_of(ahead, options).distance), options.groups)
+    target = target_of(ahead, options).distance
+    count = leading(fitted.residuals / target, before.residual / target, options.groups)
     if count < min(SHORTEST, len(ahead)):
         return None
     return _coded(ahead[:count], before.reference, fitted.first(count), before, options)
@@ -108,13 +112,17 @@ def _continued(
 
 def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup, Followed | None] | int:
     """A group with a key frame of its own, or the number of frames to try instead."""
-    key = len(ahead) // 2
+    targets = [Target(frame) for frame in ahead]
+    course = choose_key(targets, options.embedded)
+    if course.count == 0:
+        return len(ahead) // 2  # no key is followed back to the first frame
+    ahead, targets, key = ahead[: course.count], targets[: course.count], course.key
     lattice = options.layers.step * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
     reference = code_on_lattice(base_mesh(ahead[key], options.template), lattice, options.template.levels)
-    if reference.base.is_empty:
+    base, faces = reference.mesh, reference.base.faces
+    if base.is_empty:
         return 1 if len(ahead) > 1 else (intra_only(ahead, options), None)
-    base, faces, targets = reference.mesh, reference.base.faces, [Target(frame) for frame in ahead]
-    predictions = from_key(reference.base, key, targets, options.embedded)
+    predictions = course.move(reference.base)
     guides = Guides(None, shared_detail(base.faces, len(base.vertices), options.template))
     fit = replace(options.fit, key=key)
     fitted = Fitted.of(faces, fit_targets(faces, predictions, targets, fit, guides), targets)

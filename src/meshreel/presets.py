@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from .analysis.fit import FitOptions
+from .analysis.groups import GroupOptions
 from .analysis.reference import ReferenceOptions
 from .analysis.template import TemplateOptions
 from .analysis.track import TrackOptions
@@ -76,6 +77,7 @@ def _best(quality: float) -> EncoderOptions:
         template=TemplateOptions(error=0.00088 * (step / 0.0012) ** 0.55),
         layers=LayersOptions(step=step, detail_ratios=(0.6, 0.8), price=0.08),
         fit=FitOptions(restart=False, pull=0.3, second_smoothing=0.7),
+        groups=GroupOptions(worth=3.0),
     )
 
 

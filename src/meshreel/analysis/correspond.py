@@ -1,36 +1,70 @@
-"""Where a template is in other frames, before it is fitted: from its key frame, or from the last frame of a group.
+"""Which frame is the key of a group, how far its surface is followed, and where a template is in these frames.
 
-In: a template that lies on one surface, the frames. Out: its predicted positions (docs/decisions/0011-correspondence).
+In: the frames of a group to be, prepared for matching. Out: the key, the number of frames that follow, and the motion
+(docs/decisions/0011-correspondence). A key is judged by what the embedded deformation leaves over, before any fit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
 
 from ..geometry.topology import vertex_normals
 from ..types import Mesh
-from .embedded import EmbeddedOptions, Tracker
+from .embedded import EmbeddedOptions, Motion, Tracker
 from .fit_match import Target
 
+EVEN = 0.0005  # a residual that is in no doubt
+LOST = 0.004  # a residual above which no surface fit finds back
+PLACES = (0.5, 0.7, 0.85, 0.25, 0.0)  # of the keys, in parts of the group; tried until one is not in doubt
+UNEVEN = 1.8  # times the median residual that the largest may be: beyond, something that the key has not has appeared
 
-def from_key(
-    template: Mesh, key: int, targets: Sequence[Target], options: EmbeddedOptions
-) -> Float64[np.ndarray, "T V 3"]:
-    """The positions in every frame of a template that lies on frame `key`."""
-    if len(targets) == 1:
-        return template.vertices[None].copy()
-    tracker = Tracker(targets[key].mesh, key, options)
-    for frame in [*range(key + 1, len(targets)), *reversed(range(key))]:
-        tracker.step(frame, targets[frame])
-    return tracker.motion(range(len(targets))).move(template.vertices, vertex_normals(template))
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """How the key frame's surface moves through the frames that follow it."""
+
+    key: int
+    count: int  # frames, from the first, that are followed
+    motion: Motion  # through all frames
+
+    def move(self, template: Mesh) -> Float64[np.ndarray, "T V 3"]:
+        """The positions, in the frames that are followed, of a template that lies on the key frame."""
+        return self.motion.move(template.vertices, vertex_normals(template))[: self.count]
+
+
+def choose_key(targets: Sequence[Target], options: EmbeddedOptions) -> Course:
+    """The course that is followed for longest; of equally long ones that which leaves least over."""
+    courses = list[Course]()
+    for key in dict.fromkeys(int(place * len(targets)) for place in PLACES):
+        courses.append(_course(targets, key, options))
+        residuals = courses[-1].motion.residuals
+        if residuals.max() <= min(options.doubt, UNEVEN * max(float(np.median(residuals)), EVEN)):
+            break
+    return max(courses, key=lambda course: (course.count, -float(np.sum(course.motion.residuals[: course.count] ** 2))))
 
 
 def from_last(template: Mesh, targets: Sequence[Target], options: EmbeddedOptions) -> Float64[np.ndarray, "T V 3"]:
-    """The positions in every frame of a template as it lies on the frame before them."""
+    """The positions of a template as it lies on the frame before, in those of these frames that are followed."""
     tracker = Tracker(template, -1, options)
-    for frame, target in enumerate(targets):
-        tracker.step(frame, target)
-    return tracker.motion(range(len(targets))).move(template.vertices, vertex_normals(template))
+    count = 0
+    for target in targets:
+        if tracker.step(count, target) > LOST:
+            break
+        count += 1
+    if count == 0:
+        return np.zeros((0, *template.vertices.shape))
+    return tracker.motion(range(count)).move(template.vertices, vertex_normals(template))
+
+
+def _course(targets: Sequence[Target], key: int, options: EmbeddedOptions) -> Course:
+    tracker = Tracker(targets[key].mesh, key, options)
+    for frame in [*range(key + 1, len(targets)), *reversed(range(key))]:
+        tracker.step(frame, targets[frame])
+    motion = tracker.motion(range(len(targets)))
+    lost = np.flatnonzero(motion.residuals > LOST)
+    count = int(lost[0]) if len(lost) else len(targets)
+    return Course(key, count if count > key else 0, motion)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..geometry.nearest import Surface
-from ..geometry.topology import vertex_normals
+from ..geometry.topology import vertex_areas, vertex_normals
 from ..types import Mesh
 from .fit_match import Target, interpolated
 
@@ -24,6 +24,7 @@ class Residual:
     to_frame: float  # RMS over the template's vertices to the frame's surface
     quantile: float  # 95 % of all these distances are less; the worse direction
     normals: float  # degrees, mean angle to the normal at the closest point; mean of both directions
+    by_area: float  # RMS over the area, the worse direction: few vertices may span much of a surface that is left over
 
     @property
     def rms(self) -> float:
@@ -31,7 +32,7 @@ class Residual:
         return max(self.to_fit, self.to_frame)
 
 
-NOTHING = Residual(np.inf, np.inf, np.inf, np.inf)
+NOTHING = Residual(np.inf, np.inf, np.inf, np.inf, np.inf)
 
 
 def measure(fitted: Mesh, target: Target) -> Residual:
@@ -45,11 +46,14 @@ def measure(fitted: Mesh, target: Target) -> Residual:
         + _mean_angle(normals, target.normals_at(back))
     ) / 2
     quantile = max(float(np.quantile(to_fit, 0.95)), float(np.quantile(to_frame, 0.95)))
-    return Residual(_rms(to_fit), _rms(to_frame), quantile, angles)
+    by_area = max(_rms(to_fit, vertex_areas(target.mesh)), _rms(to_frame, vertex_areas(fitted)))
+    return Residual(_rms(to_fit), _rms(to_frame), quantile, angles, by_area)
 
 
-def _rms(distances: Float64[np.ndarray, " N"]) -> float:
-    return float(np.sqrt(np.mean(distances**2)))
+def _rms(distances: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"] | None = None) -> float:
+    if weights is None or not weights.any():
+        return float(np.sqrt(np.mean(distances**2)))
+    return float(np.sqrt(np.average(distances**2, weights=weights)))
 
 
 def _mean_angle(one: Float64[np.ndarray, "N 3"], other: Float64[np.ndarray, "N 3"]) -> float:

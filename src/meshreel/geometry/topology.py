@@ -63,6 +63,12 @@ def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
     return total / np.where(length > 0, length, 1.0)[:, None]
 
 
+def vertex_areas(mesh: Mesh) -> Float64[np.ndarray, " V"]:
+    """A third of the area of each vertex's faces, squared units of the vertices."""
+    thirds = np.repeat(face_normals(mesh)[1] / 3, 3)
+    return np.bincount(mesh.faces.reshape(-1), thirds, len(mesh.vertices))
+
+
 def weld(mesh: Mesh) -> Mesh:
     """The mesh with vertices at exactly equal positions merged; faces that collapse are dropped.
 
