@@ -12,14 +12,15 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import FormatError
-from ..format.layout import DracoGroup, Form, LaplacianGroup
+from ..format.layout import DracoGroup, Form, LaplacianGroup, LayersPatches
 from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh
 from .displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
 from .intra import decode_empty, decode_intra
-from .layers import LayersState, decode_layers, layers_parts
+from .layers import LayersState, decode_layers, layers_end, layers_parts
 from .mesh import check_growth, check_step, decode_mesh
+from .patches import decode_patches
 from .reference import CodedReference as CodedReference
 from .reference import code_reference as code_reference
 
@@ -60,13 +61,25 @@ def continue_group(
     elif form == Form.LAPLACIAN:
         meshes = _decode_laplacian(unpack_all(LaplacianGroup, data), layers)
     elif form == Form.LAYERS:
-        faces, positions, state = decode_layers(data, layers, previous)
-        meshes = [Mesh(frame, faces) for frame in positions]
+        meshes, state = _decode_layers(data, layers, previous)
     else:
         raise FormatError(f"group form {form} is not known to this reader")
     if len(meshes) != frame_count:
         raise FormatError(f"a group of {len(meshes)} frames where the index says {frame_count}")
     return meshes, state
+
+
+def _decode_layers(
+    data: bytes, levels: int | None, previous: LayersState | None
+) -> tuple[list[Mesh], LayersState | None]:
+    """Frames of a payload, with their patches where it has them and more layers than its levels are wanted."""
+    head, end = layers_end(data, levels)
+    faces, positions, state = decode_layers(data[:end], levels, previous)
+    if end == len(data) or (levels is not None and levels <= head.levels):
+        return [Mesh(frame, faces) for frame in positions], state
+    record = unpack_all(LayersPatches, data[end:])
+    patches = decode_patches(record, head.frames, len(faces) >> 2 * head.levels, head.levels)
+    return patches.apply(positions, faces), state
 
 
 def _decode_laplacian(record: LaplacianGroup, components: int | None) -> list[Mesh]:

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float64, Int32
 
 from ..errors import FormatError, InputError
-from ..format.layout import Form, LayersGroup, LayersLevel, Origin, Presence
-from ..format.records import pack, unpack
+from ..format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
+from ..format.records import pack, unpack, unpack_all
 from ..geometry.levels import heights, refine, subdivide
 from ..types import Mesh
 from .details import decode_level, encode_level
@@ -156,6 +156,14 @@ def decode_layers(
     return faces, known, _state(base, known, scalars)
 
 
+def layers_end(data: bytes, levels: int | None = None) -> tuple[LayersGroup, int]:
+    """The head of a payload, and where its levels end, or the first so many. FormatError on damaged bytes."""
+    head, offset = unpack(LayersGroup, data)
+    for _ in range(head.levels if levels is None else min(levels, head.levels)):
+        _, offset = unpack(LayersLevel, data, offset)
+    return head, offset
+
+
 def layers_parts(data: bytes) -> dict[str, int]:
     """Bytes of a payload by what they are for. Raises FormatError on damaged bytes."""
     head, offset = unpack(LayersGroup, data)
@@ -164,8 +172,9 @@ def layers_parts(data: bytes) -> dict[str, int]:
         start = offset
         _, offset = unpack(LayersLevel, data, offset)
         parts[f"level {number}"] = offset - start
-    if offset != len(data):
-        raise FormatError(f"layers: {len(data) - offset} bytes too many")
+    if offset < len(data):
+        patches = unpack_all(LayersPatches, data[offset:])
+        parts |= {"dropped faces": len(patches.dropped), "patches": len(patches.mesh)}
     return parts
 
 

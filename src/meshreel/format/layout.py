@@ -192,6 +192,18 @@ class LayersLevel:
 
 
 @dataclass(frozen=True, slots=True)
+class LayersPatches:
+    """The last layer of a group of form LAYERS, which it may be without: what does not follow the base mesh."""
+
+    level: Annotated[int, U8, "the mask is over the faces of this level, at most L; 0 is the base"]
+    runs: Annotated[int, Varint(), "number of integers in `dropped`"]
+    dropped: Annotated[bytes, Blob(Varint()), "integers: lengths of runs, of faces that frames are shown without"]
+    step_level: Annotated[int, U8, "k: the spacing of the mesh's lattice is 2^(-k/8)"]
+    width: Annotated[int, Varint(), "cells of the lattice that each frame has along x"]
+    mesh: Annotated[bytes, Blob(Varint()), "what frames are shown with besides, Draco; no bytes: nothing"]
+
+
+@dataclass(frozen=True, slots=True)
 class DracoGroup:
     """The payload of a group of form DRACO."""
 
@@ -209,4 +221,14 @@ class EmptyGroup:
 
 
 RECORDS = (Preamble, Header, Index, IndexEntry, Layer, Checksum)
-PAYLOADS = (LaplacianGroup, DisplacementHead, Component, LayersGroup, LayersLevel, CodedField, DracoGroup, EmptyGroup)
+PAYLOADS = (
+    LaplacianGroup,
+    DisplacementHead,
+    Component,
+    LayersGroup,
+    LayersLevel,
+    CodedField,
+    LayersPatches,
+    DracoGroup,
+    EmptyGroup,
+)

@@ -1,0 +1,148 @@
+"""Where no template fits: faces that a frame is shown without, and small meshes that it is shown with <-> LayersPatches.
+
+In -> out: for each frame of a group a mask over its faces and a mesh on a lattice <-> a record. The masks are runs that
+know the frame before; the meshes of all frames are one Draco mesh, set side by side, so that its head is paid once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64
+
+from ..errors import FormatError, InputError
+from ..format.layout import LayersPatches
+from ..geometry.topology import drop_unreferenced
+from ..types import Mesh
+from . import entropy
+from .mesh import decode_mesh, encode_mesh
+from .steps import LEVELS, step_of
+
+MOST_CELLS = 1 << 20  # of the lattice, over all frames: what Draco's float32 positions tell apart
+
+
+@dataclass(frozen=True, slots=True)
+class Patches:
+    """What changes on the frames of a group."""
+
+    dropped: Bool[np.ndarray, "T F"]  # faces that a frame is shown without
+    meshes: tuple[Mesh, ...]  # what it is shown with besides; possibly empty
+
+    def apply(self, positions: Float64[np.ndarray, "T V 3"], faces: Int32[np.ndarray, "F 3"]) -> list[Mesh]:
+        """The frames as shown: vertices and faces of the patch are behind the template's."""
+        return [
+            _joined(points, faces if not gone.any() else faces[~gone], patch)
+            for points, gone, patch in zip(positions, self.dropped, self.meshes, strict=True)
+        ]
+
+
+def encode_patches(
+    dropped: Bool[np.ndarray, "T G"], meshes: Sequence[Mesh], level: int, step_level: int
+) -> tuple[LayersPatches, tuple[Mesh, ...]]:
+    """The record, and the meshes as they decode. The mask is over the faces of `level`, each with all its parts.
+
+    Raises InputError where the meshes need more cells than Draco can tell apart.
+    """
+    runs = encode_runs(dropped)
+    width, side_by_side = _set_out(meshes, step_of(step_level))
+    data = encode_mesh(side_by_side, step_of(step_level))
+    record = LayersPatches(level, len(runs), entropy.encode_integers(runs), step_level, width, data)
+    return record, _taken_in(record, len(meshes))
+
+
+def decode_patches(record: LayersPatches, frames: int, faces: int, levels: int) -> Patches:
+    """The patches of a group of so many frames, whose template has `faces` faces before its `levels` subdivisions.
+
+    Raises FormatError on a damaged record.
+    """
+    if record.level > levels or record.step_level >= LEVELS:
+        raise FormatError(f"patches on level {record.level} of {levels}, at step level {record.step_level}")
+    runs = entropy.decode_integers(record.dropped, record.runs)
+    dropped = decode_runs(runs, frames, faces * 4**record.level)
+    return Patches(np.repeat(dropped, 4 ** (levels - record.level), axis=1), _taken_in(record, frames))
+
+
+def encode_runs(dropped: Bool[np.ndarray, "T G"]) -> Int32[np.ndarray, " N"]:
+    """Lengths of runs: kept in all frames or not, by face; then the same as in the frame before or not, of the others.
+
+    Both begin with a run that is kept, or the same, which alone may have no length. No runs where nothing is dropped.
+    """
+    if not dropped.any():
+        return np.zeros(0, np.int32)
+    ever = dropped.any(axis=0)
+    known = dropped[:, ever]
+    turned = known ^ np.concatenate([np.zeros((1, known.shape[1]), bool), known[:-1]])
+    return np.concatenate([_lengths(ever), _lengths(turned.reshape(-1))])
+
+
+def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[np.ndarray, "T G"]:
+    """The mask. Raises FormatError where the runs do not fill it."""
+    dropped = np.zeros((frames, faces), bool)
+    if len(runs) == 0:
+        return dropped
+    ever, rest = _filled(runs, faces)
+    count = int(ever.sum())
+    turned, rest = _filled(rest, frames * count)
+    if len(rest):
+        raise FormatError(f"patches: {len(rest)} runs too many")
+    dropped[:, ever] = np.logical_xor.accumulate(turned.reshape(frames, count), axis=0)
+    return dropped
+
+
+def _lengths(bits: Bool[np.ndarray, " N"]) -> Int32[np.ndarray, " R"]:
+    turns = np.flatnonzero(np.diff(bits, prepend=False))
+    return np.diff(np.concatenate([[0], turns, [len(bits)]])).astype(np.int32)
+
+
+def _filled(runs: Int32[np.ndarray, " N"], count: int) -> tuple[Bool[np.ndarray, " C"], Int32[np.ndarray, " R"]]:
+    """So many bits from the first runs, and the runs that are left."""
+    if (runs[:1] < 0).any() or (runs[1:] < 1).any():
+        raise FormatError("patches: a run without length")
+    ends = np.cumsum(runs.astype(np.int64))
+    last = int(np.searchsorted(ends, count))
+    if last >= len(runs) or ends[last] != count:
+        raise FormatError(f"patches: runs that do not end with the {count} faces they tell of")
+    return np.repeat(np.arange(last + 1) % 2 == 1, runs[: last + 1]), runs[last + 1 :]
+
+
+def _set_out(meshes: Sequence[Mesh], step: float) -> tuple[int, Mesh]:
+    """Cells that each frame has along x, and all meshes in one, that of frame t moved by t times as many."""
+    cells = [np.rint(mesh.vertices / step).astype(np.int64) for mesh in meshes]
+    width = 2 * max((int(np.abs(points[:, 0]).max(initial=0)) for points in cells), default=0) + 2
+    if width * len(meshes) > MOST_CELLS:
+        raise InputError(f"patches of {len(meshes)} frames, {width} cells wide: raise the step")
+    starts = np.cumsum([0, *(len(points) for points in cells)])
+    moved = [points + [t * width, 0, 0] for t, points in enumerate(cells)]
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return width, Mesh.of(np.concatenate(moved) * step, np.concatenate(faces))
+
+
+def _taken_in(record: LayersPatches, frames: int) -> tuple[Mesh, ...]:
+    """The meshes of each frame out of the one in a record."""
+    step = step_of(record.step_level)
+    mesh = decode_mesh(record.mesh, step)
+    if mesh.is_empty:
+        return (Mesh.empty(),) * frames
+    cells = _cells(mesh, step, record.width, frames)
+    of_vertices = (cells[:, 0] + record.width // 2) // max(record.width, 1)
+    of_faces = of_vertices[mesh.faces]
+    if of_faces.min() < 0 or of_faces.max() >= frames or (of_faces != of_faces[:, :1]).any():
+        raise FormatError(f"patches: a face that is in none of {frames} frames, or in two")
+    cells[:, 0] -= of_vertices * record.width
+    points = cells * step
+    return tuple(drop_unreferenced(Mesh(points, mesh.faces[of_faces[:, 0] == t])) for t in range(frames))
+
+
+def _cells(mesh: Mesh, step: float, width: int, frames: int) -> Int64[np.ndarray, "V 3"]:
+    if not 0 < width * frames <= MOST_CELLS or np.abs(mesh.vertices).max() > 2 * MOST_CELLS * step:
+        raise FormatError(f"patches: {frames} frames, {width} cells wide")
+    return np.rint(mesh.vertices / step).astype(np.int64)
+
+
+def _joined(points: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], patch: Mesh) -> Mesh:
+    if patch.is_empty:
+        return Mesh(points, faces)
+    more = (patch.faces + len(points)).astype(np.int32)
+    return Mesh(np.concatenate([points, patch.vertices]), np.concatenate([faces, more]))

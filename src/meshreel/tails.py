@@ -1,0 +1,320 @@
+"""The worst one or two per cent of a group: faces to drop and patches to add, each only where it pays for its bytes.
+
+In -> out: frames, the group as its layers decode, its size -> a LayersPatches record and the frames as shown, or nothing.
+A byte is worth what it would gain in the layers: there the squared error falls by 4 dB when the rate doubles, but for
+the tails, which no step makes smaller, so they are left out of that account.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64
+
+from .coding import entropy
+from .coding.mesh import encode_mesh
+from .coding.patches import Patches, encode_patches, encode_runs
+from .coding.steps import level_of, step_of
+from .errors import InputError
+from .format.layout import LayersPatches
+from .format.records import pack
+from .geometry.decimate import decimate
+from .geometry.nearest import Surface
+from .geometry.topology import clean, components, drop_unreferenced, face_normals
+from .types import Mesh
+
+BODY = 0.98  # of the surface; the rest are the tails
+LEAST_BYTES = 4  # that a region or a patch takes at least
+DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share
+
+
+@dataclass(frozen=True, slots=True)
+class TailOptions:
+    """What is tried."""
+
+    thresholds: tuple[float, ...] = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest
+    shares: tuple[float, ...] = (0.1, 0.25)  # of a patch's vertices that are kept
+    lattice: float = 2.0  # spacing of the patches' lattice, in RMS distances of the rest
+    exchange: float = 1.33  # relative fall of the squared error for a relative rise of the rate: 4 dB a doubling
+
+    def __post_init__(self) -> None:
+        if not self.thresholds or min(self.thresholds) <= 1:
+            raise InputError(f"thresholds {self.thresholds}: give one or more, above 1")
+        if not all(0 < share <= 1 for share in self.shares):
+            raise InputError(f"shares {self.shares}: give fractions of the vertices, in (0, 1]; none: no patches")
+        if not self.lattice > 0 or not self.exchange > 0:
+            raise InputError(f"lattice {self.lattice:g}, exchange {self.exchange:g}: give numbers above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Tails:
+    """A layer of patches and the frames that are shown with it."""
+
+    record: LayersPatches
+    frames: list[Mesh]
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """What the frames of a group have in common, as decoded."""
+
+    faces: Int32[np.ndarray, "F 3"]
+    levels: int  # of subdivision; the children of a face are four in a row
+
+
+def find_tails(
+    frames: Sequence[Mesh],
+    positions: Float64[np.ndarray, "T V 3"],
+    template: Template,
+    size: int,
+    options: TailOptions = TailOptions(),
+) -> Tails | None:
+    """The layer of patches that lowers squared error + price x bytes most; None where none does.
+
+    `size` is that of the layers without it, bytes. Neither the mean nor the larger of both directions' errors rises by
+    more than the layer's bytes are worth.
+    """
+    shown = [_Frame(frame, Mesh(points, template.faces)) for frame, points in zip(frames, positions, strict=True)]
+    usual = float(np.mean([frame.body() for frame in shown]))  # squared
+    if usual == 0:
+        return None
+    search = _Search(shown, template, usual, options.exchange * len(frames) * usual / size, options)
+    best, least = None, search.cost(None)
+    for dropped, level in search.masks():
+        tried = search.coded(dropped, (Mesh.empty(),) * len(frames), level)
+        if (cost := search.cost(tried)) < least:
+            best, least = tried, cost
+    for patches in search.patches(best):
+        kept = best.parts.dropped[:, :: 4 ** (template.levels - best.record.level)] if best else search.nothing()
+        tried = search.coded(kept, patches, best.record.level if best else 0)
+        if (cost := search.cost(tried)) < least:
+            best, least = tried, cost
+    if best is None or not search.holds(best):
+        return None
+    return Tails(best.record, best.parts.apply(positions, template.faces))
+
+
+@dataclass(frozen=True, slots=True)
+class _Coded:
+    record: LayersPatches
+    parts: Patches
+    size: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    frames: list[_Frame]
+    template: Template
+    usual: float  # mean squared distance without the tails
+    price: float  # of a byte, squared distances summed over the frames
+    options: TailOptions
+
+    def nothing(self) -> Bool[np.ndarray, "T G"]:
+        """A mask over the base's faces that drops none."""
+        return np.zeros((len(self.frames), len(self.template.faces) >> 2 * self.template.levels), bool)
+
+    def coded(self, dropped: Bool[np.ndarray, "T G"], meshes: Sequence[Mesh], level: int) -> _Coded:
+        """A mask over the faces of a level and patches, as decoded."""
+        record, decoded = encode_patches(dropped, meshes, level, self.step_level)
+        parts = Patches(np.repeat(dropped, 4 ** (self.template.levels - level), axis=1), decoded)
+        return _Coded(record, parts, len(pack(record)))
+
+    @property
+    def step_level(self) -> int:
+        """The lattice of the patches."""
+        return level_of(self.options.lattice * self.usual**0.5)
+
+    def cost(self, tried: _Coded | None) -> float:
+        """Squared error, mean of both directions, with the price of the bytes."""
+        return self._errors(tried).mean(axis=1).sum() + (self.price * tried.size if tried else 0.0)
+
+    def holds(self, tried: _Coded) -> bool:
+        """Whether the larger of both directions' errors pays for the bytes, too."""
+        before, after = (self._errors(which).max(axis=1).sum() for which in (None, tried))
+        return bool(after + self.price * tried.size < before)
+
+    def _errors(self, tried: _Coded | None) -> Float64[np.ndarray, "T 2"]:
+        if tried is None:
+            return np.array([frame.errors for frame in self.frames])
+        pairs = zip(self.frames, tried.parts.dropped, tried.parts.meshes, strict=True)
+        return np.array([frame.errors_with(gone, patch) for frame, gone, patch in pairs])
+
+    def masks(self) -> Iterator[tuple[Bool[np.ndarray, "T G"], int]]:
+        """Faces that are worth dropping, for each threshold and level of detail; none that are empty."""
+        for level in range(self.template.levels, max(self.template.levels - 2, -1), -1):
+            parts = 4 ** (self.template.levels - level)
+            for threshold in self.options.thresholds:
+                far = [frame.far_faces(parts) > threshold**2 * self.usual for frame in self.frames]
+                chosen = self._paying(np.repeat(np.stack(far), parts, axis=1))[:, ::parts]
+                if chosen.any():
+                    yield chosen, level
+
+    def _paying(self, far: Bool[np.ndarray, "T F"]) -> Bool[np.ndarray, "T F"]:
+        """Of the regions of faces, connected in space and time, those that are worth their bytes."""
+        labels = _regions(self.template.faces, far)
+        gains = np.zeros(far.shape)
+        for gain, frame, gone in zip(gains, self.frames, far, strict=True):
+            if gone.any():
+                gain += frame.gains(gone)
+        totals = np.bincount(labels[far], gains[far], labels.max() + 1)
+        chosen = np.zeros_like(far)
+        for label in np.flatnonzero(totals > self.price * LEAST_BYTES):
+            region = labels == label
+            if totals[label] > self.price * len(entropy.encode_integers(encode_runs(region))):
+                chosen |= region
+        return chosen
+
+    def patches(self, best: _Coded | None) -> Iterator[tuple[Mesh, ...]]:
+        """Patches that are worth their bytes, for each threshold."""
+        if not self.options.shares:
+            return
+        left = [frame.left(best.parts.dropped[t] if best else None) for t, frame in enumerate(self.frames)]
+        for threshold in self.options.thresholds:
+            meshes = tuple(
+                self._patch(frame, squared, threshold) for frame, squared in zip(self.frames, left, strict=True)
+            )
+            if not all(mesh.is_empty for mesh in meshes):
+                yield meshes
+
+    def _patch(self, frame: _Frame, squared: Float64[np.ndarray, " N"], threshold: float) -> Mesh:
+        """What a frame should be shown with besides, where its own samples are so far from what is decoded."""
+        chosen = []
+        for faces in frame.lost(squared, threshold**2 * self.usual):
+            samples = frame.samples_of(faces)
+            if frame.weights[samples] @ squared[samples] < 2 * self.price * LEAST_BYTES:
+                continue
+            tried = [(self._worth(frame, squared, samples, small), small) for small in self._reduced(frame, faces)]
+            worth, small = max(tried, key=lambda pair: pair[0], default=(0.0, None))
+            if small is not None and worth > 0:
+                chosen.append(small)
+        return _joined(chosen)
+
+    def _reduced(self, frame: _Frame, faces: Int64[np.ndarray, " S"]) -> Iterator[Mesh]:
+        mesh = clean(Mesh(frame.original.vertices, frame.original.faces[faces]))
+        for share in self.options.shares:
+            small = decimate(mesh, max(4, round(share * len(mesh.vertices))))
+            step = step_of(self.step_level)
+            small = clean(Mesh(np.rint(small.vertices / step) * step, small.faces))
+            if not small.is_empty:
+                yield small
+
+    def _worth(
+        self, frame: _Frame, squared: Float64[np.ndarray, " N"], samples: Int64[np.ndarray, " n"], patch: Mesh
+    ) -> float:
+        size = max(len(encode_mesh(patch, step_of(self.step_level))) - DRACO_HEAD, LEAST_BYTES)
+        near = _squared(Surface(patch), frame.points[samples])[0]
+        gain = frame.weights[samples] @ np.maximum(squared[samples] - near, 0.0)
+        return float(gain / 2 - self.price * size)
+
+
+class _Frame:
+    """A frame and its decoded mesh, sampled at vertices and centroids, and how far each is from the other."""
+
+    def __init__(self, original: Mesh, decoded: Mesh) -> None:
+        self.original, self.decoded = original, decoded
+        self.target = Surface(original)
+        self.points, areas = _samples(original)
+        shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
+        weights = np.concatenate([shares, 0.75 * areas])
+        self.weights = weights / weights.sum()
+        self.squared, self.hit = _squared(Surface(decoded), self.points)
+        self.areas, self.apart = self._apart(decoded)  # of each decoded face: its area, its mean squared distance
+        self.errors = (float(self.weights @ self.squared), float(self.areas @ self.apart / self.areas.sum()))
+
+    def body(self) -> float:
+        """Mean squared distance from the frame to the decoded mesh without the farthest 2 % of the surface."""
+        order = np.argsort(self.squared)
+        inside = order[: np.searchsorted(np.cumsum(self.weights[order]), BODY)]
+        return float(self.weights[inside] @ self.squared[inside])
+
+    def far_faces(self, parts: int) -> Float64[np.ndarray, " G"]:
+        """Mean squared distance of each run of so many decoded faces."""
+        areas = self.areas.reshape(-1, parts).sum(axis=1)
+        return (self.areas * self.apart).reshape(-1, parts).sum(axis=1) / np.where(areas > 0, areas, 1.0)
+
+    def gains(self, gone: Bool[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
+        """What dropping each of these faces takes away from the mean of both errors, if all are dropped."""
+        invented = self.areas * (self.apart - self.errors[1]) / self.areas.sum()
+        lost = self.weights * (self.left(gone) - self.squared)
+        return (invented * gone - np.bincount(self.hit, lost, len(gone))) / 2
+
+    def left(self, gone: Bool[np.ndarray, " F"] | None) -> Float64[np.ndarray, " N"]:
+        """Squared distances from the frame's samples to what remains of the decoded mesh."""
+        if gone is None or not gone.any():
+            return self.squared
+        if gone.all():
+            return np.full(len(self.squared), np.inf)
+        squared = self.squared.copy()
+        moved = gone[self.hit]
+        kept = Surface(Mesh(self.decoded.vertices, self.decoded.faces[~gone]))
+        squared[moved] = _squared(kept, self.points[moved])[0]
+        return squared
+
+    def errors_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh) -> tuple[float, float]:
+        """Mean squared distances, forward and backward, with a patch and without some faces."""
+        squared, areas, apart = self.left(gone), self.areas * ~gone, self.apart
+        if not patch.is_empty:
+            squared = np.minimum(squared, _squared(Surface(patch), self.points)[0])
+            more = self._apart(patch)
+            areas, apart = np.concatenate([areas, more[0]]), np.concatenate([apart, more[1]])
+        return float(self.weights @ squared), float(areas @ apart / areas.sum()) if areas.any() else np.inf
+
+    def lost(self, squared: Float64[np.ndarray, " N"], limit: float) -> Iterator[Int64[np.ndarray, " S"]]:
+        """Connected faces of the frame that are farther than a limit (squared) from what is decoded, with a rim."""
+        faces, count = self.original.faces, len(self.original.vertices)
+        far = _of_faces(squared, faces) > limit
+        touched = np.zeros(count, bool)
+        touched[faces[far]] = True
+        wide = np.flatnonzero(touched[faces].any(axis=1))
+        labels = components(faces[wide], count)[faces[wide, 0]]
+        order = np.argsort(labels, kind="stable")
+        yield from np.split(wide[order], np.flatnonzero(np.diff(labels[order])) + 1) if len(wide) else ()
+
+    def samples_of(self, faces: Int64[np.ndarray, " S"]) -> Int64[np.ndarray, " n"]:
+        """The samples on some of the frame's faces."""
+        return np.concatenate([np.unique(self.original.faces[faces]), len(self.original.vertices) + faces])
+
+    def _apart(self, mesh: Mesh) -> tuple[Float64[np.ndarray, " F"], Float64[np.ndarray, " F"]]:
+        points, areas = _samples(mesh)
+        return areas, _of_faces(_squared(self.target, points)[0], mesh.faces)
+
+
+def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:
+    return np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)]), face_normals(mesh)[1]
+
+
+def _squared(
+    surface: Surface, points: Float64[np.ndarray, "N 3"]
+) -> tuple[Float64[np.ndarray, " N"], Int64[np.ndarray, " N"]]:
+    hits = surface.closest(points)
+    return ((hits.points - points) ** 2).sum(axis=1), hits.faces
+
+
+def _of_faces(squared: Float64[np.ndarray, " N"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
+    """Means over the faces; 1/12 for each corner and 3/4 for the centroid integrate quadratics exactly."""
+    return squared[faces].sum(axis=1) / 12 + 0.75 * squared[-len(faces) :]
+
+
+def _regions(faces: Int32[np.ndarray, "F 3"], far: Bool[np.ndarray, "T F"]) -> Int64[np.ndarray, "T F"]:
+    """Labels of the regions of faces that share a vertex, or are the same in the next frame; -1 outside."""
+    count = int(faces.max()) + 1
+    frames, at = np.nonzero(far)
+    corners = frames[:, None] * count + faces[at]
+    stays = far[1:] & far[:-1]
+    earlier, same = np.nonzero(stays)
+    ends = earlier * count + faces[same, 0]
+    links = np.stack([ends, ends + count, ends], axis=1)
+    used, inverse = np.unique(np.concatenate([corners, links]), return_inverse=True)
+    labels = np.full(far.shape, -1)
+    labels[far] = components(inverse.reshape(-1, 3), len(used))[inverse.reshape(-1, 3)[: len(at), 0]]
+    return labels
+
+
+def _joined(meshes: Sequence[Mesh]) -> Mesh:
+    if not meshes:
+        return Mesh.empty()
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return drop_unreferenced(Mesh.of(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces)))
