@@ -39,13 +39,15 @@ def test_an_unknown_preset_is_refused_by_name():
 
 
 def test_options_of_the_other_preset_are_refused_with_the_remedy():
-    with pytest.raises(InputError, match="basis size 4: .*use preset `paper`"):
+    with pytest.raises(InputError, match=r"basis size 4: .*use preset `paper`"):
         preset_options(basis_size=4)
-    with pytest.raises(InputError, match="key interval 2: .*`paper`"):
+    with pytest.raises(InputError, match=r"centers 300: .*use preset `paper`"):
+        preset_options(centers=300)
+    with pytest.raises(InputError, match=r"key interval 2: .*`paper`"):
         preset_options("paper", key_interval=2.0)
     with pytest.raises(InputError, match="key interval 0"):
         preset_options(key_interval=0.0)
 
 
 def test_many_centers_bring_the_samples_they_need():
-    assert preset_options(centers=20_000).track.samples >= 80_000
+    assert preset_options("paper", centers=20_000).track.samples >= 80_000
