@@ -39,7 +39,7 @@ Row = dict[str, Any]
 
 def main() -> int:
     """Prints every row as soon as it is there."""
-    apart, meeting = compute(story(0), preset_options()), compute(story(), preset_options())
+    apart, meeting = compute(story(0), preset_options("paper")), compute(story(), preset_options("paper"))
     rows = (float_rows(), lattice_rows(apart), noise_rows(apart.frames[0]), anchor_rows(apart))
     for row in chain(*rows, floor_rows(apart), second_fit_rows(apart), pose_rows(meeting)):
         print(json.dumps(row), flush=True)
@@ -101,7 +101,7 @@ def anchor_rows(stages: Stages) -> Iterator[Row]:
 
 def pose_rows(stages: Stages) -> Iterator[Row]:
     """The fit of the reference that each pose would have given, mean and worst frame, and which was chosen."""
-    options = preset_options()
+    options = preset_options("paper")
     distances = largest_distances(stages.centers)
     kin = neighbours(affinity(distances, options.reference.centers), options.reference.deform)
     how = (options.reference.deform, options.reference.fuse)
@@ -121,14 +121,14 @@ def pose_rows(stages: Stages) -> Iterator[Row]:
 def floor_rows(stages: Stages) -> Iterator[Row]:
     """Bytes of the group in the laplacian form, and in the draco form that is as good."""
     quality = measure(stages.frames, stages.decoded)
-    found = cheapest_intra(stages.frames, quality, np.inf, preset_options().intra)
+    found = cheapest_intra(stages.frames, quality, np.inf, preset_options("paper").intra)
     yield {"decision": "floor", "laplacian_bytes": len(stages.payload), "draco_bytes": len(found[0]) if found else None,
            "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
 
 
 def second_fit_rows(stages: Stages) -> Iterator[Row]:
     """Bytes and distance of fits made without a second fit, or with one from few or many components of the first."""
-    options = preset_options()
+    options = preset_options("paper")
     key, base = stages.reference.key, stages.coded.base
     for start in (0, 3, 15):
         fit = fit_frames(base.faces, stages.predictions, stages.frames, replace(options.fit, key=key, components=start))

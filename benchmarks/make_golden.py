@@ -26,13 +26,13 @@ from meshreel.types import Mesh
 from tests.golden import frame_record
 
 FRAMES = 4
-Group = tuple[int, bytes, tuple[int, ...]]  # frames, payload, layer ends
+Group = tuple[int, bytes, tuple[int, ...], bool]  # frames, payload, layer ends, whether predicted from the last
 
 
 def main(folder: Path) -> None:
     """Writes every golden file and its record."""
     folder.mkdir(parents=True, exist_ok=True)
-    moving, still, nothing = laplacian_group(), draco_group(), (2, encode_empty(), ())
+    moving, still, nothing = laplacian_group(), draco_group(), (2, encode_empty(), (), False)
     files = {
         "laplacian": (header(), [moving]),
         "draco": (header(), [still]),
@@ -44,8 +44,9 @@ def main(folder: Path) -> None:
     for name, (head, groups) in files.items():
         path = folder / f"{name}.reel"
         with ReelWriter(path, head) as writer:
-            for frames, payload, layers in groups:
-                writer.add_group(writer.frame_count, frames, payload, layers)
+            for frames, payload, layers, predicted in groups:
+                before = (writer.last_group,) if predicted and writer.last_group is not None else ()
+                writer.add_group(writer.frame_count, frames, payload, layers, before)
         path.with_suffix(".json").write_text(json.dumps(record(open_video(path)), indent=1) + "\n")
 
 
@@ -73,7 +74,7 @@ def laplacian_group() -> Group:
     ripple = np.sin(20 * points[:, None, :] + time[None, :, None])
     field = 0.01 * ripple + 0.1 * points[:, None, :] * time[None, :, None] / FRAMES
     payload, layers = encode_group(reference, field, DisplacementOptions(step=0.002))
-    return FRAMES, payload, layers
+    return FRAMES, payload, layers, False
 
 
 def ball() -> CodedReference:
@@ -102,7 +103,7 @@ def layers_groups(reference: CodedReference, sizes: tuple[int, ...]) -> list[Gro
         time = (first + np.arange(frames))[:, None, None]
         wanted = points * (1 + 0.01 * time) + 0.004 * np.sin(30 * points[:, [1, 2, 0]] + 0.2 * time)
         coded = encode_layers(reference, wanted, LayersOptions(step=0.001), state)
-        groups.append((frames, coded.payload, coded.layers))
+        groups.append((frames, coded.payload, coded.layers, state is not None))
         state, first = coded.state, first + frames
     return groups
 
@@ -111,7 +112,7 @@ def draco_group() -> Group:
     """A ball, nothing, and a larger ball: one subdivision in the decoder."""
     ball = deforming_sphere(1, levels=1)[0]
     meshes = [Mesh.of(0.2 * ball.vertices, ball.faces), Mesh.empty(), Mesh.of(0.3 * ball.vertices, ball.faces)]
-    return 3, encode_intra(meshes, 0.001, 1), ()
+    return 3, encode_intra(meshes, 0.001, 1), (), False
 
 
 def record(video: Video) -> dict[str, object]:

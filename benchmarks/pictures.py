@@ -49,7 +49,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("-o", "--output", type=Path, default=OUTPUT)
     output = parser.parse_args(arguments).output
     output.mkdir(parents=True, exist_ok=True)
-    draw_all(compute(story(), preset_options()), output)
+    draw_all(compute(story(), preset_options("paper")), output)
     return 0
 
 
@@ -165,7 +165,7 @@ def components(stages: Stages, path: Path) -> None:
     kept = numbers <= stages.components
     axes.bar(numbers[kept], deviations[kept], color=BODIES[1], label=f"as many as are sent: {stages.components}")
     axes.bar(numbers[~kept], deviations[~kept], color="lightgrey", label="the others")
-    step = 100 * preset_options().displacements.step
+    step = 100 * preset_options("paper").displacements.step
     axes.axhline(step, color=BODIES[0], linewidth=1, label=f"base step of the quantiser: {step:.2f} %")
     axes.set(
         yscale="log", xlabel="component", ylabel="RMS of its weights,\n% of the diagonal", xlim=(0, len(numbers) + 1)

@@ -1,28 +1,43 @@
-"""Encoder options that are quick on small procedural bodies: few centers, a coarse reference, few trials."""
+"""Encoder options that are quick on small procedural bodies: few centers and nodes, coarse templates, few trials."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+from meshreel.analysis.embedded import EmbeddedOptions, Stage
 from meshreel.choice import IntraOptions, Quality
 from meshreel.presets import preset_options
 from meshreel.windows import EncoderOptions
 
+TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,))
+
 
 def quick(
-    preset: str = "paper",
+    preset: str = "best",
     quality: float = 50.0,
     basis_size: int | None = None,
-    group_size: int = 10,
-    centers: int = 150,
+    group_size: int | None = None,
+    centers: int | None = None,
+    key_interval: float | None = None,
 ) -> EncoderOptions:
     """The preset's options made small; takes what `preset_options` takes."""
-    options = preset_options(preset, quality, basis_size, group_size, min(centers, 150))
+    options = preset_options(preset, quality, basis_size, group_size, centers, key_interval)
+    options = replace(options, intra=TRIALS)
+    return _quick_best(options) if preset == "best" else _quick_paper(options)
+
+
+def _quick_best(options: EncoderOptions) -> EncoderOptions:
+    coarse = Stage(40, (0.1, 0.06, 0.03), (10.0, 1.0, 0.1))
+    fine = Stage(120, (0.024, 0.012), (0.3, 0.1))
+    fit = replace(options.fit, gates=(0.024, 0.012), smoothing=(2.0, 0.4))
+    return replace(options, embedded=EmbeddedOptions(coarse, fine, samples=800), fit=fit)
+
+
+def _quick_paper(options: EncoderOptions) -> EncoderOptions:
     fuse = replace(options.reference.fuse, poisson=replace(options.reference.fuse.poisson, depth=6))
     return replace(
         options,
         target=Quality(distance=0.003, angle=15.0, worst=0.006),
-        track=replace(options.track, samples=3000),
+        track=replace(options.track, centers=min(options.track.centers, 150), samples=3000),
         reference=replace(options.reference, vertices=150, keys=1, trial_depth=5, trial_vertices=150, fuse=fuse),
-        intra=IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,)),
     )

@@ -13,6 +13,7 @@ from meshreel.coding.group import decode_group
 from meshreel.coding.mesh import encode_mesh
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
+from meshreel.decoder import _Decoded
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import AnchorRule, DisplacementHead, Form, LaplacianGroup
 from meshreel.format.records import pack
@@ -145,16 +146,20 @@ def survivors(data):
     return found
 
 
+# Every byte of the head and every fifth behind it: each costs a decode.
+PLACES = [place for place in range(len(MIXED)) if place % 5 == 0 or place < meshreel.open(MIXED).reader.head_size]
+
+
 def test_wherever_a_file_ends_only_what_is_missing_is_lost():
     groups = meshreel.open(MIXED).reader.groups
-    for size in range(len(MIXED)):
+    for size in PLACES:
         whole = {group.number for group in groups if group.end <= size} if size >= groups[0].offset else set()
         assert survivors(MIXED[:size]) == whole, size
 
 
 def test_a_flipped_byte_anywhere_is_found_and_costs_one_group_at_most():
     groups = meshreel.open(MIXED).reader.groups
-    for place in range(len(MIXED)):
+    for place in PLACES:
         data = bytearray(MIXED)
         data[place] ^= 0x40
         hit = {group.number for group in groups if group.offset <= place < group.end}
@@ -166,7 +171,7 @@ def test_a_flipped_byte_anywhere_is_found_and_costs_one_group_at_most():
 def test_payloads_that_lie_behind_a_right_checksum_raise_format_errors_only(number, mask):
     reader = meshreel.open(MIXED).reader
     payload, count = reader.read_chunk(number), reader.groups[number].frame_count
-    for place in range(len(payload)):
+    for place in range(mask % 3, len(payload), 3):
         data = bytearray(payload)
         data[place] ^= mask
         with suppress(FormatError):
@@ -192,7 +197,7 @@ class Contended(meshreel.Video):
 
     @property
     def _group(self):
-        return -1, []
+        return _Decoded(-1, [], None)
 
     @_group.setter
     def _group(self, group):

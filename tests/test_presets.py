@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 
 from meshreel.errors import InputError
@@ -9,8 +11,9 @@ from meshreel.presets import displacement_step, preset_options, reference_vertic
 from meshreel.windows import EncoderOptions
 
 
-def test_the_default_options_are_the_default_preset():
-    assert preset_options() == EncoderOptions()
+def test_the_default_preset_is_best_and_bare_options_are_those_of_paper():
+    assert preset_options() == preset_options("best", 50.0) != preset_options("paper")
+    assert preset_options("paper") == EncoderOptions()
 
 
 def test_more_quality_means_finer_steps_and_more_vertices():
@@ -19,6 +22,9 @@ def test_more_quality_means_finer_steps_and_more_vertices():
     vertices = [reference_vertices(q) for q in qualities]
     assert steps == sorted(steps, reverse=True) and vertices == sorted(vertices)
     assert len(set(steps)) == len(set(vertices)) == len(qualities)
+    best = [preset_options("best", q) for q in qualities]
+    assert all(a.layers.step > b.layers.step and a.template.error > b.template.error for a, b in pairwise(best))
+    assert all(a.target.distance > b.target.distance for a, b in pairwise(best))
 
 
 @pytest.mark.parametrize("quality", [-1, 100.5, float("nan")])
@@ -28,9 +34,20 @@ def test_a_quality_out_of_range_is_refused_with_its_value(quality):
 
 
 def test_an_unknown_preset_is_refused_by_name():
-    with pytest.raises(InputError, match="'best'"):
-        preset_options("best")
+    with pytest.raises(InputError, match="'worst'; known: best, paper"):
+        preset_options("worst")
+
+
+def test_options_of_the_other_preset_are_refused_with_the_remedy():
+    with pytest.raises(InputError, match=r"basis size 4: .*use preset `paper`"):
+        preset_options(basis_size=4)
+    with pytest.raises(InputError, match=r"centers 300: .*use preset `paper`"):
+        preset_options(centers=300)
+    with pytest.raises(InputError, match=r"key interval 2: .*`paper`"):
+        preset_options("paper", key_interval=2.0)
+    with pytest.raises(InputError, match="key interval 0"):
+        preset_options(key_interval=0.0)
 
 
 def test_many_centers_bring_the_samples_they_need():
-    assert preset_options(centers=20_000).track.samples >= 80_000
+    assert preset_options("paper", centers=20_000).track.samples >= 80_000

@@ -20,6 +20,7 @@ from .choice import Quality
 from .container.writer import ReelWriter
 from .format.layout import Form, Header
 from .layered import encode_segment
+from .presets import preset_options
 from .types import Mesh, MeshSequence
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
 
@@ -57,15 +58,16 @@ class Summary:
 def encode(
     sequence: MeshSequence,
     path: str | Path,
-    options: EncoderOptions = EncoderOptions(),
+    options: EncoderOptions | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Summary:
-    """Writes `sequence` to a .reel file at `path`, which appears only when it is complete.
+    """Writes `sequence` to a .reel file at `path`, which appears only when it is complete; None: preset `best` at 50.
 
     With an executor, windows are encoded side by side; the bytes are the same. Raises InputError for frames that
     cannot be used, before anything is coded.
     """
+    options = options or preset_options()
     stages = Stages(progress, len(sequence))
     seen = survey(sequence, stages)
     groups: list[GroupSummary] = []

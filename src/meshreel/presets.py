@@ -41,6 +41,8 @@ def preset_options(
         raise InputError(f"quality must be in 0 to 100, got {quality:g}")
     if preset == "best" and basis_size is not None:
         raise InputError(f"basis size {basis_size}: preset `best` chooses the components; use preset `paper`")
+    if preset == "best" and centers is not None:
+        raise InputError(f"centers {centers}: preset `best` tracks none; use preset `paper`")
     if preset != "best" and key_interval is not None:
         raise InputError(f"key interval {key_interval:g}: groups of preset `{preset}` all decode on their own")
     centers = 2000 if centers is None else centers

@@ -31,8 +31,10 @@ class Goal:
 
     def __post_init__(self) -> None:
         given = [value for value in (self.psnr, self.mbps) if value is not None]
-        if len(given) != 1 or not 0 < given[0] < math.inf:
-            raise InputError(f"targets {self.psnr} dB and {self.mbps} Mbps: give one of them, above 0")
+        if len(given) != 1:
+            raise InputError(f"targets {self.psnr} dB and {self.mbps} Mbps: give one of them")
+        if not 0 < given[0] < math.inf:
+            raise InputError(f"target {given[0]:g} {'dB' if self.mbps is None else 'Mbps'}: give a number above 0")
 
     @property
     def tolerance(self) -> float:

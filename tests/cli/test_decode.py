@@ -31,12 +31,12 @@ def test_quiet_is_silent(run, tmp_path):
     assert (run("decode", FILE, "-o", tmp_path, "--quiet").out, len(list(tmp_path.iterdir()))) == ("", 10)
 
 
-def test_fewer_components_give_another_shape(run, tmp_path):
+def test_fewer_layers_give_another_shape(run, tmp_path):
     run("decode", FILE, "-o", tmp_path / "whole")
-    run("decode", FILE, "-o", tmp_path / "coarse", "--components", "1")
+    run("decode", FILE, "-o", tmp_path / "coarse", "--layers", "1")
     whole, coarse = ((tmp_path / name / "frame_00003.ply").read_bytes() for name in ("whole", "coarse"))
     assert len(whole) == len(coarse) and whole != coarse
-    assert failed(run("decode", FILE, "-o", tmp_path, "--components", "-1"), "components", "-1")
+    assert failed(run("decode", FILE, "-o", tmp_path, "--layers", "-1"), "layers", "-1")
 
 
 def test_frames_of_another_video_in_the_folder_are_pointed_out(run, tmp_path):

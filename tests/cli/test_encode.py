@@ -54,7 +54,7 @@ def test_every_option_reaches_the_encoder(run, balls, tmp_path):
     assert [group["frames"] for group in said.row["groups"]] in ([1, 2], [2, 1])
     info = run("info", tmp_path / "a.reel", "--json").row
     assert info["metadata"]["quality"] == 70
-    assert [g["components"] for g in info["groups"] if g["form"] == "laplacian"] == [2]
+    assert [g["layers"] for g in info["groups"] if g["form"] == "laplacian"] == [2]
 
 
 @pytest.mark.usefixtures("quick_presets")
@@ -69,9 +69,9 @@ def test_flags_default_to_the_defaults_of_the_options():
     defaults = {name: parameter.default for name, parameter in inspect.signature(command).parameters.items()}
     code = preset_options()
     assert replace(defaults["reading"].options(), weld=None) == SequenceOptions()
-    assert (defaults["preset"], defaults["quality"]) == (code.preset, code.quality)
-    assert (defaults["group_size"], defaults["centers"]) == (code.group_size, code.track.centers)
-    assert defaults["basis_size"] is code.displacements.basis_size is None
+    assert defaults["preset"] == code.preset == "best"
+    chosen_by_the_preset = ("quality", "basis_size", "centers", "group_size", "keyint", "target_psnr", "target_mbps")
+    assert [defaults[name] for name in chosen_by_the_preset] == [None] * len(chosen_by_the_preset)
 
 
 @pytest.mark.usefixtures("quick_presets")

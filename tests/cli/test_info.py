@@ -15,7 +15,7 @@ def test_every_byte_is_in_some_part_and_in_some_group(run):
     assert {"reference", "basis", "displacements", "draco"} < set(row["parts"])
 
 
-def test_groups_have_their_frames_forms_and_components(run):
+def test_groups_have_their_frames_forms_and_layers(run):
     groups = run("info", FILE, "--json").row["groups"]
     assert [(g["first_frame"], g["frames"], g["form"]) for g in groups] == [
         (0, 2, "empty"),
@@ -23,7 +23,7 @@ def test_groups_have_their_frames_forms_and_components(run):
         (6, 3, "draco"),
         (9, 1, "empty"),
     ]
-    assert groups[1]["components"] > 0
+    assert groups[1]["layers"] > 0
 
 
 def test_text_tells_frames_rate_forms_and_what_was_recorded(run):

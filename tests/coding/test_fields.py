@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from meshreel import _core
 from meshreel.coding import fields, orthonormal
 from meshreel.coding.fields import Rate, Surface, decode_field, encode_field
-from meshreel.coding.graph import hierarchy
+from meshreel.coding.graph import hierarchy, siblings
 from meshreel.coding.steps import LEVELS
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.levels import subdivide

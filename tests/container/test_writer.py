@@ -163,7 +163,7 @@ def test_a_file_without_frames_is_an_input_error(tmp_path):
         ({"layers": (5, 5, 10)}, "must rise"),
         ({"layers": (0, 10)}, "must rise"),
         ({"layers": (5,)}, "payload's 10 bytes"),
-        ({"depends_on": (1,)}, "last group only"),
+        ({"depends_on": (0, 1, 3)}, "last group only"),
         ({"depends_on": (2,)}, "last group only"),
         ({"depends_on": (-1,)}, "last group only"),
     ],
@@ -178,6 +178,21 @@ def test_a_group_that_cannot_be_is_refused_and_the_file_goes_on(arguments, messa
             writer.add_group(**(good | arguments))
         assert writer.add_group(**good) == 2
     assert ReelReader(BytesSource(file.getvalue())).frame_count == 15
+
+
+def test_a_group_may_depend_on_the_one_before_it_and_on_no_other():
+    file = io.BytesIO()
+    with ReelWriter(file, HEADER) as writer:
+        assert writer.last_group is None
+        writer.add_group(0, 10, EMPTY)
+        writer.add_static(EMPTY)  # may lie between them
+        writer.add_group(10, 5, EMPTY, depends_on=(0, 1))
+        assert writer.last_group == 2
+        with pytest.raises(InputError, match="last group only"):
+            writer.add_group(15, 3, EMPTY, depends_on=(0,))
+        writer.add_group(15, 3, EMPTY, depends_on=(writer.last_group,))
+    groups = ReelReader(BytesSource(file.getvalue())).groups
+    assert [group.depends_on for group in groups] == [(), (0, 1), (2,)]
 
 
 def test_memory_does_not_grow_with_the_file(tmp_path):

@@ -22,6 +22,7 @@ from meshreel.evaluation.runner import Bench, run_point, run_points
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Mesh, MeshList
+from tests.small_options import TRIALS
 from tests.golden import GOLDEN
 
 BALLS = sliding_sphere(2, levels=2)
@@ -143,7 +144,8 @@ def test_a_curve_row_has_rate_groups_and_a_few_metrics_of_each_frame(folder):
     assert sum(group["bytes"] for group in row["groups"]) < row["bytes"]
 
 
-def test_a_floor_row_says_what_draco_would_cost_each_group(folder):
+def test_a_floor_row_says_what_draco_would_cost_each_group(folder, monkeypatch):
+    monkeypatch.setattr("meshreel.evaluation.peers.IntraOptions", lambda: TRIALS)
     wasteful = Point("ball", "draco", {"qp": 14}, kind="floor")
     row = runner.measure_point(wasteful, Bench(folder, comparison=QUICK))
     assert len(row["groups"]) == 2 and all("draco_bytes" in group for group in row["groups"])

@@ -19,6 +19,7 @@ def test_what_the_encoder_writes_passes():
     check_header(HEADER, 10)
     check_header(replace(HEADER, intervals=(1, 2)), 3)
     check_index(Index((STATIC, replace(GROUP, depends_on=(0,)))))
+    check_index(Index((GROUP, STATIC, replace(GROUP, depends_on=(0, 1)), replace(GROUP, depends_on=(2,)))))
     assert parse_metadata('{"quality": 50}') == {"quality": 50}
 
 

@@ -19,7 +19,7 @@ from .compare import counted, metric_table
 from .console import Common
 from .encode import describe, summary_row, workers
 
-_CODE = preset_options()
+_QUALITY = preset_options().quality
 _BEGIN, _FRAME_RATE = 0.95, 20.0  # s into the story, 1/s: in 20 frames apart, in touch and apart again
 
 
@@ -27,7 +27,7 @@ def command(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])] = Path("demo"),
     frames: int = 20,
-    quality: float = _CODE.quality,
+    quality: float = _QUALITY,
     ssim: bool = True,
     jobs: int = 1,
     common: Common = Common(),
@@ -45,13 +45,13 @@ def command(
     ssim
         Render and compare pictures too (some seconds a frame).
     jobs
-        Groups to encode side by side.
+        Runs of frames that need no other to encode side by side.
     """
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
+    options = preset_options(quality=quality)  # refused before frames are made
     bodies = soft_bodies(SoftBodiesOptions(frames=frames, frame_rate=_FRAME_RATE, begin=_BEGIN))
     capture = MeshList(tuple(bodies), bodies.frame_rate)  # few enough to keep, and slow to make
-    options = preset_options(quality=quality)
     output.mkdir(parents=True, exist_ok=True)
     file, picture = output / "demo.reel", output / "demo.png"
     with common.stages(frames) as progress, workers(jobs) as executor:

@@ -21,7 +21,7 @@ from ..windows import EncoderOptions
 from .console import Common
 from .reading import Reading
 
-_CODE = preset_options()
+DEFAULT_QUALITY = preset_options().quality
 
 
 def command(
@@ -30,7 +30,7 @@ def command(
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     preset: Literal["best", "paper"] = "best",
-    quality: float = _CODE.quality,
+    quality: float | None = None,
     target_psnr: float | None = None,
     target_mbps: float | None = None,
     reading: Reading = Reading(),
@@ -53,23 +53,23 @@ def command(
     preset
         How to code: `best` is what measures best, `paper` is section 3 of the TSMC paper.
     quality
-        0 (small) to 100 (fine).
+        0 (small) to 100 (fine); 50 where neither it nor a target is given.
     target_psnr
         Instead of a quality: the D2-PSNR (one way, mean over the frames, as `compare` prints it) to meet within 0.3 dB.
-        Takes a few encodes.
+        Takes some encodes, 8 at most.
     target_mbps
-        Instead of a quality: the rate to meet within 5 %, Mbit/s. Takes a few encodes.
+        Instead of a quality: the rate of the file to meet within 5 %, Mbit/s. Takes some encodes, 8 at most.
     basis_size
         Exactly this many KLT components per group, and no per-frame Draco where that is cheaper; both by
         rate-distortion where it is not given. Preset `paper` only.
     centers
-        Volume centers to track, the paper's K (2000).
+        Volume centers to track, the paper's K (2000). Preset `paper` only.
     group_size
         Most frames in a group, the paper's GoF (16; `paper`: 10).
     keyint
         Seconds, at most, from one frame that decodes on its own to the next (4). Preset `best` only.
     jobs
-        Groups to encode side by side; the file is the same.
+        Runs of frames that need no other to encode side by side (groups, or what `keyint` cuts); the file is the same.
     """
     if output.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
@@ -79,8 +79,11 @@ def command(
     def options_at(quality: float) -> EncoderOptions:
         return preset_options(preset, quality, basis_size, group_size, centers, keyint)
 
-    options = options_at(quality)
     goal = None if target_psnr is None and target_mbps is None else Goal(target_psnr, target_mbps)
+    if goal is not None and quality is not None:
+        raise InputError(f"--quality {quality:g} and a target: the target chooses the quality, give one of both")
+    quality = DEFAULT_QUALITY if quality is None else quality
+    options = options_at(quality)
     source = inputs[0] if len(inputs) == 1 else inputs
     sequence = open_sequence(source, reading.options())
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:

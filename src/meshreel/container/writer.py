@@ -49,9 +49,8 @@ class ReelWriter:
     def __enter__(self) -> ReelWriter:
         with _as_input_error(self._target):
             pack(self.header)
-            check_header(self.header, len(self.header.intervals) + 1)  # now, not when all is coded
-            parse_metadata(self.header.metadata)
             check_header(self.header, len(self.header.intervals) + 1)  # now, not when all is encoded
+            parse_metadata(self.header.metadata)
             self._spool = _open_spool(self._target)
         return self
 
