@@ -34,6 +34,7 @@ class GroupSummary:
     size: int  # bytes
     quality: Quality
     predicted: bool = False  # from the group before
+    key: int | None = None  # the frame of the sequence whose surface the others follow
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,9 @@ def encode(
                 before = () if writer.last_group is None or not group.predicted else (writer.last_group,)
                 writer.add_group(writer.frame_count, group.frame_count, group.payload, group.layers, before)
                 quality = group.quality.scaled(seen.diagonal)
-                groups.append(GroupSummary(group.form, group.frame_count, len(group.payload), quality, group.predicted))
+                key = None if group.key is None else writer.frame_count - group.frame_count + group.key
+                size = len(group.payload)
+                groups.append(GroupSummary(group.form, group.frame_count, size, quality, group.predicted, key))
         writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups))
     return Summary(Path(path).stat().st_size, tuple(groups), _warnings(seen))
 
@@ -167,6 +170,7 @@ def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[s
     return {
         "preset": options.preset,
         "quality": options.quality,
+        "key_frames": [group.key for group in groups if group.key is not None],
         "rms_m": _rounded(mean_square**0.5),
         "worst_rms_m": _rounded(max(group.quality.worst for group in groups)),
         "d2_psnr_paper": _rounded(sum(g.frame_count * g.quality.psnr for g in groups) / frames),

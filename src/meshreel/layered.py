@@ -80,7 +80,7 @@ def _next_group(
     ahead: Sequence[Mesh], before: Followed | None, options: EncoderOptions
 ) -> tuple[EncodedGroup, Followed | None]:
     """The group that begins with the first of these frames."""
-    if before is not None:
+    if before is not None and options.predict:
         continued = _continued(ahead, before, options)
         if continued is not None:
             return continued
@@ -113,7 +113,7 @@ def _continued(
 def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup, Followed | None] | int:
     """A group with a key frame of its own, or the number of frames to try instead."""
     targets = [Target(frame) for frame in ahead]
-    course = choose_key(targets, options.embedded)
+    course = choose_key(targets, options.embedded, options.keys)
     if course.count == 0:
         return len(ahead) // 2  # no key is followed back to the first frame
     ahead, targets, key = ahead[: course.count], targets[: course.count], course.key
@@ -133,7 +133,8 @@ def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup
             return cut
     elif fitted.residuals[0] > options.groups.limit * target.distance:
         return intra_only(ahead, options), None
-    return _coded(ahead, reference, fitted, None, options)
+    group, followed = _coded(ahead, reference, fitted, None, options)
+    return (replace(group, key=key) if group.form == Form.LAYERS else group), followed
 
 
 def _coded(

@@ -50,6 +50,8 @@ class EncoderOptions:
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)
     intra: IntraOptions = field(default_factory=IntraOptions)
     form: Form = Form.LAPLACIAN  # of the groups that a template follows
+    keys: int = 5  # frames tried as the key of a group, at most (form LAYERS)
+    predict: bool = True  # groups from the one before, where its template still fits (form LAYERS)
     key_interval: float = 4.0  # s, at most, from one random-access point to the next (form LAYERS)
     embedded: EmbeddedOptions = field(default_factory=EmbeddedOptions)
     template: TemplateOptions = field(default_factory=TemplateOptions)
@@ -76,6 +78,7 @@ class EncodedGroup:
     layers: tuple[int, ...]  # k + 1 layers decode with k components, or to k levels
     quality: Quality
     predicted: bool = False  # from the group before
+    key: int | None = None  # the frame, counted in the group, whose surface the others follow
 
 
 class Stages:

@@ -36,10 +36,13 @@ class Course:
         return self.motion.move(template.vertices, vertex_normals(template))[: self.count]
 
 
-def choose_key(targets: Sequence[Target], options: EmbeddedOptions) -> Course:
-    """The course that is followed for longest; of equally long ones that which leaves least over."""
+def choose_key(targets: Sequence[Target], options: EmbeddedOptions, most: int = len(PLACES)) -> Course:
+    """The course that is followed for longest; of equally long ones that which leaves least over.
+
+    At most so many keys are tried.
+    """
     courses = list[Course]()
-    for key in dict.fromkeys(int(place * len(targets)) for place in PLACES):
+    for key in dict.fromkeys(int(place * len(targets)) for place in PLACES[:most]):
         courses.append(_course(targets, key, options))
         residuals = courses[-1].motion.residuals
         if residuals.max() <= min(options.doubt, UNEVEN * max(float(np.median(residuals)), EVEN)):

@@ -5,6 +5,7 @@ In -> out: EncoderOptions -> EncoderOptions. A variant is one line of VARIANTS; 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -14,10 +15,15 @@ from ..windows import EncoderOptions
 Change = Callable[[EncoderOptions], EncoderOptions]
 
 VARIANTS: dict[str, Change] = {
-    "no second fit": lambda o: replace(o, fit=replace(o.fit, components=0)),
-    "groups not cut": lambda o: replace(o, groups=replace(o.groups, limit=1e9, tolerance=1e9)),
-    "groups of 5": lambda o: replace(o, group_size=5),
-    "one key tried": lambda o: replace(o, reference=o.reference.fewer_trials()),
+    "no shared detail": lambda o: replace(o, fit=replace(o.fit, components=0)),
+    "middle key, no cuts": lambda o: replace(
+        o, keys=1, groups=replace(o.groups, limit=1e9, tolerance=1e9, worth=math.inf)
+    ),
+    "flat midpoints": lambda o: replace(o, layers=replace(o.layers, curvatures=(0,))),
+    "plain rounding": lambda o: replace(o, layers=replace(o.layers, price=0.0)),
+    "errors along the surface count": lambda o: replace(o, layers=replace(o.layers, tangential=1.0)),
+    "groups alone": lambda o: replace(o, predict=False),
+    "no tails": lambda o: replace(o, tails=None),
 }
 
 

@@ -16,7 +16,16 @@ from . import layers
 BODIES = ("dancer", "basketball_player")
 WHOLE = (20.0, 35.0, 50.0, 65.0, 80.0)  # qualities of the whole: its curve reaches around every variant's
 QUALITIES = (35.0, 65.0)  # of the variants
-PARTS = ("no second fit", "groups not cut", "groups of 5")
+PARTS = (
+    "no shared detail",
+    "middle key, no cuts",
+    "flat midpoints",
+    "plain rounding",
+    "errors along the surface count",
+    "no tails",
+)
+GROUPS = "groups alone"  # shows only where there are several groups
+LONG = ("crane60", 32)  # frames
 COMPARISON = layers.COMPARISON
 
 
@@ -28,6 +37,10 @@ def points(small: bool) -> Iterator[Point]:
             yield _point(body, quality, frames)
         for part in PARTS:
             yield from (_point(body, quality, frames, part) for quality in QUALITIES)
+    if not small:
+        body, frames = LONG
+        yield from (_point(body, quality, frames) for quality in QUALITIES)
+        yield from (_point(body, quality, frames, GROUPS) for quality in QUALITIES)
 
 
 def references(_sequence: str) -> dict[str, list[tuple[float, float]]]:
@@ -63,6 +76,8 @@ def sections(rows: Sequence[Row]) -> Iterator[str]:
         for body in bodies:
             cells = [_change(rows, body, part, measure) for measure in JUDGED]
             yield f"| {part} | {body} | {' | '.join(cells)} |"
+    cells = [_change(rows, LONG[0], GROUPS, measure) for measure in JUDGED]
+    yield f"| {GROUPS} | {LONG[0]}, {LONG[1]} frames | {' | '.join(cells)} |"
 
 
 def _change(rows: Sequence[Row], body: str, part: str, measure: Measure) -> str:
