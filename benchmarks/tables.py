@@ -97,6 +97,19 @@ def correspondence(rows: list[Row]) -> Table:
     ]
 
 
+def template(rows: list[Row]) -> Table:
+    """A row a template or a choice of the coder; rate and quality at each step."""
+    steps = _distinct(rows, "step")
+    found = {(r["template"], r["choice"], r["step"]): r for r in rows}
+    names = list(dict.fromkeys((r["template"], r["choice"]) for r in rows))
+    heads = ["template", "choice", *(f"> step {100 * step:.2f} %: Mbps, symmetric dB, normals" for step in steps)]
+    told = [[found[(*name, step)] for step in steps] for name in names]
+    cells = [
+        [f"{r['mbps']:.3f}, {r['symmetric_psnr']:.1f}, {r['normal_error_deg']:.2f}" for r in line] for line in told
+    ]
+    return heads, [[*name, *line] for name, line in zip(names, cells, strict=True)]
+
+
 TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "noise": noise,
     "anchors": anchors,
@@ -104,6 +117,7 @@ TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "pose": pose,
     "second fit": second_fit,
     "correspondence": correspondence,
+    "template": template,
 }
 
 

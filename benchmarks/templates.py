@@ -1,0 +1,99 @@
+"""What the template and the steps of `layers` are chosen from: base meshes, levels, midpoints and ratios of steps.
+
+python benchmarks/templates.py --data ../shared/data/performers        # twenty minutes
+
+In: the frames of the dancer. Out: a line a point, and the rows `template` of docs/decisions/measured.jsonl.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshreel.analysis.correspond import choose_key
+from meshreel.analysis.fit import Guides, fit_targets
+from meshreel.analysis.fit_match import Target
+from meshreel.analysis.survey import survey
+from meshreel.analysis.template import TemplateOptions, shared_detail
+from meshreel.choice import measure
+from meshreel.coding.layers import LayersOptions, encode_layers
+from meshreel.coding.reference import CodedReference, code_on_lattice
+from meshreel.geometry.decimate import decimate
+from meshreel.geometry.topology import weld
+from meshreel.io.sequence import SequenceOptions, open_sequence
+from meshreel.presets import preset_options
+from meshreel.types import Mesh
+
+ROWS = Path(__file__).resolve().parents[1] / "docs" / "decisions" / "measured.jsonl"
+DECISION, BODY = "template", "dancer"
+BEST = preset_options("best")
+TEMPLATES = ((500, 2), (700, 2), (1000, 2), (1500, 2), (2500, 1), (500, 3))  # vertices of the base, levels
+STEPS = (0.0035, 0.0018, 0.0009)
+CHOICES = {  # of the coder, on the base of 1000 vertices
+    "flat midpoints": {"curvatures": (0,)},
+    "ratios .8, .8": {"detail_ratios": (0.8, 0.8)},
+    "ratios .6, 1.2": {"detail_ratios": (0.6, 1.2)},
+    "price .04": {"price": 0.04},
+    "price .12": {"price": 0.12},
+}
+Row = dict[str, Any]
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Measures every point and replaces the rows of this decision."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, required=True)
+    folder = parser.parse_args(arguments).data / BODY
+    sequence = open_sequence(folder, SequenceOptions(weld=weld))
+    seen = survey(sequence)
+    frames = [seen.normalise(mesh) for mesh in sequence]
+    rows = []
+    for row in _measured(frames):
+        rows.append({"decision": DECISION, "sequence": BODY} | row)
+        print(json.dumps(rows[-1]), flush=True)
+    kept = [line for line in ROWS.read_text(encoding="utf-8").splitlines() if json.loads(line)["decision"] != DECISION]
+    text = "".join(line + "\n" for line in [*kept, *map(json.dumps, rows)])
+    ROWS.write_text(text, encoding="utf-8")
+    return 0
+
+
+def _measured(frames: list[Mesh]) -> Iterator[Row]:
+    targets = [Target(frame) for frame in frames]
+    course = choose_key(targets, BEST.embedded)
+    for vertices, levels in TEMPLATES:
+        lattice = 0.33 * BEST.layers.step
+        reference = code_on_lattice(decimate(frames[course.key], vertices), lattice, levels)
+        base, faces = reference.mesh, reference.base.faces
+        shared = shared_detail(base.faces, len(base.vertices), TemplateOptions(levels=levels))
+        fit = replace(BEST.fit, key=course.key)
+        positions = fit_targets(faces, course.move(reference.base), targets, fit, Guides(None, shared))
+        name = f"{vertices} vertices, {levels} levels"
+        tried = {"": {}} | (CHOICES if (vertices, levels) == (1000, 2) else {})
+        for choice, changes in tried.items():
+            for step in STEPS:
+                options = replace(BEST.layers, step=step, **changes)
+                yield {"template": name, "choice": choice, "step": step} | _point(frames, reference, positions, options)
+
+
+def _point(frames: list[Mesh], reference: CodedReference, positions: np.ndarray, options: LayersOptions) -> Row:
+    coded = encode_layers(reference, positions, options)
+    quality = measure(frames, [Mesh(places, reference.base.faces) for places in coded.positions])
+    mbps = len(coded.payload) * 8 * 30 / len(frames) / 1e6
+    symmetric = -20 * np.log10(quality.distance / np.mean([frame.diagonal for frame in frames]))
+    return {
+        "mbps": round(mbps, 4),
+        "d2_psnr_paper": round(quality.psnr, 2),
+        "symmetric_psnr": round(float(symmetric), 2),
+        "normal_error_deg": round(quality.angle, 3),
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
