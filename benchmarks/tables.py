@@ -104,9 +104,8 @@ def template(rows: list[Row]) -> Table:
     names = list(dict.fromkeys((r["template"], r["choice"]) for r in rows))
     heads = ["template", "choice", *(f"> step {100 * step:.2f} %: Mbps, symmetric dB, normals" for step in steps)]
     told = [[found[(*name, step)] for step in steps] for name in names]
-    cells = [
-        [f"{r['mbps']:.3f}, {r['symmetric_psnr']:.1f}, {r['normal_error_deg']:.2f}" for r in line] for line in told
-    ]
+    said = "{mbps:.3f}, {symmetric_psnr:.1f}, {normal_error_deg:.2f}"
+    cells = [[said.format(**row) for row in line] for line in told]
     return heads, [[*name, *line] for name, line in zip(names, cells, strict=True)]
 
 

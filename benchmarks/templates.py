@@ -36,7 +36,7 @@ DECISION, BODY = "template", "dancer"
 BEST = preset_options("best")
 TEMPLATES = ((500, 2), (700, 2), (1000, 2), (1500, 2), (2500, 1), (500, 3))  # vertices of the base, levels
 STEPS = (0.0035, 0.0018, 0.0009)
-CHOICES = {  # of the coder, on the base of 1000 vertices
+CHOICES: dict[str, dict[str, Any]] = {  # of the coder, on the base of 1000 vertices
     "flat midpoints": {"curvatures": (0,)},
     "ratios .8, .8": {"detail_ratios": (0.8, 0.8)},
     "ratios .6, 1.2": {"detail_ratios": (0.6, 1.2)},
@@ -75,7 +75,7 @@ def _measured(frames: list[Mesh]) -> Iterator[Row]:
         fit = replace(BEST.fit, key=course.key)
         positions = fit_targets(faces, course.move(reference.base), targets, fit, Guides(None, shared))
         name = f"{vertices} vertices, {levels} levels"
-        tried = {"": {}} | (CHOICES if (vertices, levels) == (1000, 2) else {})
+        tried: dict[str, dict[str, Any]] = {"": {}} | (CHOICES if (vertices, levels) == (1000, 2) else {})
         for choice, changes in tried.items():
             for step in STEPS:
                 options = replace(BEST.layers, step=step, **changes)
