@@ -20,9 +20,11 @@ from .analysis.groups import cut_at, leading
 from .analysis.template import base_mesh, shared_detail
 from .choice import NO_ERROR, measure
 from .coding.intra import encode_empty
-from .coding.layers import LayersState, encode_layers
+from .coding.layers import EncodedLayers, LayersState, encode_layers
 from .coding.reference import CodedReference, code_on_lattice
 from .format.layout import Form
+from .format.records import pack
+from .tails import find_tails
 from .types import Mesh
 from .windows import EncodedGroup, EncoderOptions, Stages, cheaper, intra_only, laplacian, target_of
 
@@ -142,9 +144,9 @@ def _coded(
 ) -> tuple[EncodedGroup, Followed | None]:
     """The cheapest form of a group, and what the next may begin with."""
     encoded = encode_layers(reference, fit.positions, options.layers, before.state if before else None)
-    decoded = [Mesh(positions, reference.base.faces) for positions in encoded.positions]
+    payload, layers, decoded = _with_tails(frames, encoded, reference.base.faces, options)
     quality = measure(frames, decoded)
-    group = EncodedGroup(Form.LAYERS, len(frames), encoded.payload, encoded.layers, quality, before is not None)
+    group = EncodedGroup(Form.LAYERS, len(frames), payload, layers, quality, before is not None)
     if quality.distance > TOO_COARSE * target_of(frames, options).distance:
         other = laplacian(frames, reference, fit.positions, options.displacements)
         if other.quality.reaches(quality) and len(other.payload) < len(group.payload):
@@ -154,3 +156,15 @@ def _coded(
         return group, None
     usual = before.residual if before else float(np.median(fit.residuals))
     return group, Followed(reference, encoded.state, fit.positions[-1], usual)
+
+
+def _with_tails(
+    frames: Sequence[Mesh], encoded: EncodedLayers, faces: Int32[np.ndarray, "F 3"], options: EncoderOptions
+) -> tuple[bytes, tuple[int, ...], list[Mesh]]:
+    """Payload, ends of its layers, and frames as decoded; with a layer of patches where that pays."""
+    payload, layers = encoded.payload, encoded.layers
+    found = options.tails and find_tails(frames, encoded.positions, faces, len(payload), options.tails)
+    if not found:
+        return payload, layers, [Mesh(positions, faces) for positions in encoded.positions]
+    payload += pack(found.record)
+    return payload, (*layers, len(payload)), found.frames

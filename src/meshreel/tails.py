@@ -1,6 +1,6 @@
 """The worst one or two per cent of a group: faces to drop and patches to add, each only where it pays for its bytes.
 
-In -> out: frames, the group as its layers decode, its size -> a LayersPatches record and the frames as shown, or nothing.
+In -> out: frames, the group as its layers decode, its size -> a LayersPatches and the frames as shown, or nothing.
 A byte is worth what it would gain in the layers: there the squared error falls by 4 dB when the rate doubles, but for
 the tails, which no step makes smaller, so they are left out of that account.
 """
@@ -35,7 +35,7 @@ class TailOptions:
     """What is tried."""
 
     thresholds: tuple[float, ...] = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest
-    shares: tuple[float, ...] = (0.1, 0.25)  # of a patch's vertices that are kept
+    shares: tuple[float, ...] = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept
     lattice: float = 2.0  # spacing of the patches' lattice, in RMS distances of the rest
     exchange: float = 1.33  # relative fall of the squared error for a relative rise of the rate: 4 dB a doubling
 
@@ -56,18 +56,10 @@ class Tails:
     frames: list[Mesh]
 
 
-@dataclass(frozen=True, slots=True)
-class Template:
-    """What the frames of a group have in common, as decoded."""
-
-    faces: Int32[np.ndarray, "F 3"]
-    levels: int  # of subdivision; the children of a face are four in a row
-
-
 def find_tails(
     frames: Sequence[Mesh],
     positions: Float64[np.ndarray, "T V 3"],
-    template: Template,
+    faces: Int32[np.ndarray, "F 3"],
     size: int,
     options: TailOptions = TailOptions(),
 ) -> Tails | None:
@@ -76,24 +68,23 @@ def find_tails(
     `size` is that of the layers without it, bytes. Neither the mean nor the larger of both directions' errors rises by
     more than the layer's bytes are worth.
     """
-    shown = [_Frame(frame, Mesh(points, template.faces)) for frame, points in zip(frames, positions, strict=True)]
+    shown = [_Frame(frame, Mesh(points, faces)) for frame, points in zip(frames, positions, strict=True)]
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
     if usual == 0:
         return None
-    search = _Search(shown, template, usual, options.exchange * len(frames) * usual / size, options)
+    search = _Search(shown, faces, usual, options.exchange * len(frames) * usual / size, options)
     best, least = None, search.cost(None)
-    for dropped, level in search.masks():
-        tried = search.coded(dropped, (Mesh.empty(),) * len(frames), level)
+    for dropped in search.masks():
+        tried = search.coded(dropped, (Mesh.empty(),) * len(frames))
         if (cost := search.cost(tried)) < least:
             best, least = tried, cost
     for patches in search.patches(best):
-        kept = best.parts.dropped[:, :: 4 ** (template.levels - best.record.level)] if best else search.nothing()
-        tried = search.coded(kept, patches, best.record.level if best else 0)
+        tried = search.coded(best.parts.dropped if best else search.nothing, patches)
         if (cost := search.cost(tried)) < least:
             best, least = tried, cost
     if best is None or not search.holds(best):
         return None
-    return Tails(best.record, best.parts.apply(positions, template.faces))
+    return Tails(best.record, best.parts.apply(positions, faces))
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,20 +97,20 @@ class _Coded:
 @dataclass(frozen=True, slots=True)
 class _Search:
     frames: list[_Frame]
-    template: Template
+    faces: Int32[np.ndarray, "F 3"]
     usual: float  # mean squared distance without the tails
     price: float  # of a byte, squared distances summed over the frames
     options: TailOptions
 
-    def nothing(self) -> Bool[np.ndarray, "T G"]:
-        """A mask over the base's faces that drops none."""
-        return np.zeros((len(self.frames), len(self.template.faces) >> 2 * self.template.levels), bool)
+    @property
+    def nothing(self) -> Bool[np.ndarray, "T F"]:
+        """A mask that drops no face."""
+        return np.zeros((len(self.frames), len(self.faces)), bool)
 
-    def coded(self, dropped: Bool[np.ndarray, "T G"], meshes: Sequence[Mesh], level: int) -> _Coded:
-        """A mask over the faces of a level and patches, as decoded."""
-        record, decoded = encode_patches(dropped, meshes, level, self.step_level)
-        parts = Patches(np.repeat(dropped, 4 ** (self.template.levels - level), axis=1), decoded)
-        return _Coded(record, parts, len(pack(record)))
+    def coded(self, dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh]) -> _Coded:
+        """A mask and patches, as decoded."""
+        record, decoded = encode_patches(dropped, meshes, self.step_level)
+        return _Coded(record, Patches(dropped, decoded), len(pack(record)))
 
     @property
     def step_level(self) -> int:
@@ -139,21 +130,18 @@ class _Search:
         if tried is None:
             return np.array([frame.errors for frame in self.frames])
         pairs = zip(self.frames, tried.parts.dropped, tried.parts.meshes, strict=True)
-        return np.array([frame.errors_with(gone, patch) for frame, gone, patch in pairs])
+        return np.array([frame.errors_with(gone, patch, self.usual) for frame, gone, patch in pairs])
 
-    def masks(self) -> Iterator[tuple[Bool[np.ndarray, "T G"], int]]:
-        """Faces that are worth dropping, for each threshold and level of detail; none that are empty."""
-        for level in range(self.template.levels, max(self.template.levels - 2, -1), -1):
-            parts = 4 ** (self.template.levels - level)
-            for threshold in self.options.thresholds:
-                far = [frame.far_faces(parts) > threshold**2 * self.usual for frame in self.frames]
-                chosen = self._paying(np.repeat(np.stack(far), parts, axis=1))[:, ::parts]
-                if chosen.any():
-                    yield chosen, level
+    def masks(self) -> Iterator[Bool[np.ndarray, "T F"]]:
+        """Faces that are worth dropping, for each threshold; none that are empty."""
+        for threshold in self.options.thresholds:
+            chosen = self._paying(np.stack([frame.apart > threshold**2 * self.usual for frame in self.frames]))
+            if chosen.any():
+                yield chosen
 
     def _paying(self, far: Bool[np.ndarray, "T F"]) -> Bool[np.ndarray, "T F"]:
         """Of the regions of faces, connected in space and time, those that are worth their bytes."""
-        labels = _regions(self.template.faces, far)
+        labels = _regions(self.faces, far)
         gains = np.zeros(far.shape)
         for gain, frame, gone in zip(gains, self.frames, far, strict=True):
             if gone.any():
@@ -229,11 +217,6 @@ class _Frame:
         inside = order[: np.searchsorted(np.cumsum(self.weights[order]), BODY)]
         return float(self.weights[inside] @ self.squared[inside])
 
-    def far_faces(self, parts: int) -> Float64[np.ndarray, " G"]:
-        """Mean squared distance of each run of so many decoded faces."""
-        areas = self.areas.reshape(-1, parts).sum(axis=1)
-        return (self.areas * self.apart).reshape(-1, parts).sum(axis=1) / np.where(areas > 0, areas, 1.0)
-
     def gains(self, gone: Bool[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
         """What dropping each of these faces takes away from the mean of both errors, if all are dropped."""
         invented = self.areas * (self.apart - self.errors[1]) / self.areas.sum()
@@ -252,11 +235,16 @@ class _Frame:
         squared[moved] = _squared(kept, self.points[moved])[0]
         return squared
 
-    def errors_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh) -> tuple[float, float]:
-        """Mean squared distances, forward and backward, with a patch and without some faces."""
+    def errors_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh, least: float) -> tuple[float, float]:
+        """Mean squared distances, forward and backward, with a patch and without some faces.
+
+        Samples that are nearer than `least` (squared) are not asked whether the patch is nearer still.
+        """
         squared, areas, apart = self.left(gone), self.areas * ~gone, self.apart
         if not patch.is_empty:
-            squared = np.minimum(squared, _squared(Surface(patch), self.points)[0])
+            far = np.flatnonzero(squared > least)
+            squared = squared.copy()
+            squared[far] = np.minimum(squared[far], _squared(Surface(patch), self.points[far])[0])
             more = self._apart(patch)
             areas, apart = np.concatenate([areas, more[0]]), np.concatenate([apart, more[1]])
         return float(self.weights @ squared), float(areas @ apart / areas.sum()) if areas.any() else np.inf

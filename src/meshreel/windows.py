@@ -27,6 +27,7 @@ from .coding.intra import encode_empty
 from .coding.layers import LayersOptions
 from .errors import InputError, NoReferenceError
 from .format.layout import Form
+from .tails import TailOptions
 from .types import Centers, Mesh
 
 Progress = Callable[[str, int, int], None]  # stage, frames done in it, frames of the sequence
@@ -56,6 +57,7 @@ class EncoderOptions:
     embedded: EmbeddedOptions = field(default_factory=EmbeddedOptions)
     template: TemplateOptions = field(default_factory=TemplateOptions)
     layers: LayersOptions = field(default_factory=LayersOptions)
+    tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches (form LAYERS)
 
     def __post_init__(self) -> None:
         if not 0 <= self.quality <= 100:

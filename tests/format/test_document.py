@@ -14,7 +14,9 @@ from meshreel.coding import entropy, laplacian
 from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.layers import LayersOptions, LayersState, decode_layers, encode_layers
 from meshreel.coding.mesh import decode_mesh
+from meshreel.coding.patches import encode_patches
 from meshreel.coding.reference import code_reference
+from meshreel.coding.steps import step_of
 from meshreel.format import records
 from meshreel.format.layout import AnchorRule, DisplacementHead, LayersGroup, LayersLevel, Origin
 from meshreel.geometry.topology import subdivide_midpoint
@@ -131,3 +133,19 @@ def test_the_document_decodes_layers_to_the_bit(decoder: dict[str, Any], frames:
         told, told_faces, left = told_by(decoder, payload, left)
         np.testing.assert_array_equal(told_faces, faces)
         np.testing.assert_array_equal(told, positions)
+
+
+def test_the_document_decodes_patches_to_the_bit(decoder: dict[str, Any]) -> None:
+    generator, mesh = np.random.default_rng(6), body()
+    shapes = [Mesh.of(0.05 * mesh.vertices - 0.1 * t, mesh.faces) for t in range(3)]
+    for patches in (shapes, [Mesh.empty(), shapes[1], Mesh.empty()], [Mesh.empty()] * 3):
+        for density in (0.0, 0.1, 1.0):
+            dropped = generator.random((3, 50)) < density
+            record, decoded = encode_patches(dropped, patches, 70)
+            one = decode_mesh(record.mesh, step_of(70))
+            lists = [tuple(v) for v in one.vertices.tolist()], [tuple(f) for f in one.faces.tolist()]
+            told = decoder["decode_patches"](record, lists, 3, 50)
+            for t, (kept, places, faces) in enumerate(told):
+                np.testing.assert_array_equal(kept, np.flatnonzero(~dropped[t]))
+                np.testing.assert_array_equal(np.reshape(places, (-1, 3)), decoded[t].vertices)
+                np.testing.assert_array_equal(np.reshape(faces, (-1, 3)), decoded[t].faces)

@@ -78,7 +78,7 @@ def _decode_layers(
     if end == len(data) or (levels is not None and levels <= head.levels):
         return [Mesh(frame, faces) for frame in positions], state
     record = unpack_all(LayersPatches, data[end:])
-    patches = decode_patches(record, head.frames, len(faces) >> 2 * head.levels, head.levels)
+    patches = decode_patches(record, head.frames, len(faces))
     return patches.apply(positions, faces), state
 
 

@@ -1,4 +1,4 @@
-"""Where no template fits: faces that a frame is shown without, and small meshes that it is shown with <-> LayersPatches.
+"""Where no template fits: faces a frame is shown without, and small meshes it is shown with <-> LayersPatches.
 
 In -> out: for each frame of a group a mask over its faces and a mesh on a lattice <-> a record. The masks are runs that
 know the frame before; the meshes of all frames are one Draco mesh, set side by side, so that its head is paid once.
@@ -39,32 +39,28 @@ class Patches:
 
 
 def encode_patches(
-    dropped: Bool[np.ndarray, "T G"], meshes: Sequence[Mesh], level: int, step_level: int
+    dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh], step_level: int
 ) -> tuple[LayersPatches, tuple[Mesh, ...]]:
-    """The record, and the meshes as they decode. The mask is over the faces of `level`, each with all its parts.
+    """The record, and the meshes as they decode.
 
     Raises InputError where the meshes need more cells than Draco can tell apart.
     """
     runs = encode_runs(dropped)
     width, side_by_side = _set_out(meshes, step_of(step_level))
     data = encode_mesh(side_by_side, step_of(step_level))
-    record = LayersPatches(level, len(runs), entropy.encode_integers(runs), step_level, width, data)
+    record = LayersPatches(len(runs), entropy.encode_integers(runs), step_level, width, data)
     return record, _taken_in(record, len(meshes))
 
 
-def decode_patches(record: LayersPatches, frames: int, faces: int, levels: int) -> Patches:
-    """The patches of a group of so many frames, whose template has `faces` faces before its `levels` subdivisions.
-
-    Raises FormatError on a damaged record.
-    """
-    if record.level > levels or record.step_level >= LEVELS:
-        raise FormatError(f"patches on level {record.level} of {levels}, at step level {record.step_level}")
+def decode_patches(record: LayersPatches, frames: int, faces: int) -> Patches:
+    """The patches of a group of so many frames, whose finest level has so many faces. FormatError where damaged."""
+    if record.step_level >= LEVELS:
+        raise FormatError(f"patches: step level {record.step_level}, there are {LEVELS}")
     runs = entropy.decode_integers(record.dropped, record.runs)
-    dropped = decode_runs(runs, frames, faces * 4**record.level)
-    return Patches(np.repeat(dropped, 4 ** (levels - record.level), axis=1), _taken_in(record, frames))
+    return Patches(decode_runs(runs, frames, faces), _taken_in(record, frames))
 
 
-def encode_runs(dropped: Bool[np.ndarray, "T G"]) -> Int32[np.ndarray, " N"]:
+def encode_runs(dropped: Bool[np.ndarray, "T F"]) -> Int32[np.ndarray, " N"]:
     """Lengths of runs: kept in all frames or not, by face; then the same as in the frame before or not, of the others.
 
     Both begin with a run that is kept, or the same, which alone may have no length. No runs where nothing is dropped.
@@ -74,10 +70,10 @@ def encode_runs(dropped: Bool[np.ndarray, "T G"]) -> Int32[np.ndarray, " N"]:
     ever = dropped.any(axis=0)
     known = dropped[:, ever]
     turned = known ^ np.concatenate([np.zeros((1, known.shape[1]), bool), known[:-1]])
-    return np.concatenate([_lengths(ever), _lengths(turned.reshape(-1))])
+    return np.concatenate([_lengths(np.asarray(ever)), _lengths(turned.reshape(-1))])
 
 
-def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[np.ndarray, "T G"]:
+def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[np.ndarray, "T F"]:
     """The mask. Raises FormatError where the runs do not fill it."""
     dropped = np.zeros((frames, faces), bool)
     if len(runs) == 0:
@@ -98,12 +94,14 @@ def _lengths(bits: Bool[np.ndarray, " N"]) -> Int32[np.ndarray, " R"]:
 
 def _filled(runs: Int32[np.ndarray, " N"], count: int) -> tuple[Bool[np.ndarray, " C"], Int32[np.ndarray, " R"]]:
     """So many bits from the first runs, and the runs that are left."""
-    if (runs[:1] < 0).any() or (runs[1:] < 1).any():
-        raise FormatError("patches: a run without length")
+    if (runs < 0).any():
+        raise FormatError("patches: a run of negative length")
     ends = np.cumsum(runs.astype(np.int64))
     last = int(np.searchsorted(ends, count))
     if last >= len(runs) or ends[last] != count:
         raise FormatError(f"patches: runs that do not end with the {count} faces they tell of")
+    if (runs[1 : last + 1] == 0).any():
+        raise FormatError("patches: a run without length")
     return np.repeat(np.arange(last + 1) % 2 == 1, runs[: last + 1]), runs[last + 1 :]
 
 

@@ -195,7 +195,6 @@ class LayersLevel:
 class LayersPatches:
     """The last layer of a group of form LAYERS, which it may be without: what does not follow the base mesh."""
 
-    level: Annotated[int, U8, "the mask is over the faces of this level, at most L; 0 is the base"]
     runs: Annotated[int, Varint(), "number of integers in `dropped`"]
     dropped: Annotated[bytes, Blob(Varint()), "integers: lengths of runs, of faces that frames are shown without"]
     step_level: Annotated[int, U8, "k: the spacing of the mesh's lattice is 2^(-k/8)"]

@@ -1,0 +1,177 @@
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from meshreel.coding.group import continue_group, decode_group, payload_parts
+from meshreel.coding.layers import encode_layers
+from meshreel.coding.patches import Patches, decode_patches, decode_runs, encode_patches, encode_runs
+from meshreel.errors import FormatError, InputError
+from meshreel.format.layout import LayersPatches
+from meshreel.format.records import pack
+from meshreel.types import Mesh
+
+from .bodies import ball, moving
+from .test_laplacian import icosahedron
+
+FRAMES, STEP_LEVEL = 4, 72
+BALL = ball()
+CODED = encode_layers(BALL, moving(BALL, FRAMES))
+FACES = len(BALL.base.faces)
+SPHERE = icosahedron(1)
+MESHES = tuple(Mesh.of(0.05 * SPHERE.vertices - 0.1 * t, SPHERE.faces) for t in range(FRAMES - 1)) + (Mesh.empty(),)
+DROPPED = np.zeros((FRAMES, FACES), bool)
+DROPPED[1:, 100:140] = True
+DROPPED[2, 120:200] = True
+RECORD, DECODED = encode_patches(DROPPED, MESHES, STEP_LEVEL)
+PAYLOAD = CODED.payload + pack(RECORD)
+
+
+@given(arrays(bool, st.tuples(st.integers(1, 5), st.integers(1, 40))))
+def test_a_mask_is_what_its_runs_say(dropped: np.ndarray) -> None:
+    runs = encode_runs(dropped)
+    np.testing.assert_array_equal(decode_runs(runs, *dropped.shape), dropped)
+    assert len(runs) == 0 or dropped.any()
+
+
+@given(st.lists(st.integers(-(2**31), 2**31 - 1) | st.integers(0, 6), max_size=12))
+def test_any_runs_give_a_mask_that_has_them_or_are_refused(runs: list[int]) -> None:
+    values = np.array(runs, np.int32)
+    with contextlib.suppress(FormatError):
+        mask = decode_runs(values, 3, 10)
+        assert mask.shape == (3, 10)
+
+
+@pytest.mark.parametrize("runs", [[10], [11, 1], [3, 0, 7, 9], [3, 7, 21, 1], [3, 7, 20], [-1, 11], [3, 2, 5], [0, 10]])
+def test_runs_that_do_not_fill_the_mask_are_refused(runs: list[int]) -> None:
+    with pytest.raises(FormatError):
+        decode_runs(np.array(runs, np.int32), 3, 10)
+
+
+def test_a_mask_that_lasts_costs_little_more_than_one_frame() -> None:
+    generator = np.random.default_rng(1)
+    once = generator.random((1, 4000)) < 0.02
+    assert len(encode_runs(np.repeat(once, 16, axis=0))) <= len(encode_runs(once)) + 1
+
+
+def test_decoding_gives_the_mask_and_the_meshes_to_the_bit() -> None:
+    patches = decode_patches(RECORD, FRAMES, FACES)
+    np.testing.assert_array_equal(patches.dropped, DROPPED)
+    for mine, theirs, wanted in zip(patches.meshes, DECODED, MESHES, strict=True):
+        np.testing.assert_array_equal(mine.vertices, theirs.vertices)
+        np.testing.assert_array_equal(mine.faces, theirs.faces)
+        assert len(mine.faces) == len(wanted.faces)
+        if not wanted.is_empty:
+            apart = np.linalg.norm(mine.vertices[:, None] - wanted.vertices, axis=2).min(axis=1)
+            assert apart.max() < 2.0 ** (-STEP_LEVEL / 8)
+
+
+def test_frames_are_shown_without_the_faces_and_with_the_meshes() -> None:
+    frames = decode_group(PAYLOAD, FRAMES)
+    for t, (frame, plain) in enumerate(zip(frames, decode_group(CODED.payload, FRAMES), strict=True)):
+        count = FACES - int(DROPPED[t].sum())
+        np.testing.assert_array_equal(frame.faces[:count], plain.faces[~DROPPED[t]])
+        np.testing.assert_array_equal(frame.vertices[: len(plain.vertices)], plain.vertices)
+        np.testing.assert_array_equal(frame.faces[count:] - len(plain.vertices), DECODED[t].faces)
+        np.testing.assert_array_equal(frame.vertices[len(plain.vertices) :], DECODED[t].vertices)
+
+
+def test_without_their_layer_the_group_is_as_it_was() -> None:
+    ends = (*CODED.layers, len(PAYLOAD))
+    for levels in range(BALL.levels + 1):
+        for data in (PAYLOAD, PAYLOAD[: ends[levels]]):
+            frames = decode_group(data, FRAMES, levels)
+            for mine, theirs in zip(frames, decode_group(CODED.payload, FRAMES, levels), strict=True):
+                np.testing.assert_array_equal(mine.vertices, theirs.vertices)
+                np.testing.assert_array_equal(mine.faces, theirs.faces)
+    assert len(decode_group(PAYLOAD, FRAMES, BALL.levels + 1)[0].vertices) > len(BALL.base.vertices)
+
+
+def test_the_next_group_is_predicted_as_if_nothing_were_patched() -> None:
+    state = continue_group(PAYLOAD, FRAMES, None, None)[1]
+    assert state is not None
+    np.testing.assert_array_equal(state.base, CODED.state.base)
+
+
+def test_the_parts_of_a_payload_are_all_its_bytes() -> None:
+    parts = payload_parts(PAYLOAD)
+    assert sum(parts.values()) == len(PAYLOAD)
+    assert parts["dropped faces"] == len(RECORD.dropped) and parts["patches"] == len(RECORD.mesh)
+
+
+def test_nothing_to_change_takes_a_handful_of_bytes() -> None:
+    record, _ = encode_patches(np.zeros((3, 9), bool), [Mesh.empty()] * 3, STEP_LEVEL)
+    assert len(pack(record)) <= 5
+    patches = decode_patches(record, 3, 9)
+    assert not patches.dropped.any() and all(mesh.is_empty for mesh in patches.meshes)
+
+
+def test_all_faces_may_go() -> None:
+    record, _ = encode_patches(np.ones((FRAMES, FACES), bool), [Mesh.empty()] * FRAMES, STEP_LEVEL)
+    assert all(mesh.is_empty for mesh in decode_group(CODED.payload + pack(record), FRAMES))
+
+
+def test_meshes_too_wide_for_the_lattice_are_refused() -> None:
+    wide = [Mesh.of(300 * SPHERE.vertices, SPHERE.faces)] * FRAMES
+    with pytest.raises(InputError, match="raise the step"):
+        encode_patches(DROPPED, wide, 100)
+
+
+@pytest.mark.parametrize("size", range(1, len(pack(RECORD))))
+def test_a_truncated_record_is_refused(size: int) -> None:
+    with pytest.raises(FormatError):
+        decode_group(PAYLOAD[: len(CODED.payload) + size], FRAMES)
+
+
+def test_bytes_behind_it_are_refused() -> None:
+    with pytest.raises(FormatError, match="too many"):
+        decode_group(PAYLOAD + b"x", FRAMES)
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"runs": RECORD.runs + 1},
+        {"runs": 2**40},
+        {"dropped": b""},
+        {"step_level": 200},
+        {"width": 0},
+        {"width": 1},
+        {"width": RECORD.width // 2},
+        {"width": 2**60},
+        {"mesh": b"DRACO"},
+        {"mesh": RECORD.mesh[:-3]},
+    ],
+    ids=str,
+)
+def test_a_damaged_record_is_refused(damage: dict[str, object]) -> None:
+    with pytest.raises(FormatError):
+        decode_patches(replace(RECORD, **damage), FRAMES, FACES)  # type: ignore[arg-type]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, len(pack(RECORD)) - 1), st.integers(1, 255))
+def test_flipped_bits_give_a_valid_mesh_or_a_format_error(at: int, flip: int) -> None:
+    data = bytearray(PAYLOAD)
+    data[len(CODED.payload) + at] ^= flip
+    with contextlib.suppress(FormatError):
+        for mesh in decode_group(bytes(data), FRAMES):
+            assert np.isfinite(mesh.vertices).all()
+            assert mesh.is_empty or (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices))
+
+
+def test_a_mask_over_other_faces_is_refused() -> None:
+    with pytest.raises(FormatError):
+        decode_patches(RECORD, FRAMES, FACES - 1)
+
+
+def test_frames_without_changes_keep_the_templates_faces_themselves() -> None:
+    plain = Patches(np.zeros((1, FACES), bool), (Mesh.empty(),))
+    assert plain.apply(CODED.positions[:1], BALL.base.faces)[0].faces is BALL.base.faces
+    assert isinstance(RECORD, LayersPatches)
