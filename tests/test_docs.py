@@ -7,6 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -24,13 +25,12 @@ def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
     _run_page(RUN[0], tmp_path, "small")
 
 
-def test_the_tutorial_runs_as_it_stands_and_shows_components(tmp_path: Path) -> None:
+def test_the_tutorial_runs_as_it_stands_and_shows_layers(tmp_path: Path) -> None:
     printed = _run_page(RUN[1], tmp_path)
     with meshreel.open(tmp_path / "scan.reel") as video:
-        assert [group.form for group in video.reader.groups] == [Form.LAPLACIAN]
-    sizes, away = zip(*re.findall(r"(\d+) bytes, ([\d.]+) mm", printed), strict=True)
-    assert len(sizes) == 4 and sorted(sizes, key=int) == list(sizes) and len(set(sizes)) == 4
-    assert sorted(away, key=float, reverse=True) == list(away) and float(away[-1]) == 0 and len(set(away)) == 4
+        assert [group.form for group in video.reader.groups] == [Form.LAYERS]
+    shown = [(int(size), int(count)) for size, count in re.findall(r"(\d+) bytes, (\d+) vertices", printed)]
+    assert len(shown) == 3 and all(a < c and 2 * b < d for (a, b), (c, d) in pairwise(shown))
 
 
 @pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)

@@ -76,6 +76,8 @@ def encode_to(
     meets the goal.
     """
     search, path = Search(goal), Path(path)
+    if path.is_dir() or not path.parent.is_dir():
+        raise InputError(f"{path}: cannot be written: {'is a folder' if path.is_dir() else 'no such folder'}")
     partial = path.with_name(f".{uuid.uuid4().hex}.tmp")
     try:
         for _ in range(TRIALS):

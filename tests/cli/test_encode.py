@@ -58,6 +58,29 @@ def test_every_option_reaches_the_encoder(run, balls, tmp_path):
 
 
 @pytest.mark.usefixtures("quick_presets")
+def test_groups_are_predicted_between_the_frames_that_keyint_asks_for(run, balls, tmp_path):
+    said = run(
+        "encode", balls, "-o", tmp_path / "a.reel", "--group-size", "1", "--fps", "10", "--keyint", "0.2", "--json"
+    )
+    groups = run("info", tmp_path / "a.reel", "--json").row["groups"]
+    assert [group["predicted"] for group in said.row["groups"]] == [group["predicted"] for group in groups]
+    assert [group["first_frame"] for group in groups if not group["predicted"]][:1] == [0]
+    assert all(group["layers"] == 2 for group in groups if group["form"] == "layers")
+    assert len(groups) == 3 and not groups[1]["predicted"]  # runs of one and of two frames
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_a_target_is_met_and_the_quality_that_met_it_told(run, balls, tmp_path):
+    out = tmp_path / "a.reel"
+    first = run("encode", balls, "-o", out, "--frames", ":1", "--quality", "45", "--json").row
+    said = run("encode", balls, "-o", out, "--frames", ":1", "--target-mbps", first["mbps"], "--json")
+    assert said.code == 0 and said.row["mbps"] == pytest.approx(first["mbps"], rel=0.05)
+    assert run("info", out, "--json").row["metadata"]["quality"] == said.row["quality"]
+    assert failed(run("encode", balls, "-o", out, "--frames", ":1", "--target-mbps", "1e-6"), "a.reel", "no quality")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.reel"]
+
+
+@pytest.mark.usefixtures("quick_presets")
 def test_two_processes_write_the_same_file_as_one(run, balls, tmp_path):
     for jobs in ("1", "2"):
         said = run("encode", balls, "-o", tmp_path / f"{jobs}.reel", "--group-size", "1", "--jobs", jobs, "--quiet")
@@ -128,8 +151,17 @@ def test_a_frame_that_cannot_be_used_is_told_with_file_and_number(run, tmp_path,
         (["-o", "a.reel", "--quality", "101"], ["quality", "101"]),
         (["-o", "a.reel", "--quality", "high"], ["high"]),
         (["-o", "a.reel", "--group-size", "0"], ["group size", "0"]),
-        (["-o", "a.reel", "--centers", "0"], ["centers", "0"]),
-        (["-o", "a.reel", "--basis-size", "-1"], ["-1"]),
+        (["-o", "a.reel", "--preset", "paper", "--centers", "0"], ["centers", "0"]),
+        (["-o", "a.reel", "--preset", "paper", "--basis-size", "-1"], ["-1"]),
+        (["-o", "a.reel", "--basis-size", "4"], ["basis size 4", "preset `paper`"]),
+        (["-o", "a.reel", "--centers", "300"], ["centers 300", "preset `paper`"]),
+        (["-o", "a.reel", "--keyint", "0"], ["key interval 0"]),
+        (["-o", "a.reel", "--keyint", "2", "--preset", "paper"], ["key interval 2"]),
+        (["-o", "a.reel", "--quality", "50", "--target-psnr", "60"], ["--quality 50", "one of both"]),
+        (["-o", "a.reel", "--quality", "0", "--target-mbps", "1"], ["--quality 0", "one of both"]),
+        (["-o", "a.reel", "--target-mbps", "1", "--target-psnr", "60"], ["60", "1", "one of them"]),
+        (["-o", "a.reel", "--target-psnr", "-3"], ["-3 dB"]),
+        (["-o", "a.reel", "--target-mbps", "0"], ["0 Mbps"]),
         (["-o", "a.reel", "--fps", "0"], ["frame rate"]),
         (["-o", "a.reel", "--scale", "-1"], ["scale"]),
         (["-o", "a.reel", "--frames", "1-2"], ["1-2"]),

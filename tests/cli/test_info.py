@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import meshreel
 from tests.cli.conftest import FILE, failed
+from tests.golden import GOLDEN
 
 
 def test_every_byte_is_in_some_part_and_in_some_group(run):
@@ -49,3 +50,14 @@ def test_other_files_are_told(run, tmp_path):
     assert failed(run("info", tmp_path / "a.reel"), "a.reel", "not a .reel")
     assert failed(run("info", tmp_path / "b.reel", "--json"), "b.reel")
     assert failed(run("info"), "FILE")
+
+
+def test_a_group_that_is_predicted_from_the_one_before_is_told(run):
+    file = GOLDEN / "layers.reel"
+    groups = run("info", file, "--json").row["groups"]
+    assert [(group["form"], group["layers"], group["predicted"]) for group in groups] == [
+        ("layers", 2, False),
+        ("layers", 2, True),
+        ("layers", 2, True),
+    ]
+    assert run("info", file).out.count("layers, predicted") == 2

@@ -22,8 +22,8 @@ from meshreel.evaluation.runner import Bench, run_point, run_points
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Mesh, MeshList
-from tests.small_options import TRIALS
 from tests.golden import GOLDEN
+from tests.small_options import TRIALS
 
 BALLS = sliding_sphere(2, levels=2)
 QUICK = ComparisonOptions(ssim=False)
