@@ -97,6 +97,25 @@ def correspondence(rows: list[Row]) -> Table:
     ]
 
 
+def tails(rows: list[Row]) -> Table:
+    """A row a clip, quality and way: rate, and every metric."""
+    heads = ["frames", "> quality", "tails", "> Mbps", "> d2 (paper), dB", "> symmetric, dB", "> worst frame, dB"]
+    heads += ["> normals, degrees", "> SSIM", "> CPU s a frame"]
+    names = ("d2_psnr_paper", "symmetric_psnr", "worst_symmetric_psnr", "normal_error_deg")
+    return heads, [
+        [
+            r["case"],
+            f"{r['quality']:g}",
+            r["way"],
+            "" if r["mbps"] is None else f"{r['mbps']:.4f}",
+            *(f"{r[name]:.2f}" for name in names),
+            f"{r['ssim_masked']:.4f}",
+            f"{r['cpu_s_per_frame']:.2f}" if r.get("cpu_s_per_frame", 0) > 0.005 else "",
+        ]
+        for r in rows
+    ]
+
+
 TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "noise": noise,
     "anchors": anchors,
@@ -104,6 +123,7 @@ TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "pose": pose,
     "second fit": second_fit,
     "correspondence": correspondence,
+    "tails": tails,
 }
 
 

@@ -17,6 +17,7 @@ VARIANTS: dict[str, Change] = {
     "no second fit": lambda o: replace(o, fit=replace(o.fit, components=0)),
     "groups not cut": lambda o: replace(o, groups=replace(o.groups, limit=1e9, tolerance=1e9)),
     "groups of 5": lambda o: replace(o, group_size=5),
+    "no patches": lambda o: replace(o, tails=None),
     "one key tried": lambda o: replace(o, reference=o.reference.fewer_trials()),
 }
 

@@ -16,7 +16,7 @@ from . import layers
 BODIES = ("dancer", "basketball_player")
 WHOLE = (20.0, 35.0, 50.0, 65.0, 80.0)  # qualities of the whole: its curve reaches around every variant's
 QUALITIES = (35.0, 65.0)  # of the variants
-PARTS = ("no second fit", "groups not cut", "groups of 5")
+PARTS = ("no second fit", "groups not cut", "groups of 5", "no patches")
 COMPARISON = layers.COMPARISON
 
 
