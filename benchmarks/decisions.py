@@ -1,7 +1,7 @@
 """The numbers in docs/decisions, measured on one group of the procedural story: one JSON row a line.
 
 python benchmarks/decisions.py > docs/decisions/measured.jsonl        # some minutes
-That drops the rows of captured bodies, which benchmarks/correspondence.py puts in again.
+That drops the rows of captured bodies, which benchmarks/correspondence.py and benchmarks/tails.py put in again.
 """
 
 from __future__ import annotations

@@ -17,11 +17,13 @@ from meshreel.coding.displacements import DisplacementOptions
 from meshreel.coding.group import code_reference, encode_group
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.coding.layers import LayersOptions, LayersState, encode_layers
+from meshreel.coding.patches import encode_patches
 from meshreel.coding.reference import CodedReference
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import Video
 from meshreel.decoder import open as open_video
-from meshreel.format.layout import Header
+from meshreel.format.layout import Form, Header, Origin
+from meshreel.format.records import pack
 from meshreel.types import Mesh
 from tests.golden import frame_record
 
@@ -39,12 +41,18 @@ def main(folder: Path) -> None:
         "empty": (header(), [nothing]),
         "layers": (header(), layers_groups(ball(), (1, 10, 3))),
         "layers_open": (header(), [nothing, *layers_groups(patches(), (4, 1)), *layers_groups(ball(), (2,))]),
+        "layers_patched": (header(), patched_groups()),
         "mixed": (header(intervals=(40_000, 20_000, 33_333) * 3), [nothing, moving, still, (1, *nothing[1:])]),
     }
     for name, (head, groups) in files.items():
         path = folder / f"{name}.reel"
         with ReelWriter(path, head) as writer:
+<<<<<<< HEAD
             for frames, payload, layers, predicted in groups:
+=======
+            for frames, payload, layers in groups:
+                predicted = payload[:2] == bytes((Form.LAYERS, Origin.PREVIOUS))
+>>>>>>> tails
                 before = (writer.last_group,) if predicted and writer.last_group is not None else ()
                 writer.add_group(writer.frame_count, frames, payload, layers, before)
         path.with_suffix(".json").write_text(json.dumps(record(open_video(path)), indent=1) + "\n")
@@ -105,6 +113,20 @@ def layers_groups(reference: CodedReference, sizes: tuple[int, ...]) -> list[Gro
         coded = encode_layers(reference, wanted, LayersOptions(step=0.001), state)
         groups.append((frames, coded.payload, coded.layers, state is not None))
         state, first = coded.state, first + frames
+    return groups
+
+
+def patched_groups() -> list[Group]:
+    """Two groups, the second predicted from the first, with faces that go and come, and meshes beside them."""
+    groups = list[Group]()
+    knob = deforming_sphere(1, levels=1)[0]
+    for number, (frames, payload, layers) in enumerate(layers_groups(ball(), (3, 2))):
+        dropped = np.zeros((frames, len(ball().base.faces)), bool)
+        dropped[0, 40 + number : 90] = True
+        dropped[1:, 60:130] = True
+        beside = [Mesh.of(0.05 * knob.vertices + [0.3 - 0.6 * t, 0, 0], knob.faces) for t in range(frames)]
+        record, _ = encode_patches(dropped, [*beside[:-1], Mesh.empty()], 70)
+        groups.append((frames, payload + pack(record), (*layers, len(payload) + len(pack(record)))))
     return groups
 
 

@@ -97,6 +97,7 @@ def correspondence(rows: list[Row]) -> Table:
     ]
 
 
+<<<<<<< HEAD
 def template(rows: list[Row]) -> Table:
     """A row a template or a choice of the coder; rate and quality at each step."""
     steps = _distinct(rows, "step")
@@ -107,6 +108,25 @@ def template(rows: list[Row]) -> Table:
     said = "{mbps:.3f}, {symmetric_psnr:.1f}, {normal_error_deg:.2f}"
     cells = [[said.format(**row) for row in line] for line in told]
     return heads, [[*name, *line] for name, line in zip(names, cells, strict=True)]
+=======
+def tails(rows: list[Row]) -> Table:
+    """A row a clip, quality and way: rate, and every metric."""
+    heads = ["frames", "> quality", "tails", "> Mbps", "> d2 (paper), dB", "> symmetric, dB", "> worst frame, dB"]
+    heads += ["> normals, degrees", "> SSIM", "> CPU s a frame"]
+    names = ("d2_psnr_paper", "symmetric_psnr", "worst_symmetric_psnr", "normal_error_deg")
+    return heads, [
+        [
+            r["case"],
+            f"{r['quality']:g}",
+            r["way"],
+            "" if r["mbps"] is None else f"{r['mbps']:.4f}",
+            *(f"{r[name]:.2f}" for name in names),
+            f"{r['ssim_masked']:.4f}",
+            f"{r['cpu_s_per_frame']:.2f}" if r.get("cpu_s_per_frame", 0) > 0.005 else "",
+        ]
+        for r in rows
+    ]
+>>>>>>> tails
 
 
 TABLES: dict[str, Callable[[list[Row]], Table]] = {
@@ -116,7 +136,11 @@ TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "pose": pose,
     "second fit": second_fit,
     "correspondence": correspondence,
+<<<<<<< HEAD
     "template": template,
+=======
+    "tails": tails,
+>>>>>>> tails
 }
 
 

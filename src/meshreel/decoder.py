@@ -60,8 +60,8 @@ class Video(Sequence[Mesh]):
     def at(self, quality: int | None) -> Video:
         """The same video from at most this many layers of a group beyond the first: fewer bytes, still valid.
 
-        A layer is one subdivision of a group of form LAYERS, whose mesh is coarser without it, and one displacement
-        component of a group of form LAPLACIAN. None: all of them.
+        A layer is one subdivision of a group of form LAYERS, whose mesh is coarser without it, or its patches, which
+        come last; and one displacement component of a group of form LAPLACIAN. None: all of them.
         """
         if quality is not None and quality < 0:
             raise InputError(f"quality must not be negative, got {quality}: give a number of layers, or None for all")

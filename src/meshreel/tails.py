@@ -295,8 +295,9 @@ def _regions(faces: Int32[np.ndarray, "F 3"], far: Bool[np.ndarray, "T F"]) -> I
     ends = earlier * count + faces[same, 0]
     links = np.stack([ends, ends + count, ends], axis=1)
     used, inverse = np.unique(np.concatenate([corners, links]), return_inverse=True)
+    triples = inverse.reshape(-1, 3).astype(np.int32)
     labels = np.full(far.shape, -1)
-    labels[far] = components(inverse.reshape(-1, 3), len(used))[inverse.reshape(-1, 3)[: len(at), 0]]
+    labels[far] = components(triples, len(used))[triples[: len(at), 0]]
     return labels
 
 

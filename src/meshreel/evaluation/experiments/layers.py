@@ -24,11 +24,11 @@ COMPARISON = ComparisonOptions(views=ParallelViewOptions())  # four parallel vie
 QUALITIES: dict[str, tuple[float, ...]] = {
     "dancer": (5, 20, 35, 50, 65, 80, 95),
     "basketball_player": (5, 20, 35, 50, 65, 80, 95),
-    "mitch": (35, 50, 65),
-    "crane60": (20, 40, 60, 80),
-    "samba60": (20, 40, 60, 80),
+    "mitch": (50, 65, 80),
+    "crane60": (25, 50, 75),
+    "samba60": (25, 50, 75),
 }
-PAPER = (15.0, 35.0, 50.0, 75.0)  # qualities of the preset that the curves are shown beside
+PAPER = (35.0, 75.0)  # qualities of the preset that the curves are shown beside
 PAPER_ON = ("dancer", "basketball_player")
 COLLISION = 50.0
 DECODED = (35.0, 50.0, 65.0)  # qualities at which decoding is timed, on dancer

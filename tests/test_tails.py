@@ -1,0 +1,146 @@
+"""Patches are found where surface is missing or too much, and nowhere else; and only where they pay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.choice import Quality, measure
+from meshreel.coding.group import payload_parts
+from meshreel.coding.patches import decode_patches
+from meshreel.encoder import encode
+from meshreel.errors import InputError
+from meshreel.format.records import pack
+from meshreel.presets import preset_options
+from meshreel.tails import TailOptions, find_tails
+from meshreel.types import Mesh, MeshList
+from meshreel.windows import EncoderOptions
+from tests.coding.test_laplacian import icosahedron
+
+BALL = Mesh.of(0.3 * icosahedron(3).vertices, icosahedron(3).faces)
+NOISE = 1e-4 * np.random.default_rng(0).normal(size=(6, *BALL.vertices.shape))
+SIZE = 4000  # bytes of the layers, say
+
+
+def knob(scale: float = 0.05, at: float = 0.4) -> Mesh:
+    """A small ball beside the large one."""
+    small = icosahedron(1)
+    return Mesh.of(scale * small.vertices + [at, 0, 0], small.faces)
+
+
+def both(one: Mesh, other: Mesh) -> Mesh:
+    return Mesh.of(np.concatenate([one.vertices, other.vertices]),
+                   np.concatenate([one.faces, other.faces + len(one.vertices)]))  # fmt: skip
+
+
+def noisy(mesh: Mesh, frames: int = 6) -> np.ndarray:
+    """Places of a mesh that begins with the ball's vertices, a little wrong."""
+    places = np.repeat(mesh.vertices[None], frames, axis=0)
+    places[:, : len(BALL.vertices)] += NOISE[:frames]
+    return places
+
+
+def test_where_the_template_fits_there_is_no_layer() -> None:
+    assert find_tails([BALL] * 6, noisy(BALL), BALL.faces, SIZE) is None
+
+
+def test_a_perfect_template_has_no_tails() -> None:
+    places = np.repeat(BALL.vertices[None], 2, axis=0)
+    assert find_tails([BALL] * 2, places, BALL.faces, SIZE) is None
+
+
+def test_surface_that_is_not_there_any_more_is_dropped() -> None:
+    template = both(BALL, knob())
+    frames = [template] * 3 + [BALL] * 3
+    found = find_tails(frames, noisy(template), template.faces, SIZE)
+    assert found is not None
+    for t, frame in enumerate(found.frames):
+        assert len(frame.faces) == (len(template.faces) if t < 3 else len(BALL.faces))
+    assert len(pack(found.record)) < 40 and not found.record.mesh
+
+
+def test_surface_that_is_new_is_added() -> None:
+    frames = [BALL] * 5 + [both(BALL, knob())]
+    found = find_tails(frames, noisy(BALL), BALL.faces, SIZE)
+    assert found is not None
+    assert [len(frame.faces) > len(BALL.faces) for frame in found.frames] == [False] * 5 + [True]
+    plain = [Mesh(places, BALL.faces) for places in noisy(BALL)]
+    assert measure(frames, found.frames).distance < 0.3 * measure(frames, plain).distance
+
+
+def test_without_shares_nothing_is_added() -> None:
+    frames = [BALL] * 5 + [both(BALL, knob())]
+    assert find_tails(frames, noisy(BALL), BALL.faces, SIZE, TailOptions(shares=())) is None
+
+
+def test_where_bytes_are_dear_nothing_is_sent() -> None:
+    frames = [BALL] * 5 + [both(BALL, knob(0.004, 0.32))]
+    assert find_tails(frames, noisy(BALL), BALL.faces, SIZE, TailOptions(exchange=1e9)) is None
+
+
+@pytest.mark.parametrize("size", [300, 3000, 30_000])
+@pytest.mark.parametrize("scale", [0.003, 0.01, 0.05])
+def test_it_is_never_worse_than_what_the_bytes_are_worth(size: int, scale: float) -> None:
+    template = both(BALL, knob(scale))
+    frames = [both(BALL, knob(scale, -0.4))] * 2 + [template] * 4
+    places = noisy(template)
+    found = find_tails(frames, places, template.faces, size)
+    if found is None:
+        return
+    before = measure(frames, [Mesh(p, template.faces) for p in places]).distance ** 2
+    after = measure(frames, found.frames).distance ** 2
+    body = 6 * measure([BALL] * 6, [Mesh(p, BALL.faces) for p in noisy(BALL)]).distance ** 2
+    assert 6 * (before - after) > 0.5 * body * len(pack(found.record)) / size  # half: it counts the body a little less
+
+
+def test_the_frames_are_those_that_the_record_decodes_to() -> None:
+    template = both(BALL, knob())
+    frames = [both(BALL, knob(at=-0.4)), template, BALL]
+    places = noisy(template, 3)
+    found = find_tails(frames, places, template.faces, SIZE)
+    assert found is not None and found.record.mesh and found.record.dropped
+    decoded = decode_patches(found.record, 3, len(template.faces)).apply(places, template.faces)
+    for mine, theirs in zip(decoded, found.frames, strict=True):
+        np.testing.assert_array_equal(mine.vertices, theirs.vertices)
+        np.testing.assert_array_equal(mine.faces, theirs.faces)
+    assert find_tails(frames, places, template.faces, SIZE).record == found.record  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"thresholds": ()}, {"thresholds": (1.0,)}, {"shares": (0.0,)}, {"lattice": 0.0}, {"exchange": -1.0}]
+)
+def test_options_out_of_range_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="give"):
+        TailOptions(**wrong)  # type: ignore[arg-type]
+
+
+def options() -> EncoderOptions:
+    """`best`, all frames in one group."""
+    best = preset_options("best", 40.0, group_size=4)
+    groups = replace(best.groups, limit=1e6, tolerance=1e6)
+    return replace(best, groups=groups, target=Quality(0.01, 90.0, 0.01))
+
+
+@pytest.fixture(scope="module")
+def sequence() -> MeshList:
+    """A ball that grows; beside it, in the first frame only, a knob."""
+    frames = [Mesh.of((1 + 0.02 * t) * BALL.vertices, BALL.faces) for t in range(4)]
+    return MeshList((both(frames[0], knob()), *frames[1:]))
+
+
+def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path) -> None:
+    encode(sequence, tmp_path / "with.reel", options())
+    encode(sequence, tmp_path / "without.reel", replace(options(), tails=None))
+    patched, plain = meshreel.open(tmp_path / "with.reel"), meshreel.open(tmp_path / "without.reel")
+    assert "patches" in payload_parts(patched.reader.read_chunk(0))
+    assert "patches" not in payload_parts(plain.reader.read_chunk(0))
+    levels = len(plain.reader.chunks[0].layers) - 1
+    for mine, theirs in zip(patched.at(levels), plain, strict=True):
+        np.testing.assert_array_equal(mine.vertices, theirs.vertices)
+        np.testing.assert_array_equal(mine.faces, theirs.faces)
+    assert len(patched[0].faces) > len(plain[0].faces) and len(patched[1].faces) <= len(plain[1].faces)
+    assert len(patched.at(levels + 1)[0].faces) == len(patched[0].faces)
+    assert measure(list(sequence), list(patched)).distance < 0.5 * measure(list(sequence), list(plain)).distance
