@@ -47,12 +47,7 @@ def main(folder: Path) -> None:
     for name, (head, groups) in files.items():
         path = folder / f"{name}.reel"
         with ReelWriter(path, head) as writer:
-<<<<<<< HEAD
             for frames, payload, layers, predicted in groups:
-=======
-            for frames, payload, layers in groups:
-                predicted = payload[:2] == bytes((Form.LAYERS, Origin.PREVIOUS))
->>>>>>> tails
                 before = (writer.last_group,) if predicted and writer.last_group is not None else ()
                 writer.add_group(writer.frame_count, frames, payload, layers, before)
         path.with_suffix(".json").write_text(json.dumps(record(open_video(path)), indent=1) + "\n")

@@ -97,7 +97,6 @@ def correspondence(rows: list[Row]) -> Table:
     ]
 
 
-<<<<<<< HEAD
 def template(rows: list[Row]) -> Table:
     """A row a template or a choice of the coder; rate and quality at each step."""
     steps = _distinct(rows, "step")
@@ -108,7 +107,8 @@ def template(rows: list[Row]) -> Table:
     said = "{mbps:.3f}, {symmetric_psnr:.1f}, {normal_error_deg:.2f}"
     cells = [[said.format(**row) for row in line] for line in told]
     return heads, [[*name, *line] for name, line in zip(names, cells, strict=True)]
-=======
+
+
 def tails(rows: list[Row]) -> Table:
     """A row a clip, quality and way: rate, and every metric."""
     heads = ["frames", "> quality", "tails", "> Mbps", "> d2 (paper), dB", "> symmetric, dB", "> worst frame, dB"]
@@ -126,7 +126,6 @@ def tails(rows: list[Row]) -> Table:
         ]
         for r in rows
     ]
->>>>>>> tails
 
 
 TABLES: dict[str, Callable[[list[Row]], Table]] = {
@@ -136,11 +135,8 @@ TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "pose": pose,
     "second fit": second_fit,
     "correspondence": correspondence,
-<<<<<<< HEAD
     "template": template,
-=======
     "tails": tails,
->>>>>>> tails
 }
 
 

@@ -15,7 +15,6 @@ from ..windows import EncoderOptions
 Change = Callable[[EncoderOptions], EncoderOptions]
 
 VARIANTS: dict[str, Change] = {
-<<<<<<< HEAD
     "no shared detail": lambda o: replace(o, fit=replace(o.fit, components=0)),
     "middle key, no cuts": lambda o: replace(
         o, keys=1, groups=replace(o.groups, limit=1e9, tolerance=1e9, worth=math.inf)
@@ -25,13 +24,6 @@ VARIANTS: dict[str, Change] = {
     "errors along the surface count": lambda o: replace(o, layers=replace(o.layers, tangential=1.0)),
     "groups alone": lambda o: replace(o, predict=False),
     "no tails": lambda o: replace(o, tails=None),
-=======
-    "no second fit": lambda o: replace(o, fit=replace(o.fit, components=0)),
-    "groups not cut": lambda o: replace(o, groups=replace(o.groups, limit=1e9, tolerance=1e9)),
-    "groups of 5": lambda o: replace(o, group_size=5),
-    "no patches": lambda o: replace(o, tails=None),
-    "one key tried": lambda o: replace(o, reference=o.reference.fewer_trials()),
->>>>>>> tails
 }
 
 

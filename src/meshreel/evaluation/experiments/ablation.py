@@ -16,7 +16,6 @@ from . import layers
 BODIES = ("dancer", "basketball_player")
 WHOLE = (20.0, 35.0, 50.0, 65.0, 80.0)  # qualities of the whole: its curve reaches around every variant's
 QUALITIES = (35.0, 65.0)  # of the variants
-<<<<<<< HEAD
 PARTS = (
     "no shared detail",
     "middle key, no cuts",
@@ -27,9 +26,6 @@ PARTS = (
 )
 GROUPS = "groups alone"  # shows only where there are several groups
 LONG = ("crane60", 32)  # frames
-=======
-PARTS = ("no second fit", "groups not cut", "groups of 5", "no patches")
->>>>>>> tails
 COMPARISON = layers.COMPARISON
 
 
