@@ -22,7 +22,7 @@ from meshreel.coding.reference import CodedReference
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import Video
 from meshreel.decoder import open as open_video
-from meshreel.format.layout import Form, Header, Origin
+from meshreel.format.layout import Header
 from meshreel.format.records import pack
 from meshreel.types import Mesh
 from tests.golden import frame_record
@@ -115,13 +115,14 @@ def patched_groups() -> list[Group]:
     """Two groups, the second predicted from the first, with faces that go and come, and meshes beside them."""
     groups = list[Group]()
     knob = deforming_sphere(1, levels=1)[0]
-    for number, (frames, payload, layers) in enumerate(layers_groups(ball(), (3, 2))):
+    for number, (frames, payload, layers, predicted) in enumerate(layers_groups(ball(), (3, 2))):
         dropped = np.zeros((frames, len(ball().base.faces)), bool)
         dropped[0, 40 + number : 90] = True
         dropped[1:, 60:130] = True
         beside = [Mesh.of(0.05 * knob.vertices + [0.3 - 0.6 * t, 0, 0], knob.faces) for t in range(frames)]
         record, _ = encode_patches(dropped, [*beside[:-1], Mesh.empty()], 70)
-        groups.append((frames, payload + pack(record), (*layers, len(payload) + len(pack(record)))))
+        payload += pack(record)
+        groups.append((frames, payload, (*layers, len(payload)), predicted))
     return groups
 
 
