@@ -35,7 +35,7 @@ def main(folder: Path) -> None:
     """Writes every golden file and its record."""
     folder.mkdir(parents=True, exist_ok=True)
     moving, still, nothing = laplacian_group(), draco_group(), (2, encode_empty(), (), False)
-    files = {
+    files: dict[str, tuple[Header, list[Group]]] = {
         "laplacian": (header(), [moving]),
         "draco": (header(), [still]),
         "empty": (header(), [nothing]),

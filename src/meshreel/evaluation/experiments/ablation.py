@@ -14,7 +14,7 @@ from ..rows import Point, Row, curve_rows
 from . import layers
 
 BODIES = ("dancer", "basketball_player")
-WHOLE = (20.0, 35.0, 50.0, 65.0, 80.0)  # qualities of the whole: its curve reaches around every variant's
+WHOLE = (20.0, 50.0, 80.0)  # qualities of the whole: its curve reaches around every variant's
 QUALITIES = (35.0, 65.0)  # of the variants
 PARTS = (
     "no shared detail",
