@@ -22,7 +22,7 @@ from .layers_goals import GOALS, goal, halves, no_bridges, no_loser, quick_decod
 PRESET = "best"
 COMPARISON = ComparisonOptions(views=ParallelViewOptions())  # four parallel views of 512 x 512, the study's
 QUALITIES: dict[str, tuple[float, ...]] = {
-    "dancer": (5, 20, 35, 50, 65, 80, 95),
+    "dancer": (5, 20, 35, 45, 50, 65, 80, 95),
     "basketball_player": (5, 20, 35, 50, 65, 80, 95),
     "mitch": (50, 65, 80),
     "crane60": (25, 50, 75),
