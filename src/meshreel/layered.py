@@ -31,6 +31,7 @@ from .windows import EncodedGroup, EncoderOptions, Stages, cheaper, intra_only, 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: what it rounds away is coded again with the motion
 LATTICE_ALONE = 0.8  # the same for one frame, whose base need not move
 TOO_COARSE = 1.5  # targets that the layers' distance may be before the Laplacian form is tried
+STILL = 1.1  # times what a template usually leaves over that it may leave where it was
 SHORTEST = 4  # frames that a group predicted from the one before must follow, or a new key frame is taken
 
 
@@ -99,6 +100,9 @@ def _continued(
     base = before.reference.base
     template = replace(options.template, levels=before.reference.levels)
     targets = [Target(frame) for frame in ahead]
+    still = _standing(before, targets)
+    if still is not None:
+        return _coded(ahead, before.reference, still, before, options)
     predictions = from_last(Mesh(before.positions, base.faces), targets, options.embedded)
     targets = targets[: len(predictions)]
     if len(targets) < min(SHORTEST, len(ahead)):
@@ -110,6 +114,16 @@ def _continued(
     if count < min(SHORTEST, len(ahead)):
         return None
     return _coded(ahead[:count], before.reference, fitted.first(count), before, options)
+
+
+def _standing(before: Followed, targets: list[Target]) -> Fitted | None:
+    """The template where it was, if it leaves no more over there than it usually does: a fit would only slide."""
+    faces = before.reference.base.faces
+    for some in (targets[-1:], targets):  # most bodies have moved by the last frame
+        fitted = Fitted.of(faces, np.repeat(before.positions[None], len(some), axis=0), some)
+        if fitted.residuals.max() > STILL * before.residual:
+            return None
+    return fitted
 
 
 def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup, Followed | None] | int:
