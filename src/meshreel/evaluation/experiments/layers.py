@@ -26,9 +26,9 @@ QUALITIES: dict[str, tuple[float, ...]] = {
     "basketball_player": (5, 20, 35, 50, 65, 80, 95),
     "mitch": (50, 65, 80),
     "crane60": (25, 50, 75),
-    "samba60": (25, 50, 75),
+    "samba60": (25, 75),
 }
-PAPER = (35.0, 75.0)  # qualities of the preset that the curves are shown beside
+PAPER = (50.0,)  # qualities of the preset that the curves are shown beside
 PAPER_ON = ("dancer", "basketball_player")
 COLLISION = 50.0
 DECODED = (35.0, 50.0, 65.0)  # qualities at which decoding is timed, on dancer
@@ -42,9 +42,9 @@ SUBDIVIDED = (
     *((0.12, 10), (0.2, 10), (0.2, 11), (0.3, 11), (0.3, 12), (0.5, 11), (0.5, 12), (0.75, 12)),
 )
 SUBDIVIDED_REMESHED = ((0.05, 7), (0.08, 8), (0.12, 9), (0.2, 10), (0.3, 11), (0.5, 11))
-SUBDIVIDED_SOME = ((0.03, 8), (0.06, 9), (0.12, 10), (0.3, 11), (0.75, 12))  # for the eye: nothing is judged by it
+SUBDIVIDED_SOME = ((0.03, 8), (0.12, 10), (0.75, 12))  # for the eye: nothing is judged by it
 FEW = ("mitch", "crane60", "samba60")  # one point each of Draco and of A2, which are off the hull there
-SWEEPS = {"mitch": SUBDIVIDED_SOME, "crane60": SUBDIVIDED_REMESHED, "samba60": SUBDIVIDED_REMESHED}
+SWEEPS = {"mitch": SUBDIVIDED_SOME, "crane60": SUBDIVIDED_REMESHED, "samba60": SUBDIVIDED_REMESHED[1::2]}
 LEAST_GAIN = -60.0  # % of the anchors' rate, on the performers
 PROUD = -70.0  # the figure to be proud of, and the bound on the remeshed bodies
 GAIN_ENDS = 70.0  # dB
