@@ -51,49 +51,75 @@ int64_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, i
 
 constexpr double kMostBend = 0.15;  // of an edge's length
 
-void normals_of(const double* p, size_t vertices, const int32_t* faces, size_t face_count, std::vector<double>& n) {
-    n.assign(3 * vertices, 0.0);
-    for (size_t f = 0; f < face_count; ++f) {
-        const int32_t* face = faces + 3 * f;
-        const double* a = p + 3 * static_cast<size_t>(face[0]);
-        const double* b = p + 3 * static_cast<size_t>(face[1]);
-        const double* c = p + 3 * static_cast<size_t>(face[2]);
-        const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2];
-        const double wx = c[0] - a[0], wy = c[1] - a[1], wz = c[2] - a[2];
-        const double x = uy * wz - uz * wy, y = uz * wx - ux * wz, z = ux * wy - uy * wx;
-        for (int k = 0; k < 3; ++k) {
-            double* sum = n.data() + 3 * static_cast<size_t>(face[k]);
-            sum[0] += x, sum[1] += y, sum[2] += z;
-        }
-    }
-    for (size_t v = 0; v < vertices; ++v) {
-        double* x = n.data() + 3 * v;
-        const double length = std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
-        const double scale = length > 0.0 ? 1.0 / length : 0.0;
-        x[0] *= scale, x[1] *= scale, x[2] *= scale;
+// Rows of places or normals: all frames' x of a vertex, then their y, then their z. A loop over frames is one over
+// neighbours in memory, and each frame's numbers come about as if it were alone.
+struct Rows {
+    const double* data;
+    size_t frames;
+    const double* of(int32_t v) const { return data + 3 * frames * static_cast<size_t>(v); }
+};
+
+void face_normal(const Rows& p, const int32_t* face, double* __restrict n) {
+    const size_t frames = p.frames;
+    const double *a = p.of(face[0]), *b = p.of(face[1]), *c = p.of(face[2]);
+    for (size_t t = 0; t < frames; ++t) {
+        const size_t ty = t + frames, tz = ty + frames;
+        const double ux = b[t] - a[t], uy = b[ty] - a[ty], uz = b[tz] - a[tz];
+        const double wx = c[t] - a[t], wy = c[ty] - a[ty], wz = c[tz] - a[tz];
+        n[t] = uy * wz - uz * wy, n[ty] = uz * wx - ux * wz, n[tz] = ux * wy - uy * wx;
     }
 }
 
-// Calls visit(edge, curved midpoint, direction): on a circle through both ends with their normals, the arc's middle is
-// (n_b - n_a) . (b - a) / 8 above the chord's, for small angles.
-template <class Visit>
-void for_each_edge(const double* p, const std::vector<double>& n, const int32_t* edges, size_t edge_count, int curvature,
-                   Visit visit) {
-    const double share = curvature / 64.0;
-    for (size_t e = 0; e < edge_count; ++e) {
-        const size_t a = 3 * static_cast<size_t>(edges[2 * e]), b = 3 * static_cast<size_t>(edges[2 * e + 1]);
-        const double ex = p[b] - p[a], ey = p[b + 1] - p[a + 1], ez = p[b + 2] - p[a + 2];
-        const double bend = ((n[b] - n[a]) * ex + (n[b + 1] - n[a + 1]) * ey + (n[b + 2] - n[a + 2]) * ez) / 8.0;
-        const double most = kMostBend * std::sqrt(ex * ex + ey * ey + ez * ez);
-        const double lift = share * (bend > most ? most : bend < -most ? -most : bend);
-        const double x = n[a] + n[b], y = n[a + 1] + n[b + 1], z = n[a + 2] + n[b + 2];
+void add(const double* __restrict more, size_t count, double* __restrict sum) {
+    for (size_t k = 0; k < count; ++k) sum[k] += more[k];
+}
+
+void normalize(size_t frames, double* __restrict n) {
+    for (size_t t = 0; t < frames; ++t) {
+        double &x = n[t], &y = n[t + frames], &z = n[t + 2 * frames];
         const double length = std::sqrt(x * x + y * y + z * z);
         const double scale = length > 0.0 ? 1.0 / length : 0.0;
-        const double direction[3] = {x * scale, y * scale, z * scale};
-        const double middle[3] = {(p[a] + p[b]) / 2.0 + lift * direction[0], (p[a + 1] + p[b + 1]) / 2.0 + lift * direction[1],
-                                  (p[a + 2] + p[b + 2]) / 2.0 + lift * direction[2]};
-        visit(e, middle, direction);
+        x *= scale, y *= scale, z *= scale;
     }
+}
+
+std::vector<double> normals_of(const Rows& p, size_t vertices, const int32_t* faces, size_t face_count) {
+    const size_t width = 3 * p.frames;
+    std::vector<double> n(width * vertices, 0.0), one(width);
+    for (size_t f = 0; f < face_count; ++f) {
+        face_normal(p, faces + 3 * f, one.data());
+        for (size_t k = 0; k < 3; ++k) add(one.data(), width, n.data() + width * static_cast<size_t>(faces[3 * f + k]));
+    }
+    for (size_t v = 0; v < vertices; ++v) normalize(p.frames, n.data() + width * v);
+    return n;
+}
+
+// Curved midpoint and direction of an edge: on a circle through both ends with their normals, the arc's middle is
+// (n_b - n_a) . (b - a) / 8 above the chord's, for small angles.
+void edge_frame(const Rows& p, const Rows& normals, const int32_t* edge, double share, double* __restrict middle,
+                double* __restrict direction) {
+    const size_t frames = p.frames;
+    const double *a = p.of(edge[0]), *b = p.of(edge[1]), *m = normals.of(edge[0]), *n = normals.of(edge[1]);
+    for (size_t t = 0; t < frames; ++t) {
+        const size_t ty = t + frames, tz = ty + frames;
+        const double ex = b[t] - a[t], ey = b[ty] - a[ty], ez = b[tz] - a[tz];
+        const double bend = ((n[t] - m[t]) * ex + (n[ty] - m[ty]) * ey + (n[tz] - m[tz]) * ez) / 8.0;
+        const double most = kMostBend * std::sqrt(ex * ex + ey * ey + ez * ez);
+        const double above = bend < -most ? -most : bend;
+        const double lift = share * (bend > most ? most : above);
+        const double x = m[t] + n[t], y = m[ty] + n[ty], z = m[tz] + n[tz];
+        const double length = std::sqrt(x * x + y * y + z * z);
+        const double scale = length > 0.0 ? 1.0 / length : 0.0;
+        direction[t] = x * scale, direction[ty] = y * scale, direction[tz] = z * scale;
+        middle[t] = (a[t] + b[t]) / 2.0 + lift * (x * scale);
+        middle[ty] = (a[ty] + b[ty]) / 2.0 + lift * (y * scale);
+        middle[tz] = (a[tz] + b[tz]) / 2.0 + lift * (z * scale);
+    }
+}
+
+void along(const double* __restrict scalars, const double* __restrict direction, size_t frames, double* __restrict place) {
+    for (size_t k = 0; k < 3; ++k, direction += frames, place += frames)
+        for (size_t t = 0; t < frames; ++t) place[t] += scalars[t] * direction[t];
 }
 
 template <class Body>
@@ -164,26 +190,26 @@ int mr_edge_frames(const double* positions, size_t vertices, const int32_t* face
                    size_t edge_count, int curvature, double* midpoints, double* directions) {
     if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
     return guarded([&] {
-        std::vector<double> normals;
-        normals_of(positions, vertices, faces, face_count, normals);
-        for_each_edge(positions, normals, edges, edge_count, curvature, [&](size_t e, const double* middle, const double* direction) {
-            std::copy(middle, middle + 3, midpoints + 3 * e);
-            std::copy(direction, direction + 3, directions + 3 * e);
-        });
+        const Rows places{positions, 1};
+        const std::vector<double> n = normals_of(places, vertices, faces, face_count);
+        for (size_t e = 0; e < edge_count; ++e)
+            edge_frame(places, {n.data(), 1}, edges + 2 * e, curvature / 64.0, midpoints + 3 * e, directions + 3 * e);
         return static_cast<int>(MR_LAYERS_OK);
     });
 }
 
-int mr_refine(double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges, size_t edge_count,
-              const double* scalars, int curvature) {
+int mr_refine(double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+              size_t edge_count, const double* scalars, int curvature) {
     if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
     return guarded([&] {
-        std::vector<double> normals;
-        normals_of(positions, vertices, faces, face_count, normals);
-        double* out = positions + 3 * vertices;
-        for_each_edge(positions, normals, edges, edge_count, curvature, [&](size_t e, const double* middle, const double* direction) {
-            for (int k = 0; k < 3; ++k) out[3 * e + static_cast<size_t>(k)] = middle[k] + scalars[e] * direction[k];
-        });
+        const Rows places{rows, frames};
+        const std::vector<double> n = normals_of(places, vertices, faces, face_count);
+        std::vector<double> direction(3 * frames);
+        double* out = rows + 3 * frames * vertices;
+        for (size_t e = 0; e < edge_count; ++e, out += 3 * frames, scalars += frames) {
+            edge_frame(places, {n.data(), frames}, edges + 2 * e, curvature / 64.0, out, direction.data());
+            along(scalars, direction.data(), frames, out);
+        }
         return static_cast<int>(MR_LAYERS_OK);
     });
 }

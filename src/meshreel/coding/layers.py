@@ -15,7 +15,7 @@ from jaxtyping import Float64, Int32
 from ..errors import FormatError, InputError
 from ..format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ..format.records import pack, unpack, unpack_all
-from ..geometry.levels import heights, refine, subdivide
+from ..geometry.levels import frames_of, heights, refine, refine_rows, subdivide
 from ..types import Mesh
 from .details import decode_level, encode_level
 from .fields import Rate
@@ -126,7 +126,7 @@ def encode_layers(
         known, faces = refine(known, level, coded.scalars, curvature), level.faces
     payload = b"".join(parts)
     bits["head"] = 8 * len(payload) - sum(bits.values())
-    state = _state(base, known, scalars)
+    state = _state(base, known, [level.T for level in scalars])
     return EncodedLayers(payload, tuple(accumulate(map(len, parts))), known, state, bits)
 
 
@@ -141,19 +141,18 @@ def decode_layers(
     previous = previous if head.origin == Origin.PREVIOUS else None
     base = _base(head, previous)
     known = decode_trajectories(head.motion, base, head.frames, head.has_mean == Presence.PRESENT)
-    faces, scalars = base.faces, list[Float64[np.ndarray, "T _"]]()
+    faces, scalars = base.faces, list[Float64[np.ndarray, "_ T"]]()
     for number in range(1, head.levels + 1 if levels is None else min(levels, head.levels) + 1):
         record, offset = unpack(LayersLevel, data, offset)
-        level = subdivide(faces, known.shape[1])
+        level = subdivide(faces, len(known))
         if 3 * head.frames * level.count > MOST_NUMBERS:
             raise FormatError(f"{head.frames} frames of {len(level.faces)} faces exceed {MOST_NUMBERS} numbers")
         scalars.append(decode_level(record, level, head.frames, _before(previous, number)))
-        known, faces = refine(known, level, scalars[-1], record.curvature), level.faces
+        known, faces = refine_rows(known, level, scalars[-1], record.curvature), level.faces
     if levels is None and offset != len(data):
         raise FormatError(f"layers: {len(data) - offset} bytes too many")
-    if not np.isfinite(known).all():
-        raise FormatError("layers: vertices that are not finite")
-    return faces, known, _state(base, known, scalars)
+    positions = frames_of(known)
+    return faces, positions, _state(base, positions, scalars)
 
 
 def layers_end(data: bytes, levels: int | None = None) -> tuple[LayersGroup, int]:
@@ -209,7 +208,7 @@ def _before(previous: LayersState | None, number: int) -> Float64[np.ndarray, " 
 
 
 def _state(
-    base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "T _"]]
+    base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "_ T"]]
 ) -> LayersState:
     last = positions[-1, : len(base.vertices)].copy()
-    return LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))
+    return LayersState(base.faces, last, tuple(level[:, -1].copy() for level in scalars))

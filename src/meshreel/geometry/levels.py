@@ -85,7 +85,22 @@ def refine(
     The direction is the unit sum of the normals at both ends; `curvature` / 64 of the sagitta that they say is how far
     the midpoint lies from the edge's.
     """
-    positions = np.empty((len(known), level.count, 3))
-    positions[:, : level.vertices] = known
-    _core.refine(positions, level.vertices, level.coarse, level.edges, scalars, curvature)
-    return positions
+    return frames_of(refine_rows(known.transpose(1, 2, 0), level, np.ascontiguousarray(scalars.T), curvature))
+
+
+def refine_rows(
+    known: Float64[np.ndarray, "V 3 T"], level: Level, scalars: Float64[np.ndarray, "E T"], curvature: int
+) -> Float64[np.ndarray, "W 3 T"]:
+    """As `refine`, of rows: all frames of a number are neighbours in memory, and take the same steps together."""
+    rows = np.empty((level.count, *known.shape[1:]))
+    rows[: level.vertices] = known
+    _core.refine(rows, level.vertices, level.coarse, level.edges, scalars, curvature)
+    return rows
+
+
+def frames_of(rows: Float64[np.ndarray, "V 3 T"]) -> Float64[np.ndarray, "T V 3"]:
+    """The frames of rows. Raises FormatError where they are not finite."""
+    frames, finite = _core.frames_of_rows(rows)
+    if not finite:
+        raise FormatError("vertices that are not finite")
+    return frames
