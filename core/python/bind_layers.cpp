@@ -156,6 +156,18 @@ void refine(InOut<double, 3> rows, size_t vertices, In<int32_t, 2> faces, In<int
     check(mr_refine(rows.data(), frames, vertices, faces.data(), faces.shape(0), edges.data(), count, scalars.data(), curvature));
 }
 
+// The same of V x 3 x T rows to T x (V + E) x 3 places, and whether all of them are finite.
+nb::tuple refine_frames(In<double, 3> rows, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars, int curvature) {
+    const size_t vertices = rows.shape(0), frames = rows.shape(2), count = edges.shape(0);
+    expect(rows.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
+    expect(scalars.shape(0) == count && scalars.shape(1) == frames);
+    Buffer<double> positions(3 * frames * (vertices + count));
+    int finite = 0;
+    check(mr_refine_frames(rows.data(), frames, vertices, faces.data(), faces.shape(0), edges.data(), count, scalars.data(), curvature,
+                           positions.data(), &finite));
+    return nb::make_tuple(positions.three(frames, vertices + count, 3), finite != 0);
+}
+
 // T x V x 3, and whether all of it is finite.
 nb::tuple frames_of_rows(In<double, 3> rows) {
     const size_t vertices = rows.shape(0), frames = rows.shape(2);
@@ -211,6 +223,7 @@ void bind_layers(nb::module_& m) {
     m.def("siblings", &siblings);
     m.def("edge_frames", &edge_frames);
     m.def("refine", &refine);
+    m.def("refine_frames", &refine_frames);
     m.def("frames_of_rows", &frames_of_rows);
     m.def("encode_field", &encode_field);
     m.def("decode_field", &decode_field);

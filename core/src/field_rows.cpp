@@ -61,21 +61,3 @@ int mr_field_inverse(const mr_graph* graph, const int32_t* symbols, double step,
     }
     return MR_LAYERS_OK;
 }
-
-int mr_frames_of_rows(const double* rows, size_t frames, size_t vertices, double* positions) {
-    double waste = 0.0;  // of numbers that are not finite: anything else times 0 is 0
-    for (size_t begin = 0; begin < vertices; begin += kBlock) {
-        const size_t end = std::min(begin + kBlock, vertices);
-        for (size_t t = 0; t < frames; ++t) {
-            double* out = positions + 3 * (t * vertices + begin);
-            const double* x = rows + 3 * frames * begin + t;
-            double wastes[3] = {};
-            for (size_t v = begin; v < end; ++v, x += 3 * frames, out += 3) {
-                out[0] = x[0], out[1] = x[frames], out[2] = x[2 * frames];
-                for (size_t k = 0; k < 3; ++k) wastes[k] += out[k] * 0.0;
-            }
-            waste += wastes[0] + wastes[1] + wastes[2];
-        }
-    }
-    return waste == 0.0;
-}

@@ -122,6 +122,55 @@ void along(const double* __restrict scalars, const double* __restrict direction,
         for (size_t t = 0; t < frames; ++t) place[t] += scalars[t] * direction[t];
 }
 
+// Places new vertices by the rows of the coarser level's.
+struct Refinement {
+    Rows places;
+    std::vector<double> normals;
+    double share;
+
+    Refinement(const Rows& rows, size_t vertices, const int32_t* faces, size_t face_count, int curvature)
+        : places(rows), normals(normals_of(rows, vertices, faces, face_count)), share(curvature / 64.0) {}
+
+    void place(const int32_t* edges, size_t edge_count, const double* scalars, double* out) const {
+        const size_t frames = places.frames;
+        std::vector<double> direction(3 * frames);
+        for (size_t e = 0; e < edge_count; ++e, out += 3 * frames, scalars += frames) {
+            edge_frame(places, {normals.data(), frames}, edges + 2 * e, share, out, direction.data());
+            along(scalars, direction.data(), frames, out);
+        }
+    }
+};
+
+constexpr size_t kBlock = 64;  // rows, which the nearest cache holds while they become frames
+
+// Rows written as frames x vertices x 3.
+class Frames {
+public:
+    Frames(double* positions, size_t frames, size_t vertices) : positions_(positions), frames_(frames), vertices_(vertices) {}
+
+    void set(size_t first, const double* rows, size_t count) {
+        for (size_t begin = 0; begin < count; begin += kBlock)
+            for (size_t t = 0; t < frames_; ++t)
+                set_frame(positions_ + 3 * (t * vertices_ + first + begin), rows + 3 * frames_ * begin + t, std::min(kBlock, count - begin));
+    }
+    bool are_finite() const { return waste_ == 0.0; }
+
+private:
+    void set_frame(double* __restrict out, const double* __restrict in, size_t count) {
+        double wastes[3] = {};  // of numbers that are not finite: anything else times 0 is 0
+        for (size_t v = 0; v < count; ++v, in += 3 * frames_, out += 3) {
+            const double x = in[0], y = in[frames_], z = in[2 * frames_];
+            out[0] = x, out[1] = y, out[2] = z;
+            wastes[0] += x * 0.0, wastes[1] += y * 0.0, wastes[2] += z * 0.0;
+        }
+        waste_ += wastes[0] + wastes[1] + wastes[2];
+    }
+
+    double* positions_;
+    size_t frames_, vertices_;
+    double waste_ = 0.0;
+};
+
 template <class Body>
 int guarded(Body body) {
     try {
@@ -202,14 +251,33 @@ int mr_refine(double* rows, size_t frames, size_t vertices, const int32_t* faces
               size_t edge_count, const double* scalars, int curvature) {
     if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
     return guarded([&] {
-        const Rows places{rows, frames};
-        const std::vector<double> n = normals_of(places, vertices, faces, face_count);
-        std::vector<double> direction(3 * frames);
-        double* out = rows + 3 * frames * vertices;
-        for (size_t e = 0; e < edge_count; ++e, out += 3 * frames, scalars += frames) {
-            edge_frame(places, {n.data(), frames}, edges + 2 * e, curvature / 64.0, out, direction.data());
-            along(scalars, direction.data(), frames, out);
-        }
+        const Refinement refinement({rows, frames}, vertices, faces, face_count, curvature);
+        refinement.place(edges, edge_count, scalars, rows + 3 * frames * vertices);
         return static_cast<int>(MR_LAYERS_OK);
     });
+}
+
+int mr_refine_frames(const double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+                     size_t edge_count, const double* scalars, int curvature, double* positions, int* finite) {
+    if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
+    return guarded([&] {
+        const Refinement refinement({rows, frames}, vertices, faces, face_count, curvature);
+        const size_t width = 3 * frames;
+        std::vector<double> some(width * kBlock);
+        Frames out(positions, frames, vertices + edge_count);
+        out.set(0, rows, vertices);
+        for (size_t e = 0; e < edge_count; e += kBlock) {
+            const size_t count = std::min(kBlock, edge_count - e);
+            refinement.place(edges + 2 * e, count, scalars + e * frames, some.data());
+            out.set(vertices + e, some.data(), count);
+        }
+        *finite = out.are_finite();
+        return static_cast<int>(MR_LAYERS_OK);
+    });
+}
+
+int mr_frames_of_rows(const double* rows, size_t frames, size_t vertices, double* positions) {
+    Frames out(positions, frames, vertices);
+    out.set(0, rows, vertices);
+    return out.are_finite();
 }

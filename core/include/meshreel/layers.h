@@ -75,6 +75,9 @@ int mr_edge_frames(const double* positions, size_t vertices, const int32_t* face
 // midpoint + scalar * direction. A row of scalars for each edge.
 int mr_refine(double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
               size_t edge_count, const double* scalars, int curvature);
+// The same of a last level, all of it as frames x vertices x 3; `finite` becomes whether all of them are.
+int mr_refine_frames(const double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+                     size_t edge_count, const double* scalars, int curvature, double* positions, int* finite);
 // Such rows as frames x vertices x 3. Returns 1 where all of them are finite.
 int mr_frames_of_rows(const double* rows, size_t frames, size_t vertices, double* positions);
 

@@ -37,9 +37,14 @@ struct Model {
         return p < 16 ? 16 : p > 65520 ? 65520 : p;
     }
     void update(bool bit) {
+        if (seen == kSlowMemory) {  // nearly always, and then the rates are constants
+            move(slow, bit, kRates[kSlowMemory]);
+            move(fast, bit, kRates[kFastMemory]);
+            return;
+        }
         move(slow, bit, kRates[seen]);
         move(fast, bit, kRates[seen < kFastMemory ? seen : kFastMemory]);
-        seen += seen < kSlowMemory;
+        ++seen;
     }
 };
 
@@ -62,7 +67,7 @@ inline Tail shortest_tail(uint32_t low, uint32_t range) {
 
 class RangeEncoder {
 public:
-    explicit RangeEncoder(std::vector<uint8_t>& out) : out_(out), begin_(out.size()) {}
+    explicit RangeEncoder(std::vector<uint8_t>& out) : out_(&out), begin_(out.size()) {}
 
     bool bit(Model& model, bool value) {
         const bool coded = code(model.probability(), value);
@@ -71,12 +76,12 @@ public:
     }
     bool raw_bit(bool value) { return code(1u << 15, value); }
     bool failed() const { return false; }
-    size_t position() const { return out_.size() - begin_; }  // bytes, those that are still to come left out
+    size_t position() const { return out_->size() - begin_; }  // bytes, those that are still to come left out
 
     bool finish() {
         const Tail tail = shortest_tail(low_, range_);
         if (tail.value >> 32) carry();
-        for (int k = 0; k < tail.bytes; ++k) out_.push_back(static_cast<uint8_t>(tail.value >> (24 - 8 * k)));
+        for (int k = 0; k < tail.bytes; ++k) out_->push_back(static_cast<uint8_t>(tail.value >> (24 - 8 * k)));
         return true;
     }
 
@@ -92,17 +97,17 @@ private:
             if (low_ < before) carry();
         }
         while (range_ < kTop) {
-            out_.push_back(static_cast<uint8_t>(low_ >> 24));
+            out_->push_back(static_cast<uint8_t>(low_ >> 24));
             low_ <<= 8;
             range_ <<= 8;
         }
         return value;
     }
     void carry() {
-        for (size_t k = out_.size(); k > begin_ && ++out_[k - 1] == 0; --k) {}
+        for (size_t k = out_->size(); k > begin_ && ++(*out_)[k - 1] == 0; --k) {}
     }
 
-    std::vector<uint8_t>& out_;
+    std::vector<uint8_t>* out_;
     size_t begin_;
     uint32_t low_ = 0;
     uint32_t range_ = 0xFFFFFFFFu;
@@ -119,7 +124,14 @@ public:
         model.update(value);
         return value;
     }
-    bool raw_bit(bool) { return decode(1u << 15); }
+    bool raw_bit(bool) {  // no branch: nobody can foretell it
+        const uint32_t half = range_ >> 1;
+        const uint32_t low = code_ >= half;
+        code_ -= half & (0u - low);
+        range_ = half + (range_ & low);
+        fill();
+        return low == 0;
+    }
     size_t position() const { return position_; }
     bool failed() const { return position_ > size_ + 3; }  // a whole stream is read at most 3 bytes past its end
 
@@ -141,11 +153,14 @@ private:
             code_ -= bound;
             range_ -= bound;
         }
+        fill();
+        return value;
+    }
+    void fill() {
         while (range_ < kTop) {
             code_ = code_ << 8 | next();
             range_ <<= 8;
         }
-        return value;
     }
     uint32_t next() {
         const uint32_t byte = position_ < size_ ? data_[position_] : 0u;

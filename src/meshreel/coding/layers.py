@@ -15,7 +15,7 @@ from jaxtyping import Float64, Int32
 from ..errors import FormatError, InputError
 from ..format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ..format.records import pack, unpack, unpack_all
-from ..geometry.levels import frames_of, heights, refine, refine_rows, subdivide
+from ..geometry.levels import frames_of, heights, refine, refine_frames, refine_rows, subdivide
 from ..types import Mesh
 from .details import decode_level, encode_level
 from .fields import Rate
@@ -142,16 +142,21 @@ def decode_layers(
     base = _base(head, previous)
     known = decode_trajectories(head.motion, base, head.frames, head.has_mean == Presence.PRESENT)
     faces, scalars = base.faces, list[Float64[np.ndarray, "_ T"]]()
-    for number in range(1, head.levels + 1 if levels is None else min(levels, head.levels) + 1):
+    finest = head.levels if levels is None else min(levels, head.levels)
+    positions = frames_of(known) if finest == 0 else None
+    for number in range(1, finest + 1):
         record, offset = unpack(LayersLevel, data, offset)
         level = subdivide(faces, len(known))
         if 3 * head.frames * level.count > MOST_NUMBERS:
             raise FormatError(f"{head.frames} frames of {len(level.faces)} faces exceed {MOST_NUMBERS} numbers")
         scalars.append(decode_level(record, level, head.frames, _before(previous, number)))
-        known, faces = refine_rows(known, level, scalars[-1], record.curvature), level.faces
+        if number < finest:
+            known = refine_rows(known, level, scalars[-1], record.curvature)
+        else:
+            positions = refine_frames(known, level, scalars[-1], record.curvature)
+        faces = level.faces
     if levels is None and offset != len(data):
         raise FormatError(f"layers: {len(data) - offset} bytes too many")
-    positions = frames_of(known)
     return faces, positions, _state(base, positions, scalars)
 
 

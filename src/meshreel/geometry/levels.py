@@ -85,7 +85,8 @@ def refine(
     The direction is the unit sum of the normals at both ends; `curvature` / 64 of the sagitta that they say is how far
     the midpoint lies from the edge's.
     """
-    return frames_of(refine_rows(known.transpose(1, 2, 0), level, np.ascontiguousarray(scalars.T), curvature))
+    rows = np.ascontiguousarray(known.transpose(1, 2, 0))
+    return refine_frames(rows, level, np.ascontiguousarray(scalars.T), curvature)
 
 
 def refine_rows(
@@ -98,9 +99,20 @@ def refine_rows(
     return rows
 
 
+def refine_frames(
+    known: Float64[np.ndarray, "V 3 T"], level: Level, scalars: Float64[np.ndarray, "E T"], curvature: int
+) -> Float64[np.ndarray, "T W 3"]:
+    """`refine_rows` as frames, without a copy. Raises FormatError where they are not finite."""
+    frames, finite = _core.refine_frames(known, level.coarse, level.edges, scalars, curvature)
+    return _checked(frames, finite)
+
+
 def frames_of(rows: Float64[np.ndarray, "V 3 T"]) -> Float64[np.ndarray, "T V 3"]:
     """The frames of rows. Raises FormatError where they are not finite."""
-    frames, finite = _core.frames_of_rows(rows)
+    return _checked(*_core.frames_of_rows(rows))
+
+
+def _checked(frames: Float64[np.ndarray, "T V 3"], finite: bool) -> Float64[np.ndarray, "T V 3"]:
     if not finite:
         raise FormatError("vertices that are not finite")
     return frames
