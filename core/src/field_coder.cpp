@@ -35,7 +35,7 @@ constexpr auto kClassOf = class_table();
 class Magnitudes {
 public:
     explicit Magnitudes(const meshreel_weights& weights)
-        : count_(weights.count), sums_(count_), shares_(count_), past_(count_), now_(count_), starts_(count_ + 1) {
+        : count_(weights.count), sums_(count_), shares_(count_), past_(count_), bases_(count_), now_(count_), classes_(count_), starts_(count_ + 1) {
         const auto each_link = [&](auto&& visit) {  // a place that none predicts looks at the one before it
             for (size_t v = 0; v < count_; ++v) {
                 const int64_t begin = weights.starts[v], end = weights.starts[v + 1];
@@ -57,12 +57,10 @@ public:
     // The places of a block in a column are coded between these two.
     void begin_block(size_t first, size_t places) {
         const uint32_t* past = past_.data() + first;
-        uint64_t sum = 0;
-        for (size_t k = 0; k < places; ++k) {
-            sum += past[k];
-            bases_[k] = 3 * static_cast<uint32_t>(past[k] * ratio_ >> 16);
-        }
-        expected_ += sum;
+        uint32_t* base = bases_.data() + first;
+        for (size_t k = 0; k < places; ++k) expected_ += past[k];
+        for (size_t k = 0; k < places; ++k) base[k] = 3 * static_cast<uint32_t>(past[k] * ratio_ >> 16);
+        for (size_t v = first; v < first + places; ++v) classes_[v] = class_of(v);
     }
     // The past says where a column is large; how large against the past is learned, with a memory of 400 places.
     void end_block(size_t places) {
@@ -73,18 +71,18 @@ public:
         expected_ -= expected_ / 6;
     }
 
-    int class_at(size_t v, size_t in_block) const {
-        const uint32_t around = static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
-        const uint32_t expected = around * trust_ + bases_[in_block];
-        return kClassOf[expected < kLastBegin ? expected : kLastBegin];
-    }
+    const uint8_t* classes() const { return classes_.data(); }  // right for what is coded next in a block
 
     void learn(size_t v, int64_t value) {  // of values that are not zero
         const int64_t size = value < 0 ? -value : value;
         const uint8_t known = static_cast<uint8_t>(size < kClamp ? size : kClamp);
         now_[v] = known;
         seen_ += 16u * known;
-        for (size_t k = starts_[v], end = starts_[v + 1]; k < end; ++k) sums_[static_cast<size_t>(followers_[k])] += known;
+        for (size_t k = starts_[v], end = starts_[v + 1]; k < end; ++k) {
+            const size_t follower = static_cast<size_t>(followers_[k]);
+            sums_[follower] += known;
+            classes_[follower] = class_of(follower);  // beyond the block it says nothing yet
+        }
     }
 
     // Ends a column: it joins the past, in which each step back weighs 45 / 64.
@@ -98,15 +96,21 @@ public:
     }
 
 private:
+    uint8_t class_of(size_t v) const {
+        const uint32_t around = static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
+        const uint32_t expected = around * trust_ + bases_[v];
+        return kClassOf[expected < kLastBegin ? expected : kLastBegin];
+    }
+
     size_t count_;
     std::vector<uint32_t> sums_;    // of the magnitudes at the neighbours of each place, as far as they are known
     std::vector<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16
     std::vector<uint32_t> past_;
-    std::vector<uint8_t> now_;
+    std::vector<uint32_t> bases_;  // what the past says, three fifths of it
+    std::vector<uint8_t> now_, classes_;
     std::vector<size_t> starts_;  // of the places that have each place as a neighbour
     std::vector<int32_t> followers_;
-    uint32_t bases_[kBlock];  // what the past says, three fifths of it
-    uint32_t trust_ = 5;      // fifths: in a first column all of what the neighbours say, then two
+    uint32_t trust_ = 5;  // fifths: in a first column all of what the neighbours say, then two
     uint64_t seen_ = 0, expected_ = 0, ratio_ = kFirstRatio;
 };
 
@@ -117,9 +121,8 @@ struct FieldModels {
 };
 
 template <class Coder>
-int64_t code_symbol(Coder& coder, FieldModels& models, int context, int64_t value) {
+int64_t code_nonzero(Coder& coder, FieldModels& models, int context, int64_t value) {
     const uint64_t size = static_cast<uint64_t>(value < 0 ? -value : value);
-    if (!coder.bit(models.zero[context], size != 0)) return 0;
     uint64_t read = 1;
     while (read < kUnary && coder.bit(models.more[context][read], size > read)) ++read;
     if (read == kUnary) {
@@ -136,18 +139,20 @@ template <class Coder>
 bool code_field(Coder coder, const meshreel_weights& weights, size_t* ends) {
     Magnitudes magnitudes(weights);
     FieldModels models;
-    int32_t* symbol = weights.symbols;
     for (size_t c = 0; c < weights.columns; ++c) {
+        int32_t* symbols = weights.symbols + c * weights.count;
         for (size_t first = 0; first < weights.count; first += kBlock) {
             const size_t places = std::min(kBlock, weights.count - first);
             magnitudes.begin_block(first, places);
+            const uint8_t* classes = magnitudes.classes();
             bool good = true;
-            for (size_t k = 0; k < places; ++k, ++symbol) {
-                const int64_t value = code_symbol(coder, models, magnitudes.class_at(first + k, k), *symbol);
-                if (value == 0) continue;
+            for (size_t v = first; v < first + places; ++v) {
+                const int context = classes[v];
+                if (!coder.bit(models.zero[context], symbols[v] != 0)) continue;
+                const int64_t value = code_nonzero(coder, models, context, symbols[v]);
                 good = good && fits(value);
-                *symbol = static_cast<int32_t>(value);
-                magnitudes.learn(first + k, value);
+                symbols[v] = static_cast<int32_t>(value);
+                magnitudes.learn(v, value);
             }
             if (coder.failed() || !good) return false;
             magnitudes.end_block(places);

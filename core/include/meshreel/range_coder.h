@@ -22,29 +22,36 @@ constexpr std::array<uint32_t, kSlowMemory + 1> learning_rates() {
 }
 inline constexpr auto kRates = learning_rates();
 
-inline void move(uint32_t& one, bool bit, uint64_t rate) {
-    if (bit) one += static_cast<uint32_t>((static_cast<uint64_t>(~one) * rate) >> 16);
-    else one -= static_cast<uint32_t>((static_cast<uint64_t>(one) * rate) >> 16);
-}
-
-struct Model {
-    uint32_t slow = 1u << 31;  // probability of a 1, in units of 2^-32
+struct Model {  // slow and fast apart: a compiler that makes one vector of them waits for memory on its way back
+    uint32_t slow = 1u << 31;         // probability of a 1, in units of 2^-32
+    uint32_t probability = 1u << 15;  // the mean of both, in units of 2^-16, never 0 or 1
     uint32_t fast = 1u << 31;
     uint32_t seen = 0;
 
-    uint32_t probability() const {  // of a 1, in units of 2^-16, never 0 or 1
-        const uint32_t p = (slow >> 17) + (fast >> 17);
-        return p < 16 ? 16 : p > 65520 ? 65520 : p;
+    void update(bool bit) { bit ? update_one() : update_zero(); }
+    void update_one() {
+        learn([](uint32_t one, uint32_t rate) { return one + static_cast<uint32_t>((static_cast<uint64_t>(~one) * rate) >> 16); });
     }
-    void update(bool bit) {
+    void update_zero() {
+        learn([](uint32_t one, uint32_t rate) { return one - static_cast<uint32_t>((static_cast<uint64_t>(one) * rate) >> 16); });
+    }
+
+private:
+    template <class Moved>
+    void learn(Moved moved) {
+        uint32_t patient, hasty;
         if (seen == kSlowMemory) {  // nearly always, and then the rates are constants
-            move(slow, bit, kRates[kSlowMemory]);
-            move(fast, bit, kRates[kFastMemory]);
-            return;
+            patient = moved(slow, kRates[kSlowMemory]);
+            hasty = moved(fast, kRates[kFastMemory]);
+        } else {
+            patient = moved(slow, kRates[seen]);
+            hasty = moved(fast, kRates[seen < kFastMemory ? seen : kFastMemory]);
+            ++seen;
         }
-        move(slow, bit, kRates[seen]);
-        move(fast, bit, kRates[seen < kFastMemory ? seen : kFastMemory]);
-        ++seen;
+        const uint32_t p = (patient >> 17) + (hasty >> 17);
+        slow = patient;
+        fast = hasty;
+        probability = p < 16 ? 16 : p > 65520 ? 65520 : p;
     }
 };
 
@@ -70,7 +77,7 @@ public:
     explicit RangeEncoder(std::vector<uint8_t>& out) : out_(&out), begin_(out.size()) {}
 
     bool bit(Model& model, bool value) {
-        const bool coded = code(model.probability(), value);
+        const bool coded = code(model.probability, value);
         model.update(value);
         return coded;
     }
@@ -120,9 +127,18 @@ public:
     }
 
     bool bit(Model& model, bool) {
-        const bool value = decode(model.probability());
-        model.update(value);
-        return value;
+        const uint32_t bound = bound_of(range_, model.probability);
+        if (code_ < bound) {
+            range_ = bound;
+            model.update_one();
+            fill();
+            return true;
+        }
+        code_ -= bound;
+        range_ -= bound;
+        model.update_zero();
+        fill();
+        return false;
     }
     bool raw_bit(bool) {  // no branch: nobody can foretell it
         const uint32_t half = range_ >> 1;
@@ -144,18 +160,6 @@ public:
     }
 
 private:
-    bool decode(uint32_t probability) {
-        const uint32_t bound = bound_of(range_, probability);
-        const bool value = code_ < bound;
-        if (value) {
-            range_ = bound;
-        } else {
-            code_ -= bound;
-            range_ -= bound;
-        }
-        fill();
-        return value;
-    }
     void fill() {
         while (range_ < kTop) {
             code_ = code_ << 8 | next();
