@@ -7,38 +7,42 @@
 
 namespace {
 
-constexpr size_t kLanes = 4;   // columns side by side: each is summed as if it were alone
+constexpr size_t kLanes = 2;   // columns side by side, each summed as if it were alone
 constexpr size_t kBlock = 64;  // of vertices, so that a block of rows stays in the nearest cache
+
+void add(const double* __restrict more, double weight, size_t count, double* __restrict sums) {
+    for (size_t c = 0; c < count; ++c) sums[c] += weight * more[c];
+}
 
 // decoded[v][c], rows of `stride` columns, of which those beyond `columns` are zero.
 void predict(const mr_graph& graph, const int32_t* symbols, size_t columns, double step, size_t stride, double* decoded) {
+    std::vector<double> sums(stride);
     for (size_t begin = 0; begin < graph.count; begin += kBlock) {
         const size_t end = std::min(begin + kBlock, graph.count);
         for (size_t c = 0; c < columns; ++c)
             for (size_t v = begin; v < end; ++v) decoded[v * stride + c] = step * static_cast<double>(symbols[c * graph.count + v]);
         for (size_t v = begin; v < end; ++v) {
-            double* row = decoded + v * stride;
-            for (size_t c = 0; c < stride; c += kLanes) {
-                double sums[kLanes] = {};
-                for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k) {
-                    const double* value = decoded + static_cast<size_t>(graph.near[k]) * stride + c;
-                    for (size_t j = 0; j < kLanes; ++j) sums[j] += graph.weights[k] * value[j];
-                }
-                for (size_t j = 0; j < kLanes; ++j) row[c + j] = sums[j] + row[c + j];
-            }
+            std::fill(sums.begin(), sums.end(), 0.0);
+            for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k)
+                add(decoded + static_cast<size_t>(graph.near[k]) * stride, graph.weights[k], stride, sums.data());
+            add(sums.data(), 1.0, stride, decoded + v * stride);
         }
     }
 }
 
-// So many numbers of a row side by side.
-template <size_t kNumbers>
-void transform(const double* row, const mr_basis& basis, size_t t, double* out) {
-    double sums[kNumbers];
-    for (size_t j = 0; j < kNumbers; ++j) sums[j] = basis.means ? basis.means[t + j] : 0.0;
-    const double* vector = basis.vectors + t;
-    for (size_t k = 0; k < basis.columns; ++k, vector += basis.width)
-        for (size_t j = 0; j < kNumbers; ++j) sums[j] += vector[j] * row[k];
-    for (size_t j = 0; j < kNumbers; ++j) out[t + j] = sums[j];
+// Four terms a pass over memory, added one after the other.
+void add_four(const double* __restrict v, const double* __restrict weights, size_t width, double* __restrict sums) {
+    const double w0 = weights[0], w1 = weights[1], w2 = weights[2], w3 = weights[3];
+    for (size_t t = 0; t < width; ++t)
+        sums[t] = (((sums[t] + w0 * v[t]) + w1 * v[width + t]) + w2 * v[2 * width + t]) + w3 * v[3 * width + t];
+}
+
+void transform(const double* row, const mr_basis& basis, double* out) {
+    if (basis.means) std::copy(basis.means, basis.means + basis.width, out);
+    else std::fill(out, out + basis.width, 0.0);
+    size_t k = 0;
+    for (; k + 4 <= basis.columns; k += 4) add_four(basis.vectors + k * basis.width, row + k, basis.width, out);
+    for (; k < basis.columns; ++k) add(basis.vectors + k * basis.width, row[k], basis.width, out);
 }
 
 }  // namespace
@@ -49,13 +53,7 @@ int mr_field_inverse(const mr_graph* graph, const int32_t* symbols, double step,
     try {
         std::vector<double> decoded(graph->count * stride, 0.0);
         predict(*graph, symbols, basis->columns, step, stride, decoded.data());
-        for (size_t v = 0; v < graph->count; ++v, rows += basis->width) {
-            const double* row = decoded.data() + v * stride;
-            size_t t = 0;
-            for (; t + 8 <= basis->width; t += 8) transform<8>(row, *basis, t, rows);
-            for (; t + 2 <= basis->width; t += 2) transform<2>(row, *basis, t, rows);
-            if (t < basis->width) transform<1>(row, *basis, t, rows);
-        }
+        for (size_t v = 0; v < graph->count; ++v) transform(decoded.data() + v * stride, *basis, rows + v * basis->width);
     } catch (const std::bad_alloc&) {
         return MR_LAYERS_NO_MEMORY;
     }

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <new>
 #include <vector>
 
@@ -11,6 +12,18 @@ bool in_range(const int32_t* indices, size_t count, size_t vertices) {
     for (size_t k = 0; k < count; ++k)
         if (indices[k] < 0 || static_cast<size_t>(indices[k]) >= vertices) return false;
     return true;
+}
+
+// Sorts by insertion what is as short as nearly always.
+template <class Iterator, class Less>
+void sort_few(Iterator begin, Iterator end, Less less) {
+    if (end - begin > 16) return std::sort(begin, end, less);
+    for (Iterator next = begin; next != end; ++next) {
+        const auto value = *next;
+        Iterator at = next;
+        for (; at != begin && less(value, *(at - 1)); --at) *at = *(at - 1);
+        *at = value;
+    }
 }
 
 // Half-edges grouped by their smaller end, in each group by their larger; equal ones are one edge.
@@ -36,7 +49,7 @@ int64_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, i
     int64_t count = 0;
     for (size_t v = 0; v < vertices; ++v) {
         const auto begin = halves.begin() + static_cast<int64_t>(starts[v]), end = halves.begin() + static_cast<int64_t>(starts[v + 1]);
-        std::sort(begin, end, [](const HalfEdge& a, const HalfEdge& b) { return a.high < b.high; });
+        sort_few(begin, end, [](const HalfEdge& a, const HalfEdge& b) { return a.high < b.high; });
         for (auto half = begin; half != end; ++half) {
             if (half == begin || half->high != (half - 1)->high) {
                 edges[2 * count] = static_cast<int32_t>(v);
@@ -226,7 +239,7 @@ int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t
         starts[0] = 0;
         for (size_t e = 0; e < edge_count; ++e) {
             const auto begin = all.begin() + bounds[e], end = all.begin() + bounds[e + 1];
-            std::sort(begin, end);
+            sort_few(begin, end, std::less<>());
             const auto last = std::unique(begin, end);
             std::copy(begin, last, near + starts[e]);
             starts[e + 1] = starts[e] + (last - begin);
