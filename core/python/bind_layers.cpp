@@ -120,6 +120,16 @@ Out<double, 2> orthonormal_inverse(In<int32_t, 1> symbols, size_t count, size_t 
     return vectors.two(count, width);
 }
 
+// V x 3 x T rows, and whether all of it is finite.
+nb::tuple place_rows(In<double, 2> moved, In<int32_t, 1> order, In<double, 2> base) {
+    const size_t vertices = moved.shape(0), frames = moved.shape(1) / 3;
+    expect(moved.shape(1) == 3 * frames && order.shape(0) == vertices && base.shape(0) == vertices && base.shape(1) == 3);
+    for (size_t p = 0; p < vertices; ++p) expect(order.data()[p] >= 0 && static_cast<size_t>(order.data()[p]) < vertices);
+    Buffer<double> rows(3 * frames * vertices);
+    const bool finite = mr_place_rows(moved.data(), order.data(), base.data(), vertices, frames, rows.data()) != 0;
+    return nb::make_tuple(rows.three(vertices, 3, frames), finite);
+}
+
 nb::tuple subdivide(In<int32_t, 2> faces, size_t vertices) {
     expect(faces.shape(1) == 3);
     const size_t face_count = faces.shape(0);
@@ -137,6 +147,16 @@ nb::tuple siblings(In<int32_t, 2> finer, size_t vertices, size_t edge_count) {
     check(mr_siblings(finer.data(), face_count, vertices, edge_count, starts.data(), near.data()));
     const size_t links = static_cast<size_t>(starts.data()[edge_count]);
     return nb::make_tuple(starts.one(edge_count + 1), near.one(links));
+}
+
+Out<double, 1> sibling_weights(In<int64_t, 1> starts, int weight) {
+    expect(starts.shape(0) > 0 && starts.data()[0] == 0);
+    const size_t count = starts.shape(0) - 1;
+    for (size_t e = 0; e < count; ++e) expect(starts.data()[e] <= starts.data()[e + 1]);
+    const size_t links = static_cast<size_t>(starts.data()[count]);
+    Buffer<double> weights(links);
+    mr_sibling_weights(starts.data(), count, weight, weights.data());
+    return weights.one(links);
 }
 
 nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t, 2> edges, int curvature) {
@@ -221,6 +241,8 @@ void bind_layers(nb::module_& m) {
     m.def("orthonormal_inverse", &orthonormal_inverse);
     m.def("subdivide", &subdivide);
     m.def("siblings", &siblings);
+    m.def("place_rows", &place_rows);
+    m.def("sibling_weights", &sibling_weights);
     m.def("edge_frames", &edge_frames);
     m.def("refine", &refine);
     m.def("refine_frames", &refine_frames);

@@ -59,3 +59,23 @@ int mr_field_inverse(const mr_graph* graph, const int32_t* symbols, double step,
     }
     return MR_LAYERS_OK;
 }
+
+int mr_place_rows(const double* moved, const int32_t* order, const double* base, size_t vertices, size_t frames, double* rows) {
+    double waste = 0.0;  // of numbers that are not finite: anything else times 0 is 0
+    for (size_t p = 0; p < vertices; ++p, moved += 3 * frames) {
+        const size_t v = static_cast<size_t>(order[p]);
+        for (size_t k = 0; k < 3; ++k) {
+            double* out = rows + (3 * v + k) * frames;
+            const double from = base[3 * v + k];
+            for (size_t t = 0; t < frames; ++t) out[t] = moved[3 * t + k] + from, waste += out[t] * 0.0;
+        }
+    }
+    return waste == 0.0;
+}
+
+void mr_sibling_weights(const int64_t* starts, size_t edge_count, int weight, double* weights) {
+    for (size_t e = 0; e < edge_count; ++e) {
+        const double count = static_cast<double>(starts[e + 1] - starts[e]);
+        if (count > 0.0) std::fill(weights + starts[e], weights + starts[e + 1], weight / (64.0 * count));
+    }
+}

@@ -62,10 +62,16 @@ int mr_predict_surface(const struct mr_graph* graph, const struct mr_surface* su
 // turned onto the first k axes by reflections, leave room for it. MR_LAYERS_BAD_INPUT where all of these are zero.
 int mr_orthonormal_inverse(const int32_t* symbols, size_t count, size_t width, double* vectors);
 
+// The row of the vertex order[p], all frames of an axis after the other: the displacements in row p, frame after frame x, y
+// and z, from its place in `base`. Returns 1 where all of them are finite.
+int mr_place_rows(const double* moved, const int32_t* order, const double* base, size_t vertices, size_t frames, double* rows);
+
 // The sorted edges of a mesh and its faces cut in four. `edges` has room for 3 face_count pairs; returns their number, or -1.
 int64_t mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer);
 // For each edge those that share a face with it and come before it, sorted; `near` has room for 3 face_count entries.
 int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts, int32_t* near);
+// Weights that predict each by weight / 64 of the mean of those near it.
+void mr_sibling_weights(const int64_t* starts, size_t edge_count, int weight, double* weights);
 
 // Midpoints of the edges, lifted by curvature / 64 of the bend that both ends' normals say, and along the unit sum of these
 // normals a direction (zero where there is none).

@@ -49,7 +49,10 @@ def encode_level(
 def decode_level(
     record: LayersLevel, level: Level, frames: int, previous: Float64[np.ndarray, " E"] | None
 ) -> Float64[np.ndarray, "E T"]:
-    """The scalars of a level, a row for each new vertex. Raises FormatError on damaged records, or where they need a group that is not there."""
+    """The scalars of a level, a row for each new vertex.
+
+    Raises FormatError on damaged records, or where they need a group that is not there.
+    """
     scalars = decode_field(record.scalars, siblings(level).graph(record.sibling_weight), frames, False)
     if record.origin == Origin.ALONE:
         return scalars

@@ -141,9 +141,10 @@ def decode_layers(
     previous = previous if head.origin == Origin.PREVIOUS else None
     base = _base(head, previous)
     known = decode_trajectories(head.motion, base, head.frames, head.has_mean == Presence.PRESENT)
-    faces, scalars = base.faces, list[Float64[np.ndarray, "_ T"]]()
+    faces = base.faces
+    scalars: list[Float64[np.ndarray, "_ T"]] = []
     finest = head.levels if levels is None else min(levels, head.levels)
-    positions = frames_of(known) if finest == 0 else None
+    positions = frames_of(known)
     for number in range(1, finest + 1):
         record, offset = unpack(LayersLevel, data, offset)
         level = subdivide(faces, len(known))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64
 
+from .. import _core
 from ..errors import FormatError
 from ..format.layout import CodedField
 from ..geometry.levels import frames_of
@@ -41,9 +42,7 @@ def decode_trajectories(record: CodedField, base: Mesh, frames: int, has_mean: b
 
 
 def _placed(moved: Float64[np.ndarray, "V C"], base: Mesh, places: Hierarchy) -> Float64[np.ndarray, "V 3 T"]:
-    rows = np.empty((len(moved), 3, moved.shape[1] // 3))
-    by_axis = moved.reshape(len(moved), moved.shape[1] // 3, 3).swapaxes(1, 2)
-    rows[places.order] = by_axis + base.vertices[places.order][:, :, None]
-    if not np.isfinite(rows).all():
+    rows, finite = _core.place_rows(moved, places.order, base.vertices)
+    if not finite:
         raise FormatError("a motion that is not finite")
     return rows

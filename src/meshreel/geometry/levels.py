@@ -39,9 +39,10 @@ def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
 
     Raises FormatError where a face names none of the vertices.
     """
-    if len(faces) and (faces.min() < 0 or faces.max() >= vertices):
-        raise FormatError(f"a face names vertex {int(faces.max())} or {int(faces.min())} of {vertices}")
-    edges, finer = _core.subdivide(faces, vertices)
+    try:
+        edges, finer = _core.subdivide(faces, vertices)
+    except ValueError as error:
+        raise FormatError(f"a face that names none of {vertices} vertices, or too many of them") from error
     return Level(faces, edges, finer, vertices)
 
 
