@@ -15,7 +15,7 @@ from ..errors import FormatError
 from ..format.layout import LayersLevel, Origin
 from ..geometry.levels import Level
 from .fields import EncodedField, Rate, decode_field, encode_field
-from .graph import siblings
+from .graph import Siblings, siblings
 
 SIBLING_WEIGHTS = (36, 16)  # tried, 64ths
 
@@ -47,13 +47,13 @@ def encode_level(
 
 
 def decode_level(
-    record: LayersLevel, level: Level, frames: int, previous: Float64[np.ndarray, " E"] | None
+    record: LayersLevel, near: Siblings, frames: int, previous: Float64[np.ndarray, " E"] | None
 ) -> Float64[np.ndarray, "E T"]:
     """The scalars of a level, a row for each new vertex.
 
     Raises FormatError on damaged records, or where they need a group that is not there.
     """
-    scalars = decode_field(record.scalars, siblings(level).graph(record.sibling_weight), frames, False)
+    scalars = decode_field(record.scalars, near.graph(record.sibling_weight), frames, False)
     if record.origin == Origin.ALONE:
         return scalars
     if previous is None or len(previous) != len(scalars):

@@ -13,7 +13,7 @@ from jaxtyping import Float64, Int32, Int64
 
 from .. import _core
 from ..errors import FormatError
-from ..geometry.levels import Level
+from ..geometry.levels import Level, subdivide
 from ..types import Mesh
 
 
@@ -44,6 +44,20 @@ class Siblings:
     def graph(self, weight: int) -> Graph:
         """Each new vertex's scalar is predicted by weight / 64 of the mean of its siblings'."""
         return Graph(self.starts, self.near, _core.sibling_weights(self.starts, weight))
+
+
+@dataclass(frozen=True, slots=True)
+class Connectivity:
+    """What follows from the coarser level's faces alone, so that groups which share them share it."""
+
+    level: Level
+    siblings: Siblings
+
+
+def connectivity(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Connectivity:
+    """Of the next level. Raises FormatError where a face names none of the vertices."""
+    level = subdivide(faces, vertices)
+    return Connectivity(level, siblings(level))
 
 
 def hierarchy(base: Mesh) -> Hierarchy:
