@@ -109,8 +109,9 @@ std::vector<double> normals_of(const Rows& p, size_t vertices, const int32_t* fa
 
 // Curved midpoint and direction of an edge: on a circle through both ends with their normals, the arc's middle is
 // (n_b - n_a) . (b - a) / 8 above the chord's, for small angles.
-void edge_frame(const Rows& p, const Rows& normals, const int32_t* edge, double share, double* __restrict middle,
-                double* __restrict direction) {
+// Calls visit(frame, place in a row, number of the midpoint, number of the direction).
+template <class Visit>
+void edge_frame(const Rows& p, const Rows& normals, const int32_t* edge, double share, Visit visit) {
     const size_t frames = p.frames;
     const double *a = p.of(edge[0]), *b = p.of(edge[1]), *m = normals.of(edge[0]), *n = normals.of(edge[1]);
     for (size_t t = 0; t < frames; ++t) {
@@ -123,16 +124,11 @@ void edge_frame(const Rows& p, const Rows& normals, const int32_t* edge, double 
         const double x = m[t] + n[t], y = m[ty] + n[ty], z = m[tz] + n[tz];
         const double length = std::sqrt(x * x + y * y + z * z);
         const double scale = length > 0.0 ? 1.0 / length : 0.0;
-        direction[t] = x * scale, direction[ty] = y * scale, direction[tz] = z * scale;
-        middle[t] = (a[t] + b[t]) / 2.0 + lift * (x * scale);
-        middle[ty] = (a[ty] + b[ty]) / 2.0 + lift * (y * scale);
-        middle[tz] = (a[tz] + b[tz]) / 2.0 + lift * (z * scale);
+        const double dx = x * scale, dy = y * scale, dz = z * scale;
+        visit(t, t, (a[t] + b[t]) / 2.0 + lift * dx, dx);
+        visit(t, ty, (a[ty] + b[ty]) / 2.0 + lift * dy, dy);
+        visit(t, tz, (a[tz] + b[tz]) / 2.0 + lift * dz, dz);
     }
-}
-
-void along(const double* __restrict scalars, const double* __restrict direction, size_t frames, double* __restrict place) {
-    for (size_t k = 0; k < 3; ++k, direction += frames, place += frames)
-        for (size_t t = 0; t < frames; ++t) place[t] += scalars[t] * direction[t];
 }
 
 // Places new vertices by the rows of the coarser level's.
@@ -146,10 +142,11 @@ struct Refinement {
 
     void place(const int32_t* edges, size_t edge_count, const double* scalars, double* out) const {
         const size_t frames = places.frames;
-        std::vector<double> direction(3 * frames);
         for (size_t e = 0; e < edge_count; ++e, out += 3 * frames, scalars += frames) {
-            edge_frame(places, {normals.data(), frames}, edges + 2 * e, share, out, direction.data());
-            along(scalars, direction.data(), frames, out);
+            double* __restrict place = out;
+            const double* __restrict scalar = scalars;
+            edge_frame(places, {normals.data(), frames}, edges + 2 * e, share,
+                       [=](size_t t, size_t k, double middle, double direction) { place[k] = middle + scalar[t] * direction; });
         }
     }
 };
@@ -255,7 +252,10 @@ int mr_edge_frames(const double* positions, size_t vertices, const int32_t* face
         const Rows places{positions, 1};
         const std::vector<double> n = normals_of(places, vertices, faces, face_count);
         for (size_t e = 0; e < edge_count; ++e)
-            edge_frame(places, {n.data(), 1}, edges + 2 * e, curvature / 64.0, midpoints + 3 * e, directions + 3 * e);
+            edge_frame(places, {n.data(), 1}, edges + 2 * e, curvature / 64.0, [=](size_t, size_t k, double middle, double direction) {
+                midpoints[3 * e + k] = middle;
+                directions[3 * e + k] = direction;
+            });
         return static_cast<int>(MR_LAYERS_OK);
     });
 }
