@@ -35,7 +35,8 @@ constexpr auto kClassOf = class_table();
 class Magnitudes {
 public:
     explicit Magnitudes(const meshreel_weights& weights)
-        : count_(weights.count), sums_(count_), shares_(count_), past_(count_), bases_(count_), now_(count_), classes_(count_), starts_(count_ + 1) {
+        : count_(weights.count), sums_(count_), shares_(count_), past_(count_), bases_(count_), now_(count_), classes_(count_),
+          starts_(count_ + 1) {
         const auto each_link = [&](auto&& visit) {  // a place that none predicts looks at the one before it
             for (size_t v = 0; v < count_; ++v) {
                 const int64_t begin = weights.starts[v], end = weights.starts[v + 1];
