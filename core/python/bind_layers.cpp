@@ -39,6 +39,10 @@ struct Buffer {
         T* p = data();
         return Out<T, 2>(p, {n, m}, release());
     }
+    Out<T, 3> three(size_t n, size_t m, size_t l) {
+        T* p = data();
+        return Out<T, 3>(p, {n, m, l}, release());
+    }
     std::unique_ptr<T[]> owned;
 };
 
@@ -95,12 +99,18 @@ nb::tuple predict_surface(In<double, 2> values, nb::tuple graph_arrays, In<doubl
     return nb::make_tuple(symbols.two(columns, count), decoded.two(columns, count));
 }
 
-Out<double, 2> predict_inverse(In<int32_t, 2> symbols, In<int64_t, 1> starts, In<int32_t, 1> near, In<double, 1> weights, double step) {
-    const size_t columns = symbols.shape(0), count = symbols.shape(1);
+// The columns as coded -> a row for each vertex.
+Out<double, 2> field_inverse(In<int32_t, 2> symbols, nb::tuple graph_arrays, double step, In<double, 2> vectors, In<double, 1> means) {
+    const size_t columns = symbols.shape(0), count = symbols.shape(1), width = vectors.shape(1);
+    expect(graph_arrays.size() == 3 && vectors.shape(0) == columns && means.shape(0) == width);
+    const auto starts = nb::cast<In<int64_t, 1>>(graph_arrays[0]);
+    const auto near = nb::cast<In<int32_t, 1>>(graph_arrays[1]);
+    const auto weights = nb::cast<In<double, 1>>(graph_arrays[2]);
     const mr_graph graph = graph_of(starts, near, weights, count);
-    Buffer<double> decoded(columns * count);
-    check(mr_predict_inverse(&graph, symbols.data(), columns, step, decoded.data()));
-    return decoded.two(columns, count);
+    const mr_basis basis{columns, width, vectors.data(), means.data()};
+    Buffer<double> rows(count * width);
+    check(mr_field_inverse(&graph, symbols.data(), step, &basis, rows.data()));
+    return rows.two(count, width);
 }
 
 Out<double, 2> orthonormal_inverse(In<int32_t, 1> symbols, size_t count, size_t width) {
@@ -110,12 +120,14 @@ Out<double, 2> orthonormal_inverse(In<int32_t, 1> symbols, size_t count, size_t 
     return vectors.two(count, width);
 }
 
-Out<double, 2> transform_inverse(In<double, 2> columns, In<double, 2> vectors, In<double, 1> means) {
-    const size_t count = columns.shape(0), width = columns.shape(1), frames = vectors.shape(1);
-    expect(vectors.shape(0) == count && means.shape(0) == frames);
-    Buffer<double> out(frames * width);
-    mr_transform_inverse(columns.data(), count, width, vectors.data(), frames, means.data(), out.data());
-    return out.two(frames, width);
+// V x 3 x T rows, and whether all of it is finite.
+nb::tuple place_rows(In<double, 2> moved, In<int32_t, 1> order, In<double, 2> base) {
+    const size_t vertices = moved.shape(0), frames = moved.shape(1) / 3;
+    expect(moved.shape(1) == 3 * frames && order.shape(0) == vertices && base.shape(0) == vertices && base.shape(1) == 3);
+    for (size_t p = 0; p < vertices; ++p) expect(order.data()[p] >= 0 && static_cast<size_t>(order.data()[p]) < vertices);
+    Buffer<double> rows(3 * frames * vertices);
+    const bool finite = mr_place_rows(moved.data(), order.data(), base.data(), vertices, frames, rows.data()) != 0;
+    return nb::make_tuple(rows.three(vertices, 3, frames), finite);
 }
 
 nb::tuple subdivide(In<int32_t, 2> faces, size_t vertices) {
@@ -137,6 +149,16 @@ nb::tuple siblings(In<int32_t, 2> finer, size_t vertices, size_t edge_count) {
     return nb::make_tuple(starts.one(edge_count + 1), near.one(links));
 }
 
+Out<double, 1> sibling_weights(In<int64_t, 1> starts, int weight) {
+    expect(starts.shape(0) > 0 && starts.data()[0] == 0);
+    const size_t count = starts.shape(0) - 1;
+    for (size_t e = 0; e < count; ++e) expect(starts.data()[e] <= starts.data()[e + 1]);
+    const size_t links = static_cast<size_t>(starts.data()[count]);
+    Buffer<double> weights(links);
+    mr_sibling_weights(starts.data(), count, weight, weights.data());
+    return weights.one(links);
+}
+
 nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t, 2> edges, int curvature) {
     expect(positions.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
     const size_t count = edges.shape(0);
@@ -146,15 +168,33 @@ nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t,
     return nb::make_tuple(midpoints.two(count, 3), directions.two(count, 3));
 }
 
-// `positions` T x V x 3, of which the first `vertices` are known; the next are set from T x E scalars.
-void refine(InOut<double, 3> positions, size_t vertices, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars,
-            int curvature) {
-    const size_t frames = positions.shape(0), count = edges.shape(0);
-    expect(positions.shape(2) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
-    expect(positions.shape(1) >= vertices + count && scalars.shape(0) == frames && scalars.shape(1) == count);
-    for (size_t t = 0; t < frames; ++t)
-        check(mr_refine(positions.data() + 3 * t * positions.shape(1), vertices, faces.data(), faces.shape(0), edges.data(), count,
-                        scalars.data() + t * count, curvature));
+// `rows` V x 3 x T, of which the first `vertices` are known; the next are set from E x T scalars.
+void refine(InOut<double, 3> rows, size_t vertices, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars, int curvature) {
+    const size_t frames = rows.shape(2), count = edges.shape(0);
+    expect(rows.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
+    expect(rows.shape(0) >= vertices + count && scalars.shape(0) == count && scalars.shape(1) == frames);
+    check(mr_refine(rows.data(), frames, vertices, faces.data(), faces.shape(0), edges.data(), count, scalars.data(), curvature));
+}
+
+// The same of V x 3 x T rows to T x (V + E) x 3 places, and whether all of them are finite.
+nb::tuple refine_frames(In<double, 3> rows, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars, int curvature) {
+    const size_t vertices = rows.shape(0), frames = rows.shape(2), count = edges.shape(0);
+    expect(rows.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
+    expect(scalars.shape(0) == count && scalars.shape(1) == frames);
+    Buffer<double> positions(3 * frames * (vertices + count));
+    int finite = 0;
+    check(mr_refine_frames(rows.data(), frames, vertices, faces.data(), faces.shape(0), edges.data(), count, scalars.data(), curvature,
+                           positions.data(), &finite));
+    return nb::make_tuple(positions.three(frames, vertices + count, 3), finite != 0);
+}
+
+// T x V x 3, and whether all of it is finite.
+nb::tuple frames_of_rows(In<double, 3> rows) {
+    const size_t vertices = rows.shape(0), frames = rows.shape(2);
+    expect(rows.shape(1) == 3);
+    Buffer<double> positions(3 * frames * vertices);
+    const bool finite = mr_frames_of_rows(rows.data(), frames, vertices, positions.data()) != 0;
+    return nb::make_tuple(positions.three(frames, vertices, 3), finite);
 }
 
 meshreel_weights view(const InOut<int32_t, 2>& columns, const In<int64_t, 1>& starts, const In<int32_t, 1>& near) {
@@ -197,13 +237,16 @@ void bind_layers(nb::module_& m) {
     m.def("hierarchy", &hierarchy);
     m.def("predict_forward", &predict_forward);
     m.def("predict_surface", &predict_surface);
-    m.def("predict_inverse", &predict_inverse);
+    m.def("field_inverse", &field_inverse);
     m.def("orthonormal_inverse", &orthonormal_inverse);
-    m.def("transform_inverse", &transform_inverse);
     m.def("subdivide", &subdivide);
     m.def("siblings", &siblings);
+    m.def("place_rows", &place_rows);
+    m.def("sibling_weights", &sibling_weights);
     m.def("edge_frames", &edge_frames);
     m.def("refine", &refine);
+    m.def("refine_frames", &refine_frames);
+    m.def("frames_of_rows", &frames_of_rows);
     m.def("encode_field", &encode_field);
     m.def("decode_field", &decode_field);
 }

@@ -15,15 +15,16 @@ namespace {
 constexpr int kClasses = 15;  // of expected magnitude
 constexpr int kClamp = 255;  // larger magnitudes say no more about the scale
 constexpr uint32_t kBegin[kClasses - 1] = {1, 5, 9, 14, 20, 28, 40, 64, 100, 160, 300, 600, 1200, 2400};  // sixteenths
-constexpr uint32_t kLastBegin = kBegin[kClasses - 2];
+constexpr uint32_t kLastBegin = 5 * kBegin[kClasses - 2];
 constexpr uint64_t kFirstRatio = 1u << 11;
-constexpr uint32_t kAlone = UINT32_MAX;  // a place that none predicts
+constexpr size_t kBlock = 64;  // places after which the ratio is learned anew
 
+// Of five times the expected magnitude: it is a fifth of a whole number, which need not be divided to be classed.
 constexpr std::array<uint8_t, kLastBegin + 1> class_table() {
     std::array<uint8_t, kLastBegin + 1> table{};
     uint8_t index = 0;
     for (uint32_t e = 0; e <= kLastBegin; ++e) {
-        while (index < kClasses - 1 && e >= kBegin[index]) ++index;
+        while (index < kClasses - 1 && e >= 5 * kBegin[index]) ++index;
         table[e] = index;
     }
     return table;
@@ -34,34 +35,55 @@ constexpr auto kClassOf = class_table();
 class Magnitudes {
 public:
     explicit Magnitudes(const meshreel_weights& weights)
-        : count_(weights.count), sums_(count_), shares_(count_), past_(count_), now_(count_), starts_(count_ + 1) {
-        for (size_t k = 0; k < weights.neighbour_count; ++k) ++starts_[static_cast<size_t>(weights.neighbours[k]) + 1];
-        for (size_t v = 0; v < count_; ++v) starts_[v + 1] += starts_[v];
-        followers_.resize(weights.neighbour_count);
-        std::vector<size_t> next(starts_.begin(), starts_.end() - 1);
+        : count_(weights.count), sums_(count_), shares_(count_), past_(count_), bases_(count_), now_(count_), classes_(count_),
+          starts_(count_ + 1) {
+        const auto each_link = [&](auto&& visit) {  // a place that none predicts looks at the one before it
+            for (size_t v = 0; v < count_; ++v) {
+                const int64_t begin = weights.starts[v], end = weights.starts[v + 1];
+                for (int64_t k = begin; k < end; ++k) visit(static_cast<size_t>(weights.neighbours[k]), v);
+                if (begin == end && v > 0) visit(v - 1, v);
+            }
+        };
+        each_link([&](size_t u, size_t) { ++starts_[u + 1]; });
         for (size_t v = 0; v < count_; ++v) {
-            const int64_t begin = weights.starts[v], end = weights.starts[v + 1];
-            shares_[v] = end > begin ? static_cast<uint32_t>((int64_t{16} << 16) / (end - begin)) : kAlone;
-            for (int64_t k = begin; k < end; ++k) followers_[next[static_cast<size_t>(weights.neighbours[k])]++] = static_cast<int32_t>(v);
+            const int64_t links = std::max<int64_t>(weights.starts[v + 1] - weights.starts[v], 1);
+            shares_[v] = static_cast<uint32_t>((int64_t{16} << 16) / links);
+            starts_[v + 1] += starts_[v];
         }
+        followers_.resize(starts_[count_]);
+        std::vector<size_t> next(starts_.begin(), starts_.end() - 1);
+        each_link([&](size_t u, size_t v) { followers_[next[u]++] = static_cast<int32_t>(v); });
     }
 
-    int class_at(size_t v) const {
-        uint32_t expected = static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
-        if (shares_[v] == kAlone) expected = v > 0 ? 16u * now_[v - 1] : 0u;
-        if (column_ > 0) expected = (2 * expected + 3 * static_cast<uint32_t>(past_[v] * ratio_ >> 16)) / 5;
-        return kClassOf[expected < kLastBegin ? expected : kLastBegin];
+    // The places of a block in a column are coded between these two.
+    void begin_block(size_t first, size_t places) {
+        const uint32_t* past = past_.data() + first;
+        uint32_t* base = bases_.data() + first;
+        for (size_t k = 0; k < places; ++k) expected_ += past[k];
+        for (size_t k = 0; k < places; ++k) base[k] = 3 * static_cast<uint32_t>(past[k] * ratio_ >> 16);
+        for (size_t v = first; v < first + places; ++v) classes_[v] = class_of(v);
+    }
+    // The past says where a column is large; how large against the past is learned, with a memory of 400 places.
+    void end_block(size_t places) {
+        if (places < kBlock) return;
+        ratio_ = ((seen_ << 16) + 1024 * kFirstRatio) / (expected_ + 1024);
+        if (ratio_ > 1u << 20) ratio_ = 1u << 20;
+        seen_ -= seen_ / 6;
+        expected_ -= expected_ / 6;
     }
 
-    void learn(size_t v, int64_t value) {
-        expected_ += past_[v];
-        if (value != 0) {
-            const int64_t size = value < 0 ? -value : value;
-            now_[v] = static_cast<uint8_t>(size < kClamp ? size : kClamp);
-            seen_ += 16u * now_[v];
-            for (size_t k = starts_[v]; k < starts_[v + 1]; ++k) sums_[static_cast<size_t>(followers_[k])] += now_[v];
+    const uint8_t* classes() const { return classes_.data(); }  // right for what is coded next in a block
+
+    void learn(size_t v, int64_t value) {  // of values that are not zero
+        const int64_t size = value < 0 ? -value : value;
+        const uint8_t known = static_cast<uint8_t>(size < kClamp ? size : kClamp);
+        now_[v] = known;
+        seen_ += 16u * known;
+        for (size_t k = starts_[v], end = starts_[v + 1]; k < end; ++k) {
+            const size_t follower = static_cast<size_t>(followers_[k]);
+            sums_[follower] += known;
+            classes_[follower] = class_of(follower);  // beyond the block it says nothing yet
         }
-        if (++age_ == 64) rescale();
     }
 
     // Ends a column: it joins the past, in which each step back weighs 45 / 64.
@@ -69,32 +91,28 @@ public:
         for (size_t v = 0; v < count_; ++v) past_[v] = past_[v] * 45 / 64 + 16u * 128u * now_[v] / 9;
         std::fill(now_.begin(), now_.end(), static_cast<uint8_t>(0));
         std::fill(sums_.begin(), sums_.end(), 0u);
-        ++column_;
+        trust_ = 2;
         seen_ = expected_ = 0;
-        age_ = 0;
         ratio_ = kFirstRatio;
     }
 
 private:
-    // The past says where a column is large; how large against the past is learned, with a memory of 400 places.
-    void rescale() {
-        age_ = 0;
-        ratio_ = ((seen_ << 16) + 1024 * kFirstRatio) / (expected_ + 1024);
-        if (ratio_ > 1u << 20) ratio_ = 1u << 20;
-        seen_ -= seen_ / 6;
-        expected_ -= expected_ / 6;
+    uint8_t class_of(size_t v) const {
+        const uint32_t around = static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
+        const uint32_t expected = around * trust_ + bases_[v];
+        return kClassOf[expected < kLastBegin ? expected : kLastBegin];
     }
 
     size_t count_;
     std::vector<uint32_t> sums_;    // of the magnitudes at the neighbours of each place, as far as they are known
-    std::vector<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16, or kAlone
+    std::vector<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16
     std::vector<uint32_t> past_;
-    std::vector<uint8_t> now_;
+    std::vector<uint32_t> bases_;  // what the past says, three fifths of it
+    std::vector<uint8_t> now_, classes_;
     std::vector<size_t> starts_;  // of the places that have each place as a neighbour
     std::vector<int32_t> followers_;
-    size_t column_ = 0;
+    uint32_t trust_ = 5;  // fifths: in a first column all of what the neighbours say, then two
     uint64_t seen_ = 0, expected_ = 0, ratio_ = kFirstRatio;
-    uint32_t age_ = 0;
 };
 
 struct FieldModels {
@@ -104,28 +122,41 @@ struct FieldModels {
 };
 
 template <class Coder>
-int64_t code_symbol(Coder& coder, FieldModels& models, int context, int64_t value) {
+int64_t code_nonzero(Coder& coder, FieldModels& models, int context, int64_t value) {
     const uint64_t size = static_cast<uint64_t>(value < 0 ? -value : value);
-    if (!coder.bit(models.zero[context], size != 0)) return 0;
     uint64_t read = 1;
     while (read < kUnary && coder.bit(models.more[context][read], size > read)) ++read;
-    if (read == kUnary) read += code_escape(coder, models.escape, size - kUnary);
+    if (read == kUnary) {
+        Coder apart = coder;  // whose address may be taken: the other one stays in registers
+        read += code_escape(apart, models.escape, size - kUnary);
+        coder = apart;
+    }
     const bool negative = coder.raw_bit(value < 0);
     return negative ? -static_cast<int64_t>(read) : static_cast<int64_t>(read);
 }
 
 // All columns through a coder, either way; false where the bytes are bad.
 template <class Coder>
-bool code_field(Coder& coder, const meshreel_weights& weights, size_t* ends) {
+bool code_field(Coder coder, const meshreel_weights& weights, size_t* ends) {
     Magnitudes magnitudes(weights);
     FieldModels models;
-    int32_t* symbol = weights.symbols;
     for (size_t c = 0; c < weights.columns; ++c) {
-        for (size_t v = 0; v < weights.count; ++v, ++symbol) {
-            const int64_t value = code_symbol(coder, models, magnitudes.class_at(v), *symbol);
-            if (coder.failed() || !fits(value)) return false;
-            *symbol = static_cast<int32_t>(value);
-            magnitudes.learn(v, value);
+        int32_t* symbols = weights.symbols + c * weights.count;
+        for (size_t first = 0; first < weights.count; first += kBlock) {
+            const size_t places = std::min(kBlock, weights.count - first);
+            magnitudes.begin_block(first, places);
+            const uint8_t* classes = magnitudes.classes();
+            bool good = true;
+            for (size_t v = first; v < first + places; ++v) {
+                const int context = classes[v];
+                if (!coder.bit(models.zero[context], symbols[v] != 0)) continue;
+                const int64_t value = code_nonzero(coder, models, context, symbols[v]);
+                good = good && fits(value);
+                symbols[v] = static_cast<int32_t>(value);
+                magnitudes.learn(v, value);
+            }
+            if (coder.failed() || !good) return false;
+            magnitudes.end_block(places);
         }
         magnitudes.next_column();
         if (ends) ends[c] = coder.position();

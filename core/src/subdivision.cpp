@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <new>
 #include <vector>
 
@@ -11,6 +12,18 @@ bool in_range(const int32_t* indices, size_t count, size_t vertices) {
     for (size_t k = 0; k < count; ++k)
         if (indices[k] < 0 || static_cast<size_t>(indices[k]) >= vertices) return false;
     return true;
+}
+
+// Sorts by insertion what is as short as nearly always.
+template <class Iterator, class Less>
+void sort_few(Iterator begin, Iterator end, Less less) {
+    if (end - begin > 16) return std::sort(begin, end, less);
+    for (Iterator next = begin; next != end; ++next) {
+        const auto value = *next;
+        Iterator at = next;
+        for (; at != begin && less(value, *(at - 1)); --at) *at = *(at - 1);
+        *at = value;
+    }
 }
 
 // Half-edges grouped by their smaller end, in each group by their larger; equal ones are one edge.
@@ -36,7 +49,7 @@ int64_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, i
     int64_t count = 0;
     for (size_t v = 0; v < vertices; ++v) {
         const auto begin = halves.begin() + static_cast<int64_t>(starts[v]), end = halves.begin() + static_cast<int64_t>(starts[v + 1]);
-        std::sort(begin, end, [](const HalfEdge& a, const HalfEdge& b) { return a.high < b.high; });
+        sort_few(begin, end, [](const HalfEdge& a, const HalfEdge& b) { return a.high < b.high; });
         for (auto half = begin; half != end; ++half) {
             if (half == begin || half->high != (half - 1)->high) {
                 edges[2 * count] = static_cast<int32_t>(v);
@@ -51,50 +64,122 @@ int64_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, i
 
 constexpr double kMostBend = 0.15;  // of an edge's length
 
-void normals_of(const double* p, size_t vertices, const int32_t* faces, size_t face_count, std::vector<double>& n) {
-    n.assign(3 * vertices, 0.0);
-    for (size_t f = 0; f < face_count; ++f) {
-        const int32_t* face = faces + 3 * f;
-        const double* a = p + 3 * static_cast<size_t>(face[0]);
-        const double* b = p + 3 * static_cast<size_t>(face[1]);
-        const double* c = p + 3 * static_cast<size_t>(face[2]);
-        const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2];
-        const double wx = c[0] - a[0], wy = c[1] - a[1], wz = c[2] - a[2];
-        const double x = uy * wz - uz * wy, y = uz * wx - ux * wz, z = ux * wy - uy * wx;
-        for (int k = 0; k < 3; ++k) {
-            double* sum = n.data() + 3 * static_cast<size_t>(face[k]);
-            sum[0] += x, sum[1] += y, sum[2] += z;
-        }
-    }
-    for (size_t v = 0; v < vertices; ++v) {
-        double* x = n.data() + 3 * v;
-        const double length = std::sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
-        const double scale = length > 0.0 ? 1.0 / length : 0.0;
-        x[0] *= scale, x[1] *= scale, x[2] *= scale;
+// Rows of places or normals: all frames' x of a vertex, then their y, then their z. A loop over frames is one over
+// neighbours in memory, and each frame's numbers come about as if it were alone.
+struct Rows {
+    const double* data;
+    size_t frames;
+    const double* of(int32_t v) const { return data + 3 * frames * static_cast<size_t>(v); }
+};
+
+void face_normal(const Rows& p, const int32_t* face, double* __restrict n) {
+    const size_t frames = p.frames;
+    const double *a = p.of(face[0]), *b = p.of(face[1]), *c = p.of(face[2]);
+    for (size_t t = 0; t < frames; ++t) {
+        const size_t ty = t + frames, tz = ty + frames;
+        const double ux = b[t] - a[t], uy = b[ty] - a[ty], uz = b[tz] - a[tz];
+        const double wx = c[t] - a[t], wy = c[ty] - a[ty], wz = c[tz] - a[tz];
+        n[t] = uy * wz - uz * wy, n[ty] = uz * wx - ux * wz, n[tz] = ux * wy - uy * wx;
     }
 }
 
-// Calls visit(edge, curved midpoint, direction): on a circle through both ends with their normals, the arc's middle is
-// (n_b - n_a) . (b - a) / 8 above the chord's, for small angles.
-template <class Visit>
-void for_each_edge(const double* p, const std::vector<double>& n, const int32_t* edges, size_t edge_count, int curvature,
-                   Visit visit) {
-    const double share = curvature / 64.0;
-    for (size_t e = 0; e < edge_count; ++e) {
-        const size_t a = 3 * static_cast<size_t>(edges[2 * e]), b = 3 * static_cast<size_t>(edges[2 * e + 1]);
-        const double ex = p[b] - p[a], ey = p[b + 1] - p[a + 1], ez = p[b + 2] - p[a + 2];
-        const double bend = ((n[b] - n[a]) * ex + (n[b + 1] - n[a + 1]) * ey + (n[b + 2] - n[a + 2]) * ez) / 8.0;
-        const double most = kMostBend * std::sqrt(ex * ex + ey * ey + ez * ez);
-        const double lift = share * (bend > most ? most : bend < -most ? -most : bend);
-        const double x = n[a] + n[b], y = n[a + 1] + n[b + 1], z = n[a + 2] + n[b + 2];
+void add(const double* __restrict more, size_t count, double* __restrict sum) {
+    for (size_t k = 0; k < count; ++k) sum[k] += more[k];
+}
+
+void normalize(size_t frames, double* __restrict n) {
+    for (size_t t = 0; t < frames; ++t) {
+        double &x = n[t], &y = n[t + frames], &z = n[t + 2 * frames];
         const double length = std::sqrt(x * x + y * y + z * z);
         const double scale = length > 0.0 ? 1.0 / length : 0.0;
-        const double direction[3] = {x * scale, y * scale, z * scale};
-        const double middle[3] = {(p[a] + p[b]) / 2.0 + lift * direction[0], (p[a + 1] + p[b + 1]) / 2.0 + lift * direction[1],
-                                  (p[a + 2] + p[b + 2]) / 2.0 + lift * direction[2]};
-        visit(e, middle, direction);
+        x *= scale, y *= scale, z *= scale;
     }
 }
+
+std::vector<double> normals_of(const Rows& p, size_t vertices, const int32_t* faces, size_t face_count) {
+    const size_t width = 3 * p.frames;
+    std::vector<double> n(width * vertices, 0.0), one(width);
+    for (size_t f = 0; f < face_count; ++f) {
+        face_normal(p, faces + 3 * f, one.data());
+        for (size_t k = 0; k < 3; ++k) add(one.data(), width, n.data() + width * static_cast<size_t>(faces[3 * f + k]));
+    }
+    for (size_t v = 0; v < vertices; ++v) normalize(p.frames, n.data() + width * v);
+    return n;
+}
+
+// Curved midpoint and direction of an edge: on a circle through both ends with their normals, the arc's middle is
+// (n_b - n_a) . (b - a) / 8 above the chord's, for small angles.
+// Calls visit(frame, place in a row, number of the midpoint, number of the direction).
+template <class Visit>
+void edge_frame(const Rows& p, const Rows& normals, const int32_t* edge, double share, Visit visit) {
+    const size_t frames = p.frames;
+    const double *a = p.of(edge[0]), *b = p.of(edge[1]), *m = normals.of(edge[0]), *n = normals.of(edge[1]);
+    for (size_t t = 0; t < frames; ++t) {
+        const size_t ty = t + frames, tz = ty + frames;
+        const double ex = b[t] - a[t], ey = b[ty] - a[ty], ez = b[tz] - a[tz];
+        const double bend = ((n[t] - m[t]) * ex + (n[ty] - m[ty]) * ey + (n[tz] - m[tz]) * ez) / 8.0;
+        const double most = kMostBend * std::sqrt(ex * ex + ey * ey + ez * ez);
+        const double above = bend < -most ? -most : bend;
+        const double lift = share * (bend > most ? most : above);
+        const double x = m[t] + n[t], y = m[ty] + n[ty], z = m[tz] + n[tz];
+        const double length = std::sqrt(x * x + y * y + z * z);
+        const double scale = length > 0.0 ? 1.0 / length : 0.0;
+        const double dx = x * scale, dy = y * scale, dz = z * scale;
+        visit(t, t, (a[t] + b[t]) / 2.0 + lift * dx, dx);
+        visit(t, ty, (a[ty] + b[ty]) / 2.0 + lift * dy, dy);
+        visit(t, tz, (a[tz] + b[tz]) / 2.0 + lift * dz, dz);
+    }
+}
+
+// Places new vertices by the rows of the coarser level's.
+struct Refinement {
+    Rows places;
+    std::vector<double> normals;
+    double share;
+
+    Refinement(const Rows& rows, size_t vertices, const int32_t* faces, size_t face_count, int curvature)
+        : places(rows), normals(normals_of(rows, vertices, faces, face_count)), share(curvature / 64.0) {}
+
+    void place(const int32_t* edges, size_t edge_count, const double* scalars, double* out) const {
+        const size_t frames = places.frames;
+        for (size_t e = 0; e < edge_count; ++e, out += 3 * frames, scalars += frames) {
+            double* __restrict place = out;
+            const double* __restrict scalar = scalars;
+            edge_frame(places, {normals.data(), frames}, edges + 2 * e, share,
+                       [=](size_t t, size_t k, double middle, double direction) { place[k] = middle + scalar[t] * direction; });
+        }
+    }
+};
+
+constexpr size_t kBlock = 64;  // rows, which the nearest cache holds while they become frames
+
+// Rows written as frames x vertices x 3.
+class Frames {
+public:
+    Frames(double* positions, size_t frames, size_t vertices) : positions_(positions), frames_(frames), vertices_(vertices) {}
+
+    void set(size_t first, const double* rows, size_t count) {
+        for (size_t begin = 0; begin < count; begin += kBlock)
+            for (size_t t = 0; t < frames_; ++t)
+                set_frame(positions_ + 3 * (t * vertices_ + first + begin), rows + 3 * frames_ * begin + t, std::min(kBlock, count - begin));
+    }
+    bool are_finite() const { return waste_ == 0.0; }
+
+private:
+    void set_frame(double* __restrict out, const double* __restrict in, size_t count) {
+        double wastes[3] = {};  // of numbers that are not finite: anything else times 0 is 0
+        for (size_t v = 0; v < count; ++v, in += 3 * frames_, out += 3) {
+            const double x = in[0], y = in[frames_], z = in[2 * frames_];
+            out[0] = x, out[1] = y, out[2] = z;
+            wastes[0] += x * 0.0, wastes[1] += y * 0.0, wastes[2] += z * 0.0;
+        }
+        waste_ += wastes[0] + wastes[1] + wastes[2];
+    }
+
+    double* positions_;
+    size_t frames_, vertices_;
+    double waste_ = 0.0;
+};
 
 template <class Body>
 int guarded(Body body) {
@@ -151,7 +236,7 @@ int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t
         starts[0] = 0;
         for (size_t e = 0; e < edge_count; ++e) {
             const auto begin = all.begin() + bounds[e], end = all.begin() + bounds[e + 1];
-            std::sort(begin, end);
+            sort_few(begin, end, std::less<>());
             const auto last = std::unique(begin, end);
             std::copy(begin, last, near + starts[e]);
             starts[e + 1] = starts[e] + (last - begin);
@@ -164,26 +249,48 @@ int mr_edge_frames(const double* positions, size_t vertices, const int32_t* face
                    size_t edge_count, int curvature, double* midpoints, double* directions) {
     if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
     return guarded([&] {
-        std::vector<double> normals;
-        normals_of(positions, vertices, faces, face_count, normals);
-        for_each_edge(positions, normals, edges, edge_count, curvature, [&](size_t e, const double* middle, const double* direction) {
-            std::copy(middle, middle + 3, midpoints + 3 * e);
-            std::copy(direction, direction + 3, directions + 3 * e);
-        });
+        const Rows places{positions, 1};
+        const std::vector<double> n = normals_of(places, vertices, faces, face_count);
+        for (size_t e = 0; e < edge_count; ++e)
+            edge_frame(places, {n.data(), 1}, edges + 2 * e, curvature / 64.0, [=](size_t, size_t k, double middle, double direction) {
+                midpoints[3 * e + k] = middle;
+                directions[3 * e + k] = direction;
+            });
         return static_cast<int>(MR_LAYERS_OK);
     });
 }
 
-int mr_refine(double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges, size_t edge_count,
-              const double* scalars, int curvature) {
+int mr_refine(double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+              size_t edge_count, const double* scalars, int curvature) {
     if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
     return guarded([&] {
-        std::vector<double> normals;
-        normals_of(positions, vertices, faces, face_count, normals);
-        double* out = positions + 3 * vertices;
-        for_each_edge(positions, normals, edges, edge_count, curvature, [&](size_t e, const double* middle, const double* direction) {
-            for (int k = 0; k < 3; ++k) out[3 * e + static_cast<size_t>(k)] = middle[k] + scalars[e] * direction[k];
-        });
+        const Refinement refinement({rows, frames}, vertices, faces, face_count, curvature);
+        refinement.place(edges, edge_count, scalars, rows + 3 * frames * vertices);
         return static_cast<int>(MR_LAYERS_OK);
     });
+}
+
+int mr_refine_frames(const double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+                     size_t edge_count, const double* scalars, int curvature, double* positions, int* finite) {
+    if (!fits(vertices, faces, face_count, edges, edge_count)) return MR_LAYERS_BAD_INPUT;
+    return guarded([&] {
+        const Refinement refinement({rows, frames}, vertices, faces, face_count, curvature);
+        const size_t width = 3 * frames;
+        std::vector<double> some(width * kBlock);
+        Frames out(positions, frames, vertices + edge_count);
+        out.set(0, rows, vertices);
+        for (size_t e = 0; e < edge_count; e += kBlock) {
+            const size_t count = std::min(kBlock, edge_count - e);
+            refinement.place(edges + 2 * e, count, scalars + e * frames, some.data());
+            out.set(vertices + e, some.data(), count);
+        }
+        *finite = out.are_finite();
+        return static_cast<int>(MR_LAYERS_OK);
+    });
+}
+
+int mr_frames_of_rows(const double* rows, size_t frames, size_t vertices, double* positions) {
+    Frames out(positions, frames, vertices);
+    out.set(0, rows, vertices);
+    return out.are_finite();
 }

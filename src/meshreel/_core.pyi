@@ -107,17 +107,18 @@ def predict_surface(
     step: float,
     price: float,
 ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]: ...
-def predict_inverse(
+def field_inverse(
     symbols: Int32[np.ndarray, "M V"],
-    starts: Int64[np.ndarray, " V+1"],
-    near: Int32[np.ndarray, " N"],
-    weights: Float64[np.ndarray, " N"],
+    graph: tuple[Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]],
     step: float,
-) -> Float64[np.ndarray, "M V"]: ...
+    vectors: Float64[np.ndarray, "M C"],
+    means: Float64[np.ndarray, " C"],
+) -> Float64[np.ndarray, "V C"]: ...
 def orthonormal_inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64[np.ndarray, "M C"]: ...
-def transform_inverse(
-    columns: Float64[np.ndarray, "M V"], vectors: Float64[np.ndarray, "M C"], means: Float64[np.ndarray, " C"]
-) -> Float64[np.ndarray, "C V"]: ...
+def place_rows(
+    moved: Float64[np.ndarray, "V C"], order: Int32[np.ndarray, " V"], base: Float64[np.ndarray, "V 3"]
+) -> tuple[Float64[np.ndarray, "V 3 T"], bool]: ...
+def sibling_weights(starts: Int64[np.ndarray, " E+1"], weight: int) -> Float64[np.ndarray, " N"]: ...
 def subdivide(
     faces: Int32[np.ndarray, "F 3"], vertices: int
 ) -> tuple[Int32[np.ndarray, "E 2"], Int32[np.ndarray, "4F 3"]]: ...
@@ -131,13 +132,21 @@ def edge_frames(
     curvature: int,
 ) -> tuple[Float64[np.ndarray, "E 3"], Float64[np.ndarray, "E 3"]]: ...
 def refine(
-    positions: Float64[np.ndarray, "T W 3"],
+    rows: Float64[np.ndarray, "W 3 T"],
     vertices: int,
     faces: Int32[np.ndarray, "F 3"],
     edges: Int32[np.ndarray, "E 2"],
-    scalars: Float64[np.ndarray, "T E"],
+    scalars: Float64[np.ndarray, "E T"],
     curvature: int,
 ) -> None: ...
+def refine_frames(
+    rows: Float64[np.ndarray, "V 3 T"],
+    faces: Int32[np.ndarray, "F 3"],
+    edges: Int32[np.ndarray, "E 2"],
+    scalars: Float64[np.ndarray, "E T"],
+    curvature: int,
+) -> tuple[Float64[np.ndarray, "T W 3"], bool]: ...
+def frames_of_rows(rows: Float64[np.ndarray, "V 3 T"]) -> tuple[Float64[np.ndarray, "T V 3"], bool]: ...
 def encode_field(
     columns: Int32[np.ndarray, "M V"], starts: Int64[np.ndarray, " V+1"], near: Int32[np.ndarray, " N"]
 ) -> tuple[bytes, Int64[np.ndarray, " M"]]: ...

@@ -59,7 +59,7 @@ def test_what_is_decoded_is_what_the_encoder_saw_and_near(level: int, mean: bool
     coded = encode_field(wanted, GRAPH, rate, ROUND if mean else None)
     decoded = decode_field(coded.record, GRAPH, wanted.shape[1], coded.has_mean)
     np.testing.assert_array_equal(decoded, coded.decoded)
-    assert np.abs(decoded.T - wanted).max() < 4 * rate.step
+    assert np.abs(decoded - wanted).max() < 4 * rate.step
     assert coded.basis_bits + coded.symbol_bits == 8 * len(coded.record.basis + coded.record.symbols)
 
 
@@ -68,7 +68,7 @@ def test_without_a_price_errors_stay_below_half_a_step_a_column(monkeypatch: pyt
     rate, wanted = Rate(104, 0.0), trajectories()
     coded = encode_field(wanted, GRAPH, rate)
     assert coded.record.columns == wanted.shape[1]
-    assert np.linalg.norm(coded.decoded.T - wanted, axis=1).max() <= rate.step / 2 * wanted.shape[1] ** 0.5 + 1e-9
+    assert np.linalg.norm(coded.decoded - wanted, axis=1).max() <= rate.step / 2 * wanted.shape[1] ** 0.5 + 1e-9
 
 
 def test_a_price_on_bits_saves_more_than_it_spoils() -> None:
@@ -81,7 +81,7 @@ def test_errors_move_to_where_they_do_not_show() -> None:
     wanted, errors, bits = trajectories(), [], []
     for tangential in (1.0, 0.3):
         coded = encode_field(wanted, GRAPH, Rate(72, 0.12), Surface(ROUND.normals, tangential))
-        error = (coded.decoded.T - wanted).reshape(COUNT, -1, 3)
+        error = (coded.decoded - wanted).reshape(COUNT, -1, 3)
         errors.append(((error * ROUND.normals.reshape(COUNT, -1, 3)).sum(axis=2) ** 2).mean())
         bits.append(coded.symbol_bits)
     assert errors[1] < errors[0] and bits[1] < 1.02 * bits[0]

@@ -33,8 +33,15 @@ void mr_hierarchy_destroy(mr_hierarchy* hierarchy);
 const int32_t* mr_hierarchy_order(const mr_hierarchy* hierarchy);  // the vertex at each place
 struct mr_graph mr_hierarchy_graph(const mr_hierarchy* hierarchy);  // of places
 
-// decoded[c][v] = prediction + step * symbols[c][v]; values column after column.
-int mr_predict_inverse(const struct mr_graph* graph, const int32_t* symbols, size_t columns, double step, double* decoded);
+// An orthonormal basis, and what is added to all that is made in it (nothing where null).
+struct mr_basis {
+    size_t columns, width;
+    const double* vectors;  // columns x width
+    const double* means;
+};
+// rows[v][t] = means[t] + the sum over k, in order, of vectors[k][t] * decoded[k][v], where decoded[k][v] = prediction +
+// step * symbols[k][v]; `symbols` column after column.
+int mr_field_inverse(const struct mr_graph* graph, const int32_t* symbols, double step, const struct mr_basis* basis, double* rows);
 // Symbols so that `decoded` is near `values`; a magnitude is lowered where that saves more than `price` squared steps a bit.
 int mr_predict_forward(const struct mr_graph* graph, const double* values, size_t columns, double step, double price,
                        int32_t* symbols, double* decoded);
@@ -55,22 +62,30 @@ int mr_predict_surface(const struct mr_graph* graph, const struct mr_surface* su
 // turned onto the first k axes by reflections, leave room for it. MR_LAYERS_BAD_INPUT where all of these are zero.
 int mr_orthonormal_inverse(const int32_t* symbols, size_t count, size_t width, double* vectors);
 
-// out[t][v] = means[t] (0 where null) + the sum over k, in order, of vectors[k][t] * columns[k][v].
-void mr_transform_inverse(const double* columns, size_t count, size_t width, const double* vectors, size_t frames,
-                          const double* means, double* out);
+// The row of the vertex order[p], all frames of an axis after the other: the displacements in row p, frame after frame x, y
+// and z, from its place in `base`. Returns 1 where all of them are finite.
+int mr_place_rows(const double* moved, const int32_t* order, const double* base, size_t vertices, size_t frames, double* rows);
 
 // The sorted edges of a mesh and its faces cut in four. `edges` has room for 3 face_count pairs; returns their number, or -1.
 int64_t mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer);
 // For each edge those that share a face with it and come before it, sorted; `near` has room for 3 face_count entries.
 int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts, int32_t* near);
+// Weights that predict each by weight / 64 of the mean of those near it.
+void mr_sibling_weights(const int64_t* starts, size_t edge_count, int weight, double* weights);
 
 // Midpoints of the edges, lifted by curvature / 64 of the bend that both ends' normals say, and along the unit sum of these
 // normals a direction (zero where there is none).
 int mr_edge_frames(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
                    size_t edge_count, int curvature, double* midpoints, double* directions);
-// `positions` of one frame: vertices, then room for the edges' vertices, which become midpoint + scalar * direction.
-int mr_refine(double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+// `rows` of all frames' x of a vertex, then their y, then their z: of the vertices, then room for the edges', which become
+// midpoint + scalar * direction. A row of scalars for each edge.
+int mr_refine(double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
               size_t edge_count, const double* scalars, int curvature);
+// The same of a last level, all of it as frames x vertices x 3; `finite` becomes whether all of them are.
+int mr_refine_frames(const double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
+                     size_t edge_count, const double* scalars, int curvature, double* positions, int* finite);
+// Such rows as frames x vertices x 3. Returns 1 where all of them are finite.
+int mr_frames_of_rows(const double* rows, size_t frames, size_t vertices, double* positions);
 
 #ifdef __cplusplus
 }

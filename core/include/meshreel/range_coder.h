@@ -22,24 +22,36 @@ constexpr std::array<uint32_t, kSlowMemory + 1> learning_rates() {
 }
 inline constexpr auto kRates = learning_rates();
 
-inline void move(uint32_t& one, bool bit, uint64_t rate) {
-    if (bit) one += static_cast<uint32_t>((static_cast<uint64_t>(~one) * rate) >> 16);
-    else one -= static_cast<uint32_t>((static_cast<uint64_t>(one) * rate) >> 16);
-}
-
-struct Model {
-    uint32_t slow = 1u << 31;  // probability of a 1, in units of 2^-32
+struct Model {  // slow and fast apart: a compiler that makes one vector of them waits for memory on its way back
+    uint32_t slow = 1u << 31;         // probability of a 1, in units of 2^-32
+    uint32_t probability = 1u << 15;  // the mean of both, in units of 2^-16, never 0 or 1
     uint32_t fast = 1u << 31;
     uint32_t seen = 0;
 
-    uint32_t probability() const {  // of a 1, in units of 2^-16, never 0 or 1
-        const uint32_t p = (slow >> 17) + (fast >> 17);
-        return p < 16 ? 16 : p > 65520 ? 65520 : p;
+    void update(bool bit) { bit ? update_one() : update_zero(); }
+    void update_one() {
+        learn([](uint32_t one, uint32_t rate) { return one + static_cast<uint32_t>((static_cast<uint64_t>(~one) * rate) >> 16); });
     }
-    void update(bool bit) {
-        move(slow, bit, kRates[seen]);
-        move(fast, bit, kRates[seen < kFastMemory ? seen : kFastMemory]);
-        seen += seen < kSlowMemory;
+    void update_zero() {
+        learn([](uint32_t one, uint32_t rate) { return one - static_cast<uint32_t>((static_cast<uint64_t>(one) * rate) >> 16); });
+    }
+
+private:
+    template <class Moved>
+    void learn(Moved moved) {
+        uint32_t patient, hasty;
+        if (seen == kSlowMemory) {  // nearly always, and then the rates are constants
+            patient = moved(slow, kRates[kSlowMemory]);
+            hasty = moved(fast, kRates[kFastMemory]);
+        } else {
+            patient = moved(slow, kRates[seen]);
+            hasty = moved(fast, kRates[seen < kFastMemory ? seen : kFastMemory]);
+            ++seen;
+        }
+        const uint32_t p = (patient >> 17) + (hasty >> 17);
+        slow = patient;
+        fast = hasty;
+        probability = p < 16 ? 16 : p > 65520 ? 65520 : p;
     }
 };
 
@@ -62,21 +74,21 @@ inline Tail shortest_tail(uint32_t low, uint32_t range) {
 
 class RangeEncoder {
 public:
-    explicit RangeEncoder(std::vector<uint8_t>& out) : out_(out), begin_(out.size()) {}
+    explicit RangeEncoder(std::vector<uint8_t>& out) : out_(&out), begin_(out.size()) {}
 
     bool bit(Model& model, bool value) {
-        const bool coded = code(model.probability(), value);
+        const bool coded = code(model.probability, value);
         model.update(value);
         return coded;
     }
     bool raw_bit(bool value) { return code(1u << 15, value); }
     bool failed() const { return false; }
-    size_t position() const { return out_.size() - begin_; }  // bytes, those that are still to come left out
+    size_t position() const { return out_->size() - begin_; }  // bytes, those that are still to come left out
 
     bool finish() {
         const Tail tail = shortest_tail(low_, range_);
         if (tail.value >> 32) carry();
-        for (int k = 0; k < tail.bytes; ++k) out_.push_back(static_cast<uint8_t>(tail.value >> (24 - 8 * k)));
+        for (int k = 0; k < tail.bytes; ++k) out_->push_back(static_cast<uint8_t>(tail.value >> (24 - 8 * k)));
         return true;
     }
 
@@ -92,17 +104,17 @@ private:
             if (low_ < before) carry();
         }
         while (range_ < kTop) {
-            out_.push_back(static_cast<uint8_t>(low_ >> 24));
+            out_->push_back(static_cast<uint8_t>(low_ >> 24));
             low_ <<= 8;
             range_ <<= 8;
         }
         return value;
     }
     void carry() {
-        for (size_t k = out_.size(); k > begin_ && ++out_[k - 1] == 0; --k) {}
+        for (size_t k = out_->size(); k > begin_ && ++(*out_)[k - 1] == 0; --k) {}
     }
 
-    std::vector<uint8_t>& out_;
+    std::vector<uint8_t>* out_;
     size_t begin_;
     uint32_t low_ = 0;
     uint32_t range_ = 0xFFFFFFFFu;
@@ -115,11 +127,27 @@ public:
     }
 
     bool bit(Model& model, bool) {
-        const bool value = decode(model.probability());
-        model.update(value);
-        return value;
+        const uint32_t bound = bound_of(range_, model.probability);
+        if (code_ < bound) {
+            range_ = bound;
+            model.update_one();
+            fill();
+            return true;
+        }
+        code_ -= bound;
+        range_ -= bound;
+        model.update_zero();
+        fill();
+        return false;
     }
-    bool raw_bit(bool) { return decode(1u << 15); }
+    bool raw_bit(bool) {  // no branch: nobody can foretell it
+        const uint32_t half = range_ >> 1;
+        const uint32_t low = code_ >= half;
+        code_ -= half & (0u - low);
+        range_ = half + (range_ & low);
+        fill();
+        return low == 0;
+    }
     size_t position() const { return position_; }
     bool failed() const { return position_ > size_ + 3; }  // a whole stream is read at most 3 bytes past its end
 
@@ -132,20 +160,11 @@ public:
     }
 
 private:
-    bool decode(uint32_t probability) {
-        const uint32_t bound = bound_of(range_, probability);
-        const bool value = code_ < bound;
-        if (value) {
-            range_ = bound;
-        } else {
-            code_ -= bound;
-            range_ -= bound;
-        }
+    void fill() {
         while (range_ < kTop) {
             code_ = code_ << 8 | next();
             range_ <<= 8;
         }
-        return value;
     }
     uint32_t next() {
         const uint32_t byte = position_ < size_ ? data_[position_] : 0u;

@@ -15,7 +15,7 @@ from ..errors import FormatError
 from ..format.layout import LayersLevel, Origin
 from ..geometry.levels import Level
 from .fields import EncodedField, Rate, decode_field, encode_field
-from .graph import siblings
+from .graph import Siblings, siblings
 
 SIBLING_WEIGHTS = (36, 16)  # tried, 64ths
 
@@ -43,21 +43,24 @@ def encode_level(
     tried = [(weight, encode_field(offsets, near.graph(weight), rate)) for weight in SIBLING_WEIGHTS]
     weight, field = min(tried, key=lambda pair: _cost(pair[1], offsets, rate))
     record = LayersLevel(Origin.PREVIOUS if follows else Origin.ALONE, curvature, weight, field.record)
-    return EncodedLevel(record, field, field.decoded + previous if follows else field.decoded)
+    return EncodedLevel(record, field, field.decoded.T + previous if follows else field.decoded.T)
 
 
 def decode_level(
-    record: LayersLevel, level: Level, frames: int, previous: Float64[np.ndarray, " E"] | None
-) -> Float64[np.ndarray, "T E"]:
-    """The scalars of a level. Raises FormatError on damaged records, or where they need a group that is not there."""
-    scalars = decode_field(record.scalars, siblings(level).graph(record.sibling_weight), frames, False)
+    record: LayersLevel, near: Siblings, frames: int, previous: Float64[np.ndarray, " E"] | None
+) -> Float64[np.ndarray, "E T"]:
+    """The scalars of a level, a row for each new vertex.
+
+    Raises FormatError on damaged records, or where they need a group that is not there.
+    """
+    scalars = decode_field(record.scalars, near.graph(record.sibling_weight), frames, False)
     if record.origin == Origin.ALONE:
         return scalars
-    if previous is None or len(previous) != scalars.shape[1]:
+    if previous is None or len(previous) != len(scalars):
         raise FormatError("a level that is counted from a group which is not at hand, or not to this level")
-    return scalars + previous
+    return scalars + previous[:, None]
 
 
 def _cost(field: EncodedField, offsets: Float64[np.ndarray, "E T"], rate: Rate) -> float:
-    error = float(((field.decoded - offsets.T) ** 2).sum())
+    error = float(((field.decoded.T - offsets.T) ** 2).sum())
     return error + rate.price * rate.step**2 * (field.basis_bits + field.symbol_bits)

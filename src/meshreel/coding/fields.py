@@ -50,7 +50,7 @@ class EncodedField:
 
     record: CodedField
     has_mean: bool
-    decoded: Float64[np.ndarray, "C V"]
+    decoded: Float64[np.ndarray, "V C"]
     basis_bits: int
     symbol_bits: int
 
@@ -75,12 +75,13 @@ def encode_field(
         coded = _Columns(centered, _only(basis, kept), graph, (rate, surface))
     packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
     record = CodedField(len(kept), rate.step_level, packed, coded.stream)
-    decoded = _core.transform_inverse(coded.decoded, coded.vectors, np.ldexp(mean, -bits) * has_mean)
+    arrays = (graph.starts, graph.near, graph.weights)
+    decoded = _core.field_inverse(coded.symbols, arrays, rate.step, coded.vectors, np.ldexp(mean, -bits) * has_mean)
     return EncodedField(record, has_mean, decoded, 8 * len(packed), 8 * len(coded.stream))
 
 
-def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "C V"]:
-    """The trajectories of a record, number by number. Raises FormatError where it holds none of this width."""
+def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "V C"]:
+    """The trajectories of a record. Raises FormatError where it holds none of this width."""
     count = len(graph.starts) - 1
     if record.columns > width or record.step_level >= LEVELS:
         raise FormatError(f"{record.columns} columns of {width} numbers at step level {record.step_level}")
@@ -89,8 +90,8 @@ def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -
     symbols = np.empty((record.columns, count), np.int32)
     if not _core.decode_field(record.symbols, symbols, graph.starts, graph.near):
         raise FormatError(f"{len(record.symbols)} bytes of symbols are truncated or damaged")
-    columns = _core.predict_inverse(symbols, graph.starts, graph.near, graph.weights, step_of(record.step_level))
-    return _core.transform_inverse(columns, vectors, mean)
+    arrays = (graph.starts, graph.near, graph.weights)
+    return _core.field_inverse(symbols, arrays, step_of(record.step_level), vectors, mean)
 
 
 class _Columns:

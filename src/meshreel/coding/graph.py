@@ -13,7 +13,7 @@ from jaxtyping import Float64, Int32, Int64
 
 from .. import _core
 from ..errors import FormatError
-from ..geometry.levels import Level
+from ..geometry.levels import Level, subdivide
 from ..types import Mesh
 
 
@@ -43,15 +43,29 @@ class Siblings:
 
     def graph(self, weight: int) -> Graph:
         """Each new vertex's scalar is predicted by weight / 64 of the mean of its siblings'."""
-        counts = np.diff(self.starts)
-        shares = weight / (64.0 * np.maximum(counts, 1))
-        return Graph(self.starts, self.near, np.repeat(shares, counts))
+        return Graph(self.starts, self.near, _core.sibling_weights(self.starts, weight))
+
+
+@dataclass(frozen=True, slots=True)
+class Connectivity:
+    """What follows from the coarser level's faces alone, so that groups which share them share it."""
+
+    level: Level
+    siblings: Siblings
+
+
+def connectivity(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Connectivity:
+    """Of the next level. Raises FormatError where a face names none of the vertices."""
+    level = subdivide(faces, vertices)
+    return Connectivity(level, siblings(level))
 
 
 def hierarchy(base: Mesh) -> Hierarchy:
     """The order and the predictors of a base mesh's vertices. Raises FormatError where a face names none of them."""
-    _check(base.faces, len(base.vertices))
-    order, starts, near, weights = _core.hierarchy(base.vertices, base.faces)
+    try:
+        order, starts, near, weights = _core.hierarchy(base.vertices, base.faces)
+    except ValueError as error:
+        raise FormatError(f"a face that names none of {len(base.vertices)} vertices") from error
     return Hierarchy(order, Graph(starts.view(np.int64), near, weights))  # the core's int64 may be NumPy's longlong
 
 
@@ -59,8 +73,3 @@ def siblings(level: Level) -> Siblings:
     """The siblings of a level's new vertices."""
     starts, near = _core.siblings(level.faces, level.vertices, len(level.edges))
     return Siblings(starts.view(np.int64), near)
-
-
-def _check(faces: Int32[np.ndarray, "F 3"], vertices: int) -> None:
-    if len(faces) and (faces.min() < 0 or faces.max() >= vertices):
-        raise FormatError(f"a face names vertex {int(faces.max())} or {int(faces.min())} of {vertices}")

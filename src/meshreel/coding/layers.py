@@ -6,7 +6,7 @@ of layers decodes to a coarser mesh. T = 1 is the intra form. A group may be pre
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 
 import numpy as np
@@ -15,10 +15,11 @@ from jaxtyping import Float64, Int32
 from ..errors import FormatError, InputError
 from ..format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ..format.records import pack, unpack, unpack_all
-from ..geometry.levels import heights, refine, subdivide
+from ..geometry.levels import frames_of, heights, refine, refine_frames, refine_rows, subdivide
 from ..types import Mesh
 from .details import decode_level, encode_level
 from .fields import Rate
+from .graph import Connectivity, connectivity
 from .mesh import check_growth, check_step, decode_mesh
 from .reference import CodedReference
 from .steps import LEVELS, level_of, step_of
@@ -69,6 +70,7 @@ class LayersState:
     faces: Int32[np.ndarray, "F 3"]  # of the base
     base: Float64[np.ndarray, "V 3"]  # its vertices in the last frame
     scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each level decoded
+    finer: tuple[Connectivity, ...] = ()  # of the levels as far as they are at hand; from the faces alone
 
     @property
     def levels(self) -> int:
@@ -126,7 +128,7 @@ def encode_layers(
         known, faces = refine(known, level, coded.scalars, curvature), level.faces
     payload = b"".join(parts)
     bits["head"] = 8 * len(payload) - sum(bits.values())
-    state = _state(base, known, scalars)
+    state = _state(base, known, [level.T for level in scalars])
     return EncodedLayers(payload, tuple(accumulate(map(len, parts))), known, state, bits)
 
 
@@ -141,19 +143,26 @@ def decode_layers(
     previous = previous if head.origin == Origin.PREVIOUS else None
     base = _base(head, previous)
     known = decode_trajectories(head.motion, base, head.frames, head.has_mean == Presence.PRESENT)
-    faces, scalars = base.faces, list[Float64[np.ndarray, "T _"]]()
-    for number in range(1, head.levels + 1 if levels is None else min(levels, head.levels) + 1):
+    faces = base.faces
+    scalars: list[Float64[np.ndarray, "_ T"]] = []
+    finer: list[Connectivity] = []
+    finest = head.levels if levels is None else min(levels, head.levels)
+    positions = frames_of(known)
+    for number in range(1, finest + 1):
         record, offset = unpack(LayersLevel, data, offset)
-        level = subdivide(faces, known.shape[1])
+        finer.append(_connectivity(previous, number) or connectivity(faces, len(known)))
+        level = finer[-1].level
         if 3 * head.frames * level.count > MOST_NUMBERS:
             raise FormatError(f"{head.frames} frames of {len(level.faces)} faces exceed {MOST_NUMBERS} numbers")
-        scalars.append(decode_level(record, level, head.frames, _before(previous, number)))
-        known, faces = refine(known, level, scalars[-1], record.curvature), level.faces
+        scalars.append(decode_level(record, finer[-1].siblings, head.frames, _before(previous, number)))
+        if number < finest:
+            known = refine_rows(known, level, scalars[-1], record.curvature)
+        else:
+            positions = refine_frames(known, level, scalars[-1], record.curvature)
+        faces = level.faces
     if levels is None and offset != len(data):
         raise FormatError(f"layers: {len(data) - offset} bytes too many")
-    if not np.isfinite(known).all():
-        raise FormatError("layers: vertices that are not finite")
-    return faces, known, _state(base, known, scalars)
+    return faces, positions, replace(_state(base, positions, scalars), finer=tuple(finer))
 
 
 def layers_end(data: bytes, levels: int | None = None) -> tuple[LayersGroup, int]:
@@ -208,8 +217,13 @@ def _before(previous: LayersState | None, number: int) -> Float64[np.ndarray, " 
     return previous.scalars[number - 1] if previous is not None and number <= len(previous.scalars) else None
 
 
+def _connectivity(previous: LayersState | None, number: int) -> Connectivity | None:
+    """That of a level of the group before, whose faces a group has which is predicted from it."""
+    return previous.finer[number - 1] if previous is not None and number <= len(previous.finer) else None
+
+
 def _state(
-    base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "T _"]]
+    base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "_ T"]]
 ) -> LayersState:
     last = positions[-1, : len(base.vertices)].copy()
-    return LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))
+    return LayersState(base.faces, last, tuple(level[:, -1].copy() for level in scalars))

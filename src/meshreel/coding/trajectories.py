@@ -9,8 +9,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64
 
+from .. import _core
 from ..errors import FormatError
 from ..format.layout import CodedField
+from ..geometry.levels import frames_of
 from ..geometry.topology import vertex_normals
 from ..types import Mesh
 from .fields import EncodedField, Rate, Surface, decode_field, encode_field
@@ -30,20 +32,17 @@ def encode_trajectories(
     normals = np.stack(frames, axis=1)[places.order].reshape(len(base.vertices), -1)
     surface = Surface(np.ascontiguousarray(normals), tangential)
     field = encode_field(offsets.reshape(len(base.vertices), -1), places.graph, rate, surface)
-    return field, _placed(field.decoded, base, places)
+    return field, frames_of(_placed(field.decoded, base, places))
 
 
-def decode_trajectories(record: CodedField, base: Mesh, frames: int, has_mean: bool) -> Float64[np.ndarray, "T V 3"]:
-    """Where the base's vertices are in every frame. Raises FormatError on damaged records."""
+def decode_trajectories(record: CodedField, base: Mesh, frames: int, has_mean: bool) -> Float64[np.ndarray, "V 3 T"]:
+    """Where the base's vertices are in every frame, as rows. Raises FormatError on damaged records."""
     places = hierarchy(base)
     return _placed(decode_field(record, places.graph, 3 * frames, has_mean), base, places)
 
 
-def _placed(rows: Float64[np.ndarray, "C V"], base: Mesh, places: Hierarchy) -> Float64[np.ndarray, "T V 3"]:
-    frames = len(rows) // 3
-    positions = np.empty((frames, len(base.vertices), 3))
-    moved = np.moveaxis(rows.reshape(frames, 3, -1), 1, 2)
-    positions[:, places.order] = moved + base.vertices[places.order]
-    if not np.isfinite(positions).all():
+def _placed(moved: Float64[np.ndarray, "V C"], base: Mesh, places: Hierarchy) -> Float64[np.ndarray, "V 3 T"]:
+    rows, finite = _core.place_rows(moved, places.order, base.vertices)
+    if not finite:
         raise FormatError("a motion that is not finite")
-    return positions
+    return rows

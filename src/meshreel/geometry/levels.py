@@ -39,9 +39,10 @@ def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
 
     Raises FormatError where a face names none of the vertices.
     """
-    if len(faces) and (faces.min() < 0 or faces.max() >= vertices):
-        raise FormatError(f"a face names vertex {int(faces.max())} or {int(faces.min())} of {vertices}")
-    edges, finer = _core.subdivide(faces, vertices)
+    try:
+        edges, finer = _core.subdivide(faces, vertices)
+    except ValueError as error:
+        raise FormatError(f"a face that names none of {vertices} vertices, or too many of them") from error
     return Level(faces, edges, finer, vertices)
 
 
@@ -85,7 +86,34 @@ def refine(
     The direction is the unit sum of the normals at both ends; `curvature` / 64 of the sagitta that they say is how far
     the midpoint lies from the edge's.
     """
-    positions = np.empty((len(known), level.count, 3))
-    positions[:, : level.vertices] = known
-    _core.refine(positions, level.vertices, level.coarse, level.edges, scalars, curvature)
-    return positions
+    rows = np.ascontiguousarray(known.transpose(1, 2, 0))
+    return refine_frames(rows, level, np.ascontiguousarray(scalars.T), curvature)
+
+
+def refine_rows(
+    known: Float64[np.ndarray, "V 3 T"], level: Level, scalars: Float64[np.ndarray, "E T"], curvature: int
+) -> Float64[np.ndarray, "W 3 T"]:
+    """As `refine`, of rows: all frames of a number are neighbours in memory, and take the same steps together."""
+    rows = np.empty((level.count, *known.shape[1:]))
+    rows[: level.vertices] = known
+    _core.refine(rows, level.vertices, level.coarse, level.edges, scalars, curvature)
+    return rows
+
+
+def refine_frames(
+    known: Float64[np.ndarray, "V 3 T"], level: Level, scalars: Float64[np.ndarray, "E T"], curvature: int
+) -> Float64[np.ndarray, "T W 3"]:
+    """`refine_rows` as frames, without a copy. Raises FormatError where they are not finite."""
+    frames, finite = _core.refine_frames(known, level.coarse, level.edges, scalars, curvature)
+    return _checked(frames, finite)
+
+
+def frames_of(rows: Float64[np.ndarray, "V 3 T"]) -> Float64[np.ndarray, "T V 3"]:
+    """The frames of rows. Raises FormatError where they are not finite."""
+    return _checked(*_core.frames_of_rows(rows))
+
+
+def _checked(frames: Float64[np.ndarray, "T V 3"], finite: bool) -> Float64[np.ndarray, "T V 3"]:
+    if not finite:
+        raise FormatError("vertices that are not finite")
+    return frames
