@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import meshreel
+from meshreel import tails
 from meshreel.choice import Quality, measure
 from meshreel.coding.group import payload_parts
 from meshreel.coding.patches import decode_patches
@@ -79,6 +80,38 @@ def test_without_shares_nothing_is_added() -> None:
 def test_where_bytes_are_dear_nothing_is_sent() -> None:
     frames = [BALL] * 5 + [both(BALL, knob(0.004, 0.32))]
     assert find_tails(frames, noisy(BALL), BALL.faces, SIZE, TailOptions(exchange=1e9)) is None
+
+
+def sheet(step: float = 0.05) -> Mesh:
+    """A flat square."""
+    x, z = (c.reshape(-1) for c in np.meshgrid(np.arange(-0.3, 0.31, step), np.arange(-0.3, 0.31, step)))
+    side = round(len(x) ** 0.5)
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).reshape(-1)
+    halves = ((corner, corner + 1, corner + side + 1), (corner, corner + side + 1, corner + side))
+    return Mesh.of(np.stack([x, 0 * x, z], axis=1), np.concatenate([np.stack(half, axis=1) for half in halves]))
+
+
+@pytest.mark.parametrize("axes", [[0, 1, 2], [1, 0, 2]], ids=["along x", "along y"])
+@pytest.mark.parametrize("noise", [1e-9, 3e-7, 2e-6])
+def test_on_a_template_that_fits_almost_exactly_the_lattice_is_as_fine_as_there_is_room_for(noise: float, axes) -> None:
+    flat = Mesh.of(sheet().vertices[:, axes], sheet().faces)
+    frames = [flat] * 3 + [both(flat, knob(at=0.45))]
+    places = np.repeat(flat.vertices[None], 4, axis=0)
+    places = places + noise * np.random.default_rng(0).normal(size=places.shape)
+    found = find_tails(frames, places, flat.faces, SIZE)
+    assert (found is None) == (noise == 1e-9)  # there a byte is worth nothing
+    if found is not None:
+        decoded = decode_patches(found.record, 4, len(flat.faces)).apply(places, flat.faces)
+        assert measure(frames[3:], decoded[3:]).distance < 0.005 and len(decoded[0].faces) == len(flat.faces)
+
+
+def test_a_mask_that_pays_is_kept_where_a_patch_beside_it_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    template = both(BALL, knob())
+    frames = [both(BALL, knob(at=-0.4)), template, BALL]
+    places = noisy(template, 3)
+    monkeypatch.setattr(tails._Search, "holds", lambda _, tried: all(mesh.is_empty for mesh in tried.parts.meshes))
+    found = find_tails(frames, places, template.faces, SIZE)
+    assert found is not None and found.record.dropped and not found.record.mesh
 
 
 @pytest.mark.parametrize("size", [300, 30_000])

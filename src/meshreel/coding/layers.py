@@ -70,11 +70,6 @@ class LayersState:
     base: Float64[np.ndarray, "V 3"]  # its vertices in the last frame
     scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each level decoded
 
-    @property
-    def levels(self) -> int:
-        """How many levels are known."""
-        return len(self.scalars)
-
 
 @dataclass(frozen=True, slots=True)
 class EncodedLayers:
@@ -84,7 +79,6 @@ class EncodedLayers:
     layers: tuple[int, ...]  # where each ends
     positions: Float64[np.ndarray, "T V 3"]
     state: LayersState
-    bits: dict[str, int]  # of each part
 
 
 def encode_layers(
@@ -107,10 +101,7 @@ def encode_layers(
     head = LayersGroup(
         Form.LAYERS, origin, frames, levels, reference.step, data, Presence(field.has_mean), field.record
     )
-    parts, bits = (
-        [pack(head)],
-        {"base mesh": 8 * len(data), "motion basis": field.basis_bits, "motion": field.symbol_bits},
-    )
+    parts = [pack(head)]
     scalars: list[Float64[np.ndarray, "T _"]] = []
     faces = base.faces
     for number in range(1, levels + 1):
@@ -121,13 +112,10 @@ def encode_layers(
         aim = heights(positions[:, : level.count], known, level, curvature)
         coded = encode_level(aim, level, options.rate(number), curvature, _before(previous, number))
         parts.append(pack(coded.record))
-        bits[f"level {number} basis"], bits[f"level {number}"] = coded.field.basis_bits, coded.field.symbol_bits
         scalars.append(coded.scalars)
         known, faces = refine(known, level, coded.scalars, curvature), level.faces
-    payload = b"".join(parts)
-    bits["head"] = 8 * len(payload) - sum(bits.values())
     state = _state(base, known, scalars)
-    return EncodedLayers(payload, tuple(accumulate(map(len, parts))), known, state, bits)
+    return EncodedLayers(b"".join(parts), tuple(accumulate(map(len, parts))), known, state)
 
 
 def decode_layers(

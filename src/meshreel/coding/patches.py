@@ -38,6 +38,12 @@ class Patches:
         ]
 
 
+def reach(step_level: int, frames: int) -> tuple[float, float]:
+    """How far from 0 the meshes of so many frames may be: along x, where they stand side by side, and elsewhere."""
+    step = step_of(step_level)
+    return (MOST_CELLS // frames // 2 - 0.75) * step, (MOST_CELLS // 2 - 0.75) * step
+
+
 def encode_patches(
     dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh], step_level: int
 ) -> tuple[LayersPatches, tuple[Mesh, ...]]:
