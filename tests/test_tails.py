@@ -121,8 +121,7 @@ def test_it_is_never_worse_than_what_the_bytes_are_worth(size: int, scale: float
     frames = [both(BALL, knob(scale, -0.4))] * 2 + [template] * 4
     places = noisy(template)
     found = find_tails(frames, places, template.faces, size)
-    if found is None:
-        return
+    assert found is not None
     before = measure(frames, [Mesh(p, template.faces) for p in places]).distance ** 2
     after = measure(frames, found.frames).distance ** 2
     body = 6 * measure([BALL] * 6, [Mesh(p, BALL.faces) for p in noisy(BALL)]).distance ** 2
@@ -153,15 +152,16 @@ def test_options_out_of_range_are_refused(wrong: dict[str, object]) -> None:
 def options() -> EncoderOptions:
     """`best`, all frames in one group."""
     best = preset_options("best", 40.0, group_size=4)
-    groups = replace(best.groups, limit=1e6, tolerance=1e6)
+    groups = replace(best.groups, limit=1e6, tolerance=1e6, worth=1e6)
     return replace(best, groups=groups, target=Quality(0.01, 90.0, 0.01))
 
 
 @pytest.fixture(scope="module")
 def sequence() -> MeshList:
-    """A ball that grows; beside it, in the first frame only, a knob."""
-    frames = [Mesh.of((1 + 0.02 * t) * BALL.vertices, BALL.faces) for t in range(4)]
-    return MeshList((both(frames[0], knob()), *frames[1:]))
+    """A ball that grows; beside it, in the first frame only, a knob: too small for the frame to be lost."""
+    fine = icosahedron(4)
+    frames = [Mesh.of(0.3 * (1 + 0.02 * t) * fine.vertices, fine.faces) for t in range(4)]
+    return MeshList((both(frames[0], knob(0.012, 0.32)), *frames[1:]))
 
 
 def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path) -> None:

@@ -116,8 +116,7 @@ def _encoded_windows(
     """The groups of each run of frames that needs no other, in order; with an executor, a run a worker ahead."""
     executor, stages = run
     layered = options.form == Form.LAYERS
-    interval = min(options.key_interval * sequence.frame_rate, len(sequence))
-    size = max(1, round(interval)) if layered else options.group_size
+    size = max(1, round(options.key_interval * sequence.frame_rate)) if layered else options.group_size
     windows = (_Normalised(sequence, seen, window) for window in seen.windows(size))
     encode_one = encode_segment if layered else encode_window
     if executor is None:

@@ -58,7 +58,9 @@ class FitOptions:
                 f"components {self.components}: give > 0, > 0, >= 1, >= 0"
             )
         if self.second_smoothing is not None and not self.second_smoothing > 0:
-            raise InputError(f"second smoothing {self.second_smoothing:g}: give > 0, or None for the last of `smoothing`")
+            raise InputError(
+                f"second smoothing {self.second_smoothing:g}: give > 0, or None for the last of `smoothing`"
+            )
         if self.iterations < 1 or not 0 <= self.tolerance < 1:
             raise InputError(f"{self.iterations} iterations, tolerance {self.tolerance}: give at least 1, and 0 to 1")
 
