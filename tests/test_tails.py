@@ -26,9 +26,9 @@ NOISE = 1e-4 * np.random.default_rng(0).normal(size=(6, *BALL.vertices.shape))
 SIZE = 4000  # bytes of the layers, say
 
 
-def knob(scale: float = 0.05, at: float = 0.4) -> Mesh:
+def knob(scale: float = 0.05, at: float = 0.4, levels: int = 1) -> Mesh:
     """A small ball beside the large one."""
-    small = icosahedron(1)
+    small = icosahedron(levels)
     return Mesh.of(scale * small.vertices + [at, 0, 0], small.faces)
 
 
@@ -161,7 +161,7 @@ def sequence() -> MeshList:
     """A ball that grows; beside it, in the first frame only, a knob: too small for the frame to be lost."""
     fine = icosahedron(4)
     frames = [Mesh.of(0.3 * (1 + 0.02 * t) * fine.vertices, fine.faces) for t in range(4)]
-    return MeshList((both(frames[0], knob(0.012, 0.32)), *frames[1:]))
+    return MeshList((both(frames[0], knob(0.015, 0.32, 0)), *frames[1:]))
 
 
 def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path) -> None:

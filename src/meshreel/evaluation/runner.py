@@ -1,4 +1,4 @@
-"""What is measured of a codec, here and in peers.py: one JSON-ready row for a codec at an operating point on a sequence.
+"""What is measured (and in peers.py, beside a peer): one JSON-ready row for a codec at an operating point.
 
 Rate is the length of the bytes; decoding happens in a fresh process from a file; times are processor time, and a row
 carries DracoPy's decoding time of the same body from the same run, so that machines can be compared by ratio.
