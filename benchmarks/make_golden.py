@@ -14,11 +14,11 @@ import numpy as np
 
 from meshreel.capture.procedural import deforming_sphere
 from meshreel.coding.displacements import DisplacementOptions
-from meshreel.coding.group import code_reference, encode_group
+from meshreel.coding.group import encode_group
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.coding.layers import LayersOptions, LayersState, encode_layers
 from meshreel.coding.patches import encode_patches
-from meshreel.coding.reference import CodedReference
+from meshreel.coding.reference import CodedReference, code_reference
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import Video
 from meshreel.decoder import open as open_video

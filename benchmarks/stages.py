@@ -18,7 +18,8 @@ from meshreel.analysis.survey import survey
 from meshreel.analysis.track import track_centers
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
-from meshreel.coding.group import CodedReference, code_reference, decode_group, encode_group, payload_parts
+from meshreel.coding.group import decode_group, encode_group, payload_parts
+from meshreel.coding.reference import CodedReference, code_reference
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
 from meshreel.windows import EncoderOptions

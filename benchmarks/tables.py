@@ -24,9 +24,7 @@ def main() -> int:
     rows = [json.loads(line) for line in lines]
     for page in sorted(PAGES.glob("0*.md")):
         old = page.read_text(encoding="utf-8")
-        new = re.sub(
-            r"(<!-- table: ([\w ]+) -->\n).*?(<!-- end -->)", lambda at: _filled(at, rows), old, flags=re.DOTALL
-        )
+        new = MARKED.sub(lambda at: _filled(at, rows), old)
         if new != old:
             page.write_text(new, encoding="utf-8")
             print(page)

@@ -21,7 +21,7 @@ from meshreel.analysis.correspond import choose_key
 from meshreel.analysis.fit import Guides, fit_targets
 from meshreel.analysis.fit_match import Target
 from meshreel.analysis.survey import survey
-from meshreel.analysis.template import TemplateOptions, shared_detail
+from meshreel.analysis.template import shared_detail
 from meshreel.choice import measure
 from meshreel.coding.layers import LayersOptions, encode_layers
 from meshreel.coding.reference import CodedReference, code_on_lattice
@@ -71,7 +71,7 @@ def _measured(frames: list[Mesh]) -> Iterator[Row]:
         lattice = 0.33 * BEST.layers.step
         reference = code_on_lattice(decimate(frames[course.key], vertices), lattice, levels)
         base, faces = reference.mesh, reference.base.faces
-        shared = shared_detail(base.faces, len(base.vertices), TemplateOptions(levels=levels))
+        shared = shared_detail(base.faces, len(base.vertices), levels)
         fit = replace(BEST.fit, key=course.key)
         positions = fit_targets(faces, course.move(reference.base), targets, fit, Guides(None, shared))
         name = f"{vertices} vertices, {levels} levels"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
+from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -45,6 +47,42 @@ def test_an_executor_gives_the_same_bytes(written, tmp_path):
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
     assert again == summary
     assert last == {"survey": 8, "code": 8}
+
+
+def test_processes_give_the_same_bytes(written, tmp_path):
+    path, summary = written
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
+        assert encode(BALLS, tmp_path / "b.reel", OPTIONS, executor) == summary
+    assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
+
+
+def test_no_more_runs_are_read_than_there_are_workers_and_one(tmp_path):
+    class Waiting(ThreadPoolExecutor):
+        most = now = 0
+
+        def submit(self, *arguments):
+            self.now += 1
+            self.most = max(self.most, self.now)
+            future = super().submit(*arguments)
+            real = future.result
+            future.result = lambda: (real(), setattr(self, "now", self.now - 1))[0]
+            return future
+
+    with Waiting(2) as executor:
+        encode(BALLS, tmp_path / "b.reel", replace(OPTIONS, group_size=1, key_interval=0.05), executor)
+    assert executor.most == 3
+
+
+@pytest.mark.parametrize("rate", [200.0, 1e15])
+def test_more_empty_frames_than_a_group_holds_are_more_groups(rate, tmp_path):
+    told: dict[str, int] = {}
+    frames = MeshList((Mesh.empty(),) * 70_000, frame_rate=rate)
+    options = replace(OPTIONS, key_interval=600.0)
+    summary = encode(frames, tmp_path / "a.reel", options, progress=lambda s, done, _: told.update({s: done}))
+    assert [group.frame_count for group in summary.groups] == [65_535, 4_465]
+    assert told == {"survey": 70_000, "code": 70_000}
+    with meshreel.open(tmp_path / "a.reel") as video:
+        assert len(video) == 70_000 and video[65_535].is_empty
 
 
 def test_what_the_summary_says_is_what_is_measured_on_the_file(written):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
 from meshreel.errors import InputError
+from meshreel.format.layout import Form
 from meshreel.presets import displacement_step, preset_options, reference_vertices
 from meshreel.windows import EncoderOptions
 
@@ -45,8 +47,24 @@ def test_options_of_the_other_preset_are_refused_with_the_remedy():
         preset_options(centers=300)
     with pytest.raises(InputError, match=r"key interval 2: .*`paper`"):
         preset_options("paper", key_interval=2.0)
-    with pytest.raises(InputError, match="key interval 0"):
-        preset_options(key_interval=0.0)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, 600.1, 1e308, float("inf"), float("nan")])
+def test_a_key_interval_out_of_range_is_refused(seconds):
+    with pytest.raises(InputError, match=r"key interval .*at most 600"):
+        preset_options(key_interval=seconds)
+
+
+@pytest.mark.parametrize("keys", [0, -1, 6])
+def test_at_least_one_key_is_tried_and_no_more_than_there_are_places_for(keys):
+    with pytest.raises(InputError, match=f"{keys} keys: give 1 to 5"):
+        replace(preset_options(), keys=keys)
+
+
+@pytest.mark.parametrize("form", [Form.DRACO, Form.EMPTY])
+def test_a_form_that_follows_no_template_cannot_be_asked_for(form):
+    with pytest.raises(InputError, match="give LAPLACIAN or LAYERS"):
+        replace(preset_options(), form=form)
 
 
 def test_many_centers_bring_the_samples_they_need():

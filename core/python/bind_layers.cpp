@@ -134,9 +134,9 @@ nb::tuple subdivide(In<int32_t, 2> faces, size_t vertices) {
     expect(faces.shape(1) == 3);
     const size_t face_count = faces.shape(0);
     Buffer<int32_t> edges(6 * face_count), finer(12 * face_count);
-    const int64_t count = mr_subdivide(faces.data(), face_count, vertices, edges.data(), finer.data());
-    check(count < 0 ? MR_LAYERS_BAD_INPUT : MR_LAYERS_OK);
-    return nb::make_tuple(edges.two(static_cast<size_t>(count), 2), finer.two(4 * face_count, 3));
+    size_t count = 0;
+    check(mr_subdivide(faces.data(), face_count, vertices, edges.data(), finer.data(), &count));
+    return nb::make_tuple(edges.two(count, 2), finer.two(4 * face_count, 3));
 }
 
 nb::tuple siblings(In<int32_t, 2> finer, size_t vertices, size_t edge_count) {

@@ -32,7 +32,7 @@ struct HalfEdge {
     int32_t slot;  // 3 * face + side
 };
 
-int64_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* numbers) {
+size_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* numbers) {
     std::vector<size_t> starts(vertices + 1, 0);
     const auto ends = [&](size_t slot) {
         const int32_t a = faces[slot], b = faces[slot % 3 == 2 ? slot - 2 : slot + 1];
@@ -46,7 +46,7 @@ int64_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, i
         const auto [low, high] = ends(slot);
         halves[next[static_cast<size_t>(low)]++] = {high, static_cast<int32_t>(slot)};
     }
-    int64_t count = 0;
+    size_t count = 0;
     for (size_t v = 0; v < vertices; ++v) {
         const auto begin = halves.begin() + static_cast<int64_t>(starts[v]), end = halves.begin() + static_cast<int64_t>(starts[v + 1]);
         sort_few(begin, end, [](const HalfEdge& a, const HalfEdge& b) { return a.high < b.high; });
@@ -196,11 +196,11 @@ bool fits(size_t vertices, const int32_t* faces, size_t face_count, const int32_
 
 }  // namespace
 
-int64_t mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer) {
-    if (!in_range(faces, 3 * face_count, vertices) || vertices + 3 * face_count > INT32_MAX) return -1;
-    try {
+int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer, size_t* edge_count) {
+    if (!in_range(faces, 3 * face_count, vertices) || vertices + 3 * face_count > INT32_MAX) return MR_LAYERS_BAD_INPUT;
+    return guarded([&] {
         std::vector<int32_t> numbers(3 * face_count);
-        const int64_t count = number_edges(faces, face_count, vertices, edges, numbers.data());
+        *edge_count = number_edges(faces, face_count, vertices, edges, numbers.data());
         const int32_t first = static_cast<int32_t>(vertices);
         for (size_t f = 0; f < face_count; ++f, finer += 12) {
             const int32_t a = faces[3 * f], b = faces[3 * f + 1], c = faces[3 * f + 2];
@@ -208,10 +208,8 @@ int64_t mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, i
             const int32_t cut[12] = {a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca};
             std::copy(cut, cut + 12, finer);
         }
-        return count;
-    } catch (const std::bad_alloc&) {
-        return -1;
-    }
+        return static_cast<int>(MR_LAYERS_OK);
+    });
 }
 
 int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts, int32_t* near) {

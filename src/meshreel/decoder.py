@@ -5,6 +5,7 @@ Reads beside encoder.py. Imports NumPy, DracoPy and the compiled core only: no O
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -56,6 +57,7 @@ class Video(Sequence[Mesh]):
         self.quality = quality
         self._close = close
         self._group = _Decoded(-1, [], None)
+        self._states: dict[int, LayersState | None] = {}  # of the groups of one chain: playing backwards asks for each
 
     def at(self, quality: int | None) -> Video:
         """The same video from at most this many layers of a group beyond the first: fewer bytes, still valid.
@@ -63,6 +65,7 @@ class Video(Sequence[Mesh]):
         A layer is one subdivision of a group of form LAYERS, whose mesh is coarser without it, or its patches, which
         come last; and one displacement component of a group of form LAPLACIAN. None: all of them.
         """
+        quality = None if quality is None else operator.index(quality)
         if quality is not None and quality < 0:
             raise InputError(f"quality must not be negative, got {quality}: give a number of layers, or None for all")
         return Video(self.reader, quality, self._close)
@@ -114,11 +117,15 @@ class Video(Sequence[Mesh]):
         if known.number == chunk.number:
             return known.frames
         chain = [chunk]
-        while (before := self._group_before(chain[-1])) is not None and before != known.number:
+        states = self._states
+        while (before := self._group_before(chain[-1])) is not None and before not in states:
             chain.append(self.reader.chunks[before])
-        state = known.state if before is not None else None
+        state = states.get(before) if before is not None else None
+        states = {} if before is None else dict(states)
         for link in reversed(chain):
             meshes, state = self._decode(link, state)
+            states[link.number] = state
+        self._states = states  # replaced, not changed: other threads may read it
         known = _Decoded(chunk.number, [self._place(mesh) for mesh in meshes], state)
         self._group = known
         return known.frames

@@ -65,8 +65,9 @@ def encode(
 ) -> Summary:
     """Writes `sequence` to a .reel file at `path`, which appears only when it is complete; None: preset `best` at 50.
 
-    With an executor, windows are encoded side by side; the bytes are the same. Raises InputError for frames that
-    cannot be used, before anything is coded.
+    With an executor, runs of frames are encoded side by side; the bytes are the same. In memory are then as many runs
+    as it has workers and one more, each of a key interval (preset `best`) or a group. Raises InputError for frames
+    that cannot be used, before anything is coded.
     """
     options = options or preset_options()
     stages = Stages(progress, len(sequence))
@@ -112,7 +113,7 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
 def _encoded_windows(
     sequence: MeshSequence, seen: Survey, options: EncoderOptions, run: tuple[Executor | None, Stages]
 ) -> Iterator[Iterable[EncodedGroup]]:
-    """The groups of each run of frames that needs no other, in order; with an executor, a few runs ahead."""
+    """The groups of each run of frames that needs no other, in order; with an executor, a run a worker ahead."""
     executor, stages = run
     layered = options.form == Form.LAYERS
     size = max(1, round(options.key_interval * sequence.frame_rate)) if layered else options.group_size
@@ -122,7 +123,7 @@ def _encoded_windows(
         for frames in windows:
             yield encode_one(frames, options, stages)
         return
-    ahead = 2 * getattr(executor, "_max_workers", 8)
+    ahead = getattr(executor, "_max_workers", 8)
     waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()
     for frames in windows:
         waiting.append((len(frames), executor.submit(_encode_all, layered, list(frames), options)))

@@ -32,6 +32,7 @@ LATTICE = 0.33  # spacing of the base's lattice, in steps: what it rounds away i
 LATTICE_ALONE = 0.8  # the same for one frame, whose base need not move
 TOO_COARSE = 1.5  # targets that the layers' distance may be before the Laplacian form is tried
 STILL = 1.1  # times what a template usually leaves over that it may leave where it was
+MOST_EMPTY = 65_535  # frames of a group without surface: what its field in the index holds
 SHORTEST = 4  # frames that a group predicted from the one before must follow, or a new key frame is taken
 
 
@@ -68,7 +69,10 @@ def encode_segment(
     """The groups of a segment, frames all empty or none is; only those of one group are held at a time."""
     stages = stages or Stages(None, len(frames))
     if frames[0].is_empty:
-        yield EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)
+        for start in range(0, len(frames), MOST_EMPTY):
+            count = min(MOST_EMPTY, len(frames) - start)
+            stages.add("code", count)
+            yield EncodedGroup(Form.EMPTY, count, encode_empty(), (), NO_ERROR)
         return
     at, before = 0, None
     while at < len(frames):
@@ -98,7 +102,6 @@ def _continued(
 ) -> tuple[EncodedGroup, Followed | None] | None:
     """A group predicted from the one before, as long as its template fits; None where that is not long."""
     base = before.reference.base
-    template = replace(options.template, levels=before.reference.levels)
     targets = [Target(frame) for frame in ahead]
     still = _standing(before, targets)
     if still is not None:
@@ -107,7 +110,8 @@ def _continued(
     targets = targets[: len(predictions)]
     if len(targets) < min(SHORTEST, len(ahead)):
         return None
-    guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), template))
+    levels = before.reference.levels
+    guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), levels))
     fitted = Fitted.of(base.faces, fit_targets(base.faces, predictions, targets, options.fit, guides), targets)
     target = target_of(ahead, options).distance
     count = leading(fitted.residuals / target, before.residual / target, options.groups)
@@ -139,7 +143,7 @@ def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup
     if base.is_empty:
         return 1 if len(ahead) > 1 else (intra_only(ahead, options), None)
     predictions = course.move(reference.base)
-    guides = Guides(None, shared_detail(base.faces, len(base.vertices), options.template))
+    guides = Guides(None, shared_detail(base.faces, len(base.vertices), reference.levels))
     fit = replace(options.fit, key=key)
     fitted = Fitted.of(faces, fit_targets(faces, predictions, targets, fit, guides), targets)
     target = target_of(ahead, options)
@@ -165,6 +169,8 @@ def _coded(
         other = laplacian(frames, reference, fit.positions, options.displacements)
         if other.quality.reaches(quality) and len(other.payload) < len(group.payload):
             group = other
+    if not np.isfinite(group.quality.distance):
+        return intra_only(frames, options), None  # the template has collapsed: nothing can be compared with it
     group = cheaper(frames, group, options)
     if group.form != Form.LAYERS:
         return group, None

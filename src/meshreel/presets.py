@@ -45,13 +45,8 @@ def preset_options(
         raise InputError(f"centers {centers}: preset `best` tracks none; use preset `paper`")
     if preset != "best" and key_interval is not None:
         raise InputError(f"key interval {key_interval:g}: groups of preset `{preset}` all decode on their own")
-    centers = 2000 if centers is None else centers
-    options = replace(
-        _best(float(quality)) if preset == "best" else _paper(float(quality)),
-        preset=preset,
-        quality=float(quality),
-        track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
-    )
+    chosen = _best(float(quality)) if preset == "best" else _paper(float(quality), centers)
+    options = replace(chosen, preset=preset, quality=float(quality))
     if group_size is not None:
         options = replace(options, group_size=group_size)
     if basis_size is not None:
@@ -61,9 +56,11 @@ def preset_options(
     return options
 
 
-def _paper(quality: float) -> EncoderOptions:
+def _paper(quality: float, centers: int | None) -> EncoderOptions:
     step = displacement_step(quality)
+    centers = 2000 if centers is None else centers
     return EncoderOptions(
+        track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
         target=Quality(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
         displacements=DisplacementOptions(step=step),

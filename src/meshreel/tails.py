@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float64, Int32, Int64
 
 from .coding import entropy
 from .coding.mesh import encode_mesh
-from .coding.patches import Patches, encode_patches, encode_runs
+from .coding.patches import Patches, encode_patches, encode_runs, reach
 from .coding.steps import level_of, step_of
 from .errors import InputError
 from .format.layout import LayersPatches
@@ -28,6 +28,10 @@ from .types import Mesh
 BODY = 0.98  # of the surface; the rest are the tails
 LEAST_BYTES = 4  # that a region or a patch takes at least
 DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share
+EXACT = 1e-7  # RMS distance of the rest, of the diagonal, at which a byte is worth nothing any more
+
+
+TINY = 1e-300  # of areas: a mesh may have none
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,21 +74,25 @@ def find_tails(
     """
     shown = [_Frame(frame, Mesh(points, faces)) for frame, points in zip(frames, positions, strict=True)]
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
-    if usual == 0:
+    if not EXACT**2 < usual < np.inf:
         return None
-    search = _Search(shown, faces, usual, options.exchange * len(frames) * usual / size, options)
+    price = options.exchange * len(frames) * usual / size
+    search = _Search(shown, faces, usual, price, options, _step_level(frames, options.lattice * usual**0.5))
     best, least = None, search.cost(None)
+    better = list[_Coded]()  # each than those before it
     for dropped in search.masks():
         tried = search.coded(dropped, (Mesh.empty(),) * len(frames))
         if (cost := search.cost(tried)) < least:
             best, least = tried, cost
+            better.append(tried)
+    dropped = best.parts.dropped if best else search.nothing
     for patches in search.patches(best):
-        tried = search.coded(best.parts.dropped if best else search.nothing, patches)
+        tried = search.coded(dropped, patches)
         if (cost := search.cost(tried)) < least:
-            best, least = tried, cost
-    if best is None or not search.holds(best):
-        return None
-    return Tails(best.record, best.parts.apply(positions, faces))
+            least = cost
+            better.append(tried)
+    chosen = next((tried for tried in reversed(better) if search.holds(tried)), None)
+    return chosen and Tails(chosen.record, chosen.parts.apply(positions, faces))
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +109,7 @@ class _Search:
     usual: float  # mean squared distance without the tails
     price: float  # of a byte, squared distances summed over the frames
     options: TailOptions
+    step_level: int  # of the patches' lattice
 
     @property
     def nothing(self) -> Bool[np.ndarray, "T F"]:
@@ -111,11 +120,6 @@ class _Search:
         """A mask and patches, as decoded."""
         record, decoded = encode_patches(dropped, meshes, self.step_level)
         return _Coded(record, Patches(dropped, decoded), len(pack(record)))
-
-    @property
-    def step_level(self) -> int:
-        """The lattice of the patches."""
-        return level_of(self.options.lattice * self.usual**0.5)
 
     def cost(self, tried: _Coded | None) -> float:
         """Squared error, mean of both directions, with the price of the bytes."""
@@ -185,7 +189,7 @@ class _Search:
             small = decimate(mesh, max(4, round(share * len(mesh.vertices))))
             step = step_of(self.step_level)
             small = clean(Mesh(np.rint(small.vertices / step) * step, small.faces))
-            if not small.is_empty:
+            if not small.is_empty and _within(np.abs(small.vertices).max(axis=0), self.step_level, len(self.frames)):
                 yield small
 
     def _worth(
@@ -195,6 +199,20 @@ class _Search:
         near = _squared(Surface(patch), frame.points[samples])[0]
         gain = frame.weights[samples] @ np.maximum(squared[samples] - near, 0.0)
         return float(gain / 2 - self.price * size)
+
+
+def _step_level(frames: Sequence[Mesh], step: float) -> int:
+    """The lattice that is asked for, or the finest one that has room for whatever part of the frames."""
+    level = level_of(step)
+    far = np.max([np.abs(frame.vertices).max(axis=0) for frame in frames], axis=0)
+    while level > 0 and not _within(far, level, len(frames)):
+        level -= 1
+    return level
+
+
+def _within(far: Float64[np.ndarray, " 3"], step_level: int, frames: int) -> bool:
+    across, elsewhere = reach(step_level, frames)
+    return bool(far[0] <= across and far[1:].max() <= elsewhere)
 
 
 class _Frame:
@@ -209,7 +227,7 @@ class _Frame:
         self.weights = weights / weights.sum()
         self.squared, self.hit = _squared(Surface(decoded), self.points)
         self.areas, self.apart = self._apart(decoded)  # of each decoded face: its area, its mean squared distance
-        self.errors = (float(self.weights @ self.squared), float(self.areas @ self.apart / self.areas.sum()))
+        self.errors = (float(self.weights @ self.squared), float(self.areas @ self.apart / max(self.areas.sum(), TINY)))
 
     def body(self) -> float:
         """Mean squared distance from the frame to the decoded mesh without the farthest 2 % of the surface."""
@@ -219,7 +237,7 @@ class _Frame:
 
     def gains(self, gone: Bool[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
         """What dropping each of these faces takes away from the mean of both errors, if all are dropped."""
-        invented = self.areas * (self.apart - self.errors[1]) / self.areas.sum()
+        invented = self.areas * (self.apart - self.errors[1]) / max(self.areas.sum(), TINY)
         lost = self.weights * (self.left(gone) - self.squared)
         return (invented * gone - np.bincount(self.hit, lost, len(gone))) / 2
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float64
 
+from .analysis.correspond import PLACES
 from .analysis.embedded import EmbeddedOptions
 from .analysis.fit import Fit, FitOptions, fit_frames
 from .analysis.groups import GroupOptions, cut_at
@@ -22,9 +23,10 @@ from .analysis.template import TemplateOptions
 from .analysis.track import TrackOptions, track_centers
 from .choice import NO_ERROR, IntraOptions, Quality, cheapest_intra, finest_intra, measure
 from .coding.displacements import DisplacementOptions
-from .coding.group import CodedReference, code_reference, decode_group, encode_group
+from .coding.group import decode_group, encode_group
 from .coding.intra import encode_empty
 from .coding.layers import LayersOptions
+from .coding.reference import CodedReference, code_reference
 from .errors import InputError, NoReferenceError
 from .format.layout import Form
 from .tails import TailOptions
@@ -32,6 +34,7 @@ from .types import Centers, Mesh
 
 Progress = Callable[[str, int, int], None]  # stage, frames done in it, frames of the sequence
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it
+MOST_SECONDS = 600  # of a key interval: whoever joins late decodes as much before a picture is there
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +53,7 @@ class EncoderOptions:
     groups: GroupOptions = field(default_factory=GroupOptions)
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)
     intra: IntraOptions = field(default_factory=IntraOptions)
-    form: Form = Form.LAPLACIAN  # of the groups that a template follows
+    form: Form = Form.LAPLACIAN  # of the groups that a template follows; or LAYERS
     keys: int = 5  # frames tried as the key of a group, at most (form LAYERS)
     predict: bool = True  # groups from the one before, where its template still fits (form LAYERS)
     key_interval: float = 4.0  # s, at most, from one random-access point to the next (form LAYERS)
@@ -64,8 +67,12 @@ class EncoderOptions:
             raise InputError(f"quality must be in 0 to 100, got {self.quality:g}")
         if not 1 <= self.group_size <= MOST_FRAMES:
             raise InputError(f"group size must be in 1 to {MOST_FRAMES}, got {self.group_size}")
-        if not 0 < self.key_interval < float("inf"):
-            raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0")
+        if self.form not in (Form.LAPLACIAN, Form.LAYERS):
+            raise InputError(f"form {self.form}: give LAPLACIAN or LAYERS; the others are taken where these cost more")
+        if not 1 <= self.keys <= len(PLACES):
+            raise InputError(f"{self.keys} keys: give 1 to {len(PLACES)}")
+        if not 0 < self.key_interval <= MOST_SECONDS:
+            raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0 and at most {MOST_SECONDS}")
         if not 1 <= self.reference_bits <= 20 or not 0 <= self.levels <= 4:
             raise InputError(f"reference bits {self.reference_bits}, levels {self.levels}: give 1 to 20 and 0 to 4")
 

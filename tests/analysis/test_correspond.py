@@ -1,11 +1,12 @@
-"""A template is found again in other frames: from its key frame outward, and from the last frame of a group onward."""
+"""A template is found again in other frames: from the key that is chosen, and onward from the last frame of a group."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from meshreel.analysis.correspond import from_key, from_last
+from meshreel.analysis import correspond
+from meshreel.analysis.correspond import choose_key, from_last
 from meshreel.analysis.embedded import EmbeddedOptions, Stage
 from meshreel.analysis.fit_match import Target
 from meshreel.capture.procedural import sliding_sphere
@@ -33,29 +34,76 @@ def wanted(count: int) -> np.ndarray:
     return np.stack([placed(BASE.vertices, np.cos(0.05 * t), np.sin(0.05 * t), t) for t in range(count)])
 
 
-@pytest.mark.parametrize("key", [0, 2, 4])
-def test_a_template_is_followed_from_its_key_in_both_directions(key: int) -> None:
-    meshes = frames(5)
-    template = Mesh.of(wanted(5)[key], BASE.faces)
-    found = from_key(template, key, [Target(mesh) for mesh in meshes], OPTIONS)
-    np.testing.assert_allclose(found[key], template.vertices, atol=1e-9)
+def with_speck(mesh: Mesh) -> Mesh:
+    """Beside the body's end one face."""
+    speck = mesh.vertices[mesh.vertices[:, 0].argmax()] + [0.03, 0, 0] + 0.002 * np.eye(3)
+    return Mesh.of(np.concatenate([mesh.vertices, speck]), [*mesh.faces, len(mesh.vertices) + np.arange(3)])
+
+
+@pytest.fixture
+def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The keys that are tried."""
+    keys, course = list[int](), correspond._course
+
+    def told(targets: list[Target], key: int, options: EmbeddedOptions) -> correspond.Course:
+        keys.append(key)
+        return course(targets, key, options)
+
+    monkeypatch.setattr(correspond, "_course", told)
+    return keys
+
+
+def test_of_an_even_motion_the_middle_frame_is_the_key_and_no_other_is_tried(tried: list[int]) -> None:
+    course = choose_key([Target(mesh) for mesh in frames(5)], OPTIONS)
+    assert (course.key, course.count, tried) == (2, 5, [2])
+    template = Mesh.of(wanted(5)[2], BASE.faces)
+    found = course.move(template)
+    np.testing.assert_allclose(found[2], template.vertices, atol=1e-9)
     assert np.linalg.norm(found - wanted(5), axis=2).max() < 0.01
 
 
 def test_a_single_frame_keeps_the_template_as_it_is() -> None:
-    found = from_key(BASE, 0, [Target(BALL)], OPTIONS)
-    np.testing.assert_array_equal(found, BASE.vertices[None])
-    assert found.base is not BASE.vertices  # what is given back may be changed
+    course = choose_key([Target(BALL)], OPTIONS)
+    assert (course.key, course.count) == (0, 1)
+    np.testing.assert_allclose(course.move(BASE), BASE.vertices[None], atol=1e-12)
+
+
+def test_frames_are_followed_up_to_one_that_is_lost() -> None:
+    other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
+    course = choose_key([Target(mesh) for mesh in [*frames(4), other]], OPTIONS)
+    assert course.key < course.count == 4
+    assert course.move(BASE).shape == (4, len(BASE.vertices), 3)
+
+
+def test_from_a_key_that_is_alone_with_what_it_has_none_is_followed() -> None:
+    other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
+    course = choose_key([Target(mesh) for mesh in [other, *frames(2)]], OPTIONS, 1)
+    assert (course.key, course.count) == (1, 0)
+
+
+def test_where_something_appears_that_the_middle_frame_has_not_another_is_the_key(tried: list[int]) -> None:
+    first = frames(5)
+    targets = [Target(mesh) for mesh in (*first[:3], *map(with_speck, first[3:]))]
+    course = choose_key(targets, OPTIONS)
+    assert (course.key, course.count) == (3, 5) and tried[:2] == [2, 3]
+    tried.clear()
+    assert choose_key(targets, OPTIONS, 1).key == 2 and tried == [2]
 
 
 def test_a_template_that_lies_on_the_frame_before_is_followed_onward() -> None:
     meshes = frames(4)
-    found = from_last(Mesh.of(wanted(1)[0], BASE.faces), [Target(mesh) for mesh in meshes[1:]], OPTIONS)
-    assert found.shape == (3, len(BASE.vertices), 3)
-    assert np.linalg.norm(found - wanted(4)[1:], axis=2).max() < 0.02
+    found = from_last(meshes[0], [Target(mesh) for mesh in meshes[1:]], OPTIONS)
+    assert np.linalg.norm(found - [mesh.vertices for mesh in meshes[1:]], axis=2).max() < 0.02
+
+
+def test_a_template_is_followed_onward_up_to_a_frame_that_is_lost() -> None:
+    other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
+    for count in (0, 2):
+        targets = [Target(mesh) for mesh in [*frames(count + 1)[1:], other, BALL]]
+        assert from_last(BALL, targets, OPTIONS).shape == (count, len(BALL.vertices), 3)
 
 
 def test_the_same_frames_give_the_same_bits() -> None:
     targets = [Target(mesh) for mesh in frames(2)]
-    first, second = (from_key(BASE, 0, targets, OPTIONS) for _ in range(2))
+    first, second = (choose_key(targets, OPTIONS).move(BASE) for _ in range(2))
     np.testing.assert_array_equal(first, second)

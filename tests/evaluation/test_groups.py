@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from math import inf
 
 import pytest
 
 from meshreel.evaluation.groups import at_borders, by_distance, bytes_between, group_records, key_frames, without_keys
+from meshreel.metrics.distance import PSNR_CEILING
 from tests.container.files import HEADER, small_file
 
 
@@ -34,6 +36,16 @@ def test_a_key_that_is_known_is_left_out_instead():
 def test_frames_of_their_own_are_keys_unless_all_are():
     assert without_keys(row([1, 2], (1, 5), (1, 5)), "ssim_masked") == 1.5
     assert without_keys(row([9, 1, 2], (1, 5), (2, 5)), "ssim_masked") == 1
+
+
+@pytest.mark.parametrize(
+    ("metric", "best", "value"),
+    [("d2_psnr", True, PSNR_CEILING), ("ssim_masked", True, 1.0), ("rms_forward_m", False, inf)],
+)
+def test_a_value_that_was_not_finite_is_what_it_can_be_of_that_metric(metric, best, value):
+    found = {"groups": row([0, 0], (2, 10))["groups"], "per_frame": [{metric: 0.5}, {metric: None}]}
+    assert key_frames(found, metric) == [1 if best else 0]
+    assert by_distance(found, metric)[0 if best else 1] == (0 if best else 1, value, 1)
 
 
 def test_what_was_not_measured_is_none():

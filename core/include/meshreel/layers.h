@@ -66,8 +66,8 @@ int mr_orthonormal_inverse(const int32_t* symbols, size_t count, size_t width, d
 // and z, from its place in `base`. Returns 1 where all of them are finite.
 int mr_place_rows(const double* moved, const int32_t* order, const double* base, size_t vertices, size_t frames, double* rows);
 
-// The sorted edges of a mesh and its faces cut in four. `edges` has room for 3 face_count pairs; returns their number, or -1.
-int64_t mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer);
+// The sorted edges of a mesh and its faces cut in four. `edges` has room for 3 face_count pairs, of which `edge_count` are set.
+int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer, size_t* edge_count);
 // For each edge those that share a face with it and come before it, sorted; `near` has room for 3 face_count entries.
 int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts, int32_t* near);
 // Weights that predict each by weight / 64 of the mean of those near it.

@@ -143,7 +143,8 @@ class Tracker:
         usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # noise is not failure
         starts = self._starts(frame, there)
         best = self._poses[last], np.inf
-        for start, torn in ((starts[0], o.torn[0]), (starts[0], o.torn[1]), (starts[-1], o.torn[0])):
+        tries = [(starts[0], o.torn[0]), (starts[0], o.torn[1]), *((start, o.torn[0]) for start in starts[1:])]
+        for start, torn in tries:
             pose = self._rounds(self._fine, self._carried(start, there, torn), there, o.fine, torn)
             residual = self._measure(pose, target)
             if residual < best[1]:

@@ -35,7 +35,6 @@ class FitOptions:
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # pairs farther apart do not count; of the diagonal
     smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weight of the shape: its Laplacian against the turned one
     agreement: float = 0.3  # least cosine between the normals of a pair
-    centroids: bool = True  # the faces of the template look for the frame too; not worth the time where it is dense
     anchor: float = 0.02  # row weight of the offset from the prediction
     components: int = 15  # of the trajectories, that the second fit is drawn to; 0: no second fit
     pull: float = 0.1  # row weight of the offset from the coherent positions, in the second fit
@@ -57,6 +56,10 @@ class FitOptions:
             raise InputError(
                 f"anchor {self.anchor}, pull {self.pull}, guard {self.guard}, "
                 f"components {self.components}: give > 0, > 0, >= 1, >= 0"
+            )
+        if self.second_smoothing is not None and not self.second_smoothing > 0:
+            raise InputError(
+                f"second smoothing {self.second_smoothing:g}: give > 0, or None for the last of `smoothing`"
             )
         if self.iterations < 1 or not 0 <= self.tolerance < 1:
             raise InputError(f"{self.iterations} iterations, tolerance {self.tolerance}: give at least 1, and 0 to 1")
@@ -150,8 +153,9 @@ def _first_fit(
         x = predictions[at]
         for gate, smoothing in zip(options.gates, options.smoothing, strict=True):
             shape, turns = turned_laplacian(template, rest, x)
-            guard = options.guard if smoothing == options.smoothing[-1] else 1.0  # before, the data must have their say
-            stiffness = smoothing * np.where(doubtful(template, rest, turns, x), guard, 1.0)
+            stiffness = np.full(template.count, smoothing)
+            if options.guard > 1 and smoothing == options.smoothing[-1]:  # before, the data must have their say
+                stiffness[doubtful(template, rest, turns, x)] *= options.guard
             x = _round(template, x, target, Problem(shape, stiffness, predictions[at], options.anchor), gate, options)
         positions[at] = x
         rest = positions[key] if given is None else given
@@ -199,5 +203,5 @@ def _round(
     gate: float,
     options: FitOptions,
 ) -> Float64[np.ndarray, "V 3"]:
-    rows = match(template, x, target, MatchOptions(gate, options.agreement, options.centroids))
+    rows = match(template, x, target, MatchOptions(gate, options.agreement))
     return x + solve(template, rows, x, problem, (options.iterations, options.tolerance))

@@ -25,7 +25,6 @@ class MatchOptions:
 
     gate: float  # pairs farther apart count nothing; fraction of the bounding-box diagonal
     agreement: float  # least cosine between the normals of a pair
-    centroids: bool = True  # the template's faces look for the frame too, not its vertices only
 
 
 class Target:
@@ -73,17 +72,16 @@ def _from_template(template: Template, mesh: Mesh, target: Target, options: Matc
     used = np.flatnonzero(template.corner >= 0)
     points, own = mesh.vertices[used], vertex_normals(mesh)[used]
     faces, corners = template.corner[used] // 3, np.eye(3)[template.corner[used] % 3]
-    if options.centroids:
-        points = np.concatenate([points, mesh.vertices[mesh.faces].mean(axis=1)])
-        faces = np.concatenate([faces, np.arange(len(mesh.faces))])
-        corners = np.concatenate([corners, np.full((len(mesh.faces), 3), 1 / 3)])
-        own = np.concatenate([own, face_normals(mesh)[0]])
+    points = np.concatenate([points, mesh.vertices[mesh.faces].mean(axis=1)])
+    faces = np.concatenate([faces, np.arange(len(mesh.faces))])
+    corners = np.concatenate([corners, np.full((len(mesh.faces), 3), 1 / 3)])
+    own = np.concatenate([own, face_normals(mesh)[0]])
     hits = target.surface.closest(points)
     normals = target.normals_at(hits)
     weights = _pair_weights(points - hits.points, normals, own, options)
     weights *= _interpolated_scalar(target.inside, target.mesh.faces, hits)
     values = np.einsum("nd,nd->n", normals, hits.points)
-    scale = np.where(np.arange(len(points)) < len(used), 1.0 if options.centroids else 2.0, 0.5)  # two faces a vertex
+    scale = np.where(np.arange(len(points)) < len(used), 1.0, 0.5)  # two faces a vertex
     return Rows(faces, corners, normals, values, weights * scale)
 
 

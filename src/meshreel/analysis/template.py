@@ -51,17 +51,17 @@ def base_mesh(key: Mesh, options: TemplateOptions) -> Mesh:
 
 
 def shared_detail(
-    faces: Int32[np.ndarray, "F 3"], count: int, options: TemplateOptions
+    faces: Int32[np.ndarray, "F 3"], count: int, levels: int
 ) -> Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]:
     """What makes fitted positions coherent: `count` base vertices stay, the detail becomes its median over time.
 
     Detail is what the coder sees: scalars along the normals of the coarser level.
     """
-    levels = levels_of(faces, count, options.levels)
+    hierarchy = levels_of(faces, count, levels)
 
     def coherent(positions: Float64[np.ndarray, "T V 3"]) -> Float64[np.ndarray, "T V 3"]:
         known = np.ascontiguousarray(positions[:, :count])
-        for level in levels:
+        for level in hierarchy:
             scalars = heights(positions[:, : level.count], positions[:, : level.vertices], level, CURVATURE)
             known = refine(known, level, np.tile(np.median(scalars, axis=0), (len(known), 1)), CURVATURE)
         return known

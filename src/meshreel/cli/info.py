@@ -72,13 +72,13 @@ def _describe_group(reader: ReelReader, chunk: Chunk) -> dict[str, Any]:
 
 def _rates(row: dict[str, Any]) -> Table:
     table = Table("part", "bytes", "Mbps", "share")
-    for name, size in row["parts"].items():
+    for name, size in ((name, size) for name, size in row["parts"].items() if size):
         table.add_row(name, str(size), f"{row['parts_mbps'][name]:.4f}", f"{100 * size / row['bytes']:.1f} %")
     return table
 
 
 def _groups(row: dict[str, Any]) -> Table:
-    table = Table("group", "frames", "form", "layers", "bytes", "parts")
+    table = Table("group", "frames", "form", "layers beyond the first", "bytes", "parts")
     for number, group in enumerate(row["groups"]):
         parts = ", ".join(f"{name} {size}" for name, size in group["parts"].items())
         first, last = group["first_frame"], group["first_frame"] + group["frames"] - 1

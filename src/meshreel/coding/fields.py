@@ -1,7 +1,7 @@
 """Fields of trajectories <-> CodedField: KLT over time, closed-loop prediction over a causal graph, one entropy stream.
 
 In: V trajectories of C numbers, a graph of their V vertices. Out: a CodedField, and the trajectories as it decodes to.
-The basis is orthonormal but for its rounding, so all columns share one step. A column is kept where it pays.
+The basis as decoded is orthonormal, so all columns share one step. A column is kept where it pays.
 """
 
 from __future__ import annotations

@@ -21,8 +21,7 @@ from .intra import decode_empty, decode_intra
 from .layers import LayersState, decode_layers, layers_end, layers_parts
 from .mesh import check_growth, check_step, decode_mesh
 from .patches import decode_patches
-from .reference import CodedReference as CodedReference
-from .reference import code_reference as code_reference
+from .reference import CodedReference
 
 
 def encode_group(

@@ -72,11 +72,6 @@ class LayersState:
     scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each level decoded
     finer: tuple[Connectivity, ...] = ()  # of the levels as far as they are at hand; from the faces alone
 
-    @property
-    def levels(self) -> int:
-        """How many levels are known."""
-        return len(self.scalars)
-
 
 @dataclass(frozen=True, slots=True)
 class EncodedLayers:
@@ -86,7 +81,6 @@ class EncodedLayers:
     layers: tuple[int, ...]  # where each ends
     positions: Float64[np.ndarray, "T V 3"]
     state: LayersState
-    bits: dict[str, int]  # of each part
 
 
 def encode_layers(
@@ -109,10 +103,7 @@ def encode_layers(
     head = LayersGroup(
         Form.LAYERS, origin, frames, levels, reference.step, data, Presence(field.has_mean), field.record
     )
-    parts, bits = (
-        [pack(head)],
-        {"base mesh": 8 * len(data), "motion basis": field.basis_bits, "motion": field.symbol_bits},
-    )
+    parts = [pack(head)]
     scalars: list[Float64[np.ndarray, "T _"]] = []
     faces = base.faces
     for number in range(1, levels + 1):
@@ -123,13 +114,10 @@ def encode_layers(
         aim = heights(positions[:, : level.count], known, level, curvature)
         coded = encode_level(aim, level, options.rate(number), curvature, _before(previous, number))
         parts.append(pack(coded.record))
-        bits[f"level {number} basis"], bits[f"level {number}"] = coded.field.basis_bits, coded.field.symbol_bits
         scalars.append(coded.scalars)
         known, faces = refine(known, level, coded.scalars, curvature), level.faces
-    payload = b"".join(parts)
-    bits["head"] = 8 * len(payload) - sum(bits.values())
     state = _state(base, known, [level.T for level in scalars])
-    return EncodedLayers(payload, tuple(accumulate(map(len, parts))), known, state, bits)
+    return EncodedLayers(b"".join(parts), tuple(accumulate(map(len, parts))), known, state)
 
 
 def decode_layers(

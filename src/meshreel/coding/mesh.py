@@ -15,6 +15,8 @@ from ..types import Mesh
 
 MAX_BITS = 21  # float32 positions inside Draco hold no more
 COMPRESSION_LEVEL = 7  # the paper's
+EDGEBREAKER = 1  # Draco's number of the method
+MOST_PER_BYTE = 20_000  # vertices or faces: a flat, regular grid takes a byte for a thousand
 MAX_FACES = 64_000_000
 
 
@@ -55,6 +57,7 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
         return Mesh.empty()
     import DracoPy
 
+    _check_claims(data)
     try:
         decoded = DracoPy.decode(bytes(data))
         mesh = Mesh.of(np.round(np.asarray(decoded.points, dtype=np.float64) / step) * step, decoded.faces)
@@ -65,6 +68,26 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
     if len(mesh.faces) and (mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices)):
         raise FormatError(f"damaged Draco data ({len(data)} bytes): a face names vertex {mesh.faces.max()}")
     return mesh
+
+
+def _check_claims(data: bytes) -> None:
+    """Raises FormatError where the head of Draco bytes claims more than they can hold: memory is taken for the claim.
+
+    The head, as Draco's bitstream specification has it: "DRACO", version (2), type of the geometry, method, flags (2);
+    then, for edgebreaker, the traversal, and in both methods the numbers of vertices and faces as varints.
+    """
+    if len(data) > 10 and data[10] & 0x80:
+        raise FormatError("damaged Draco data: it has metadata, which no mesh of a stream has")
+    start = 12 if len(data) > 8 and data[8] == EDGEBREAKER else 11
+    for _ in range(2):
+        count, shift = 0, 0
+        while start < len(data):
+            count |= (data[start] & 0x7F) << shift
+            shift, start = shift + 7, start + 1
+            if not data[start - 1] & 0x80 or shift > 63:
+                break
+        if count > MOST_PER_BYTE * len(data):
+            raise FormatError(f"damaged Draco data: {len(data)} bytes that claim {count} vertices or faces")
 
 
 def check_growth(mesh: Mesh, levels: int, frames: int = 1) -> None:

@@ -38,6 +38,12 @@ class Patches:
         ]
 
 
+def reach(step_level: int, frames: int) -> tuple[float, float]:
+    """How far from 0 the meshes of so many frames may be: along x, where they stand side by side, and elsewhere."""
+    step = step_of(step_level)
+    return (MOST_CELLS // frames // 2 - 0.75) * step, (MOST_CELLS // 2 - 0.75) * step
+
+
 def encode_patches(
     dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh], step_level: int
 ) -> tuple[LayersPatches, tuple[Mesh, ...]]:
@@ -56,6 +62,8 @@ def decode_patches(record: LayersPatches, frames: int, faces: int) -> Patches:
     """The patches of a group of so many frames, whose finest level has so many faces. FormatError where damaged."""
     if record.step_level >= LEVELS:
         raise FormatError(f"patches: step level {record.step_level}, there are {LEVELS}")
+    if record.runs > 2 * faces + frames * (faces + 1) + 2:
+        raise FormatError(f"patches: {record.runs} runs over {frames} frames of {faces} faces")
     runs = entropy.decode_integers(record.dropped, record.runs)
     return Patches(decode_runs(runs, frames, faces), _taken_in(record, frames))
 

@@ -18,12 +18,8 @@ class CodedReference:
     data: bytes  # Draco
     step: float  # spacing of its lattice, normalised units
     levels: int  # midpoint subdivisions after decoding
+    mesh: Mesh  # decoded
     base: Mesh  # decoded and subdivided
-
-    @property
-    def mesh(self) -> Mesh:
-        """Decoded, not subdivided."""
-        return decode_mesh(self.data, self.step)
 
 
 def code_reference(mesh: Mesh, bits: int, levels: int) -> CodedReference:
@@ -36,4 +32,5 @@ def code_on_lattice(mesh: Mesh, step: float, levels: int) -> CodedReference:
     """The reference on a lattice of about this spacing (rounded to float32), coded and decoded."""
     step = float(np.float32(step))
     data = encode_mesh(mesh, step)
-    return CodedReference(data, step, levels, subdivide_midpoint(decode_mesh(data, step), levels))
+    decoded = decode_mesh(data, step)
+    return CodedReference(data, step, levels, decoded, subdivide_midpoint(decoded, levels))

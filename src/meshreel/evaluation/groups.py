@@ -13,6 +13,7 @@ import numpy as np
 
 from ..container.reader import ReelReader
 from ..container.sources import BytesSource
+from ..metrics.distance import PSNR_CEILING
 from .rows import Row
 
 SMALLER_IS_BETTER = ("normal_error_deg", "normal_error_at_vertices_deg", "rms_forward_m", "rms_backward_m")
@@ -82,6 +83,15 @@ def bytes_between(row: Row, first: int, last: int) -> float:
 
 
 def _values(row: Row, metric: str) -> np.ndarray:
-    """A metric's value for every frame; a value that was not finite (None) is the best or the worst it can be."""
-    best = 0.0 if metric in SMALLER_IS_BETTER else 200.0
-    return np.array([best if (v := frame[metric]) is None else v for frame in row["per_frame"]], dtype=np.float64)
+    """A metric's value for every frame; None, one that was not finite, is what that stands for."""
+    infinite = _infinite(metric)
+    return np.array([infinite if (v := frame[metric]) is None else v for frame in row["per_frame"]], dtype=np.float64)
+
+
+def _infinite(metric: str) -> float:
+    """A PSNR without error counts as in the means of a row; a distance is that of a frame which is not there."""
+    if "psnr" in metric:
+        return PSNR_CEILING
+    if metric.startswith("ssim"):
+        return 1.0
+    return np.inf if metric.startswith(("rms", "hausdorff95")) else 0.0

@@ -1,4 +1,4 @@
-"""The only place that measures: one JSON-ready row for a codec at an operating point on a sequence.
+"""What is measured (and in peers.py, beside a peer): one JSON-ready row for a codec at an operating point.
 
 Rate is the length of the bytes; decoding happens in a fresh process from a file; times are processor time, and a row
 carries DracoPy's decoding time of the same body from the same run, so that machines can be compared by ratio.
@@ -52,7 +52,7 @@ def run_points(
     points: Sequence[Point],
     file: Path,
     bench: Bench,
-    tell: Callable[[Row, bool], None],
+    tell: Tell,
     executor: Executor | None = None,
 ) -> list[Row]:
     """Rows of all points, each appended to `file` as soon as it is there; `tell` hears each and whether it is new.

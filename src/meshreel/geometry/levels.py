@@ -16,7 +16,7 @@ from ..errors import FormatError
 from ..types import Mesh
 from .topology import vertex_normals
 
-MOST_SLANT = 0.3  # cosine between direction and surface below which the tangent plane says nothing
+LEAST_COSINE = 0.3  # between direction and the surface's normal; below, the tangent plane says nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,9 +69,9 @@ def heights(
         midpoints, directions = _core.edge_frames(coarse, level.coarse, level.edges, curvature)
         normals = vertex_normals(Mesh(np.ascontiguousarray(target), level.faces))[level.vertices :]
         away = target[level.vertices :] - midpoints
-        slant = (directions * normals).sum(axis=1)
-        steep = slant >= MOST_SLANT
-        met = (away * normals).sum(axis=1) / np.where(steep, slant, 1.0)
+        cosine = (directions * normals).sum(axis=1)
+        steep = cosine >= LEAST_COSINE
+        met = (away * normals).sum(axis=1) / np.where(steep, cosine, 1.0)
         ends = coarse[level.edges]
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         scalars[t] = np.clip(np.where(steep, met, (away * directions).sum(axis=1)), -length, length)

@@ -113,7 +113,7 @@ class ViewOptions:
 
 @dataclass(frozen=True, slots=True)
 class ParallelViewOptions:
-    """How four small parallel views stand around a bounding box: quick, and the rate-distortion study's."""
+    """How four small parallel views stand around a bounding box, one a side: quick to draw."""
 
     size: int = 512  # pixels, width and height
     up: str = "y"  # the axis that points up: y or z

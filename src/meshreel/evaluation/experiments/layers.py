@@ -20,7 +20,7 @@ from . import targets
 from .layers_goals import GOALS, goal, halves, no_bridges, no_loser, quick_decode, quick_encode
 
 PRESET = "best"
-COMPARISON = ComparisonOptions(views=ParallelViewOptions())  # four parallel views of 512 x 512, the study's
+COMPARISON = ComparisonOptions(views=ParallelViewOptions())  # four parallel views of 512 x 512 pixels
 QUALITIES: dict[str, tuple[float, ...]] = {
     "dancer": (5, 20, 35, 45, 50, 65, 80, 95),
     "basketball_player": (5, 20, 35, 50, 65, 80, 95),
