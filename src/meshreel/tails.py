@@ -92,7 +92,7 @@ def find_tails(
             least = cost
             better.append(tried)
     chosen = next((tried for tried in reversed(better) if search.holds(tried)), None)
-    return chosen and Tails(chosen.record, chosen.parts.apply(positions, faces))
+    return None if chosen is None else Tails(chosen.record, chosen.parts.apply(positions, faces))
 
 
 @dataclass(frozen=True, slots=True)
