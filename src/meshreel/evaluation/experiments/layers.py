@@ -24,7 +24,7 @@ COMPARISON = ComparisonOptions(views=ParallelViewOptions())  # four parallel vie
 QUALITIES: dict[str, tuple[float, ...]] = {
     "dancer": (5, 20, 35, 45, 50, 65, 80, 95),
     "basketball_player": (5, 20, 35, 50, 65, 80, 95),
-    "mitch": (50, 65, 69, 80),
+    "mitch": (50, 65, 67.5, 69, 80),
     "crane60": (25, 50, 75),
     "samba60": (25, 75),
 }
