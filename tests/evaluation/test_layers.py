@@ -189,7 +189,7 @@ def test_a_variant_changes_the_preset_and_its_curve_has_its_own_name(name, prese
 
 
 def test_an_unknown_variant_is_told():
-    with pytest.raises(InputError, match="known: groups"):
+    with pytest.raises(InputError, match="known: errors"):
         make_codec("meshreel", {"variant": "everything"})
 
 

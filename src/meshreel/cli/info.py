@@ -78,7 +78,7 @@ def _rates(row: dict[str, Any]) -> Table:
 
 
 def _groups(row: dict[str, Any]) -> Table:
-    table = Table("group", "frames", "form", "layers beyond the first", "bytes", "parts")
+    table = Table("group", "frames", "form", "layers", "bytes", "parts")
     for number, group in enumerate(row["groups"]):
         parts = ", ".join(f"{name} {size}" for name, size in group["parts"].items())
         first, last = group["first_frame"], group["first_frame"] + group["frames"] - 1
