@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -25,7 +24,7 @@ from tests.shared_data import performer
 QUALITIES = (0, 20, 40, 60, 80, 100)
 BETTER = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "ssim_masked")
 WORSE = ("normal_error_deg", "normal_error_at_vertices_deg")
-LOOK = ComparisonOptions(views=ParallelViewOptions(128))
+LOOK = ComparisonOptions(views=ParallelViewOptions())  # of 128 x 128 pixels, SSIM is noise above .99
 
 
 def quicker(options: EncoderOptions) -> EncoderOptions:
@@ -34,21 +33,6 @@ def quicker(options: EncoderOptions) -> EncoderOptions:
     reference = replace(options.reference, keys=1, canonical_keys=1, trial_depth=5, trial_vertices=150, fuse=fuse)
     track = replace(options.track, centers=150, samples=3000)
     return replace(options, reference=reference, track=track, intra=IntraOptions(fractions=(0.5, 1.0)))
-
-
-@dataclass(frozen=True)
-class Case:
-    """How a preset is tested: what makes it quick, and by how much SSIM may fall where the form of a group changes."""
-
-    quicker: Callable[[EncoderOptions], EncoderOptions]
-    slack: float = 0.0
-    turn: float = (
-        0.0  # degrees that normals may be worse: on this few vertices the base mesh changes with every quality
-    )
-
-
-# One line a preset. `paper` goes over to Draco per frame at high quality, whose SSIM is a thousandth lower at first.
-PRESETS = {"paper": Case(quicker, slack=0.002), "best": Case(quicker, slack=0.002, turn=0.2)}
 
 
 def walker() -> MeshList:
@@ -62,19 +46,17 @@ def dancer() -> MeshList:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [walker, dancer], ids=["made", "captured"])
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", ["paper", "best"])
 def test_quality_is_monotone(preset, make, tmp_path):
-    case, body, rows = PRESETS[preset], make(), []
+    body, rows = make(), []
     for quality in QUALITIES:
         path = tmp_path / f"{quality}.reel"
-        size = encode(body, path, case.quicker(preset_options(preset, quality=quality))).size
+        size = encode(body, path, quicker(preset_options(preset, quality=quality))).size
         rows.append({"bytes": size} | compare_sequences(body, open_video(path), LOOK).to_row())
     for (a, low), (b, high) in pairwise(zip(QUALITIES, rows, strict=True)):
         between = f"from quality {a} to {b}"
         assert low["bytes"] < high["bytes"], between
         for metric in BETTER:
-            slack = case.slack if metric == "ssim_masked" else 0.0
-            assert low[metric] < high[metric] + slack, (metric, between)
+            assert low[metric] < high[metric], (metric, between)
         for metric in WORSE:
-            turn = case.turn if metric == "normal_error_deg" else 0.0
-            assert low[metric] + turn > high[metric], (metric, between)
+            assert low[metric] > high[metric], (metric, between)

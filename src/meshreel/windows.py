@@ -34,6 +34,7 @@ from .types import Centers, Mesh
 
 Progress = Callable[[str, int, int], None]  # stage, frames done in it, frames of the sequence
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it
+MOST_FOR_HALF = 2  # times the bytes that half the distance (6 dB) may cost; a finer template gives 4 dB for that
 MOST_SECONDS = 600  # of a key interval: whoever joins late decodes as much before a picture is there
 
 
@@ -183,9 +184,19 @@ def laplacian(
 
 
 def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions) -> EncodedGroup:
-    """The group, or its `draco` form where that is as good and smaller."""
-    found = cheapest_intra(frames, group.quality, len(group.payload), options.intra)
-    return group if found is None else EncodedGroup(Form.DRACO, len(frames), found[0], (), found[1])
+    """The group, or its `draco` form where that is the better bargain.
+
+    As good and smaller; or so much better that no finer template would get there for the bytes, as on bodies of few,
+    large faces.
+    """
+    size = len(group.payload)
+    found = cheapest_intra(frames, group.quality, MOST_FOR_HALF * size, options.intra)
+    if found is None:
+        return group
+    payload, quality = found
+    if len(payload) >= size and quality.distance > group.quality.distance / 2:
+        return group
+    return EncodedGroup(Form.DRACO, len(frames), payload, (), quality)
 
 
 def intra_only(frames: Sequence[Mesh], options: EncoderOptions) -> EncodedGroup:
