@@ -70,12 +70,21 @@ def body(sequence, groups=TEN):
     return own + [row(sequence, A2S, 5 * mbps, db, kind="curve") for mbps, db in CURVE]
 
 
+BACK = tuple((10, size, None) for size in (480, 480, 480, 420, 420, 420))
+
+
+def backwards(sequence, groups=BACK):
+    return row(sequence, BEST, 0.26, 70.0, groups, kind="backwards", point=f"{sequence} backwards")
+
+
 GOOD = [
     *body("dancer"),
     *body("basketball_player"),
     *body("mitch"),
     *body("crane60", SIXTY),
     *body("samba60", SIXTY),
+    backwards("crane60"),
+    backwards("samba60"),
     row("collision", BEST, 0.4, 66.0, ((10, 500, None), (10, 400, 400), *SIXTY[2:]), kind="floor"),
     memory(20, 400.0),
     memory(60, 410.0),
@@ -90,7 +99,7 @@ def judged(rows):
 
 def test_good_rows_keep_every_promise():
     found = judged(GOOD)
-    assert [p for p in found if not p.met] == [] and len(found) == 18
+    assert [p for p in found if not p.met] == [] and len(found) == 20
 
 
 def test_without_rows_nothing_is_claimed():
@@ -122,8 +131,17 @@ def test_one_part_that_falls_short_is_missed_alone(name, sequence, change):
 def test_a_long_sequence_must_not_cost_more_later():
     later = tuple((10, size, None) for size in (400, 400, 400, 400, 400, 401))
     rows = body("crane60", later)
-    [found] = [p for p in judged(rows) if p.text.startswith("crane60: bytes")]
+    [found] = [p for p in judged(rows) if p.text.startswith("crane60: bytes of frames")]
     assert found.met is False and "1.001 at quality 60" in found.value
+
+
+def test_a_half_that_moves_more_may_cost_more_but_not_for_its_place():
+    moving = tuple((10, size, None) for size in (300, 300, 300, 480, 480, 480))  # 1.6 forth; back for less, or for more
+    for back, value, met in ((330, "0.989", True), (340, "1.004", False)):
+        groups = tuple((10, size, None) for size in (540, 540, 540, back, back, back))
+        rows = [*body("crane60", moving), backwards("crane60", groups)]
+        missed, found = [p for p in judged(rows) if p.text.startswith("crane60: bytes")]
+        assert missed.met is False and (found.met, found.value) == (met, f"{value} at quality 70"), found
 
 
 def test_a_group_that_draco_would_make_smaller_is_a_loser():

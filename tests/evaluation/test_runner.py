@@ -14,7 +14,7 @@ from meshreel.evaluation import runner
 from meshreel.evaluation.bridges import count_bridges
 from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import CODECS, make_codec
-from meshreel.evaluation.datasets import open_dataset
+from meshreel.evaluation.datasets import Backwards, open_dataset
 from meshreel.evaluation.fresh import peak_rss_mb
 from meshreel.evaluation.peers import equal_anchor, run_fresh
 from meshreel.evaluation.rows import Point, read_rows
@@ -142,6 +142,21 @@ def test_a_curve_row_has_rate_groups_and_a_few_metrics_of_each_frame(folder):
     assert row["mbps"] > 0 and set(row["per_frame"][0]) < set(runner.CURVE_METRICS)
     assert [group["frames"] for group in row["groups"]] == [1, 1] and "decode" not in row
     assert sum(group["bytes"] for group in row["groups"]) < row["bytes"]
+
+
+def test_a_backwards_row_begins_with_the_last_frame(tmp_path):
+    grown = np.stack([BALLS[0].vertices, 1.3 * BALLS[0].vertices])
+    np.savez(tmp_path / "ball.npz", vertices=grown, faces=BALLS[0].faces)
+    forth, back = (
+        runner.measure_point(Point("ball", "draco", {"qp": 9}, kind=kind), Bench(tmp_path, comparison=QUICK))
+        for kind in ("curve", "backwards")
+    )
+    assert [frame["d2_psnr"] for frame in back["per_frame"]] == [frame["d2_psnr"] for frame in forth["per_frame"]][::-1]
+    assert len({frame["d2_psnr"] for frame in back["per_frame"]}) > 1
+    turned = Backwards(open_dataset("ball", tmp_path))
+    assert [len(turned), len(list(turned))] == [back["frames"]] * 2
+    with pytest.raises(IndexError):
+        turned[len(turned)]
 
 
 def test_a_floor_row_says_what_draco_would_cost_each_group(folder, monkeypatch):

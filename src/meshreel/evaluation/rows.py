@@ -23,7 +23,8 @@ class Point:
     options: dict[str, Any] = field(default_factory=dict)
     frames: int | None = None  # the first so many; None: all
     # "quality": rate, times, metrics; "curve": rate and metrics only; "floor": quality, and each group against Draco;
-    # "memory": peak memory of an encode in a fresh process; "decode": decoding beside the anchor of equal quality
+    # "backwards": "curve" of the frames in reverse; "memory": peak memory of an encode in a fresh process;
+    # "decode": decoding beside the anchor of equal quality
     kind: str = "quality"
 
     @property

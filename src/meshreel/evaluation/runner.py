@@ -26,7 +26,7 @@ from .bridges import count_bridges, count_degenerate
 from .codec import Codec
 from .codecs import make_codec
 from .codecs.draco import lattice_step
-from .datasets import open_dataset
+from .datasets import Backwards, open_dataset
 from .fresh import peak_rss_mb
 from .groups import group_records
 from .peers import cheapest_forms, measure_pair, run_fresh
@@ -192,6 +192,8 @@ class StageTimer:
 def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
     """The row of a point, by its kind; `rows` are those measured before, for the kinds of `AFTER`."""
     sequence = open_dataset(point.sequence, bench.data, point.frames, bench.cache)
+    if point.kind == "backwards":
+        sequence = Backwards(sequence)
     row: Row
     if point.kind == "memory":
         row = _memory(point, str(bench.data), len(sequence))
@@ -199,7 +201,8 @@ def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
         row = measure_pair(point, sequence, rows)
     else:
         codec = make_codec(point.codec, point.options)
-        measure = {"quality": run_point, "curve": run_curve_point, "floor": run_floor_point}[point.kind]
+        by_kind = {"quality": run_point, "floor": run_floor_point}
+        measure = by_kind.get(point.kind, run_curve_point)
         row = measure(point.sequence, sequence, codec, bench.comparison)
     return {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | row
 

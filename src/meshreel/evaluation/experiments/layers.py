@@ -13,11 +13,12 @@ from typing import Any
 from ...metrics.cameras import ParallelViewOptions
 from ...metrics.report import ComparisonOptions
 from ..curves import ANCHOR, ANCHORS, HULL, JUDGED, MEASURES, SYMMETRIC, Against, against_hull, hull_lines, on_hull
+from ..datasets import REMESHED
 from ..groups import at_borders, by_distance
 from ..promises import Promise, flat_memory
 from ..rows import Point, Row, curve_rows, select
 from . import targets
-from .layers_goals import GOALS, goal, halves, no_bridges, no_loser, quick_decode, quick_encode
+from .layers_goals import GOALS, goal, halves, no_bridges, no_loser, place, quick_decode, quick_encode
 
 PRESET = "best"
 COMPARISON = ComparisonOptions(views=ParallelViewOptions())  # four parallel views of 512 x 512 pixels
@@ -26,11 +27,12 @@ QUALITIES: dict[str, tuple[float, ...]] = {
     "basketball_player": (5, 20, 35, 50, 65, 80, 95),
     "mitch": (50, 65, 67.5, 69, 80),
     "crane60": (25, 50, 75),
-    "samba60": (25, 75),
+    "samba60": (25, 50, 75),
 }
 PAPER = (50.0,)  # qualities of the preset that the curves are shown beside
 PAPER_ON = ("dancer", "basketball_player")
 COLLISION = 50.0
+BACKWARDS = 50.0  # quality at which the remeshed bodies are played in reverse, too
 DECODED = (35.0, 50.0, 65.0)  # qualities at which decoding is timed, on dancer
 # Fraction of the vertices and bits of the anchors: those on or next to the hull of a full sweep on one frame. Free
 # subdivision changes neither rate nor distance, and normals for the better below half of the vertices: A2 needs few
@@ -58,6 +60,8 @@ def points(small: bool) -> Iterator[Point]:
     for body, qualities in QUALITIES.items():
         yield from (_best(body, quality) for quality in qualities)
     yield _best("collision", COLLISION, kind="floor")
+    for body in REMESHED:
+        yield _best(body, BACKWARDS, kind="backwards")
     for body in PAPER_ON:
         yield from (Point(body, "meshreel", {"preset": "paper", "quality": quality}) for quality in PAPER)
     for body in QUALITIES:
@@ -87,8 +91,9 @@ def promises(rows: Sequence[Row]) -> list[Promise]:
     codec = _codec()
     own = {body: curve_rows(rows, body, codec) for body in (*QUALITIES, "collision")}
     found = [goal(wanted, own[wanted.sequence]) for wanted in GOALS]
-    for body in ("crane60", "samba60"):
-        found += [_gain(rows, body, PROUD), halves(body, own[body])]
+    for body in REMESHED:
+        back = select(rows, body, codec, "backwards")
+        found += [_gain(rows, body, PROUD), halves(body, own[body]), place(body, own[body], back)]
     found += [no_loser(own["collision"]), no_bridges(own["collision"])]
     for body in ("dancer", "basketball_player"):
         found += [_gain(rows, body, LEAST_GAIN), _end(rows, body)]

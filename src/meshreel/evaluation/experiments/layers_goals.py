@@ -72,6 +72,21 @@ def halves(body: str, rows: Sequence[Row]) -> Promise:
     return of_rows(text, "<= 1 at every point", [row for row in rows if row["frames"] >= 2 * HALF], measure)
 
 
+def place(body: str, forth: Sequence[Row], back: Sequence[Row]) -> Promise:
+    """Whether frames cost more because they come later: what moves more costs more wherever it is, so both ways count.
+
+    A half coded second over the same half coded first, the geometric mean of both halves.
+    """
+    text = f"{body}: bytes of a half that comes second over those of the same half coming first (played both ways)"
+    first = {row["options"]["quality"]: row for row in forth if row["frames"] >= 2 * HALF}
+    pairs = [(first[row["options"]["quality"]], row) for row in back if row["options"]["quality"] in first]
+    if not pairs:
+        return Promise(text, "<= 1")
+    ratios = {a["options"]["quality"]: (_second_over_first(a) * _second_over_first(b)) ** 0.5 for a, b in pairs}
+    told = ", ".join(f"{ratio:.3f} at quality {quality:g}" for quality, ratio in sorted(ratios.items()))
+    return Promise(text, "<= 1", told, max(ratios.values()) <= 1)
+
+
 def no_loser(rows: Sequence[Row]) -> Promise:
     """Whether no group costs more than the cheapest per-frame Draco form of its quality."""
     known = [row for row in rows if all("draco_bytes" in group for group in row["groups"])]
