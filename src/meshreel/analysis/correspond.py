@@ -18,6 +18,7 @@ from .embedded import EmbeddedOptions, Motion, Tracker
 from .fit_match import Target
 
 EVEN = 0.0005  # a residual that is in no doubt
+DOUBT = 0.0015  # a residual of a frame at which other keys are tried
 LOST = 0.004  # a residual above which no surface fit finds back
 PLACES = (0.5, 0.7, 0.85, 0.25, 0.0)  # of the keys, in parts of the group; tried until one is not in doubt
 UNEVEN = 1.8  # times the median residual that the largest may be: beyond, something that the key has not has appeared
@@ -45,7 +46,7 @@ def choose_key(targets: Sequence[Target], options: EmbeddedOptions, most: int = 
     for key in dict.fromkeys(int(place * len(targets)) for place in PLACES[:most]):
         courses.append(_course(targets, key, options))
         residuals = courses[-1].motion.residuals
-        if residuals.max() <= min(options.doubt, UNEVEN * max(float(np.median(residuals)), EVEN)):
+        if residuals.max() <= min(DOUBT, UNEVEN * max(float(np.median(residuals)), EVEN)):
             break
     return max(courses, key=lambda course: (course.count, -float(np.sum(course.motion.residuals[: course.count] ** 2))))
 

@@ -53,7 +53,7 @@ class EmbeddedOptions:
     neighbours: int = 4  # nodes that move a point
     agreement: float = 0.3  # least cosine between the normals of a pair
     torn: tuple[float, float] = (0.5, 0.15)  # share of its length by which an edge misses that then counts a quarter
-    doubt: float = 0.0015  # a residual above it is tried again: from another start, and with edges that tear
+    doubt: float = 0.0005  # a residual above it, if unusual, is tried again: from another start, with edges that tear
     damping: float = 0.01  # squared row weight of a node's step against its data
     iterations: int = 60  # of the conjugate gradients, at most, a round
     tolerance: float = 1e-2  # their relative residual
