@@ -163,9 +163,9 @@ def sequence() -> MeshList:
     return MeshList((both(frames[0], knob()), *frames[1:]))
 
 
-def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("meshreel.analysis.correspond.LOST", 1.0)  # else the frame with the knob is a group of its own
-    encode(sequence, tmp_path / "with.reel", options())
+def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path) -> None:
+    patient = replace(options().embedded, lost=1.0)  # else the frame with the knob is a group of its own
+    encode(sequence, tmp_path / "with.reel", replace(options(), embedded=patient))
     patched = meshreel.open(tmp_path / "with.reel")
     assert payload_parts(patched.reader.read_chunk(0))["patches"] > 0
     levels = len(patched.reader.chunks[0].layers) - 2

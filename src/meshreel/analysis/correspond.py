@@ -17,11 +17,7 @@ from ..types import Mesh
 from .embedded import EmbeddedOptions, Motion, Tracker
 from .fit_match import Target
 
-EVEN = 0.0005  # a residual that is in no doubt
-DOUBT = 0.0015  # a residual of a frame at which other keys are tried
-LOST = 0.004  # a residual above which no surface fit finds back
 PLACES = (0.5, 0.7, 0.85, 0.25, 0.0)  # of the keys, in parts of the group; tried until one is not in doubt
-UNEVEN = 1.8  # times the median residual that the largest may be: beyond, something that the key has not has appeared
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +42,8 @@ def choose_key(targets: Sequence[Target], options: EmbeddedOptions, most: int = 
     for key in dict.fromkeys(int(place * len(targets)) for place in PLACES[:most]):
         courses.append(_course(targets, key, options))
         residuals = courses[-1].motion.residuals
-        if residuals.max() <= min(DOUBT, UNEVEN * max(float(np.median(residuals)), EVEN)):
+        usual = max(float(np.median(residuals)), options.settled)
+        if residuals.max() <= min(options.rekeyed, options.uneven * usual):
             break
     return max(courses, key=lambda course: (course.count, -float(np.sum(course.motion.residuals[: course.count] ** 2))))
 
@@ -56,7 +53,7 @@ def from_last(template: Mesh, targets: Sequence[Target], options: EmbeddedOption
     tracker = Tracker(template, -1, options)
     count = 0
     for target in targets:
-        if tracker.step(count, target) > LOST:
+        if tracker.step(count, target) > options.lost:
             break
         count += 1
     if count == 0:
@@ -69,6 +66,6 @@ def _course(targets: Sequence[Target], key: int, options: EmbeddedOptions) -> Co
     for frame in [*range(key + 1, len(targets)), *reversed(range(key))]:
         tracker.step(frame, targets[frame])
     motion = tracker.motion(range(len(targets)))
-    lost = np.flatnonzero(motion.residuals > LOST)
+    lost = np.flatnonzero(motion.residuals > options.lost)
     count = int(lost[0]) if len(lost) else len(targets)
     return Course(key, count if count > key else 0, motion)

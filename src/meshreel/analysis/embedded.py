@@ -20,9 +20,10 @@ from ..errors import InputError
 from ..geometry.nearest import Surface
 from ..geometry.topology import clean, vertex_normals
 from ..types import Mesh
-from .embedded_graph import Graph, area_samples, build_graph, farthest_first
-from .embedded_match import NORMAL_REACH, Followed
-from .embedded_solve import Level, Planes, Pose, Rest, moved, rotation, turned
+from .conjugate_gradients import Limits
+from .embedded_graph import DeformationGraph, area_samples, build_graph, farthest_first
+from .embedded_match import NORMAL_REACH, SampledTarget
+from .embedded_solve import GraphSolver, Planes, Pose, Rest, moved, rotation, turned
 from .fit_match import Target
 
 UNUSUAL = 1.25  # times the median residual so far: tried again
@@ -54,6 +55,10 @@ class EmbeddedOptions:
     agreement: float = 0.3  # least cosine between the normals of a pair
     torn: tuple[float, float] = (0.5, 0.15)  # share of its length by which an edge misses that then counts a quarter
     doubt: float = 0.0005  # a residual above it, if unusual, is tried again: from another start, with edges that tear
+    rekeyed: float = 0.0015  # a residual above it makes another frame be tried as the key
+    lost: float = 0.004  # a residual above it leaves the frame where no surface fit finds back
+    settled: float = 0.0005  # a median residual below it counts as this much: about what noise leaves
+    uneven: float = 1.8  # times the median residual above which something has appeared that the key has not
     damping: float = 0.01  # squared row weight of a node's step against its data
     iterations: int = 60  # of the conjugate gradients, at most, a round
     tolerance: float = 1e-2  # their relative residual
@@ -71,8 +76,11 @@ class EmbeddedOptions:
             raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
         if not (self.damping > 0 and 0 <= self.tolerance < 1):
             raise InputError(f"damping {self.damping}, tolerance {self.tolerance}: give > 0, and 0 to 1")
-        if not (min(self.torn) > 0 and self.doubt >= 0):
-            raise InputError(f"torn {self.torn}, doubt {self.doubt}: give > 0, and >= 0")
+        if not (min(self.torn) > 0 and min(self.doubt, self.rekeyed, self.lost, self.settled, self.uneven) >= 0):
+            raise InputError(
+                f"torn {self.torn}, doubt {self.doubt}, rekeyed {self.rekeyed}, lost {self.lost}, "
+                f"settled {self.settled}, uneven {self.uneven}: give > 0, and >= 0 for the others"
+            )
 
 
 class Tracker:
@@ -89,7 +97,7 @@ class Tracker:
         self._samples = area_samples(self.mesh, o.samples)
         nodes = farthest_first(self.mesh, self._samples, o.fine.nodes)
         self._graph, coarse = build_graph(self.mesh, nodes), build_graph(self.mesh, nodes[: o.coarse.nodes])
-        self._fine, self._few = Level(self._rest(self._graph)), self._rest(coarse)
+        self._fine, self._few = GraphSolver(self._rest(self._graph)), self._rest(coarse)
         self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes], o.neighbours)
         self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, o.neighbours)
         self._poses = {key: Pose.at(self._graph.nodes)}
@@ -122,7 +130,7 @@ class Tracker:
         residuals = np.array([self._residuals[frame] for frame in frames])
         return Motion(self.mesh, self._graph, rotations, positions, residuals, self.options.neighbours)
 
-    def _rest(self, graph: Graph) -> Rest:
+    def _rest(self, graph: DeformationGraph) -> Rest:
         points, normals = self.mesh.vertices[self._samples], vertex_normals(self.mesh)[self._samples]
         binding = graph.bind(points, graph.cells[self._samples], self.options.neighbours)
         return Rest(graph.nodes, graph.edges, points, normals, binding)
@@ -139,7 +147,7 @@ class Tracker:
     def _follow(self, frame: int, target: Target) -> tuple[Pose, float]:
         """The best of some ways to go on, by residual: where the first is good enough, no other is tried."""
         o, last = self.options, self._known(frame)
-        there = Followed(target, o.samples, o.agreement)
+        there = SampledTarget(target, o.samples, o.agreement)
         usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # noise is not failure
         starts = self._starts(frame, there)
         best = self._poses[last], np.inf
@@ -154,7 +162,7 @@ class Tracker:
         stay = self._poses[last], self._measure(self._poses[last], target)
         return best if best[1] < stay[1] else stay
 
-    def _starts(self, frame: int, target: Followed) -> list[Pose]:
+    def _starts(self, frame: int, target: SampledTarget) -> list[Pose]:
         """The neighbour's pose, and that moved on as it moved before; the one that is nearer to the frame first."""
         last = self._known(frame)
         side = 1 if frame > last else -1
@@ -165,25 +173,25 @@ class Tracker:
         ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
         gate = self.options.coarse.gates[-1]
         poses = [ahead, self._poses[last]]
-        return sorted(poses, key=lambda pose: -_planes(self._fine, pose, target, gate).weights.sum())
+        return sorted(poses, key=lambda pose: -_planes(self._fine.rest, pose, target, gate).weights.sum())
 
-    def _carried(self, pose: Pose, target: Followed, torn: float) -> Pose:
+    def _carried(self, pose: Pose, target: SampledTarget, torn: float) -> Pose:
         """The pose carried by a few nodes whose rest is that pose: what is known of the detail stays."""
         few, fine = self._few, self._fine.rest
         here = Pose(pose.rotations[: len(few.nodes)], pose.positions[: len(few.nodes)])
         points, normals = moved(fine.points, fine.nodes, fine.binding, pose), turned(fine.normals, fine.binding, pose)
         rest = Rest(here.positions, few.edges, points, normals, few.binding)
-        level = Level(rest, Level(few).holds(here, torn))
-        carried = self._rounds(level, Pose.at(here.positions), target, self.options.coarse, torn)
+        solver = GraphSolver(rest, GraphSolver(few).holds(here, torn))
+        carried = self._rounds(solver, Pose.at(here.positions), target, self.options.coarse, torn)
         positions = moved(pose.positions, here.positions, self._nodes_by_few, carried)
         return Pose(rotation(self._nodes_by_few, carried) @ pose.rotations, positions)
 
-    def _rounds(self, level: Level, pose: Pose, target: Followed, stage: Stage, torn: float) -> Pose:
+    def _rounds(self, solver: GraphSolver, pose: Pose, target: SampledTarget, stage: Stage, torn: float) -> Pose:
         o = self.options
         for gate, rigidity in zip(stage.gates, stage.rigidity, strict=True):
-            planes = _planes(level, pose, target, gate)
-            stiffness = rigidity * level.holds(pose, torn)
-            following = level.step(pose, planes, stiffness, o.damping, (o.iterations, o.tolerance))
+            planes = _planes(solver.rest, pose, target, gate)
+            stiffness = rigidity * solver.holds(pose, torn)
+            following = solver.step(pose, planes, stiffness, o.damping, Limits(o.iterations, o.tolerance))
             if not following.is_finite:
                 break
             pose = following
@@ -202,7 +210,7 @@ class Motion:
     """Where points of the key mesh are in T frames."""
 
     mesh: Mesh  # the key frame's
-    graph: Graph
+    graph: DeformationGraph
     rotations: Float64[np.ndarray, "T N 3 3"]
     positions: Float64[np.ndarray, "T N 3"]
     residuals: Float64[np.ndarray, " T"]  # symmetric RMS; 0 at the key, infinite at an empty frame
@@ -230,8 +238,7 @@ def register(key_mesh: Mesh, frames: Sequence[Mesh], key: int, options: Embedded
     return tracker.motion(range(len(frames)))
 
 
-def _planes(level: Level, pose: Pose, target: Followed, gate: float) -> Planes:
-    rest = level.rest
+def _planes(rest: Rest, pose: Pose, target: SampledTarget, gate: float) -> Planes:
     points, normals = moved(rest.points, rest.nodes, rest.binding, pose), turned(rest.normals, rest.binding, pose)
     return target.planes(points, normals, gate)
 

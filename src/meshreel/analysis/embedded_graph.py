@@ -30,7 +30,7 @@ class Binding:
 
 
 @dataclass(frozen=True, slots=True)
-class Graph:
+class DeformationGraph:
     """Nodes on a mesh; every vertex of it belongs to the cell of the node that is nearest along the surface."""
 
     nodes: Float64[np.ndarray, "N 3"]
@@ -84,7 +84,7 @@ def farthest_first(mesh: Mesh, candidates: Int64[np.ndarray, " S"], count: int) 
     return candidates[chosen]
 
 
-def build_graph(mesh: Mesh, nodes: Int64[np.ndarray, " N"]) -> Graph:
+def build_graph(mesh: Mesh, nodes: Int64[np.ndarray, " N"]) -> DeformationGraph:
     """The graph whose nodes are these vertices of the mesh."""
     edges, _ = unique_edges(mesh.faces)
     cells = _cells(mesh, edges, nodes)
@@ -92,7 +92,7 @@ def build_graph(mesh: Mesh, nodes: Int64[np.ndarray, " N"]) -> Graph:
     count = len(nodes)
     touching = np.unique((np.concatenate([i, j]) * count + np.concatenate([j, i]))[np.concatenate([i != j, i != j])])
     pairs = np.stack([touching // count, touching % count], axis=1)
-    return Graph(mesh.vertices[nodes], pairs, cells, _hoods(pairs, count))
+    return DeformationGraph(mesh.vertices[nodes], pairs, cells, _hoods(pairs, count))
 
 
 def _cells(mesh: Mesh, edges: Int64[np.ndarray, "E 2"], nodes: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " V"]:

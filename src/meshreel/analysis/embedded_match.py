@@ -16,8 +16,8 @@ from .fit_match import Target
 NORMAL_REACH = 0.01  # in a search, distance that a difference of 1 between unit normals counts as
 
 
-class Followed:
-    """A frame to be followed: its surface, and samples of it for the way back."""
+class SampledTarget:
+    """A frame that the key mesh is matched with: its surface, and samples of it for the way back."""
 
     def __init__(self, target: Target, samples: int, agreement: float) -> None:
         self._target, self._agreement = target, agreement

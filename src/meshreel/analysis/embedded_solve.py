@@ -1,8 +1,8 @@
 """Gauss-Newton steps of an embedded deformation: point-to-plane rows against as-rigid-as-possible rows.
 
-In: a level (nodes, edges, bound samples), a pose of its nodes, planes. Out: the next pose. A point p bound to nodes j
-goes to sum w_j (R_j (p - g_j) + t_j) (Sumner et al. 2007). The normal equations are not assembled: conjugate gradients
-multiply with the rows and with their transpose.
+In: a deformation graph at rest (nodes, edges, bound samples), a pose of its nodes, planes. Out: the next pose. A point
+p bound to nodes j goes to sum w_j (R_j (p - g_j) + t_j) (Sumner et al. 2007). The normal equations are not assembled:
+conjugate gradients multiply with the rows and with their transpose.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from jaxtyping import Float64, Int64
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
+from .conjugate_gradients import Limits, conjugate_gradients
 from .embedded_graph import Binding
 
 Blocks = Float64[np.ndarray, "B 6 6"]  # of the nodes, on the diagonal of the normal equations
@@ -100,8 +101,8 @@ class Rest:
     binding: Binding
 
 
-class Level:
-    """A graph to be solved for; `held` says how much its edges count before anything else is known."""
+class GraphSolver:
+    """Solves for the pose of a deformation graph; `held` is how much its edges count before anything is known."""
 
     def __init__(self, rest: Rest, held: Float64[np.ndarray, " E"] | None = None) -> None:
         self.rest = rest
@@ -121,7 +122,7 @@ class Level:
         planes: Planes,
         rigidity: Float64[np.ndarray, " E"],
         place: float,
-        limits: tuple[int, float],
+        limits: Limits,
     ) -> Pose:
         """The pose after one Gauss-Newton step.
 
@@ -138,8 +139,7 @@ class Level:
         blocks[:, range(6), range(6)] += prior
         rows = sparse.csr_array(sparse.vstack([data, rigid], format="csr"))
         right = rows.T @ np.concatenate([miss, bend])
-        system = rows, np.linalg.inv(blocks), prior.reshape(-1)
-        x = _conjugate_gradients(system, right, limits).reshape(count, 6)
+        x = _solved(rows, blocks, prior.reshape(-1), right, limits).reshape(count, 6)
         turn = x[:, :3]
         angle = np.linalg.norm(turn, axis=1, keepdims=True)
         turn = turn * np.minimum(1.0, LARGEST_TURN / np.maximum(angle, 1e-12))
@@ -210,36 +210,20 @@ def _cross(a: Float64[np.ndarray, "... 3"], b: Float64[np.ndarray, "... 3"]) -> 
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def _conjugate_gradients(
-    system: tuple[sparse.csr_array, Blocks, Float64[np.ndarray, " M"]],
+def _solved(
+    rows: sparse.csr_array,
+    blocks: Blocks,
+    prior: Float64[np.ndarray, " M"],
     right: Float64[np.ndarray, " M"],
-    limits: tuple[int, float],
+    limits: Limits,
 ) -> Float64[np.ndarray, " M"]:
-    """x of (rows^T rows + prior) x = right; system = (rows, inverse 6 x 6 blocks of the matrix, prior).
+    """x of (rows^T rows + prior) x = right; preconditioned by the inverse of the nodes' blocks of that matrix."""
+    back, inverse = sparse.csr_array(rows.T), np.linalg.inv(blocks)
 
-    Limits are iterations and relative residual.
-    """
-    rows, inverse, prior = system
-    back = sparse.csr_array(rows.T)
-
-    def apply(x: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
+    def multiply(x: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
         return back @ (rows @ x) + prior * x
 
     def precondition(r: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
         return np.matmul(inverse, r.reshape(-1, 6, 1)).reshape(-1)
 
-    x, r = np.zeros_like(right), right.copy()
-    z = precondition(r)
-    p, rz = z.copy(), float(r @ z)
-    enough = limits[1] ** 2 * rz
-    for _ in range(limits[0]):
-        if not rz > enough:
-            break
-        ap = apply(p)
-        step = rz / float(p @ ap)
-        x += step * p
-        r -= step * ap
-        z = precondition(r)
-        rz, before = float(r @ z), rz
-        p = z + rz / before * p
-    return x
+    return conjugate_gradients(multiply, precondition, right, limits)

@@ -14,6 +14,7 @@ from jaxtyping import Float64, Int32, Int64
 from scipy import sparse
 
 from ..geometry.topology import unique_edges
+from .conjugate_gradients import Limits, conjugate_gradients
 from .fit_border import border_edges
 from .fit_rows import Rows, no_rows
 
@@ -74,28 +75,25 @@ def solve(
     rows: Rows | None,
     at: Float64[np.ndarray, "V 3"],
     problem: Problem,
-    limits: tuple[int, float],
+    limits: Limits,
 ) -> Float64[np.ndarray, "V 3"]:
-    """The step from `at` that fits the rows, keeps the shape and stays near its place; limits as for the solver."""
+    """The step from `at` that fits the rows, keeps the shape and stays near its place."""
     matrix, right = template.normal_equations(no_rows() if rows is None else rows, at)
     laplacian, squared = template.laplacian, problem.stiffness**2
     smooth = laplacian.T @ (sparse.diags_array(squared) @ laplacian)
     smooth = sparse.csr_array(smooth + problem.anchor**2 * sparse.eye_array(template.count))
     right = right + laplacian.T @ (squared[:, None] * (problem.shape - laplacian @ at))
     right = right + problem.anchor**2 * (problem.place - at)
-    return _conjugate_gradients(matrix, smooth, right, limits)
+    return _solved(matrix, smooth, right, limits)
 
 
-def _conjugate_gradients(
-    matrix: sparse.bsr_array,
-    smooth: sparse.csr_array,
-    right: Float64[np.ndarray, "V 3"],
-    limits: tuple[int, float],
+def _solved(
+    matrix: sparse.bsr_array, smooth: sparse.csr_array, right: Float64[np.ndarray, "V 3"], limits: Limits
 ) -> Float64[np.ndarray, "V 3"]:
-    """x of (matrix + smooth on each axis) x = right; limits = (iterations, relative residual)."""
+    """x of (matrix + smooth on each axis) x = right; preconditioned by the blocks of the vertices."""
     count = len(right)
 
-    def apply(x: Float64[np.ndarray, "V 3"]) -> Float64[np.ndarray, "V 3"]:
+    def multiply(x: Float64[np.ndarray, "V 3"]) -> Float64[np.ndarray, "V 3"]:
         return (matrix @ x.reshape(-1)).reshape(-1, 3) + smooth @ x
 
     rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
@@ -104,22 +102,7 @@ def _conjugate_gradients(
     blocks[rows[on_diagonal]] = matrix.data[on_diagonal]
     blocks[:, range(3), range(3)] += smooth.diagonal()[:, None]
     inverse = np.linalg.inv(blocks)
-    x = np.zeros_like(right)
-    r = right.copy()
-    z = np.einsum("vij,vj->vi", inverse, r)
-    p, rz = z.copy(), float(np.vdot(r, z))
-    enough = limits[1] ** 2 * rz
-    for _ in range(limits[0]):
-        if rz <= enough or rz == 0:
-            break
-        ap = apply(p)
-        step = rz / float(np.vdot(p, ap))
-        x += step * p
-        r -= step * ap
-        z = np.einsum("vij,vj->vi", inverse, r)
-        rz, before = float(np.vdot(r, z)), rz
-        p = z + rz / before * p
-    return x
+    return conjugate_gradients(multiply, lambda r: np.einsum("vij,vj->vi", inverse, r), right, limits)
 
 
 def _uniform_laplacian(edges: Int64[np.ndarray, "E 2"], count: int) -> sparse.csr_array:
