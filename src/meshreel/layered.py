@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from .analysis.correspond import choose_key, from_last
-from .analysis.fit import Guides, fit_targets, residuals
+from .analysis.correspond import Course, choose_key, from_last
+from .analysis.fit import Fit, Guides, fit_targets
 from .analysis.fit_match import Target
 from .analysis.groups import cut_at, leading
 from .analysis.template import base_mesh, shared_detail
@@ -47,20 +47,12 @@ class Followed:
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
-    """A template on some frames."""
+class Keyed:
+    """The template of a key frame, laid onto the frames that the key's surface is followed through."""
 
-    positions: Float64[np.ndarray, "T V 3"]
-    residuals: Float64[np.ndarray, " T"]  # RMS, symmetric
-
-    @staticmethod
-    def of(faces: Int32[np.ndarray, "F 3"], positions: Float64[np.ndarray, "T V 3"], targets: list[Target]) -> Fitted:
-        """Positions with what they leave over."""
-        return Fitted(positions, np.array([residual.by_area for residual in residuals(faces, positions, targets)]))
-
-    def first(self, count: int) -> Fitted:
-        """The first so many frames."""
-        return Fitted(self.positions[:count], self.residuals[:count])
+    key: int
+    reference: CodedReference
+    fit: Fit
 
 
 def encode_segment(
@@ -87,22 +79,19 @@ def _next_group(
     ahead: Sequence[Mesh], before: Followed | None, options: EncoderOptions
 ) -> tuple[EncodedGroup, Followed | None]:
     """The group that begins with the first of these frames."""
+    targets = [Target(frame) for frame in ahead]
     if before is not None and options.predict:
-        continued = _continued(ahead, before, options)
+        continued = _continued(ahead, targets, before, options)
         if continued is not None:
             return continued
-    found = _alone(ahead, options)
-    while isinstance(found, int):
-        found = _alone(ahead[:found], options)
-    return found
+    return _alone(ahead, targets, options)
 
 
 def _continued(
-    ahead: Sequence[Mesh], before: Followed, options: EncoderOptions
+    ahead: Sequence[Mesh], targets: list[Target], before: Followed, options: EncoderOptions
 ) -> tuple[EncodedGroup, Followed | None] | None:
     """A group predicted from the one before, as long as its template fits; None where that is not long."""
     base = before.reference.base
-    targets = [Target(frame) for frame in ahead]
     still = _standing(before, targets)
     if still is not None:
         return _coded(ahead, before.reference, still, before, options)
@@ -112,53 +101,73 @@ def _continued(
         return None
     levels = before.reference.levels
     guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), levels))
-    fitted = Fitted.of(base.faces, fit_targets(base.faces, predictions, targets, options.fit, guides), targets)
+    fit = Fit.at(base.faces, fit_targets(base.faces, predictions, targets, options.fit, guides), targets)
     target = target_of(ahead, options).distance
-    count = leading(fitted.residuals / target, before.residual / target, options.groups)
+    count = leading(fit.by_area / target, before.residual / target, options.groups)
     if count < min(SHORTEST, len(ahead)):
         return None
-    return _coded(ahead[:count], before.reference, fitted.first(count), before, options)
+    return _coded(ahead[:count], before.reference, fit.first(count), before, options)
 
 
-def _standing(before: Followed, targets: list[Target]) -> Fitted | None:
+def _standing(before: Followed, targets: list[Target]) -> Fit | None:
     """The template where it was, if it leaves no more over there than it usually does: a fit would only slide."""
     faces = before.reference.base.faces
     for some in (targets[-1:], targets):  # most bodies have moved by the last frame
-        fitted = Fitted.of(faces, np.repeat(before.positions[None], len(some), axis=0), some)
-        if fitted.residuals.max() > STILL * before.residual:
+        fit = Fit.at(faces, np.repeat(before.positions[None], len(some), axis=0), some)
+        if fit.by_area.max() > STILL * before.residual:
             return None
-    return fitted
+    return fit
 
 
-def _alone(ahead: Sequence[Mesh], options: EncoderOptions) -> tuple[EncodedGroup, Followed | None] | int:
-    """A group with a key frame of its own, or the number of frames to try instead."""
-    targets = [Target(frame) for frame in ahead]
-    course = choose_key(targets, options.embedded, options.keys)
-    if course.count == 0:
-        return len(ahead) // 2  # no key is followed back to the first frame
-    ahead, targets, key = ahead[: course.count], targets[: course.count], course.key
-    lattice = options.layers.step * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
-    reference = code_on_lattice(base_mesh(ahead[key], options.template), lattice, options.template.levels)
+def _alone(
+    ahead: Sequence[Mesh], targets: list[Target], options: EncoderOptions
+) -> tuple[EncodedGroup, Followed | None]:
+    """A group with a key frame of its own, as long as its template fits; by Draco, the first frame that none fits."""
+    count = len(ahead)
+    while True:
+        course = _course(targets[:count], options)
+        frames = ahead[: course.count]
+        keyed = _keyed(frames, targets[: course.count], course, options)
+        count = _fitted(frames, keyed, options)
+        if count == len(frames) and keyed is not None:
+            group, followed = _coded(frames, keyed.reference, keyed.fit, None, options)
+            return (replace(group, key=keyed.key) if group.form == Form.LAYERS else group), followed
+        if count == 0:
+            return intra_only(frames, options), None
+
+
+def _course(targets: list[Target], options: EncoderOptions) -> Course:
+    """The way of a key frame's surface through the first of these frames: as many as some key is followed back from."""
+    while (course := choose_key(targets, options.embedded, options.keys)).count == 0:
+        targets = targets[: len(targets) // 2]
+    return course
+
+
+def _keyed(frames: Sequence[Mesh], targets: list[Target], course: Course, options: EncoderOptions) -> Keyed | None:
+    """The template of the course's key and its fit to the frames; None where nothing is left of its base mesh."""
+    lattice = options.layers.step * (LATTICE if len(frames) > 1 else LATTICE_ALONE)
+    reference = code_on_lattice(base_mesh(frames[course.key], options.template), lattice, options.template.levels)
     base, faces = reference.mesh, reference.base.faces
     if base.is_empty:
-        return 1 if len(ahead) > 1 else (intra_only(ahead, options), None)
-    predictions = course.move(reference.base)
+        return None
     guides = Guides(None, shared_detail(base.faces, len(base.vertices), reference.levels))
-    fit = replace(options.fit, key=key)
-    fitted = Fitted.of(faces, fit_targets(faces, predictions, targets, fit, guides), targets)
-    target = target_of(ahead, options)
-    if len(ahead) > 1:
-        cut = cut_at(fitted.residuals / target.distance, options.groups)
-        if cut is not None:
-            return cut
-    elif fitted.residuals[0] > options.groups.limit * target.distance:
-        return intra_only(ahead, options), None
-    group, followed = _coded(ahead, reference, fitted, None, options)
-    return (replace(group, key=key) if group.form == Form.LAYERS else group), followed
+    positions = fit_targets(faces, course.move(reference.base), targets, replace(options.fit, key=course.key), guides)
+    return Keyed(course.key, reference, Fit.at(faces, positions, targets))
+
+
+def _fitted(frames: Sequence[Mesh], keyed: Keyed | None, options: EncoderOptions) -> int:
+    """How many of the first frames a key frame should be looked for in: all where the template fits, 0 for no more."""
+    if keyed is None:
+        return 1 if len(frames) > 1 else 0
+    residuals, target = keyed.fit.by_area, target_of(frames, options).distance
+    if len(frames) == 1:
+        return 0 if residuals[0] > options.groups.limit * target else 1
+    cut = cut_at(residuals / target, options.groups)
+    return len(frames) if cut is None else cut
 
 
 def _coded(
-    frames: Sequence[Mesh], reference: CodedReference, fit: Fitted, before: Followed | None, options: EncoderOptions
+    frames: Sequence[Mesh], reference: CodedReference, fit: Fit, before: Followed | None, options: EncoderOptions
 ) -> tuple[EncodedGroup, Followed | None]:
     """The cheapest form of a group, and what the next may begin with."""
     encoded = encode_layers(reference, fit.positions, options.layers, before.state if before else None)
@@ -174,7 +183,7 @@ def _coded(
     group = cheaper(frames, group, options)
     if group.form != Form.LAYERS:
         return group, None
-    usual = before.residual if before else float(np.median(fit.residuals))
+    usual = before.residual if before else float(np.median(fit.by_area))
     return group, Followed(reference, encoded.state, fit.positions[-1], usual)
 
 

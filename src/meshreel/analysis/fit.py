@@ -17,8 +17,9 @@ from jaxtyping import Float64, Int32
 
 from ..errors import InputError
 from ..types import Mesh
+from .conjugate_gradients import Limits
 from .fit_match import MatchOptions, Target, match
-from .fit_residual import NOTHING, Residual, measure
+from .fit_residual import NOTHING, Residual, residual_of
 from .fit_shape import doubtful, strongest_components, turned_laplacian
 from .fit_system import Problem, Template, solve
 
@@ -80,6 +81,24 @@ class Fit:
     positions: Float64[np.ndarray, "T V 3"]
     residuals: tuple[Residual, ...]
 
+    @staticmethod
+    def at(
+        faces: Int32[np.ndarray, "F 3"], positions: Float64[np.ndarray, "T V 3"], targets: Sequence[Target | None]
+    ) -> Fit:
+        """Positions with what they leave over of each frame."""
+        meshes = (Mesh.of(fitted, faces) for fitted in positions)
+        pairs = zip(meshes, targets, strict=True)
+        return Fit(positions, tuple(NOTHING if target is None else residual_of(mesh, target) for mesh, target in pairs))
+
+    @property
+    def by_area(self) -> Float64[np.ndarray, " T"]:
+        """Symmetric RMS over the area of each frame."""
+        return np.array([residual.by_area for residual in self.residuals])
+
+    def first(self, count: int) -> Fit:
+        """The first so many frames."""
+        return Fit(self.positions[:count], self.residuals[:count])
+
 
 def fit_frames(
     faces: Int32[np.ndarray, "F 3"],
@@ -102,17 +121,7 @@ def fit_frames(
         return Fit(predictions.copy(), (NOTHING,) * count)
     targets = [None if mesh.is_empty else Target(mesh) for mesh in frames]
     positions = fit_targets(faces, predictions, targets, options, guides)
-    return Fit(positions, residuals(faces, positions, targets))
-
-
-def residuals(
-    faces: Int32[np.ndarray, "F 3"], positions: Float64[np.ndarray, "T V 3"], targets: Sequence[Target | None]
-) -> tuple[Residual, ...]:
-    """What is left over of each frame."""
-    return tuple(
-        NOTHING if target is None else measure(Mesh.of(fitted, faces), target)
-        for fitted, target in zip(positions, targets, strict=True)
-    )
+    return Fit.at(faces, positions, targets)
 
 
 def fit_targets(
@@ -123,68 +132,14 @@ def fit_targets(
     guides: Guides = Guides(),
 ) -> Float64[np.ndarray, "T V 3"]:
     """The template's positions on frames that are prepared already (None: an empty one); no residuals."""
-    template = Template(faces, predictions.shape[1])
-    key = _key(targets, options)
-    positions = _first_fit(template, predictions, targets, options, (key, guides.rest))
+    registration = _Registration(Template(faces, predictions.shape[1]), targets, options, _key(targets, options))
+    positions = registration.first(predictions, guides.rest)
     if options.components and len(targets) > 1:
         if guides.coherence is None:
-            coherent = strongest_components(positions, key, options.components)
+            coherent = strongest_components(positions, registration.key, options.components)
         else:
             coherent = guides.coherence(positions)
-        positions = _second_fit(template, (positions, coherent), targets, options, key)
-    return positions
-
-
-def _first_fit(
-    template: Template,
-    predictions: Float64[np.ndarray, "T V 3"],
-    targets: Sequence[Target | None],
-    options: FitOptions,
-    start: tuple[int, Float64[np.ndarray, "V 3"] | None],
-) -> Float64[np.ndarray, "T V 3"]:
-    """Every frame from its prediction, the key frame first: its fit is the shape of the others, unless one is given."""
-    key, given = start
-    positions = predictions.copy()
-    rest = predictions[key] if given is None else given
-    for at in [key] + [t for t in range(len(targets)) if t != key]:
-        target = targets[at]
-        if target is None:
-            continue
-        x = predictions[at]
-        for gate, smoothing in zip(options.gates, options.smoothing, strict=True):
-            shape, turns = turned_laplacian(template, rest, x)
-            stiffness = np.full(template.count, smoothing)
-            if options.guard > 1 and smoothing == options.smoothing[-1]:  # before, the data must have their say
-                stiffness[doubtful(template, rest, turns, x)] *= options.guard
-            x = _round(template, x, target, Problem(shape, stiffness, predictions[at], options.anchor), gate, options)
-        positions[at] = x
-        rest = positions[key] if given is None else given
-    return positions
-
-
-def _second_fit(
-    template: Template,
-    before: tuple[Float64[np.ndarray, "T V 3"], Float64[np.ndarray, "T V 3"]],
-    targets: Sequence[Target | None],
-    options: FitOptions,
-    key: int,
-) -> Float64[np.ndarray, "T V 3"]:
-    """The frames fitted again, near the coherent positions that were made of the first fit."""
-    first, coherent = before
-    positions = first.copy()
-    smoothing = options.smoothing[-1] if options.second_smoothing is None else options.second_smoothing
-    for at, target in enumerate(targets):
-        if target is None or (at == key and options.restart):
-            continue
-        x = coherent[at] if options.restart else first[at]
-        stiffness = np.full(template.count, smoothing)
-        if options.guard > 1:
-            _, turns = turned_laplacian(template, first[key], x)
-            stiffness[doubtful(template, first[key], turns, x)] *= options.guard
-        shape = template.laplacian @ coherent[at]
-        for gate in options.gates[-2:]:
-            x = _round(template, x, target, Problem(shape, stiffness, coherent[at], options.pull), gate, options)
-        positions[at] = x
+        positions = registration.second(positions, coherent)
     return positions
 
 
@@ -195,13 +150,61 @@ def _key(targets: Sequence[Target | None], options: FitOptions) -> int:
     return min(there, key=lambda t: (abs(t - middle), t), default=middle)
 
 
-def _round(
-    template: Template,
-    x: Float64[np.ndarray, "V 3"],
-    target: Target,
-    problem: Problem,
-    gate: float,
-    options: FitOptions,
-) -> Float64[np.ndarray, "V 3"]:
-    rows = match(template, x, target, MatchOptions(gate, options.agreement))
-    return x + solve(template, rows, x, problem, (options.iterations, options.tolerance))
+@dataclass(frozen=True, slots=True)
+class _Registration:
+    """A template and the frames that it is laid onto, in two fits."""
+
+    template: Template
+    targets: Sequence[Target | None]
+    options: FitOptions
+    key: int
+
+    def first(
+        self, predictions: Float64[np.ndarray, "T V 3"], given: Float64[np.ndarray, "V 3"] | None
+    ) -> Float64[np.ndarray, "T V 3"]:
+        """Every frame from its prediction, the key frame first: its fit is the others' shape if none is given."""
+        options, template = self.options, self.template
+        positions = predictions.copy()
+        rest = predictions[self.key] if given is None else given
+        for at in [self.key] + [t for t in range(len(self.targets)) if t != self.key]:
+            target = self.targets[at]
+            if target is None:
+                continue
+            x = predictions[at]
+            for gate, smoothing in zip(options.gates, options.smoothing, strict=True):
+                shape, turns = turned_laplacian(template, rest, x)
+                stiffness = np.full(template.count, smoothing)
+                if options.guard > 1 and smoothing == options.smoothing[-1]:  # before, the data must have their say
+                    stiffness[doubtful(template, rest, turns, x)] *= options.guard
+                x = self._round(x, target, gate, Problem(shape, stiffness, predictions[at], options.anchor))
+            positions[at] = x
+            rest = positions[self.key] if given is None else given
+        return positions
+
+    def second(
+        self, first: Float64[np.ndarray, "T V 3"], coherent: Float64[np.ndarray, "T V 3"]
+    ) -> Float64[np.ndarray, "T V 3"]:
+        """The frames fitted again, near the coherent positions that were made of the first fit."""
+        options, template = self.options, self.template
+        positions = first.copy()
+        smoothing = options.smoothing[-1] if options.second_smoothing is None else options.second_smoothing
+        for at, target in enumerate(self.targets):
+            if target is None or (at == self.key and options.restart):
+                continue
+            x = coherent[at] if options.restart else first[at]
+            stiffness = np.full(template.count, smoothing)
+            if options.guard > 1:
+                _, turns = turned_laplacian(template, first[self.key], x)
+                stiffness[doubtful(template, first[self.key], turns, x)] *= options.guard
+            shape = template.laplacian @ coherent[at]
+            for gate in options.gates[-2:]:
+                x = self._round(x, target, gate, Problem(shape, stiffness, coherent[at], options.pull))
+            positions[at] = x
+        return positions
+
+    def _round(
+        self, x: Float64[np.ndarray, "V 3"], target: Target, gate: float, problem: Problem
+    ) -> Float64[np.ndarray, "V 3"]:
+        options = self.options
+        rows = match(self.template, x, target, MatchOptions(gate, options.agreement))
+        return x + solve(self.template, rows, x, problem, Limits(options.iterations, options.tolerance))

@@ -35,7 +35,7 @@ class Residual:
 NOTHING = Residual(np.inf, np.inf, np.inf, np.inf, np.inf)
 
 
-def measure(fitted: Mesh, target: Target) -> Residual:
+def residual_of(fitted: Mesh, target: Target) -> Residual:
     """The residual of one fitted frame."""
     surface, normals = Surface(fitted), vertex_normals(fitted)
     ahead, back = surface.closest(target.mesh.vertices), target.surface.closest(fitted.vertices)
