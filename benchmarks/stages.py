@@ -80,7 +80,7 @@ def compute(sequence: MeshList, options: EncoderOptions) -> Stages:
     field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
     payload, layers = encode_group(coded, field, options.displacements)
     moved = tuple(
-        _moved(frame, own, spread.positions, (reference, options))
+        _moved(frame, own, spread.positions, reference, options)
         for frame, own in zip(frames, centers.positions, strict=True)
     )
     return Stages(
@@ -104,9 +104,9 @@ def _moved(
     frame: Mesh,
     own: Float64[np.ndarray, "K 3"],
     pose: Float64[np.ndarray, "K 3"],
-    how: tuple[Reference, EncoderOptions],
+    reference: Reference,
+    options: EncoderOptions,
 ) -> Moved:
-    reference, options = how
     binding = bind(frame, own, reference.neighbours, options.reference.deform)
     motions = center_motions(own, pose, reference.neighbours)
     vertices = move(frame.vertices, binding, motions, reference.neighbours)

@@ -7,18 +7,14 @@ In: folders and .npz files of performers. Out: a table, and the rows `tails` of 
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-from correspondence import ROWS, Case, frames_of
+from captured import Case, Row, asked_cases, keep
 from jaxtyping import Bool
 
 from meshreel.coding.layers import LayersState, decode_layers
@@ -50,22 +46,14 @@ WAYS: dict[str, TailOptions | None] = {
     "and patches": TailOptions(),
 }
 UNCODED = 4.0  # RMS distances from which surface counts as a tail, where nothing has a price
-Row = dict[str, Any]
 
 
 def main() -> int:
     """Measures every case that was asked for and puts its rows in the place of older ones."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="the folder of the performers")
-    parser.add_argument("performers", nargs="*", help="all if none is named")
-    given = parser.parse_args()
-    for case in CASES:
-        if given.performers and case.performer not in given.performers:
-            continue
-        frames = frames_of(case, given.data)
+    for case, frames in asked_cases(__doc__, CASES):
         for quality in QUALITIES:
             groups = list(encode_segment(frames, replace(preset_options("best", quality), tails=None)))
-            keep(list(rows_of(case, quality, frames, groups)))
+            keep(rows_of(case, quality, frames, groups), "case", "quality")
     return 0
 
 
@@ -149,19 +137,6 @@ def mean_psnr(values: Sequence[float]) -> float:
 def mean_angle(errors: Sequence[SurfaceErrors]) -> float:
     """Degrees."""
     return float(np.mean([e.angle for e in errors]))
-
-
-def keep(rows: Sequence[Row]) -> None:
-    """Prints rows and puts them into measured.jsonl, in place of those of the same case and quality."""
-    for each in rows:
-        print("  ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{v}" for k, v in each.items()), flush=True)
-    same = {(each["case"], each["quality"]) for each in rows}
-    lines = ROWS.read_text(encoding="utf-8").splitlines()
-    known = [(line, json.loads(line)) for line in lines]
-    others = [line for line, r in known if r["decision"] != DECISION or (r["case"], r["quality"]) not in same]
-    new = ROWS.with_suffix(".new")
-    new.write_text("\n".join([*others, *(json.dumps(each) for each in rows)]) + "\n", encoding="utf-8")
-    new.replace(ROWS)
 
 
 if __name__ == "__main__":

@@ -7,32 +7,26 @@ In: the frames of the dancer. Out: a line a point, and the rows `template` of do
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from captured import Case, Row, asked_cases, keep
 
 from meshreel.analysis.correspond import choose_key
 from meshreel.analysis.fit import Guides, fit_targets
 from meshreel.analysis.fit_match import Target
-from meshreel.analysis.survey import survey
 from meshreel.analysis.template import shared_detail
 from meshreel.choice import measure
 from meshreel.coding.layers import LayersOptions, encode_layers
 from meshreel.coding.reference import CodedReference, code_on_lattice
 from meshreel.geometry.decimate import decimate
-from meshreel.geometry.topology import weld
-from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.presets import preset_options
 from meshreel.types import Mesh
 
-ROWS = Path(__file__).resolve().parents[1] / "docs" / "decisions" / "measured.jsonl"
-DECISION, BODY = "template", "dancer"
+DECISION, CASES = "template", (Case("dancer"),)
 BEST = preset_options("best")
 TEMPLATES = ((500, 2), (700, 2), (1000, 2), (1500, 2), (2500, 1), (500, 3))  # vertices of the base, levels
 STEPS = (0.0035, 0.0018, 0.0009)
@@ -43,24 +37,12 @@ CHOICES: dict[str, dict[str, Any]] = {  # of the coder, on the base of 1000 vert
     "price .04": {"price": 0.04},
     "price .12": {"price": 0.12},
 }
-Row = dict[str, Any]
 
 
-def main(arguments: Sequence[str]) -> int:
+def main() -> int:
     """Measures every point and replaces the rows of this decision."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True)
-    folder = parser.parse_args(arguments).data / BODY
-    sequence = open_sequence(folder, SequenceOptions(weld=weld))
-    seen = survey(sequence)
-    frames = [seen.normalise(mesh) for mesh in sequence]
-    rows = []
-    for row in _measured(frames):
-        rows.append({"decision": DECISION, "sequence": BODY} | row)
-        print(json.dumps(rows[-1]), flush=True)
-    kept = [line for line in ROWS.read_text(encoding="utf-8").splitlines() if json.loads(line)["decision"] != DECISION]
-    text = "".join(line + "\n" for line in [*kept, *map(json.dumps, rows)])
-    ROWS.write_text(text, encoding="utf-8")
+    for case, frames in asked_cases(__doc__, CASES):
+        keep({"decision": DECISION, "sequence": case.performer} | row for row in _measured(frames))
     return 0
 
 
@@ -96,4 +78,4 @@ def _point(frames: list[Mesh], reference: CodedReference, positions: np.ndarray,
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())
