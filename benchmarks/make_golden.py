@@ -105,7 +105,7 @@ def layers_groups(reference: CodedReference, sizes: tuple[int, ...]) -> list[Gro
     for frames in sizes:
         time = (first + np.arange(frames))[:, None, None]
         wanted = points * (1 + 0.01 * time) + 0.004 * np.sin(30 * points[:, [1, 2, 0]] + 0.2 * time)
-        coded = encode_layers(reference, wanted, LayersOptions(step=0.001), state)
+        coded = encode_layers(reference, wanted, LayersOptions(step=0.001, detail_ratios=(0.8, 1.1), price=0.12), state)
         groups.append((frames, coded.payload, coded.layers, state is not None))
         state, first = coded.state, first + frames
     return groups

@@ -7,15 +7,30 @@ from itertools import pairwise
 
 import pytest
 
+from meshreel.analysis.template import TemplateOptions
+from meshreel.coding.layers import LayersOptions
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
-from meshreel.presets import displacement_step, preset_options, reference_vertices
+from meshreel.presets import PRESETS, displacement_step, preset_options, reference_vertices
 from meshreel.windows import EncoderOptions
 
 
 def test_the_default_preset_is_best_and_bare_options_are_those_of_paper():
     assert preset_options() == preset_options("best", 50.0) != preset_options("paper")
     assert preset_options("paper") == EncoderOptions()
+
+
+def test_what_only_best_uses_defaults_to_its_values_at_50():
+    best = preset_options("best", 50.0)
+    assert best.layers == LayersOptions()
+    assert best.template.error == pytest.approx(TemplateOptions().error, rel=1e-3)
+    assert best.template.levels == TemplateOptions().levels
+
+
+def test_the_laplacian_form_follows_the_quality_in_every_preset():
+    for quality in (0, 25, 50, 100):
+        steps = {preset_options(preset, quality).displacements.step for preset in PRESETS}
+        assert steps == {displacement_step(quality)}
 
 
 def test_more_quality_means_finer_steps_and_more_vertices():

@@ -68,15 +68,17 @@ def _paper(quality: float, centers: int | None) -> EncoderOptions:
 
 
 def _best(quality: float) -> EncoderOptions:
+    """Layers and template alone belong to this preset: their defaults are its values at quality 50."""
     step = motion_step(quality)
     return EncoderOptions(
         form=Form.LAYERS,
         group_size=16,
         target=Quality(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
         template=TemplateOptions(error=0.00088 * (step / 0.0012) ** 0.55),
-        layers=LayersOptions(step=step, detail_ratios=(0.6, 0.8), price=0.08),
-        fit=FitOptions(restart=False, pull=0.3, second_smoothing=0.7),
-        groups=GroupOptions(worth=3.0),
+        layers=LayersOptions(step=step),
+        displacements=DisplacementOptions(step=displacement_step(quality)),
+        fit=FitOptions(restart=False, pull=0.3, second_smoothing=0.7),  # the defaults are those of `paper`
+        groups=GroupOptions(worth=3.0),  # likewise
     )
 
 

@@ -27,7 +27,7 @@ ROUNDS = 2  # of the search for the number of vertices
 class TemplateOptions:
     """How fine the template of a group is."""
 
-    error: float = 9e-4  # RMS distance of the key frame's vertices to the base mesh to aim at, of the diagonal
+    error: float = 1.1e-3  # RMS distance of the key frame's vertices to the base mesh to aim at, of the diagonal
     levels: int = 2  # midpoint subdivisions of the base
 
     def __post_init__(self) -> None:

@@ -33,10 +33,10 @@ MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
 class LayersOptions:
     """How a group of layers is coded; lengths relative to the sequence's diagonal."""
 
-    step: float = 2e-3  # quantiser step of the base's motion
-    detail_ratios: tuple[float, ...] = (0.8, 1.1)  # steps of the levels, in base steps; the last for all that follow
+    step: float = 1.8e-3  # quantiser step of the base's motion
+    detail_ratios: tuple[float, ...] = (0.6, 0.8)  # steps of the levels, in base steps; the last for all that follow
     curvatures: tuple[int, ...] = (48, 58)  # of the levels' midpoints, 64ths; the last for all that follow
-    price: float = 0.12  # of a bit, squared steps
+    price: float = 0.08  # of a bit, squared steps
     tangential: float = 0.4  # weight of squared errors of the base's vertices along the surface, 0 to 1
 
     def __post_init__(self) -> None:
