@@ -74,7 +74,7 @@ def encode(
     seen = survey(sequence, stages)
     groups: list[GroupSummary] = []
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        for encoded in _encoded_windows(sequence, seen, options, (executor, stages)):
+        for encoded in _encoded_windows(sequence, seen, options, executor, stages):
             for group in encoded:
                 before = () if writer.last_group is None or not group.predicted else (writer.last_group,)
                 writer.add_group(writer.frame_count, group.frame_count, group.payload, group.layers, before)
@@ -111,10 +111,9 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
 
 
 def _encoded_windows(
-    sequence: MeshSequence, seen: Survey, options: EncoderOptions, run: tuple[Executor | None, Stages]
+    sequence: MeshSequence, seen: Survey, options: EncoderOptions, executor: Executor | None, stages: Stages
 ) -> Iterator[Iterable[EncodedGroup]]:
     """The groups of each run of frames that needs no other, in order; with an executor, a run a worker ahead."""
-    executor, stages = run
     layered = options.form == Form.LAYERS
     size = max(1, round(options.key_interval * sequence.frame_rate)) if layered else options.group_size
     windows = (_Normalised(sequence, seen, window) for window in seen.windows(size))
@@ -170,7 +169,7 @@ def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[s
     mean_square = sum(group.frame_count * group.quality.distance**2 for group in groups) / frames
     return {
         "preset": options.preset,
-        "quality": options.quality,
+        "quality": _rounded(options.quality),
         "key_frames": [group.key for group in groups if group.key is not None],
         "rms_m": _rounded(mean_square**0.5),
         "worst_rms_m": _rounded(max(group.quality.worst for group in groups)),

@@ -18,9 +18,12 @@ from . import entropy, klt, orthonormal
 from .graph import Graph
 from .steps import LEVELS, step_of
 
-MOST_BITS = 30
-LEAST_SCALE = 6.0
+MOST_BITS = 30  # of a mean's fraction: one that is a diagonal long still fits 32 bits
 FINENESS = 20.0  # a basis vector's rounding turns its column's typical weight away by about 1 / FINENESS of a step
+LEAST_SCALE = 6.0  # integers to a basis vector's unit length: rounding moves each of its numbers by at most 1/12
+MOST_SCALE = 2.0**24  # integers to a basis vector's unit length: far within their 32 bits
+LEAST_RMS = 0.2  # of a column's weights, steps: below it nearly all of them round to 0, and its vector is not worth it
+MOST_WEIGHT = 1e9  # steps: what is left of one after prediction, twice as much at most, still fits 32 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +71,11 @@ def encode_field(
     side = np.append(bits, mean).astype(np.int32) if has_mean else np.zeros(0, np.int32)
     centered = trajectories - (np.ldexp(mean, -bits) if has_mean else 0.0)
     basis = klt.fit_about(np.zeros(width), centered)
-    kept = np.flatnonzero(basis.energies > (0.2 * rate.step) ** 2)
-    coded = _Columns(centered, _only(basis, kept), graph, (rate, surface))
+    kept = np.flatnonzero(basis.energies > (LEAST_RMS * rate.step) ** 2)
+    coded = _Columns(centered, _only(basis, kept), graph, rate, surface)
     while not (pays := coded.pays()).all():
         kept = kept[pays]
-        coded = _Columns(centered, _only(basis, kept), graph, (rate, surface))
+        coded = _Columns(centered, _only(basis, kept), graph, rate, surface)
     packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
     record = CodedField(len(kept), rate.step_level, packed, coded.stream)
     arrays = (graph.starts, graph.near, graph.weights)
@@ -102,16 +105,17 @@ class _Columns:
         trajectories: Float64[np.ndarray, "V C"],
         basis: klt.Basis,
         graph: Graph,
-        terms: tuple[Rate, Surface | None],
+        rate: Rate,
+        surface: Surface | None,
     ) -> None:
-        rate, surface = terms
         self.rate = rate
         count, width = len(basis.energies), trajectories.shape[1]
         scales = FINENESS * np.sqrt(width / 12 * basis.energies) / rate.step
-        self.basis = orthonormal.forward(np.ascontiguousarray(basis.vectors.T), np.clip(scales, LEAST_SCALE, 2.0**24))
+        scales = np.clip(scales, LEAST_SCALE, MOST_SCALE)
+        self.basis = orthonormal.forward(np.ascontiguousarray(basis.vectors.T), scales)
         self.vectors = orthonormal.inverse(self.basis, count, width)
         self.weights = np.ascontiguousarray(self.vectors @ trajectories.T)
-        if np.abs(self.weights).max(initial=0) > 1e9 * rate.step:
+        if np.abs(self.weights).max(initial=0) > MOST_WEIGHT * rate.step:
             raise InputError(f"a trajectory {np.abs(self.weights).max():g} long is too long for step {rate.step:g}")
         self.symbols, self.decoded = self._quantized(graph, surface)
         self.stream, self.sizes = _core.encode_field(self.symbols, graph.starts, graph.near)
