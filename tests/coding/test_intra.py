@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from meshreel.coding.intra import decode_empty, decode_intra, encode_empty, encode_intra
 from meshreel.coding.mesh import MAX_FACES, encode_mesh
+from meshreel.coding.reference import code_on_lattice
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import DracoGroup, Form
 from meshreel.format.records import pack
@@ -55,6 +58,27 @@ def test_bytes_that_are_no_draco_mesh_are_refused() -> None:
 def test_a_mesh_too_wide_for_its_step_is_an_input_error() -> None:
     with pytest.raises(InputError, match="at most 21"):
         encode_mesh(BALL, 1e-8)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("step", [1e-300, 1e-310, 5e-324, 0.0, -1e-3, math.inf, math.nan])
+def test_a_step_that_no_lattice_has_is_refused_without_a_warning(step: float) -> None:
+    with pytest.raises(InputError, match="at most 21 bits"):
+        encode_mesh(BALL, step)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("step", [1e-310, 5e-324])
+def test_bytes_with_a_step_next_to_nothing_are_refused_without_a_warning(step: float) -> None:
+    with pytest.raises(FormatError, match="not finite"):
+        decode_intra(pack(DracoGroup(Form.DRACO, 0, step, (encode_mesh(BALL, 1e-3),))))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("step", [1e-300, 0.0])
+def test_a_reference_on_a_lattice_too_fine_for_its_type_is_refused_without_a_warning(step: float) -> None:
+    with pytest.raises(InputError, match="at most 21 bits"):
+        code_on_lattice(BALL, step, 1)
 
 
 def test_an_empty_group_is_one_byte() -> None:

@@ -29,13 +29,15 @@ def encode_mesh(mesh: Mesh, step: float) -> bytes:
         return b""
     import DracoPy
 
-    low = np.floor(mesh.vertices.min(axis=0) / step) * step
-    cells = float((mesh.vertices.max(axis=0) - low).max()) / step
-    bits = max(1, math.ceil(math.log2(cells + 2)))
-    if bits > MAX_BITS:
+    with np.errstate(all="ignore"):  # next to 0, or none at all: refused below
+        low = np.floor(mesh.vertices.min(axis=0) / np.float64(step)) * step
+        cells = float((mesh.vertices.max(axis=0) - low).max() / np.float64(step))
+    if not (step > 0 and cells + 2 <= 2**MAX_BITS):
+        width = float(np.ptp(mesh.vertices, axis=0).max())
         raise InputError(
-            f"a mesh {cells * step:g} wide needs {bits} bits at step {step:g}; at most {MAX_BITS}: raise the step"
+            f"a mesh {width:g} wide has {cells:.4g} cells at step {step:g}; at most {MAX_BITS} bits: raise the step"
         )
+    bits = max(1, math.ceil(math.log2(cells + 2)))
     return bytes(
         DracoPy.encode(
             mesh.vertices,
@@ -60,7 +62,9 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
     _check_claims(data)
     try:
         decoded = DracoPy.decode(bytes(data))
-        mesh = Mesh.of(np.round(np.asarray(decoded.points, dtype=np.float64) / step) * step, decoded.faces)
+        with np.errstate(all="ignore"):  # a step next to 0, which no encoder takes: refused below
+            points = np.round(np.asarray(decoded.points, dtype=np.float64) / step) * step
+        mesh = Mesh.of(points, decoded.faces)
     except Exception as error:  # DracoPy raises its own types, and others, on damaged bytes
         raise FormatError(f"damaged Draco data ({len(data)} bytes): {error}") from error
     if not np.isfinite(mesh.vertices).all():
