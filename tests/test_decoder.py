@@ -54,6 +54,16 @@ def test_a_video_is_a_sequence_of_meshes():
     assert [mesh.is_empty for mesh in video] == [True, True] + 4 * [False] + [False, True, False] + [True]
 
 
+def test_what_a_video_keeps_cannot_be_changed_from_outside():
+    for name in ("mixed", "layers", "layers_patched"):
+        video = meshreel.open(GOLDEN / f"{name}.reel")
+        for number, mesh in enumerate(video):
+            for array in (mesh.vertices, mesh.faces):
+                with pytest.raises(ValueError, match="read-only"):
+                    array += 1
+            assert video[number] is mesh  # it is given again
+
+
 def test_slices_and_negative_indices_are_those_of_a_list():
     video = meshreel.open(MIXED)
     whole = digests(video)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import overload
 
@@ -49,7 +49,7 @@ class _Decoded:
 class Video(Sequence[Mesh]):
     """Frames of a .reel file as a sequence of meshes; random access decodes one group, and those it depends on.
 
-    A file stays open until `close`, or until the end of a `with` block.
+    A file stays open until `close`, or until the end of a `with` block. The arrays of its meshes are read-only.
     """
 
     def __init__(self, reader: ReelReader, quality: int | None = None, close: Callable[[], None] | None = None) -> None:
@@ -143,6 +143,11 @@ class Video(Sequence[Mesh]):
             raise FormatError(f"{chunk}: {error}") from error
 
     def _place(self, mesh: Mesh) -> Mesh:
-        """A mesh in metres: the header's origin and scale undo the encoder's normalisation."""
+        """A mesh in metres: the header's origin and scale undo the encoder's normalisation.
+
+        Read-only: it is kept and given again, and frames share their faces with each other and with the next group.
+        """
         header = self.reader.header
-        return replace(mesh, vertices=np.asarray(header.origin) + header.scale * mesh.vertices)
+        vertices, faces = np.asarray(header.origin) + header.scale * mesh.vertices, mesh.faces.view()
+        vertices.flags.writeable = faces.flags.writeable = False
+        return Mesh(vertices, faces)
