@@ -30,6 +30,7 @@ def searched(goal: Goal, curve: Callable[[float], float]) -> tuple[float | None,
         if quality is None:
             return None, trial
         assert 0 <= quality <= 100
+        assert quality == float(f"{quality:.4g}")  # so that what the file records is what was tried
         if abs(curve(quality) - goal.wanted) <= goal.tolerance:
             return quality, trial + 1
         search.learn(quality, curve(quality))

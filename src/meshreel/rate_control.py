@@ -20,6 +20,7 @@ from .windows import EncoderOptions, Progress
 
 TRIALS = 8  # whole encodes, at most
 FIRST_QUALITY = 50.0
+DIGITS = 4  # significant ones of a quality that is tried: what the file records says all of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +113,10 @@ class Search:
         if below is not None and above is not None:
             low, high = sorted((below, above))
             share = (wanted - self._known[below]) / max(self._known[above] - self._known[below], 1e-9)
-            return low + (high - low) * min(max(share, 0.1), 0.9) if high - low > 0.1 else None
+            return _short(low + (high - low) * min(max(share, 0.1), 0.9)) if high - low > 0.1 else None
         last = above if below is None else below
         assert last is not None
-        ahead = min(max(last + (wanted - self._known[last]) / self._slope(), 0.0), 100.0)
+        ahead = _short(min(max(last + (wanted - self._known[last]) / self._slope(), 0.0), 100.0))
         return None if ahead in self._known else ahead
 
     def learn(self, quality: float, value: float) -> None:
@@ -131,3 +132,7 @@ class Search:
         """From the two outermost qualities known, where there are two."""
         (q0, v0), (q1, v1) = min(self._known.items()), max(self._known.items())
         return max((v1 - v0) / (q1 - q0), 0.3 * self._goal.slope) if q1 > q0 else self._goal.slope
+
+
+def _short(quality: float) -> float:
+    return float(f"{quality:.{DIGITS}g}")

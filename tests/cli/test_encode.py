@@ -81,6 +81,20 @@ def test_a_target_is_met_and_the_quality_that_met_it_told(run, balls, tmp_path):
 
 
 @pytest.mark.usefixtures("quick_presets")
+def test_the_quality_that_a_target_took_and_the_psnr_that_was_reached_are_told(run, balls, tmp_path):
+    out = tmp_path / "a.reel"
+    first = run("encode", balls, "-o", out, "--frames", ":1", "--quality", "45.67891", "--json").row
+    recorded = run("info", out, "--json").row["metadata"]
+    assert recorded["quality"] == 45.68  # four digits of it
+    assert first["d2_psnr_paper"] == pytest.approx(recorded["d2_psnr_paper"], abs=0.01)
+    goal = ("--target-mbps", f"{first['mbps']}")
+    row = run("encode", balls, "-o", out, "--frames", ":1", *goal, "--json").row
+    assert row["quality"] == float(f"{row['quality']:.4g}")
+    text = run("encode", balls, "-o", out, "--frames", ":1", *goal).out
+    assert text.endswith(f"; quality {row['quality']:g}, {row['d2_psnr_paper']:.2f} dB\n")
+
+
+@pytest.mark.usefixtures("quick_presets")
 def test_two_processes_write_the_same_file_as_one(run, balls, tmp_path):
     for jobs in ("1", "2"):
         said = run("encode", balls, "-o", tmp_path / f"{jobs}.reel", "--group-size", "1", "--jobs", jobs, "--quiet")

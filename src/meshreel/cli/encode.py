@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import signal
 from collections.abc import Iterator
@@ -94,7 +95,9 @@ def command(
     warnings = (*sequence.warnings, *summary.warnings)
     common.warn(warnings)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
-    common.result({"output": str(output), "warnings": warnings} | row, f"{output}: {describe(row)}")
+    reached = "" if row["d2_psnr_paper"] is None else f", {row['d2_psnr_paper']:.2f} dB"
+    text = f"{output}: {describe(row)}; quality {quality:g}{reached}"
+    common.result({"output": str(output), "warnings": warnings} | row, text)
 
 
 def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
@@ -104,6 +107,7 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
         "bytes": summary.size,
         "frames": summary.frame_count,
         "mbps": summary.size * 8 / seconds / 1e6,
+        "d2_psnr_paper": summary.psnr if math.isfinite(summary.psnr) else None,
         "groups": [
             {
                 "form": group.form.name.lower(),
