@@ -45,6 +45,24 @@ def test_a_damaged_group_is_reported_and_the_others_shown(run, tmp_path):
     assert "group 1: chunk 1 (frames 2 to 5)" in said.err
 
 
+def test_of_a_truncated_file_what_is_there_and_what_is_missing_is_told(run, tmp_path):
+    data, groups = FILE.read_bytes(), meshreel.open(FILE).reader.groups
+    cut = groups[2].offset + 10
+    (tmp_path / "a.reel").write_bytes(data[:cut])
+    row = run("info", tmp_path / "a.reel", "--json").row
+    assert (row["bytes"], row["bytes_missing"]) == (len(data), len(data) - cut)
+    assert row["groups"][2]["parts"] == {"damaged": 10, "missing": groups[2].size - 10}
+    assert row["groups"][3]["parts"] == {"missing": groups[3].size}
+    assert sum(row["parts"].values()) == len(data) and row["parts"]["missing"] == len(data) - cut
+    said = run("info", tmp_path / "a.reel")
+    assert (
+        said.code == 0
+        and f"{cut} of {len(data)} bytes ({len(data) - cut} are missing: the file is truncated)" in said.out
+    )
+    assert "group 2: " in said.err and "group 3: " in said.err and "group 1" not in said.err
+    assert "missing" not in run("info", FILE).out and run("info", FILE, "--json").row["bytes_missing"] == 0
+
+
 def test_other_files_are_told(run, tmp_path):
     (tmp_path / "a.reel").write_bytes(b"PK\x03\x04")
     assert failed(run("info", tmp_path / "a.reel"), "a.reel", "not a .reel")

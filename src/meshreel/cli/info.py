@@ -24,20 +24,27 @@ def command(file: Path, /, *, common: Common = Common()) -> None:
         The .reel file.
     """
     row = describe_file(file)
-    head = f"{file}: {row['frames']} frames at {row['frame_rate']:g}/s, {row['bytes']} bytes, {row['mbps']:.4g} Mbps"
+    size = f"{row['bytes']} bytes"
+    if missing := row["bytes_missing"]:
+        size = f"{row['bytes'] - missing} of {size} ({missing} are missing: the file is truncated)"
+    head = f"{file}: {row['frames']} frames at {row['frame_rate']:g}/s, {size}, {row['mbps']:.4g} Mbps"
     recorded = ", ".join(f"{name} {value}" for name, value in row["metadata"].items())
     common.result(row, head, f"recorded at encode: {recorded or 'nothing'}", _rates(row), _groups(row))
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
 
 
 def describe_file(file: Path) -> dict[str, Any]:
-    """Everything `info` shows, ready for JSON. A damaged group is reported with its error; the others are read."""
+    """Everything `info` shows, ready for JSON. A damaged group is reported with its error; the others are read.
+
+    Sizes and rates are those of the whole file, also where its end is missing.
+    """
     with FileSource(file) as source:
         try:
             reader = ReelReader(source)
         except FormatError as error:
             raise FormatError(f"{file}: {error}") from error
-        groups = [_describe_group(reader, chunk) for chunk in reader.groups]
+        there = source.size
+        groups = [_describe_group(reader, chunk, there) for chunk in reader.groups]
         static = sum(chunk.size for chunk in reader.chunks) - sum(chunk.size for chunk in reader.groups)
     parts = {"header and index": reader.head_size} | ({"static": static} if static else {})
     for group in groups:
@@ -47,6 +54,7 @@ def describe_file(file: Path) -> dict[str, Any]:
         "frames": reader.frame_count,
         "frame_rate": reader.frame_rate,
         "bytes": reader.size,
+        "bytes_missing": reader.size - there,
         "mbps": megabits(reader.size, reader),
         "parts": parts,
         "parts_mbps": {name: megabits(count, reader) for name, count in parts.items()},
@@ -60,14 +68,17 @@ def megabits(size: int, reader: ReelReader) -> float:
     return size * 8 * reader.frame_rate / reader.frame_count / 1e6
 
 
-def _describe_group(reader: ReelReader, chunk: Chunk) -> dict[str, Any]:
+def _describe_group(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, Any]:
+    """A group of a file of which so many bytes are there."""
     row: dict[str, Any] = {"first_frame": chunk.first_frame, "frames": chunk.frame_count}
     row |= {"form": chunk.form.name.lower(), "bytes": chunk.size, "layers": len(chunk.layers) - 1}
     row["predicted"] = any(reader.chunks[n].kind == ChunkKind.GROUP for n in chunk.depends_on)
     try:
         return row | {"parts": payload_parts(reader.read_chunk(chunk.number))}
     except FormatError as error:
-        return row | {"parts": {"damaged": chunk.size}, "error": str(error)}
+        missing = min(max(chunk.end - there, 0), chunk.size)
+        parts = {"damaged": chunk.size - missing, "missing": missing}
+        return row | {"parts": {name: size for name, size in parts.items() if size}, "error": str(error)}
 
 
 def _rates(row: dict[str, Any]) -> Table:
