@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import meshreel
 from meshreel.capture.procedural import sliding_sphere
+from meshreel.container.writer import ReelWriter
 from meshreel.io.write import write_mesh
 from meshreel.types import Mesh
 from tests.cli.conftest import FILE, failed
@@ -36,6 +38,32 @@ def test_a_file_against_its_own_meshes_is_all_but_exact(run, decoded, tmp_path):
     assert row["key_frames"] == [2] and "d2_psnr_paper_without_keys" in row
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
     json.dumps(row, allow_nan=False)
+
+
+def with_metadata(path, metadata):
+    """The golden file with other metadata, at a path."""
+    reader = meshreel.open(FILE).reader
+    with ReelWriter(path, replace(reader.header, metadata=json.dumps(metadata))) as writer:
+        for chunk in reader.groups:
+            ends = np.cumsum([layer.size for layer in chunk.layers]).tolist()
+            writer.add_group(chunk.first_frame, chunk.frame_count, reader.read_chunk(chunk.number), ends)
+    return path
+
+
+def test_the_key_frames_that_a_file_names_are_left_out_of_a_mean_of_their_own(run, decoded, tmp_path):
+    keyed = with_metadata(tmp_path / "keyed.reel", {"key_frames": [2, 7, -1, 10, True, "3", None, 2.0]})
+    row = run("compare", decoded, keyed, "--no-ssim", "--json").row
+    assert row["key_frames"] == [2, 7]
+    between = [row["per_frame"][i]["rms_forward_m"] for i in (3, 4, 5, 6, 8) if row["per_frame"][i]["diagonal_m"]]
+    assert row["rms_forward_m_without_keys"] == pytest.approx(np.mean(between))
+    assert run("compare", decoded, keyed, "--no-ssim", "--json", "--keys", "3").row["key_frames"] == [3]
+    assert "without key frames" in run("compare", decoded, keyed, "--no-ssim").out
+
+
+@pytest.mark.parametrize("metadata", [{}, {"key_frames": 3}, {"key_frames": {"2": 2}}])
+def test_without_key_frames_the_table_has_no_column_for_them(run, decoded, tmp_path, metadata):
+    bare = with_metadata(tmp_path / "bare.reel", metadata)
+    assert "without key frames" not in run("compare", decoded, bare, "--no-ssim").out
 
 
 def test_the_table_has_a_line_a_metric_and_tells_the_views(run, balls):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,8 @@ def command(
     other: Video | FileSequence = open_video(decoded) if reel else open_sequence(decoded, meshes)
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
+    if isinstance(other, Video) and not options.keys:
+        options = replace(options, keys=recorded_keys(other))
     with common.stages(len(sequence)) as progress:
         row = compare_sequences(sequence, counted(other, progress), options).to_row()
     if sheet is not None:
@@ -77,13 +80,23 @@ def is_reel(path: str) -> bool:
         return source.get_bytes(0, len(MAGIC)) == MAGIC
 
 
+def recorded_keys(video: Video) -> tuple[int, ...]:
+    """The key frames that the encoder has recorded in a file; what else may stand there is passed over."""
+    recorded = video.reader.metadata.get("key_frames")
+    numbers = recorded if isinstance(recorded, list) else []
+    return tuple(number for number in numbers if type(number) is int and 0 <= number < len(video))
+
+
 def metric_table(row: dict[str, Any]) -> Table:
-    """The numbers of a row, one metric a line: the mean over frames and the worst frame."""
-    table = Table("metric", "mean", "worst frame", "without key frames")
+    """The numbers of a row, one metric a line: the mean over frames, the worst frame, and the mean without keys."""
+    columns = {"mean": "", "worst frame": "_worst"}
+    if any(name.endswith("_without_keys") for name in row):
+        columns["without key frames"] = "_without_keys"
+    table = Table("metric", *columns)
     for name, value in row.items():
         if name.endswith(("_worst", "_without_keys")) or not isinstance(value, (int, float, type(None))):
             continue
-        table.add_row(name, *(_number(row.get(key)) for key in (name, f"{name}_worst", f"{name}_without_keys")))
+        table.add_row(name, *(_number(row.get(name + ending)) for ending in columns.values()))
     return table
 
 

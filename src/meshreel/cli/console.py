@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -71,6 +73,17 @@ class Common:
         )
         with Progress(*columns, console=console, disable=self.quiet or not console.is_terminal) as bars:
             yield StageBars(bars, total)
+
+
+def called_as() -> str:
+    """How this program was called, for a command that is shown: as found on PATH, by its path, or as a module."""
+    called = Path(sys.argv[0])
+    if called.stem == "__main__":
+        return f"{sys.executable} -m meshreel"
+    if called.stem != "meshreel":
+        return "meshreel"  # from another program, which has it as a library
+    found = shutil.which(called.name)
+    return "meshreel" if found is not None and Path(found).resolve() == called.resolve() else str(called)
 
 
 class StageBars:

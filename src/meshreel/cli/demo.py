@@ -15,8 +15,8 @@ from ..metrics.report import ComparisonOptions, compare_sequences
 from ..metrics.sheet import SheetOptions, write_sheet
 from ..presets import preset_options
 from ..types import MeshList
-from .compare import counted, metric_table
-from .console import Common
+from .compare import counted, metric_table, recorded_keys
+from .console import Common, called_as
 from .encode import describe, summary_row, workers
 
 _QUALITY = preset_options().quality
@@ -57,7 +57,8 @@ def command(
     with common.stages(frames) as progress, workers(jobs) as executor:
         summary = encode(capture, file, options, executor, progress)
         video = open_video(file)
-        measured = compare_sequences(capture, counted(video, progress), ComparisonOptions(ssim=ssim)).to_row()
+        asked = ComparisonOptions(ssim=ssim, keys=recorded_keys(video))
+        measured = compare_sequences(capture, counted(video, progress), asked).to_row()
     shown = sorted({k * (frames - 1) // 4 for k in range(5)})
     write_sheet(capture, video, picture, SheetOptions(frames=tuple(shown)))
     row = summary_row(summary, capture.frame_rate) | measured
@@ -66,5 +67,5 @@ def command(
         metric_table(measured),
         f"{file}: {describe(row)}",
         f"picture: {picture}",
-        f"meshes: meshreel decode {file} -o {output / 'meshes'}",
+        f"meshes: {called_as()} decode {file} -o {output / 'meshes'}",
     )

@@ -50,7 +50,7 @@ class Looking:
     up: Literal["y", "z"] = "y"
     """The axis that points up."""
     keys: tuple[int, ...] = ()
-    """Key frames: means are also given without them."""
+    """Key frames: means are also given without them. Those that a .reel file names where none is given."""
 
     def options(self) -> ComparisonOptions:
         """The same for `compare_sequences`."""
