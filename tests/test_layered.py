@@ -9,6 +9,8 @@ from typing import overload
 import numpy as np
 import pytest
 
+from meshreel import layered
+from meshreel.analysis.fit_match import Target
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.choice import measure
 from meshreel.coding.group import continue_group
@@ -83,6 +85,20 @@ def test_a_body_that_becomes_another_cuts_the_group_there():
     starts = np.cumsum([0, *(group.frame_count for group in groups)]).tolist()
     assert 3 in starts
     assert max(group.quality.worst for group in groups) < 1e-3
+
+
+def test_a_frame_is_prepared_once_for_all_that_is_tried_with_it(monkeypatch: pytest.MonkeyPatch):
+    prepared = list[Mesh]()
+
+    class Counted(Target):
+        def __init__(self, mesh: Mesh) -> None:
+            prepared.append(mesh)
+            super().__init__(mesh)
+
+    monkeypatch.setattr(layered, "Target", Counted)
+    other = Mesh.of(BALL.vertices * [1.6, 0.3, 0.8] + [0, 0.3, 0], BALL.faces)
+    first = next(encode_segment([BALL, BALL, BALL, other, other], quick(group_size=5)))
+    assert first.frame_count < 5 and len(prepared) == 5  # though it is cut, and tried anew
 
 
 def test_a_body_that_jumps_is_followed_or_cut_but_never_lost():
