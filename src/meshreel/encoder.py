@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, overload
+from typing import Any
 
 from .analysis.survey import Survey, survey
 from .choice import Quality
@@ -21,7 +21,7 @@ from .container.writer import ReelWriter
 from .format.layout import Form, Header
 from .layered import encode_segment
 from .presets import preset_options
-from .types import Mesh, MeshSequence
+from .types import Frames, Mesh, MeshSequence
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
 
 
@@ -137,7 +137,7 @@ def _encode_all(layered: bool, frames: list[Mesh], options: EncoderOptions) -> l
     return list(encode_segment(frames, options) if layered else encode_window(frames, options))
 
 
-class _Normalised(Sequence[Mesh]):
+class _Normalised(Frames):
     """Frames of a sequence in normalised coordinates, read when they are asked for."""
 
     def __init__(self, sequence: MeshSequence, seen: Survey, window: range) -> None:
@@ -146,13 +146,10 @@ class _Normalised(Sequence[Mesh]):
     def __len__(self) -> int:
         return len(self._window)
 
-    @overload
-    def __getitem__(self, index: int) -> Mesh: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Mesh]: ...
-    def __getitem__(self, index: int | slice) -> Mesh | list[Mesh]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
+    def __iter__(self) -> Iterator[Mesh]:
+        return (self[number] for number in range(len(self)))
+
+    def __getitem__(self, index: int) -> Mesh:
         return self._seen.normalise(self._sequence[self._window[index]])
 
 

@@ -25,7 +25,7 @@ from .coding.reference import CodedReference, code_on_lattice
 from .format.layout import Form
 from .format.records import pack
 from .tails import find_tails
-from .types import Mesh
+from .types import Frames, Mesh
 from .windows import EncodedGroup, EncoderOptions, Stages, cheaper, intra_only, laplacian, target_of
 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: what it rounds away is coded again with the motion
@@ -55,9 +55,7 @@ class Keyed:
     fit: Fit
 
 
-def encode_segment(
-    frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None
-) -> Iterator[EncodedGroup]:
+def encode_segment(frames: Frames, options: EncoderOptions, stages: Stages | None = None) -> Iterator[EncodedGroup]:
     """The groups of a segment, frames all empty or none is; only those of one group are held at a time."""
     stages = stages or Stages(None, len(frames))
     if frames[0].is_empty:

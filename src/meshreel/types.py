@@ -46,19 +46,24 @@ class Mesh:
 
 
 @runtime_checkable
-class MeshSequence(Protocol):
-    """Frames read one at a time: `len`, `sequence[i]`, iteration and a frame rate; never all in memory."""
-
-    @property
-    def frame_rate(self) -> float:
-        """Frames per second, 1/s."""
-        ...
+class Frames(Protocol):
+    """Meshes by number: `len`, `frames[i]` and iteration; a list, or what reads them when they are asked for."""
 
     def __len__(self) -> int: ...
 
     def __getitem__(self, index: int) -> Mesh: ...
 
     def __iter__(self) -> Iterator[Mesh]: ...
+
+
+@runtime_checkable
+class MeshSequence(Frames, Protocol):
+    """Frames read one at a time, with a frame rate; never all in memory."""
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second, 1/s."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)

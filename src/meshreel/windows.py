@@ -30,7 +30,7 @@ from .coding.reference import CodedReference, code_reference
 from .errors import InputError, NoReferenceError
 from .format.layout import Form
 from .tails import TailOptions
-from .types import Centers, Mesh
+from .types import Centers, Frames, Mesh
 
 Progress = Callable[[str, int, int], None]  # stage, frames done in it, frames of the sequence
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it
@@ -106,7 +106,7 @@ class Stages:
             self._progress(stage, self._done[stage], self._total)
 
 
-def encode_window(frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> list[EncodedGroup]:
+def encode_window(frames: Frames, options: EncoderOptions, stages: Stages | None = None) -> list[EncodedGroup]:
     """The groups of a window: one, or more where one reference cannot follow. Frames are all empty or none is."""
     stages, frames = stages or Stages(None, len(frames)), list(frames)
     if frames[0].is_empty:
