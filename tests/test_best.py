@@ -20,7 +20,7 @@ from meshreel.types import Mesh, MeshList
 from tests.small_options import quick
 
 OPTIONS = quick(group_size=2, key_interval=0.2)
-BALLS = MeshList(tuple(sliding_sphere(8, step=0.02, levels=2)), frame_rate=20.0)
+BALLS = MeshList(tuple(sliding_sphere(8, step=0.02, levels=4)), frame_rate=20.0)
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from meshreel.types import Mesh, MeshList
 from tests.small_options import quick
 
 paper = partial(quick, "paper")
-BODY = SoftBodiesOptions(frames=6, people=1, spacing=0.05)
+BODY = SoftBodiesOptions(frames=6, people=1, spacing=0.035)
 BALL = sliding_sphere(1, levels=2)[0]
 
 

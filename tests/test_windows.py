@@ -1,0 +1,50 @@
+"""Which form a group takes: Draco per frame only where it is the better bargain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from meshreel import windows
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.choice import IntraOptions, Quality, cheapest_intra
+from meshreel.format.layout import Form
+from meshreel.windows import EncodedGroup, cheaper
+from tests.small_options import quick
+
+BALLS = list(sliding_sphere(2, levels=1))
+OPTIONS = replace(quick(), intra=IntraOptions(fractions=(1.0,), steps=(0.7,), levels=(0,)))
+ASKED = Quality(distance=0.002, angle=30.0, worst=0.004)
+
+
+@pytest.mark.parametrize(
+    ("size", "distance", "form"),
+    [
+        (501, 0.002, Form.DRACO),  # as good and smaller
+        (501, 0.0009, Form.LAYERS),  # smaller and worse
+        (499, 0.0021, Form.DRACO),  # less than half the distance for a byte more
+        (499, 0.0019, Form.LAYERS),  # a little more than half
+        (251, 0.0021, Form.DRACO),  # for not quite twice the bytes
+        (250, 0.0021, Form.LAYERS),  # for twice the bytes
+    ],
+)
+def test_draco_is_taken_where_it_is_the_better_bargain(monkeypatch, size, distance, form):
+    found = bytes(500), Quality(distance=0.001, angle=1.0, worst=0.001)
+
+    def searched(_frames, target, most_bytes, _options):
+        return found if found[1].reaches(target) and len(found[0]) < most_bytes else None
+
+    monkeypatch.setattr(windows, "cheapest_intra", searched)
+    group = EncodedGroup(Form.LAYERS, 2, bytes(size), (), Quality(distance, 2.0, distance))
+    assert cheaper(BALLS, group, OPTIONS).form == form
+
+
+def test_a_body_of_few_faces_is_left_to_draco():
+    found = cheapest_intra(BALLS, ASKED, 1e6, OPTIONS.intra)
+    assert found is not None
+    payload, quality = found
+    group = EncodedGroup(Form.LAYERS, 2, bytes(len(payload) * 2 // 3), (), ASKED)
+    chosen = cheaper(BALLS, group, OPTIONS)
+    assert (chosen.form, chosen.payload, chosen.quality) == (Form.DRACO, payload, quality)
+    assert chosen.frame_count == 2 and quality.distance < ASKED.distance / 2
