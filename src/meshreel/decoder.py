@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import overload
-
-import numpy as np
 
 from .coding.group import continue_group
 from .coding.layers import LayersState
@@ -19,7 +17,7 @@ from .container.reader import Chunk, ReelReader
 from .container.sources import BytesSource, FileSource, Source
 from .errors import FormatError, InputError
 from .format.layout import ChunkKind
-from .types import Mesh
+from .types import Mesh, Placement
 
 
 def open(source: str | Path | bytes | Source) -> Video:
@@ -49,13 +47,15 @@ class _Decoded:
 class Video(Sequence[Mesh]):
     """Frames of a .reel file as a sequence of meshes; random access decodes one group, and those it depends on.
 
-    A file stays open until `close`, or until the end of a `with` block.
+    A file stays open until `close`, or until the end of a `with` block. The frames of a group may be parts of one array in
+    memory: copy what is to be kept without the others.
     """
 
     def __init__(self, reader: ReelReader, quality: int | None = None, close: Callable[[], None] | None = None) -> None:
         self.reader = reader
         self.quality = quality
         self._close = close
+        self._place = Placement(reader.header.scale, reader.header.origin)  # undoes the encoder's normalisation
         self._group = _Decoded(-1, [], None)
         self._states: dict[int, LayersState | None] = {}  # of the groups of one chain: playing backwards asks for each
 
@@ -126,7 +126,7 @@ class Video(Sequence[Mesh]):
             meshes, state = self._decode(link, state)
             states[link.number] = state
         self._states = states  # replaced, not changed: other threads may read it
-        known = _Decoded(chunk.number, [self._place(mesh) for mesh in meshes], state)
+        known = _Decoded(chunk.number, meshes, state)
         self._group = known
         return known.frames
 
@@ -138,11 +138,6 @@ class Video(Sequence[Mesh]):
     def _decode(self, chunk: Chunk, before: LayersState | None) -> tuple[list[Mesh], LayersState | None]:
         payload = self.reader.read_chunk(chunk.number, None if self.quality is None else self.quality + 1)
         try:
-            return continue_group(payload, chunk.frame_count, self.quality, before)
+            return continue_group(payload, chunk.frame_count, self.quality, before, self._place)
         except FormatError as error:
             raise FormatError(f"{chunk}: {error}") from error
-
-    def _place(self, mesh: Mesh) -> Mesh:
-        """A mesh in metres: the header's origin and scale undo the encoder's normalisation."""
-        header = self.reader.header
-        return replace(mesh, vertices=np.asarray(header.origin) + header.scale * mesh.vertices)

@@ -25,6 +25,11 @@ class Graph:
     near: Int32[np.ndarray, " E"]
     weights: Float64[np.ndarray, " E"]
 
+    @property
+    def arrays(self) -> tuple[Int64[np.ndarray, " S"], Int32[np.ndarray, " E"], Float64[np.ndarray, " E"]]:
+        """As the core takes them."""
+        return self.starts, self.near, self.weights
+
 
 @dataclass(frozen=True, slots=True)
 class Hierarchy:
