@@ -2,8 +2,9 @@
 
 #include <algorithm>
 
+#include "causal.h"
 #include "guarded.h"
-#include "prediction.h"
+#include "wide.h"
 
 namespace meshreel {
 namespace {
@@ -56,6 +57,10 @@ FieldRows::FieldRows(const mr_field& field)
     : field_(field), stride_((field.basis.columns + kLanes - 1) / kLanes * kLanes), decoded_(new double[(field.graph.count + 1) * stride_]) {}
 
 void FieldRows::next(size_t count, double* rows) {
+    wide([&] { follow(count, rows); });
+}
+
+void FieldRows::follow(size_t count, double* rows) {
     const mr_basis& basis = field_.basis;
     for (const size_t last = at_ + count; at_ < last;) {
         const size_t end = std::min(at_ + kRowBlock, last);

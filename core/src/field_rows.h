@@ -19,6 +19,7 @@ public:
     void next(size_t count, double* rows);
 
 private:
+    void follow(size_t count, double* rows);
     void predict(size_t begin, size_t end);
 
     mr_field field_;

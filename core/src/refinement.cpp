@@ -2,15 +2,16 @@
 #include <cmath>
 #include <vector>
 
+#include "causal.h"
 #include "field_rows.h"
 #include "guarded.h"
 #include "indices.h"
 #include "meshreel/layers.h"
-#include "prediction.h"
+#include "wide.h"
 
 namespace {
 
-using meshreel::FieldRows, meshreel::guarded, meshreel::kRowBlock;
+using meshreel::FieldRows, meshreel::guarded, meshreel::kRowBlock, meshreel::wide;
 
 constexpr double kMostBend = 0.15;  // of an edge's length
 
@@ -104,36 +105,52 @@ struct Refinement {
 // Rows written as frames x vertices x 3, each coordinate as origin + scale * coordinate where there is a placement.
 class Frames {
 public:
-    Frames(const mr_frames& frames, size_t count, size_t vertices) : out_(frames), count_(count), vertices_(vertices) {}
+    Frames(const mr_frames& frames, size_t count, size_t vertices)
+        : out_(frames), count_(count), vertices_(vertices), placed_(kRowBlock * 3 * count), wastes_(count, 0.0) {}
 
     void set(size_t first, const double* rows, size_t count) {
-        for (size_t begin = 0; begin < count; begin += kRowBlock)
+        for (size_t begin = 0; begin < count; begin += kRowBlock) {
+            const size_t some = std::min(kRowBlock, count - begin);
+            for (size_t v = 0; v < some; ++v) {
+                place(rows + 3 * count_ * (begin + v), placed_.data() + 3 * count_ * v);
+                if (v % 2 == 0) fetch(first + begin + v + kRowBlock);
+            }
             for (size_t t = 0; t < count_; ++t)
-                set_frame(out_.positions + 3 * (t * vertices_ + first + begin), rows + 3 * count_ * begin + t,
-                          std::min(kRowBlock, count - begin));
+                turn(placed_.data() + t, some, out_.positions + 3 * (t * vertices_ + first + begin));
+        }
     }
-    bool are_finite() const { return waste_ == 0.0; }  // before they were placed
+    bool are_finite() const {  // before they were placed
+        return std::all_of(wastes_.begin(), wastes_.end(), [](double waste) { return waste == 0.0; });
+    }
 
 private:
-    void set_frame(double* out, const double* in, size_t count) {
-        if (!out_.placement) return each(out, in, count, [](size_t, double x) { return x; });
-        const mr_placement p = *out_.placement;
-        each(out, in, count, [p](size_t k, double x) { return p.origin[k] + p.scale * x; });
-    }
-    template <class Placed>
-    void each(double* __restrict out, const double* __restrict in, size_t count, Placed placed) {
-        double wastes[3] = {};  // of numbers that are not finite: anything else times 0 is 0
-        for (size_t v = 0; v < count; ++v, in += 3 * count_, out += 3) {
-            const double x = in[0], y = in[count_], z = in[2 * count_];
-            out[0] = placed(0, x), out[1] = placed(1, y), out[2] = placed(2, z);
-            wastes[0] += x * 0.0, wastes[1] += y * 0.0, wastes[2] += z * 0.0;
+    void place(const double* __restrict in, double* __restrict out) {
+        const size_t frames = count_;
+        double* __restrict wastes = wastes_.data();  // of numbers that are not finite: anything else times 0 is 0
+        for (size_t t = 0; t < frames; ++t) wastes[t] += in[t] * 0.0 + in[t + frames] * 0.0 + in[t + 2 * frames] * 0.0;
+        if (!out_.placement) {
+            std::copy(in, in + 3 * frames, out);
+            return;
         }
-        waste_ += wastes[0] + wastes[1] + wastes[2];
+        const mr_placement p = *out_.placement;
+        for (size_t t = 0; t < frames; ++t) {
+            out[t] = p.origin[0] + p.scale * in[t];
+            out[t + frames] = p.origin[1] + p.scale * in[t + frames];
+            out[t + 2 * frames] = p.origin[2] + p.scale * in[t + 2 * frames];
+        }
+    }
+    // Where a vertex goes in each frame: memory that is far away by then, and on its way while others are placed.
+    void fetch(size_t vertex) const {
+        if (vertex >= vertices_) return;
+        for (size_t t = 0; t < count_; ++t) meshreel::will_write(out_.positions + 3 * (t * vertices_ + vertex));
+    }
+    void turn(const double* __restrict in, size_t count, double* __restrict out) const {
+        for (size_t v = 0; v < count; ++v, in += 3 * count_, out += 3) out[0] = in[0], out[1] = in[count_], out[2] = in[2 * count_];
     }
 
     mr_frames out_;
     size_t count_, vertices_;
-    double waste_ = 0.0;
+    std::vector<double> placed_, wastes_;
 };
 
 // Calls visit(first edge, count, rows of scalars) for blocks of a level's edges.
@@ -184,7 +201,7 @@ int refine_to_frames(const mr_level& level, const double* rows, mr_frames* frame
 
 int mr_edge_frames(const mr_level* level, const double* positions, double* midpoints, double* directions) {
     if (!is_good(*level) || level->frames != 1) return MR_LAYERS_BAD_INPUT;
-    return guarded(MR_LAYERS_NO_MEMORY, [&] {
+    return guarded(MR_LAYERS_NO_MEMORY, [&] { return wide([&] {
         const Refinement refinement(*level, positions);
         for (size_t e = 0; e < level->edge_count; ++e)
             edge_frame(refinement.places, {refinement.normals.data(), 1}, level->edges + 2 * e, refinement.share,
@@ -193,32 +210,32 @@ int mr_edge_frames(const mr_level* level, const double* positions, double* midpo
                            directions[3 * e + k] = direction;
                        });
         return int{MR_LAYERS_OK};
-    });
+    }); });
 }
 
 int mr_refine(const mr_level* level, const double* rows, const double* scalars, mr_frames* frames) {
     if (!is_good(*level)) return MR_LAYERS_BAD_INPUT;
-    return guarded(MR_LAYERS_NO_MEMORY, [&] {
+    return guarded(MR_LAYERS_NO_MEMORY, [&] { return wide([&] {
         return refine_to_frames(*level, rows, frames, [&](auto visit) { each_block(*level, scalars, visit); });
-    });
+    }); });
 }
 
 int mr_refine_field(const mr_level* level, const mr_field* field, double* rows, double* last) {
     if (!is_good(*level, *field)) return MR_LAYERS_BAD_INPUT;
-    return guarded(MR_LAYERS_NO_MEMORY, [&] {
+    return guarded(MR_LAYERS_NO_MEMORY, [&] { return wide([&] {
         const Refinement refinement(*level, rows);
         each_block(*level, *field, last, [&](size_t e, size_t count, const double* scalars) {
             refinement.place(level->edges + 2 * e, count, scalars, rows + 3 * level->frames * (level->vertices + e));
         });
         return int{MR_LAYERS_OK};
-    });
+    }); });
 }
 
 int mr_refine_field_frames(const mr_level* level, const mr_field* field, const double* rows, double* last, mr_frames* frames) {
     if (!is_good(*level, *field)) return MR_LAYERS_BAD_INPUT;
-    return guarded(MR_LAYERS_NO_MEMORY, [&] {
+    return guarded(MR_LAYERS_NO_MEMORY, [&] { return wide([&] {
         return refine_to_frames(*level, rows, frames, [&](auto visit) { each_block(*level, *field, last, visit); });
-    });
+    }); });
 }
 
 void mr_frames_of_rows(const double* rows, size_t count, size_t vertices, mr_frames* frames) {

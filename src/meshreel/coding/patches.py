@@ -117,7 +117,7 @@ def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[
     turned, rest = _filled(rest, frames * count)
     if len(rest):
         raise FormatError(f"patches: {len(rest)} runs too many")
-    dropped[:, ever] = np.logical_xor.accumulate(turned.reshape(frames, count), axis=0)
+    dropped[:, np.flatnonzero(ever)] = np.logical_xor.accumulate(turned.reshape(frames, count), axis=0)
     return dropped
 
 
