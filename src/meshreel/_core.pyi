@@ -98,7 +98,7 @@ _Field: TypeAlias = tuple[  # symbols, graph, step, vectors, means, what the val
     Float64[np.ndarray, " C"],
     Float64[np.ndarray, " V"] | None,
 ]
-_Place: TypeAlias = tuple[float, tuple[float, float, float]]  # scale and origin
+_Place: TypeAlias = tuple[float, tuple[float, ...]]  # scale and origin, three numbers
 
 def hierarchy(
     positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]

@@ -47,8 +47,8 @@ class _Decoded:
 class Video(Sequence[Mesh]):
     """Frames of a .reel file as a sequence of meshes; random access decodes one group, and those it depends on.
 
-    A file stays open until `close`, or until the end of a `with` block. The frames of a group may be parts of one array in
-    memory: copy what is to be kept without the others.
+    A file stays open until `close`, or until the end of a `with` block. The frames of a group may be parts of one
+    array: copy one to keep it without the others.
     """
 
     def __init__(self, reader: ReelReader, quality: int | None = None, close: Callable[[], None] | None = None) -> None:

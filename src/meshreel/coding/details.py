@@ -79,7 +79,7 @@ def decode_last(
 ) -> Float64[np.ndarray, " E"]:
     """As `decode_level`, of a last level, whose vertices it places. FormatError where they are not finite, too."""
     scalars = _scalars(record, near.siblings, known.shape[2], previous)
-    place = shown.place and shown.place.numbers
+    place = None if shown.place is None else shown.place.numbers
     arrays = (known, near.level.coarse, near.level.edges, scalars.arrays)
     finite, last = _core.refine_field_frames(*arrays, record.curvature, place, shown.positions)
     checked(shown.positions, finite)

@@ -7,6 +7,7 @@ The basis as decoded is orthonormal, so all columns share one step. A column is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
@@ -15,7 +16,7 @@ from .. import _core
 from ..errors import FormatError, InputError
 from ..format.layout import CodedField
 from . import entropy, klt, orthonormal
-from .graph import Graph
+from .graph import Graph, GraphArrays
 from .steps import LEVELS, step_of
 
 MOST_BITS = 30
@@ -55,6 +56,16 @@ class EncodedField:
     symbol_bits: int
 
 
+FieldArrays: TypeAlias = tuple[
+    Int32[np.ndarray, "M V"],
+    GraphArrays,
+    float,
+    Float64[np.ndarray, "M C"],
+    Float64[np.ndarray, " C"],
+    Float64[np.ndarray, " V"] | None,
+]
+
+
 @dataclass(frozen=True, slots=True)
 class FieldValues:
     """The trajectories of a field, as coded: what makes their numbers can do so on its way to what they are for."""
@@ -67,7 +78,7 @@ class FieldValues:
     before: Float64[np.ndarray, " V"] | None = None  # what each trajectory is counted from, if not from 0
 
     @property
-    def arrays(self) -> tuple[object, ...]:
+    def arrays(self) -> FieldArrays:
         """As the core takes them."""
         return (self.symbols, self.graph.arrays, self.step, self.vectors, self.mean, self.before)
 

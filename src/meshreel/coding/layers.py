@@ -169,8 +169,8 @@ def place_layers(
 ) -> DecodedLayers:
     """What records decode to; with `place`, vertices as placed by it, which the state never is.
 
-    With `spare`, there is room for faces of each frame: a group whose memory is one block costs fewer of the page faults
-    that would take longer than decoding.
+    With `spare`, there is room for faces of each frame, too: where a group's memory is one block, the next group gets
+    it again, without the page faults that would take as long as decoding.
     """
     head = records.head
     previous = previous if head.origin == Origin.PREVIOUS else None

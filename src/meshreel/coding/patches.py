@@ -48,7 +48,6 @@ class Patches:
             for points, kept, patch in zip(positions, shown, self.meshes, strict=True)
         ]
 
-
     def _shown(
         self, faces: Int32[np.ndarray, "F 3"], spare: Int32[np.ndarray, "N 3"] | None
     ) -> list[Int32[np.ndarray, "_ 3"]]:

@@ -92,7 +92,7 @@ def refine(
 
 def frames_of(rows: Float64[np.ndarray, "V 3 T"], place: Placement | None = None) -> Float64[np.ndarray, "T V 3"]:
     """The frames of rows: all frames of a number are neighbours in memory. FormatError where they are not finite."""
-    return checked(*_core.frames_of_rows(rows, place and place.numbers))
+    return checked(*_core.frames_of_rows(rows, None if place is None else place.numbers))
 
 
 def checked(frames: Float64[np.ndarray, "T V 3"], finite: bool) -> Float64[np.ndarray, "T V 3"]:
