@@ -1,16 +1,22 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
 
+#include <algorithm>
 #include <cstring>
 #include <memory>
 #include <new>
+#include <optional>
 #include <stdexcept>
+#include <tuple>
 #include <vector>
 
 #include "meshreel/field_coder.h"
 #include "meshreel/layers.h"
 
 namespace nb = nanobind;
+using namespace nb::literals;
 
 namespace {
 
@@ -99,18 +105,47 @@ nb::tuple predict_surface(In<double, 2> values, nb::tuple graph_arrays, In<doubl
     return nb::make_tuple(symbols.two(columns, count), decoded.two(columns, count));
 }
 
-// The columns as coded -> a row for each vertex.
-Out<double, 2> field_inverse(In<int32_t, 2> symbols, nb::tuple graph_arrays, double step, In<double, 2> vectors, In<double, 1> means) {
-    const size_t columns = symbols.shape(0), count = symbols.shape(1), width = vectors.shape(1);
-    expect(graph_arrays.size() == 3 && vectors.shape(0) == columns && means.shape(0) == width);
-    const auto starts = nb::cast<In<int64_t, 1>>(graph_arrays[0]);
-    const auto near = nb::cast<In<int32_t, 1>>(graph_arrays[1]);
-    const auto weights = nb::cast<In<double, 1>>(graph_arrays[2]);
-    const mr_graph graph = graph_of(starts, near, weights, count);
-    const mr_basis basis{columns, width, vectors.data(), means.data()};
-    Buffer<double> rows(count * width);
-    check(mr_field_inverse(&graph, symbols.data(), step, &basis, rows.data()));
-    return rows.two(count, width);
+// A field's arrays, as Python has them: symbols, graph, step, vectors, means and what values are counted from, or None.
+struct Field {
+    explicit Field(const nb::tuple& arrays)
+        : symbols(item<In<int32_t, 2>>(arrays, 0)), graph(item<nb::tuple>(arrays, 1)), step(item<double>(arrays, 2)),
+          vectors(item<In<double, 2>>(arrays, 3)), means(item<In<double, 1>>(arrays, 4)) {
+        expect(graph.size() == 3 && vectors.shape(0) == symbols.shape(0) && means.shape(0) == vectors.shape(1));
+        starts = item<In<int64_t, 1>>(graph, 0), near = item<In<int32_t, 1>>(graph, 1), weights = item<In<double, 1>>(graph, 2);
+        if (arrays[5].is_none()) return;
+        before = item<In<double, 1>>(arrays, 5);
+        expect(before.shape(0) == count());
+    }
+    size_t count() const { return symbols.shape(1); }
+    size_t width() const { return vectors.shape(1); }
+    mr_field view() const {
+        const mr_basis basis{symbols.shape(0), width(), vectors.data(), means.data()};
+        return {graph_of(starts, near, weights, count()), basis, symbols.data(), step, before.is_valid() ? before.data() : nullptr};
+    }
+
+    template <class T>
+    static T item(const nb::tuple& arrays, size_t k) {
+        expect(k < arrays.size());
+        return nb::cast<T>(arrays[k]);
+    }
+
+    In<int32_t, 2> symbols;
+    nb::tuple graph;
+    double step;
+    In<double, 2> vectors;
+    In<double, 1> means, before;
+    In<int64_t, 1> starts;
+    In<int32_t, 1> near;
+    In<double, 1> weights;
+};
+
+// A row for each value.
+Out<double, 2> field_inverse(nb::tuple field) {
+    const Field arrays(field);
+    const mr_field view = arrays.view();
+    Buffer<double> rows(arrays.count() * arrays.width());
+    check(mr_field_inverse(&view, rows.data()));
+    return rows.two(arrays.count(), arrays.width());
 }
 
 Out<double, 2> orthonormal_inverse(In<int32_t, 1> symbols, size_t count, size_t width) {
@@ -159,42 +194,83 @@ Out<double, 1> sibling_weights(In<int64_t, 1> starts, int weight) {
     return weights.one(links);
 }
 
+mr_level level_of(size_t frames, size_t vertices, const In<int32_t, 2>& faces, const In<int32_t, 2>& edges, int curvature) {
+    expect(faces.shape(1) == 3 && edges.shape(1) == 2);
+    return {frames, vertices, faces.data(), faces.shape(0), edges.data(), edges.shape(0), curvature};
+}
+
 nb::tuple edge_frames(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t, 2> edges, int curvature) {
-    expect(positions.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
-    const size_t count = edges.shape(0);
-    Buffer<double> midpoints(3 * count), directions(3 * count);
-    check(mr_edge_frames(positions.data(), positions.shape(0), faces.data(), faces.shape(0), edges.data(), count, curvature,
-                         midpoints.data(), directions.data()));
-    return nb::make_tuple(midpoints.two(count, 3), directions.two(count, 3));
+    expect(positions.shape(1) == 3);
+    const mr_level level = level_of(1, positions.shape(0), faces, edges, curvature);
+    Buffer<double> midpoints(3 * level.edge_count), directions(3 * level.edge_count);
+    check(mr_edge_frames(&level, positions.data(), midpoints.data(), directions.data()));
+    return nb::make_tuple(midpoints.two(level.edge_count, 3), directions.two(level.edge_count, 3));
 }
 
-// `rows` V x 3 x T, of which the first `vertices` are known; the next are set from E x T scalars.
-void refine(InOut<double, 3> rows, size_t vertices, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars, int curvature) {
-    const size_t frames = rows.shape(2), count = edges.shape(0);
-    expect(rows.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
-    expect(rows.shape(0) >= vertices + count && scalars.shape(0) == count && scalars.shape(1) == frames);
-    check(mr_refine(rows.data(), frames, vertices, faces.data(), faces.shape(0), edges.data(), count, scalars.data(), curvature));
+using Place = std::optional<std::tuple<double, std::tuple<double, double, double>>>;  // scale and origin
+
+mr_placement placement_of(const Place& place) {
+    if (!place) return {};
+    const auto& [scale, origin] = *place;
+    return {scale, {std::get<0>(origin), std::get<1>(origin), std::get<2>(origin)}};
 }
 
-// The same of V x 3 x T rows to T x (V + E) x 3 places, and whether all of them are finite.
-nb::tuple refine_frames(In<double, 3> rows, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars, int curvature) {
+// The finer level's places of V x 3 x T rows and E x T scalars: T x (V + E) x 3, and whether all of them are finite.
+nb::tuple refine(In<double, 3> rows, In<int32_t, 2> faces, In<int32_t, 2> edges, In<double, 2> scalars, int curvature) {
     const size_t vertices = rows.shape(0), frames = rows.shape(2), count = edges.shape(0);
-    expect(rows.shape(1) == 3 && faces.shape(1) == 3 && edges.shape(1) == 2);
-    expect(scalars.shape(0) == count && scalars.shape(1) == frames);
+    expect(rows.shape(1) == 3 && scalars.shape(0) == count && scalars.shape(1) == frames);
+    const mr_level level = level_of(frames, vertices, faces, edges, curvature);
     Buffer<double> positions(3 * frames * (vertices + count));
-    int finite = 0;
-    check(mr_refine_frames(rows.data(), frames, vertices, faces.data(), faces.shape(0), edges.data(), count, scalars.data(), curvature,
-                           positions.data(), &finite));
-    return nb::make_tuple(positions.three(frames, vertices + count, 3), finite != 0);
+    mr_frames out{positions.data(), nullptr, 0};
+    check(mr_refine(&level, rows.data(), scalars.data(), &out));
+    return nb::make_tuple(positions.three(frames, vertices + count, 3), out.finite != 0);
+}
+
+// V x 3 x T rows and a field of scalars -> rows of the finer level, and the last frame's scalars.
+nb::tuple refine_field(In<double, 3> rows, In<int32_t, 2> faces, In<int32_t, 2> edges, nb::tuple field, int curvature) {
+    const size_t vertices = rows.shape(0), frames = rows.shape(2), count = edges.shape(0);
+    expect(rows.shape(1) == 3);
+    const Field arrays(field);
+    const mr_level level = level_of(frames, vertices, faces, edges, curvature);
+    const mr_field scalars = arrays.view();
+    Buffer<double> finer(3 * frames * (vertices + count)), last(count);
+    std::copy(rows.data(), rows.data() + rows.size(), finer.data());
+    check(mr_refine_field(&level, &scalars, finer.data(), last.data()));
+    return nb::make_tuple(finer.three(vertices + count, 3, frames), last.one(count));
+}
+
+// The same of a last level, to T x (V + E) x 3 places. Whether all of them are finite, and the last frame's scalars.
+nb::tuple refine_field_frames(In<double, 3> rows, In<int32_t, 2> faces, In<int32_t, 2> edges, nb::tuple field, int curvature,
+                              Place place, InOut<double, 3> positions) {
+    const size_t vertices = rows.shape(0), frames = rows.shape(2), count = edges.shape(0);
+    expect(rows.shape(1) == 3);
+    expect(positions.shape(0) == frames && positions.shape(1) == vertices + count && positions.shape(2) == 3);
+    const Field arrays(field);
+    const mr_level level = level_of(frames, vertices, faces, edges, curvature);
+    const mr_field scalars = arrays.view();
+    const mr_placement placement = placement_of(place);
+    mr_frames out{positions.data(), place ? &placement : nullptr, 0};
+    Buffer<double> last(count);
+    check(mr_refine_field_frames(&level, &scalars, rows.data(), last.data(), &out));
+    return nb::make_tuple(out.finite != 0, last.one(count));
 }
 
 // T x V x 3, and whether all of it is finite.
-nb::tuple frames_of_rows(In<double, 3> rows) {
+nb::tuple frames_of_rows(In<double, 3> rows, Place place) {
     const size_t vertices = rows.shape(0), frames = rows.shape(2);
     expect(rows.shape(1) == 3);
+    const mr_placement placement = placement_of(place);
     Buffer<double> positions(3 * frames * vertices);
-    const bool finite = mr_frames_of_rows(rows.data(), frames, vertices, positions.data()) != 0;
-    return nb::make_tuple(positions.three(frames, vertices, 3), finite);
+    mr_frames out{positions.data(), place ? &placement : nullptr, 0};
+    mr_frames_of_rows(rows.data(), frames, vertices, &out);
+    return nb::make_tuple(positions.three(frames, vertices, 3), out.finite != 0);
+}
+
+// Copies the faces of which `dropped` is 0 to the beginning of `room`; their number.
+size_t keep_faces(In<int32_t, 2> faces, In<uint8_t, 1> dropped, InOut<int32_t, 2> room) {
+    const size_t count = faces.shape(0);
+    expect(faces.shape(1) == 3 && room.shape(1) == 3 && dropped.shape(0) == count && room.shape(0) >= count);
+    return mr_keep_faces(faces.data(), dropped.data(), count, room.data());
 }
 
 meshreel_weights view(const InOut<int32_t, 2>& columns, const In<int64_t, 1>& starts, const In<int32_t, 1>& near) {
@@ -245,8 +321,11 @@ void bind_layers(nb::module_& m) {
     m.def("sibling_weights", &sibling_weights);
     m.def("edge_frames", &edge_frames);
     m.def("refine", &refine);
-    m.def("refine_frames", &refine_frames);
-    m.def("frames_of_rows", &frames_of_rows);
+    m.def("refine_field", &refine_field);
+    m.def("refine_field_frames", &refine_field_frames, "rows"_a, "faces"_a, "edges"_a, "field"_a, "curvature"_a, "place"_a.none(),
+          "positions"_a);
+    m.def("frames_of_rows", &frames_of_rows, "rows"_a, "place"_a.none());
+    m.def("keep_faces", &keep_faces);
     m.def("encode_field", &encode_field);
     m.def("decode_field", &decode_field);
 }

@@ -1,9 +1,11 @@
 #include "meshreel/entropy.h"
 
 #include <cstring>
-#include <new>
 #include <vector>
 
+#include "causal.h"
+#include "copy_out.h"
+#include "guarded.h"
 #include "meshreel/escape.h"
 #include "meshreel/range_coder.h"
 #include "meshreel/weight_contexts.h"
@@ -71,42 +73,15 @@ int64_t code_integer(Coder& coder, IntegerModels& models, int64_t value) {
     return negative ? -static_cast<int64_t>(read) : static_cast<int64_t>(read);
 }
 
-bool are_causal(const meshreel_weights& weights) {
-    if (weights.starts[0] != 0 || weights.starts[weights.count] != static_cast<int64_t>(weights.neighbour_count)) return false;
-    for (size_t v = 0; v < weights.count; ++v) {
-        if (weights.starts[v] > weights.starts[v + 1] || weights.starts[v + 1] > static_cast<int64_t>(weights.neighbour_count)) return false;
-        for (int64_t k = weights.starts[v]; k < weights.starts[v + 1]; ++k) {
-            const int64_t u = weights.neighbours[k];
-            if (u < 0 || u >= static_cast<int64_t>(v)) return false;
-        }
-    }
-    return true;
-}
-
-int copy_out(const std::vector<uint8_t>& bytes, uint8_t* out, size_t capacity) {
-    if (bytes.size() > capacity) return MESHREEL_ENTROPY_OUT_TOO_SMALL;
-    if (!bytes.empty()) std::memcpy(out, bytes.data(), bytes.size());
-    return MESHREEL_ENTROPY_OK;
-}
-
-// Runs `body`, which may throw only for want of memory; nothing is thrown across the C ABI.
-template <class Body>
-int guarded(Body body) {
-    try {
-        return body();
-    } catch (...) {
-        return MESHREEL_ENTROPY_NO_MEMORY;
-    }
-}
-
 }  // namespace
 }  // namespace meshreel::entropy
 
 using namespace meshreel::entropy;
+using meshreel::guarded, meshreel::is_causal;
 
 int meshreel_encode_weights(const meshreel_weights* weights, uint8_t* out, size_t capacity, size_t* sizes) {
-    if (!are_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    return guarded([&] {
+    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
+    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&] {
         std::vector<uint8_t> bytes;
         Surroundings around(*weights);
         for (size_t c = 0; c < weights->columns; ++c) {
@@ -120,8 +95,8 @@ int meshreel_encode_weights(const meshreel_weights* weights, uint8_t* out, size_
 }
 
 int meshreel_decode_weights(const meshreel_weights* weights, const uint8_t* data, const size_t* sizes, size_t* column) {
-    if (!are_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    return guarded([&]() -> int {
+    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
+    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&]() -> int {
         Surroundings around(*weights);
         for (size_t c = 0; c < weights->columns; data += sizes[c], ++c) {
             *column = c;
@@ -141,8 +116,8 @@ int meshreel_decode_weights(const meshreel_weights* weights, const uint8_t* data
 }
 
 int meshreel_weight_contexts(const meshreel_weights* weights, uint8_t* classes, uint8_t* signs) {
-    if (!are_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    return guarded([&] {
+    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
+    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&] {
         Surroundings around(*weights);
         for (size_t c = 0; c < weights->columns; ++c) {
             for (size_t v = 0; v < weights->count; ++v) {
@@ -160,7 +135,7 @@ int meshreel_weight_contexts(const meshreel_weights* weights, uint8_t* classes, 
 }
 
 int meshreel_encode_integers(const int32_t* values, size_t count, uint8_t* out, size_t capacity, size_t* size) {
-    return guarded([&] {
+    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&] {
         std::vector<uint8_t> bytes;
         RangeEncoder coder(bytes);
         IntegerModels models;

@@ -1,35 +1,22 @@
 #include "meshreel/field_coder.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
-#include <new>
 #include <vector>
 
+#include "causal.h"
+#include "copy_out.h"
+#include "guarded.h"
 #include "meshreel/escape.h"
+#include "meshreel/magnitude_classes.h"
 #include "meshreel/range_coder.h"
 
 namespace meshreel::entropy {
 namespace {
 
-constexpr int kClasses = 15;  // of expected magnitude
-constexpr int kClamp = 255;  // larger magnitudes say no more about the scale
-constexpr uint32_t kBegin[kClasses - 1] = {1, 5, 9, 14, 20, 28, 40, 64, 100, 160, 300, 600, 1200, 2400};  // sixteenths
-constexpr uint32_t kLastBegin = 5 * kBegin[kClasses - 2];
-constexpr uint64_t kFirstRatio = 1u << 11;
 constexpr size_t kBlock = 64;  // places after which the ratio is learned anew
 
-// Of five times the expected magnitude: it is a fifth of a whole number, which need not be divided to be classed.
-constexpr std::array<uint8_t, kLastBegin + 1> class_table() {
-    std::array<uint8_t, kLastBegin + 1> table{};
-    uint8_t index = 0;
-    for (uint32_t e = 0; e <= kLastBegin; ++e) {
-        while (index < kClasses - 1 && e >= 5 * kBegin[index]) ++index;
-        table[e] = index;
-    }
-    return table;
-}
-constexpr auto kClassOf = class_table();
+constexpr ClassTable<5> kClassOf;  // of five times the expected magnitude: it is a fifth of a whole number
 
 // What has been coded, as the context of what comes next: in this column at earlier places, in earlier columns here.
 class Magnitudes {
@@ -100,7 +87,7 @@ private:
     uint8_t class_of(size_t v) const {
         const uint32_t around = static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
         const uint32_t expected = around * trust_ + bases_[v];
-        return kClassOf[expected < kLastBegin ? expected : kLastBegin];
+        return kClassOf[expected];
     }
 
     size_t count_;
@@ -164,49 +151,29 @@ bool code_field(Coder coder, const meshreel_weights& weights, size_t* ends) {
     return coder.finish();
 }
 
-bool are_causal(const meshreel_weights& weights) {
-    if (weights.starts[0] != 0 || weights.starts[weights.count] != static_cast<int64_t>(weights.neighbour_count)) return false;
-    for (size_t v = 0; v < weights.count; ++v) {
-        if (weights.starts[v] > weights.starts[v + 1] || weights.starts[v + 1] > static_cast<int64_t>(weights.neighbour_count)) return false;
-        for (int64_t k = weights.starts[v]; k < weights.starts[v + 1]; ++k)
-            if (weights.neighbours[k] < 0 || weights.neighbours[k] >= static_cast<int64_t>(v)) return false;
-    }
-    return true;
-}
-
-template <class Body>
-int guarded(Body body) {
-    try {
-        return body();
-    } catch (...) {
-        return MESHREEL_ENTROPY_NO_MEMORY;
-    }
-}
-
 }  // namespace
 }  // namespace meshreel::entropy
 
 using namespace meshreel::entropy;
+using meshreel::guarded, meshreel::is_causal;
 
 int meshreel_encode_field(const meshreel_weights* weights, uint8_t* out, size_t capacity, size_t* size, size_t* ends) {
-    if (!are_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    return guarded([&]() -> int {
+    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
+    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&]() -> int {
         std::vector<uint8_t> bytes;
         RangeEncoder coder(bytes);
         if (weights->count * weights->columns > 0) code_field(coder, *weights, ends);
         *size = bytes.size();
-        if (bytes.size() > capacity) return MESHREEL_ENTROPY_OUT_TOO_SMALL;
-        if (!bytes.empty()) std::memcpy(out, bytes.data(), bytes.size());
-        return MESHREEL_ENTROPY_OK;
+        return copy_out(bytes, out, capacity);
     });
 }
 
 int meshreel_decode_field(const meshreel_weights* weights, const uint8_t* data, size_t size) {
-    if (!are_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
+    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
     const size_t count = weights->count * weights->columns;
     if (count == 0) return size == 0 ? MESHREEL_ENTROPY_OK : MESHREEL_ENTROPY_BAD_STREAM;
     if (!is_plausible(count, size)) return MESHREEL_ENTROPY_BAD_STREAM;
-    return guarded([&]() -> int {
+    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&]() -> int {
         RangeDecoder coder(data, size);
         std::memset(weights->symbols, 0, count * sizeof(int32_t));
         return code_field(coder, *weights, nullptr) ? MESHREEL_ENTROPY_OK : MESHREEL_ENTROPY_BAD_STREAM;

@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <new>
+#include <memory>
 #include <vector>
 
+#include "guarded.h"
+#include "indices.h"
 #include "meshreel/layers.h"
 
 struct mr_hierarchy {
@@ -183,18 +185,13 @@ void build(const double* positions, size_t vertices, const int32_t* faces, size_
 
 int mr_hierarchy_create(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, mr_hierarchy** out) {
     if (vertices > INT32_MAX) return MR_LAYERS_BAD_INPUT;
-    for (size_t k = 0; k < 3 * face_count; ++k)
-        if (faces[k] < 0 || static_cast<size_t>(faces[k]) >= vertices) return MR_LAYERS_BAD_INPUT;
-    mr_hierarchy* made = nullptr;
-    try {
-        made = new mr_hierarchy;
+    if (!meshreel::in_range(faces, 3 * face_count, vertices)) return MR_LAYERS_BAD_INPUT;
+    return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&] {
+        auto made = std::make_unique<mr_hierarchy>();
         build(positions, vertices, faces, face_count, *made);
-    } catch (const std::bad_alloc&) {
-        delete made;
-        return MR_LAYERS_NO_MEMORY;
-    }
-    *out = made;
-    return MR_LAYERS_OK;
+        *out = made.release();
+        return int{MR_LAYERS_OK};
+    });
 }
 
 void mr_hierarchy_destroy(mr_hierarchy* hierarchy) { delete hierarchy; }

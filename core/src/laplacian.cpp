@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <new>
 #include <vector>
 
+#include "guarded.h"
 #include "laplacian_system.h"
 
 namespace {
@@ -103,22 +103,13 @@ bool good_input(const double* positions, int64_t vertices, const int32_t* faces,
     return true;
 }
 
-template <class Body>
-int guarded(Body body) {
-    try {
-        return body();
-    } catch (const std::bad_alloc&) {
-        return MR_LAPLACIAN_NO_MEMORY;
-    } catch (...) {
-        return MR_LAPLACIAN_BAD_INPUT;
-    }
-}
-
 }  // namespace
+
+using meshreel::guarded;
 
 int mr_laplacian_create(const double* positions, int64_t vertices, const int32_t* faces, int64_t face_count,
                         const int32_t* anchors, int64_t anchor_count, double anchor_weight, mr_laplacian** out) {
-    return guarded([&] {
+    return guarded(MR_LAPLACIAN_NO_MEMORY, MR_LAPLACIAN_BAD_INPUT, [&] {
         if (!good_input(positions, vertices, faces, face_count, anchors, anchor_count)) return int(MR_LAPLACIAN_BAD_INPUT);
         auto system = std::make_unique<mr_laplacian>();
         std::vector<int64_t> starts;
@@ -170,7 +161,7 @@ int mr_laplacian_forward(const mr_laplacian* system, const double* weights, int6
 }
 
 int mr_laplacian_inverse(mr_laplacian* system, const double* deltas, int64_t columns, double* weights) {
-    return guarded([&] {
+    return guarded(MR_LAPLACIAN_NO_MEMORY, MR_LAPLACIAN_BAD_INPUT, [&] {
         if (!factor_normal(*system)) return int(MR_LAPLACIAN_SINGULAR);
         const SparseRows& r = system->rows;
         const int64_t n = system->vertices;
@@ -194,7 +185,7 @@ int mr_laplacian_inverse(mr_laplacian* system, const double* deltas, int64_t col
 
 int mr_laplacian_quantize(mr_laplacian* system, const double* deltas, int64_t columns, const double* steps,
                           const double* prices, int32_t* symbols) {
-    return guarded([&] {
+    return guarded(MR_LAPLACIAN_NO_MEMORY, MR_LAPLACIAN_BAD_INPUT, [&] {
         if (!factor_shaping(*system)) return int(MR_LAPLACIAN_SINGULAR);
         shape(*system->shaping, deltas, columns, steps, prices, symbols);
         return int(MR_LAPLACIAN_OK);

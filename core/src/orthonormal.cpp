@@ -1,7 +1,7 @@
 #include <cmath>
-#include <new>
 #include <vector>
 
+#include "guarded.h"
 #include "meshreel/layers.h"
 
 namespace {
@@ -18,7 +18,7 @@ void reflect(const double* u, double uu, size_t first, size_t width, double* v) 
 
 int mr_orthonormal_inverse(const int32_t* symbols, size_t count, size_t width, double* vectors) {
     if (count > width) return MR_LAYERS_BAD_INPUT;
-    try {
+    return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&]() -> int {
         std::vector<double> mirrors(count * width, 0.0), squares(count, 0.0);
         for (size_t k = 0; k < count; symbols += width - k, ++k) {
             double* v = vectors + k * width;
@@ -33,8 +33,6 @@ int mr_orthonormal_inverse(const int32_t* symbols, size_t count, size_t width, d
             for (size_t i = k; i < width; ++i) squares[k] += u[i] * u[i];
             for (size_t j = k; j-- > 0;) reflect(mirrors.data() + j * width, squares[j], j, width, v);
         }
-    } catch (const std::bad_alloc&) {
-        return MR_LAYERS_NO_MEMORY;
-    }
-    return MR_LAYERS_OK;
+        return MR_LAYERS_OK;
+    });
 }

@@ -4,19 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "causal.h"
 #include "meshreel/layers.h"
 
 namespace meshreel {
-
-inline bool is_causal(const mr_graph& graph) {
-    if (graph.starts[0] != 0) return false;
-    for (size_t v = 0; v < graph.count; ++v) {
-        if (graph.starts[v] > graph.starts[v + 1]) return false;
-        for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k)
-            if (graph.near[k] < 0 || static_cast<size_t>(graph.near[k]) >= v) return false;
-    }
-    return true;
-}
 
 inline double predicted(const mr_graph& graph, size_t v, const double* values) {
     double sum = 0.0;

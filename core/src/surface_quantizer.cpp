@@ -1,9 +1,9 @@
 // Closed-loop quantisation of all columns together, in a metric that sees errors across a surface better than along it.
 #include <algorithm>
 #include <cmath>
-#include <new>
 #include <vector>
 
+#include "guarded.h"
 #include "meshreel/layers.h"
 #include "prediction.h"
 
@@ -98,10 +98,8 @@ int mr_predict_surface(const mr_graph* graph, const mr_surface* surface, const d
                        double* decoded) {
     const int status = mr_predict_forward(graph, values, surface->columns, step, price, symbols, decoded);
     if (status != MR_LAYERS_OK) return status;
-    try {
+    return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&] {
         SurfaceQuantizer quantizer(*graph, *surface, step, price);
-        return quantizer.run(values, symbols, decoded) ? MR_LAYERS_OK : MR_LAYERS_OVERFLOW;
-    } catch (const std::bad_alloc&) {
-        return MR_LAYERS_NO_MEMORY;
-    }
+        return quantizer.run(values, symbols, decoded) ? int{MR_LAYERS_OK} : int{MR_LAYERS_OVERFLOW};
+    });
 }

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "guarded.h"
 #include "rigid3.h"
 
 namespace {
@@ -318,12 +319,10 @@ void relax(const meshreel_relaxation& p, meshreel_relaxed& out) {
 
 extern "C" int meshreel_relax_centers(const meshreel_relaxation* problem, meshreel_relaxed* result) {
     if (!problem || !result || !sound(*problem, *result)) return MESHREEL_TRACKING_BAD_INPUT;
-    try {
+    return meshreel::guarded(MESHREEL_TRACKING_NO_MEMORY, [&] {
         relax(*problem, *result);
-    } catch (...) {  // only a want of memory can throw here
-        return MESHREEL_TRACKING_NO_MEMORY;
-    }
-    return MESHREEL_TRACKING_OK;
+        return int{MESHREEL_TRACKING_OK};
+    });
 }
 
 extern "C" int meshreel_motion_differences(int64_t center_count, const meshreel_neighbours* neighbours, const double* rotations,

@@ -1,5 +1,7 @@
 """Types of the compiled core (core/python/bind_*.cpp)."""
 
+from typing import TypeAlias
+
 import numpy as np
 from jaxtyping import Float64, Int32, Int64, UInt8
 
@@ -87,6 +89,17 @@ def motion_differences(
 
 # bind_layers.cpp
 
+_Graph: TypeAlias = tuple[Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]
+_Field: TypeAlias = tuple[  # symbols, graph, step, vectors, means, what the values are counted from
+    Int32[np.ndarray, "M V"],
+    _Graph,
+    float,
+    Float64[np.ndarray, "M C"],
+    Float64[np.ndarray, " C"],
+    Float64[np.ndarray, " V"] | None,
+]
+_Place: TypeAlias = tuple[float, tuple[float, ...]]  # scale and origin, three numbers
+
 def hierarchy(
     positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
 ) -> tuple[Int32[np.ndarray, " V"], Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]: ...
@@ -107,13 +120,7 @@ def predict_surface(
     step: float,
     price: float,
 ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]: ...
-def field_inverse(
-    symbols: Int32[np.ndarray, "M V"],
-    graph: tuple[Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]],
-    step: float,
-    vectors: Float64[np.ndarray, "M C"],
-    means: Float64[np.ndarray, " C"],
-) -> Float64[np.ndarray, "V C"]: ...
+def field_inverse(field: _Field) -> Float64[np.ndarray, "V C"]: ...
 def orthonormal_inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64[np.ndarray, "M C"]: ...
 def place_rows(
     moved: Float64[np.ndarray, "V C"], order: Int32[np.ndarray, " V"], base: Float64[np.ndarray, "V 3"]
@@ -132,21 +139,34 @@ def edge_frames(
     curvature: int,
 ) -> tuple[Float64[np.ndarray, "E 3"], Float64[np.ndarray, "E 3"]]: ...
 def refine(
-    rows: Float64[np.ndarray, "W 3 T"],
-    vertices: int,
-    faces: Int32[np.ndarray, "F 3"],
-    edges: Int32[np.ndarray, "E 2"],
-    scalars: Float64[np.ndarray, "E T"],
-    curvature: int,
-) -> None: ...
-def refine_frames(
     rows: Float64[np.ndarray, "V 3 T"],
     faces: Int32[np.ndarray, "F 3"],
     edges: Int32[np.ndarray, "E 2"],
     scalars: Float64[np.ndarray, "E T"],
     curvature: int,
 ) -> tuple[Float64[np.ndarray, "T W 3"], bool]: ...
-def frames_of_rows(rows: Float64[np.ndarray, "V 3 T"]) -> tuple[Float64[np.ndarray, "T V 3"], bool]: ...
+def refine_field(
+    rows: Float64[np.ndarray, "V 3 T"],
+    faces: Int32[np.ndarray, "F 3"],
+    edges: Int32[np.ndarray, "E 2"],
+    field: _Field,
+    curvature: int,
+) -> tuple[Float64[np.ndarray, "W 3 T"], Float64[np.ndarray, " E"]]: ...
+def refine_field_frames(
+    rows: Float64[np.ndarray, "V 3 T"],
+    faces: Int32[np.ndarray, "F 3"],
+    edges: Int32[np.ndarray, "E 2"],
+    field: _Field,
+    curvature: int,
+    place: _Place | None,
+    positions: Float64[np.ndarray, "T W 3"],
+) -> tuple[bool, Float64[np.ndarray, " E"]]: ...
+def frames_of_rows(
+    rows: Float64[np.ndarray, "V 3 T"], place: _Place | None
+) -> tuple[Float64[np.ndarray, "T V 3"], bool]: ...
+def keep_faces(
+    faces: Int32[np.ndarray, "F 3"], dropped: UInt8[np.ndarray, " F"], room: Int32[np.ndarray, "N 3"]
+) -> int: ...
 def encode_field(
     columns: Int32[np.ndarray, "M V"], starts: Int64[np.ndarray, " V+1"], near: Int32[np.ndarray, " N"]
 ) -> tuple[bytes, Int64[np.ndarray, " M"]]: ...

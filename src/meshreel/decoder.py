@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import overload
 
-import numpy as np
-
 from .coding.group import continue_group
 from .coding.layers import LayersState
 from .container.reader import Chunk, ReelReader
 from .container.sources import BytesSource, FileSource, Source
 from .errors import FormatError, InputError
 from .format.layout import ChunkKind
-from .types import Mesh
+from .types import Mesh, Placement
 
 
 def open(source: str | Path | bytes | Source) -> Video:
@@ -49,13 +47,15 @@ class _Decoded:
 class Video(Sequence[Mesh]):
     """Frames of a .reel file as a sequence of meshes; random access decodes one group, and those it depends on.
 
-    A file stays open until `close`, or until the end of a `with` block. The arrays of its meshes are read-only.
+    A file stays open until `close`, or until the end of a `with` block. The arrays of its meshes are read-only, and
+    those of a group may be parts of one array: copy a frame to change it, or to keep it without the others.
     """
 
     def __init__(self, reader: ReelReader, quality: int | None = None, close: Callable[[], None] | None = None) -> None:
         self.reader = reader
         self.quality = quality
         self._close = close
+        self._place = Placement(reader.header.scale, reader.header.origin)  # undoes the encoder's normalisation
         self._group = _Decoded(-1, [], None)
         self._states: dict[int, LayersState | None] = {}  # of the groups of one chain: playing backwards asks for each
 
@@ -126,7 +126,7 @@ class Video(Sequence[Mesh]):
             meshes, state = self._decode(link, state)
             states[link.number] = state
         self._states = states  # replaced, not changed: other threads may read it
-        known = _Decoded(chunk.number, [self._place(mesh) for mesh in meshes], state)
+        known = _Decoded(chunk.number, meshes, state)
         self._group = known
         return known.frames
 
@@ -138,16 +138,14 @@ class Video(Sequence[Mesh]):
     def _decode(self, chunk: Chunk, before: LayersState | None) -> tuple[list[Mesh], LayersState | None]:
         payload = self.reader.read_chunk(chunk.number, None if self.quality is None else self.quality + 1)
         try:
-            return continue_group(payload, chunk.frame_count, self.quality, before)
+            meshes, state = continue_group(payload, chunk.frame_count, self.quality, before, self._place)
         except FormatError as error:
             raise FormatError(f"{chunk}: {error}") from error
+        return [_read_only(mesh) for mesh in meshes], state
 
-    def _place(self, mesh: Mesh) -> Mesh:
-        """A mesh in metres: the header's origin and scale undo the encoder's normalisation.
 
-        Read-only: it is kept and given again, and frames share their faces with each other and with the next group.
-        """
-        header = self.reader.header
-        vertices, faces = np.asarray(header.origin) + header.scale * mesh.vertices, mesh.faces.view()
-        vertices.flags.writeable = faces.flags.writeable = False
-        return Mesh(vertices, faces)
+def _read_only(mesh: Mesh) -> Mesh:
+    """The mesh, not to be written to: it is kept and given again, and shares its faces with other frames and groups."""
+    vertices, faces = mesh.vertices.view(), mesh.faces.view()
+    vertices.flags.writeable = faces.flags.writeable = False
+    return Mesh(vertices, faces)

@@ -45,6 +45,23 @@ class Mesh:
         return float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
 
 
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where normalised coordinates lie in the world: each at origin + scale x coordinate."""
+
+    scale: float  # m
+    origin: tuple[float, ...]  # m, three
+
+    def of(self, mesh: Mesh) -> Mesh:
+        """A mesh of normalised coordinates in metres."""
+        return Mesh(np.asarray(self.origin) + self.scale * mesh.vertices, mesh.faces)
+
+    @property
+    def numbers(self) -> tuple[float, tuple[float, ...]]:
+        """Scale and origin, as the core takes them."""
+        return self.scale, self.origin
+
+
 @runtime_checkable
 class Frames(Protocol):
     """Meshes by number: `len`, `frames[i]` and iteration; a list, or what reads them when they are asked for."""

@@ -9,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from meshreel import _core
 from meshreel.coding.group import continue_group, decode_group, payload_parts
 from meshreel.coding.layers import encode_layers
 from meshreel.coding.patches import Patches, decode_patches, decode_runs, encode_patches, encode_runs
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersPatches
 from meshreel.format.records import pack
-from meshreel.types import Mesh
+from meshreel.types import Mesh, Placement
 
 from .bodies import ball, moving
 from .test_laplacian import icosahedron
@@ -80,6 +81,32 @@ def test_frames_are_shown_without_the_faces_and_with_the_meshes() -> None:
         np.testing.assert_array_equal(frame.vertices[: len(plain.vertices)], plain.vertices)
         np.testing.assert_array_equal(frame.faces[count:] - len(plain.vertices), DECODED[t].faces)
         np.testing.assert_array_equal(frame.vertices[len(plain.vertices) :], DECODED[t].vertices)
+
+
+def test_a_group_that_is_placed_is_what_it_was_and_then_placed() -> None:
+    place = Placement(1.7, (3.0, -0.25, 1e6))
+    for payload in (PAYLOAD, CODED.payload):
+        for levels in (None, 0, 1, BALL.levels + 1):
+            placed, state = continue_group(payload, FRAMES, levels, None, place)
+            plain, wanted = continue_group(payload, FRAMES, levels, None)
+            for mine, theirs in zip(placed, plain, strict=True):
+                np.testing.assert_array_equal(mine.vertices, place.of(theirs).vertices)
+                np.testing.assert_array_equal(mine.faces, theirs.faces)
+            assert state is not None and wanted is not None
+            np.testing.assert_array_equal(state.base, wanted.base)
+
+
+@given(st.lists(st.tuples(st.booleans(), st.integers(1, 20)), max_size=9))
+def test_the_faces_that_are_kept_are_those_not_dropped(runs: list[tuple[bool, int]]) -> None:
+    gone = np.repeat(np.array([bit for bit, _ in runs], bool), [length for _, length in runs])
+    faces = np.arange(3 * len(gone), dtype=np.int32).reshape(-1, 3)
+    room = np.full((len(faces) + 1, 3), -1, np.int32)
+    count = _core.keep_faces(faces, gone.view(np.uint8), room)
+    np.testing.assert_array_equal(room[:count], faces[~gone])
+    assert (room[count:] == -1).all()
+    if len(faces):
+        with pytest.raises(ValueError, match="sizes"):
+            _core.keep_faces(faces, gone.view(np.uint8), room[: len(faces) - 1])
 
 
 def test_without_their_layer_the_group_is_as_it_was() -> None:

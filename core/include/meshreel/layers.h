@@ -39,9 +39,17 @@ struct mr_basis {
     const double* vectors;  // columns x width
     const double* means;
 };
-// rows[v][t] = means[t] + the sum over k, in order, of vectors[k][t] * decoded[k][v], where decoded[k][v] = prediction +
-// step * symbols[k][v]; `symbols` column after column.
-int mr_field_inverse(const struct mr_graph* graph, const int32_t* symbols, double step, const struct mr_basis* basis, double* rows);
+// A field as coded. The row of value v is row[t] = means[t] + the sum over k, in order, of vectors[k][t] * decoded[k][v], where
+// decoded[k][v] = prediction + step * symbols[k][v]; then before[v] is added, where there is such an array.
+struct mr_field {
+    struct mr_graph graph;
+    struct mr_basis basis;
+    const int32_t* symbols;  // column after column
+    double step;
+    const double* before;  // or null
+};
+// Its rows, one for each value.
+int mr_field_inverse(const struct mr_field* field, double* rows);
 // Symbols so that `decoded` is near `values`; a magnitude is lowered where that saves more than `price` squared steps a bit.
 int mr_predict_forward(const struct mr_graph* graph, const double* values, size_t columns, double step, double price,
                        int32_t* symbols, double* decoded);
@@ -73,19 +81,39 @@ int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t
 // Weights that predict each by weight / 64 of the mean of those near it.
 void mr_sibling_weights(const int64_t* starts, size_t edge_count, int weight, double* weights);
 
-// Midpoints of the edges, lifted by curvature / 64 of the bend that both ends' normals say, and along the unit sum of these
-// normals a direction (zero where there is none).
-int mr_edge_frames(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
-                   size_t edge_count, int curvature, double* midpoints, double* directions);
-// `rows` of all frames' x of a vertex, then their y, then their z: of the vertices, then room for the edges', which become
-// midpoint + scalar * direction. A row of scalars for each edge.
-int mr_refine(double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
-              size_t edge_count, const double* scalars, int curvature);
-// The same of a last level, all of it as frames x vertices x 3; `finite` becomes whether all of them are.
-int mr_refine_frames(const double* rows, size_t frames, size_t vertices, const int32_t* faces, size_t face_count, const int32_t* edges,
-                     size_t edge_count, const double* scalars, int curvature, double* positions, int* finite);
-// Such rows as frames x vertices x 3. Returns 1 where all of them are finite.
-int mr_frames_of_rows(const double* rows, size_t frames, size_t vertices, double* positions);
+// A subdivision of a mesh that moves. Its places are rows: all frames' x of a vertex, then their y, then their z.
+struct mr_level {
+    size_t frames, vertices;  // of the coarser mesh
+    const int32_t* faces;
+    size_t face_count;
+    const int32_t* edges;
+    size_t edge_count;
+    int curvature;  // share of the bend that the normals at both ends of an edge say by which its midpoint is lifted, 64ths
+};
+// Where places lie in the world: each coordinate at origin + scale * coordinate.
+struct mr_placement {
+    double scale, origin[3];
+};
+// Places as frames x vertices x 3.
+struct mr_frames {
+    double* positions;
+    const struct mr_placement* placement;  // or null: left as they are
+    int finite;                            // becomes 1 where all of them are, before they are placed
+};
+// Curved midpoints of the edges, and along the unit sum of both ends' normals a direction (zero where there is none), of one frame.
+int mr_edge_frames(const struct mr_level* level, const double* positions, double* midpoints, double* directions);
+// The finer level's vertices: the coarser one's, then midpoint + scalar * direction for each edge; a row of scalars for each.
+int mr_refine(const struct mr_level* level, const double* rows, const double* scalars, struct mr_frames* frames);
+// The same of a field of scalars, of which `last` gets those of the last frame. The first writes rows behind those of the
+// coarser level, for which `rows` has room.
+int mr_refine_field(const struct mr_level* level, const struct mr_field* field, double* rows, double* last);
+int mr_refine_field_frames(const struct mr_level* level, const struct mr_field* field, const double* rows, double* last,
+                           struct mr_frames* frames);
+// Rows as they are.
+void mr_frames_of_rows(const double* rows, size_t count, size_t vertices, struct mr_frames* frames);
+
+// Copies the faces of which `dropped` is 0; their number. `kept` has room for all.
+size_t mr_keep_faces(const int32_t* faces, const uint8_t* dropped, size_t face_count, int32_t* kept);
 
 #ifdef __cplusplus
 }

@@ -9,30 +9,16 @@
 #include <vector>
 
 #include "meshreel/entropy.h"
+#include "meshreel/magnitude_classes.h"
 
 namespace meshreel::entropy {
 
-constexpr int kClasses = 15;  // of expected magnitude
 constexpr int kSigns = 48;  // predicted sign x how strongly predicted x magnitude (1, 2, more)
-constexpr int kClamp = 255;  // larger magnitudes say no more about the scale
 constexpr size_t kNearest = 32;  // neighbours looked at, the last in order
 constexpr size_t kHistory = 6;  // earlier columns that predict
 constexpr size_t kTaps = kHistory + 2;
 
-// Where a class begins, in sixteenths of a step of expected magnitude.
-constexpr uint32_t kBegin[kClasses - 1] = {1, 5, 9, 14, 20, 28, 40, 64, 100, 160, 300, 600, 1200, 2400};
-constexpr uint32_t kLastBegin = kBegin[kClasses - 2];
-
-constexpr std::array<uint8_t, kLastBegin + 1> class_table() {
-    std::array<uint8_t, kLastBegin + 1> table{};
-    uint8_t index = 0;
-    for (uint32_t e = 0; e <= kLastBegin; ++e) {
-        while (index < kClasses - 1 && e >= kBegin[index]) ++index;
-        table[e] = index;
-    }
-    return table;
-}
-constexpr auto kClassOf = class_table();
+constexpr ClassTable<1> kClassOf;
 
 constexpr std::array<uint32_t, kNearest + 1> sixteenths() {
     std::array<uint32_t, kNearest + 1> table{};
@@ -40,8 +26,6 @@ constexpr std::array<uint32_t, kNearest + 1> sixteenths() {
     return table;
 }
 constexpr auto kSixteenths = sixteenths();
-
-constexpr uint64_t kFirstRatio = 1u << 11;  // a column about as large as the one before
 
 inline int clamped(int32_t value) { return value > kClamp ? kClamp : value < -kClamp ? -kClamp : value; }
 inline uint32_t magnitude(int value) { return static_cast<uint32_t>(value < 0 ? -value : value); }
@@ -137,7 +121,7 @@ public:
         predicted_ = predictor_.predict(taps_, used_);
         const uint64_t strength = static_cast<uint64_t>(predicted_ < 0 ? -predicted_ : predicted_) >> 16;
         const uint64_t size = expected + strength;  // where much is predicted, much comes
-        return {kClassOf[size < kLastBegin ? size : kLastBegin], predicted_};
+        return {kClassOf[size], predicted_};
     }
 
     // The value at the vertex that at() was last asked for.

@@ -1,21 +1,23 @@
 """One level of subdivision <-> CodedField: a scalar for each new vertex and frame, along the decoded normal there.
 
 In: the scalars that would place the new vertices on the wanted surface (geometry.levels). Out: the scalars as decoded,
-from which both sides place them.
+from which both sides place them; the decoder as they come about.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
 
+from .. import _core
 from ..errors import FormatError
 from ..format.layout import LayersLevel, Origin
-from ..geometry.levels import Level
-from .fields import EncodedField, Rate, decode_field, encode_field
-from .graph import Siblings, siblings
+from ..geometry.levels import Level, checked
+from ..types import Placement
+from .fields import EncodedField, FieldValues, Rate, encode_field, read_field
+from .graph import Connectivity, Siblings, siblings
 
 SIBLING_WEIGHTS = (36, 16)  # tried, 64ths
 
@@ -27,6 +29,14 @@ class EncodedLevel:
     record: LayersLevel
     field: EncodedField
     scalars: Float64[np.ndarray, "T E"]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """Where a last level's vertices go."""
+
+    positions: Float64[np.ndarray, "T W 3"]  # set
+    place: Placement | None  # what it does to them
 
 
 def encode_level(
@@ -47,18 +57,44 @@ def encode_level(
 
 
 def decode_level(
-    record: LayersLevel, near: Siblings, frames: int, previous: Float64[np.ndarray, " E"] | None
-) -> Float64[np.ndarray, "E T"]:
-    """The scalars of a level, a row for each new vertex.
+    record: LayersLevel,
+    near: Connectivity,
+    known: Float64[np.ndarray, "V 3 T"],
+    previous: Float64[np.ndarray, " E"] | None,
+) -> tuple[Float64[np.ndarray, "W 3 T"], Float64[np.ndarray, " E"]]:
+    """Rows of the level's vertices from those of the coarser one's, and the last frame's scalars.
 
     Raises FormatError on damaged records, or where they need a group that is not there.
     """
-    scalars = decode_field(record.scalars, near.graph(record.sibling_weight), frames, False)
+    scalars = _scalars(record, near.siblings, known.shape[2], previous)
+    return _core.refine_field(known, near.level.coarse, near.level.edges, scalars.arrays, record.curvature)
+
+
+def decode_last(
+    record: LayersLevel,
+    near: Connectivity,
+    known: Float64[np.ndarray, "V 3 T"],
+    previous: Float64[np.ndarray, " E"] | None,
+    shown: Shown,
+) -> Float64[np.ndarray, " E"]:
+    """As `decode_level`, of a last level, whose vertices it places. FormatError where they are not finite, too."""
+    scalars = _scalars(record, near.siblings, known.shape[2], previous)
+    place = None if shown.place is None else shown.place.numbers
+    arrays = (known, near.level.coarse, near.level.edges, scalars.arrays)
+    finite, last = _core.refine_field_frames(*arrays, record.curvature, place, shown.positions)
+    checked(shown.positions, finite)
+    return last
+
+
+def _scalars(
+    record: LayersLevel, near: Siblings, frames: int, previous: Float64[np.ndarray, " E"] | None
+) -> FieldValues:
+    scalars = read_field(record.scalars, near.graph(record.sibling_weight), frames, False)
     if record.origin == Origin.ALONE:
         return scalars
-    if previous is None or len(previous) != len(scalars):
+    if previous is None or len(previous) != len(near.starts) - 1:
         raise FormatError("a level that is counted from a group which is not at hand, or not to this level")
-    return scalars + previous[:, None]
+    return replace(scalars, before=previous)
 
 
 def _cost(field: EncodedField, offsets: Float64[np.ndarray, "E T"], rate: Rate) -> float:

@@ -7,6 +7,7 @@ The basis as decoded is orthonormal, so all columns share one step. A column is 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
@@ -15,7 +16,7 @@ from .. import _core
 from ..errors import FormatError, InputError
 from ..format.layout import CodedField
 from . import entropy, klt, orthonormal
-from .graph import Graph
+from .graph import Graph, GraphArrays
 from .steps import LEVELS, step_of
 
 MOST_BITS = 30  # of a mean's fraction: one that is a diagonal long still fits 32 bits
@@ -58,6 +59,37 @@ class EncodedField:
     symbol_bits: int
 
 
+FieldArrays: TypeAlias = tuple[
+    Int32[np.ndarray, "M V"],
+    GraphArrays,
+    float,
+    Float64[np.ndarray, "M C"],
+    Float64[np.ndarray, " C"],
+    Float64[np.ndarray, " V"] | None,
+]
+
+
+@dataclass(frozen=True, slots=True)
+class FieldValues:
+    """The trajectories of a field, as coded: what makes their numbers can do so on its way to what they are for."""
+
+    symbols: Int32[np.ndarray, "M V"]
+    graph: Graph
+    step: float
+    vectors: Float64[np.ndarray, "M C"]
+    mean: Float64[np.ndarray, " C"]
+    before: Float64[np.ndarray, " V"] | None = None  # what each trajectory is counted from, if not from 0
+
+    @property
+    def arrays(self) -> FieldArrays:
+        """As the core takes them."""
+        return (self.symbols, self.graph.arrays, self.step, self.vectors, self.mean, self.before)
+
+    def rows(self) -> Float64[np.ndarray, "V C"]:
+        """Their numbers."""
+        return _core.field_inverse(self.arrays)
+
+
 def encode_field(
     trajectories: Float64[np.ndarray, "V C"], graph: Graph, rate: Rate, surface: Surface | None = None
 ) -> EncodedField:
@@ -78,13 +110,17 @@ def encode_field(
         coded = _Columns(centered, _only(basis, kept), graph, rate, surface)
     packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
     record = CodedField(len(kept), rate.step_level, packed, coded.stream)
-    arrays = (graph.starts, graph.near, graph.weights)
-    decoded = _core.field_inverse(coded.symbols, arrays, rate.step, coded.vectors, np.ldexp(mean, -bits) * has_mean)
-    return EncodedField(record, has_mean, decoded, 8 * len(packed), 8 * len(coded.stream))
+    values = FieldValues(coded.symbols, graph, rate.step, coded.vectors, np.ldexp(mean, -bits) * has_mean)
+    return EncodedField(record, has_mean, values.rows(), 8 * len(packed), 8 * len(coded.stream))
 
 
 def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "V C"]:
     """The trajectories of a record. Raises FormatError where it holds none of this width."""
+    return read_field(record, graph, width, has_mean).rows()
+
+
+def read_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> FieldValues:
+    """The same as coded."""
     count = len(graph.starts) - 1
     if record.columns > width or record.step_level >= LEVELS:
         raise FormatError(f"{record.columns} columns of {width} numbers at step level {record.step_level}")
@@ -93,8 +129,7 @@ def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -
     symbols = np.empty((record.columns, count), np.int32)
     if not _core.decode_field(record.symbols, symbols, graph.starts, graph.near):
         raise FormatError(f"{len(record.symbols)} bytes of symbols are truncated or damaged")
-    arrays = (graph.starts, graph.near, graph.weights)
-    return _core.field_inverse(symbols, arrays, step_of(record.step_level), vectors, mean)
+    return FieldValues(symbols, graph, step_of(record.step_level), vectors, mean)
 
 
 class _Columns:
@@ -126,9 +161,8 @@ class _Columns:
         step, price = self.rate.step, self.rate.price
         if surface is None:
             return _core.predict_forward(self.weights, graph.starts, graph.near, graph.weights, step, price)
-        arrays = (graph.starts, graph.near, graph.weights)
         normals, tangential = surface.normals, surface.tangential
-        return _core.predict_surface(self.weights, arrays, self.vectors, normals, tangential, step, price)
+        return _core.predict_surface(self.weights, graph.arrays, self.vectors, normals, tangential, step, price)
 
     def pays(self) -> Bool[np.ndarray, " M"]:
         """True for the columns whose absence would cost more than they do."""

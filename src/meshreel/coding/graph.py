@@ -7,6 +7,7 @@ that of the next, with each new vertex's siblings.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
@@ -16,6 +17,8 @@ from ..errors import FormatError
 from ..geometry.levels import Level, subdivide
 from ..types import Mesh
 
+GraphArrays: TypeAlias = tuple[Int64[np.ndarray, " S"], Int32[np.ndarray, " E"], Float64[np.ndarray, " E"]]
+
 
 @dataclass(frozen=True, slots=True)
 class Graph:
@@ -24,6 +27,11 @@ class Graph:
     starts: Int64[np.ndarray, " S"]  # S = V + 1
     near: Int32[np.ndarray, " E"]
     weights: Float64[np.ndarray, " E"]
+
+    @property
+    def arrays(self) -> GraphArrays:
+        """As the core takes them."""
+        return self.starts, self.near, self.weights
 
 
 @dataclass(frozen=True, slots=True)

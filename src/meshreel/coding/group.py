@@ -15,10 +15,10 @@ from ..errors import FormatError
 from ..format.layout import DracoGroup, Form, LaplacianGroup, LayersPatches
 from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
-from ..types import Mesh
+from ..types import Mesh, Placement
 from .displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
 from .intra import decode_empty, decode_intra
-from .layers import LayersState, decode_layers, layers_end, layers_parts
+from .layers import LayersState, layers_parts, place_layers, read_layers
 from .mesh import check_growth, check_step, decode_mesh
 from .patches import decode_patches
 from .reference import CodedReference
@@ -45,40 +45,47 @@ def decode_group(data: bytes, frame_count: int, layers: int | None = None) -> li
 
 
 def continue_group(
-    data: bytes, frame_count: int, layers: int | None, previous: LayersState | None
+    data: bytes, frame_count: int, layers: int | None, previous: LayersState | None, place: Placement | None = None
 ) -> tuple[list[Mesh], LayersState | None]:
     """As `decode_group`, of a group that may be predicted from the one before; and what the next may be predicted from.
 
     `previous` is what this gave for the group before, with the same `layers`. Only the form `layers` has such a state.
+    With `place`, the frames are in metres; where the form allows, without another pass over them.
     """
     form = data[0] if data else None
-    state = None
-    if form == Form.EMPTY:
-        meshes = decode_empty(data, frame_count)
-    elif form == Form.DRACO:
-        meshes = decode_intra(data)
-    elif form == Form.LAPLACIAN:
-        meshes = _decode_laplacian(unpack_all(LaplacianGroup, data), layers)
-    elif form == Form.LAYERS:
-        meshes, state = _decode_layers(data, layers, previous)
+    if form == Form.LAYERS:
+        meshes, state = _decode_layers(data, layers, previous, place)
     else:
-        raise FormatError(f"group form {form} is not known to this reader")
+        meshes, state = _decode_alone(data, form, frame_count, layers), None
+        meshes = meshes if place is None else [place.of(mesh) for mesh in meshes]
     if len(meshes) != frame_count:
         raise FormatError(f"a group of {len(meshes)} frames where the index says {frame_count}")
     return meshes, state
 
 
+def _decode_alone(data: bytes, form: int | None, frame_count: int, layers: int | None) -> list[Mesh]:
+    """The frames of a group of a form that needs no other group."""
+    if form == Form.EMPTY:
+        return decode_empty(data, frame_count)
+    if form == Form.DRACO:
+        return decode_intra(data)
+    if form == Form.LAPLACIAN:
+        return _decode_laplacian(unpack_all(LaplacianGroup, data), layers)
+    raise FormatError(f"group form {form} is not known to this reader")
+
+
 def _decode_layers(
-    data: bytes, levels: int | None, previous: LayersState | None
+    data: bytes, levels: int | None, previous: LayersState | None, place: Placement | None
 ) -> tuple[list[Mesh], LayersState | None]:
     """Frames of a payload, with their patches where it has them and more layers than its levels are wanted."""
-    head, end = layers_end(data, levels)
-    faces, positions, state = decode_layers(data[:end], levels, previous)
-    if end == len(data) or (levels is not None and levels <= head.levels):
-        return [Mesh(frame, faces) for frame in positions], state
-    record = unpack_all(LayersPatches, data[end:])
-    patches = decode_patches(record, head.frames, len(faces))
-    return patches.apply(positions, faces), state
+    records = read_layers(data, levels)
+    plain = records.end == len(data) or (levels is not None and levels <= records.head.levels)
+    decoded = place_layers(records, previous, place, spare=not plain)
+    if plain:
+        return [Mesh(frame, decoded.faces) for frame in decoded.positions], decoded.state
+    record = unpack_all(LayersPatches, data[records.end :])
+    patches = decode_patches(record, records.head.frames, len(decoded.faces))
+    return patches.apply(decoded.positions, decoded.faces, place, decoded.spare), decoded.state
 
 
 def _decode_laplacian(record: LaplacianGroup, components: int | None) -> list[Mesh]:

@@ -6,7 +6,7 @@ of layers decodes to a coarser mesh. T = 1 is the intra form. A group may be pre
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
@@ -15,9 +15,9 @@ from jaxtyping import Float64, Int32
 from ..errors import FormatError, InputError
 from ..format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ..format.records import pack, unpack, unpack_all
-from ..geometry.levels import frames_of, heights, refine, refine_frames, refine_rows, subdivide
-from ..types import Mesh
-from .details import decode_level, encode_level
+from ..geometry.levels import frames_of, heights, refine, subdivide
+from ..types import Mesh, Placement
+from .details import Shown, decode_last, decode_level, encode_level
 from .fields import Rate
 from .graph import Connectivity, connectivity
 from .mesh import check_growth, check_step, decode_mesh
@@ -116,8 +116,28 @@ def encode_layers(
         parts.append(pack(coded.record))
         scalars.append(coded.scalars)
         known, faces = refine(known, level, coded.scalars, curvature), level.faces
-    state = _state(base, known, [level.T for level in scalars])
+    last = known[-1, : len(base.vertices)].copy()
+    state = LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))
     return EncodedLayers(b"".join(parts), tuple(accumulate(map(len, parts))), known, state)
+
+
+@dataclass(frozen=True, slots=True)
+class LayersRecords:
+    """The records of a payload, or those of its first levels."""
+
+    head: LayersGroup
+    levels: tuple[LayersLevel, ...]
+    end: int  # offset behind them
+
+
+def read_layers(data: bytes, levels: int | None = None) -> LayersRecords:
+    """The records of a payload, or only the first so many levels. Raises FormatError on damaged bytes."""
+    head, offset = unpack(LayersGroup, data)
+    records = []
+    for _ in range(head.levels if levels is None else min(levels, head.levels)):
+        record, offset = unpack(LayersLevel, data, offset)
+        records.append(record)
+    return LayersRecords(head, tuple(records), offset)
 
 
 def decode_layers(
@@ -127,38 +147,70 @@ def decode_layers(
 
     With `levels`, so many subdivisions at most, for which `data` may end behind theirs.
     """
-    head, offset = unpack(LayersGroup, data)
+    records = read_layers(data, levels)
+    if levels is None and records.end != len(data):
+        raise FormatError(f"layers: {len(data) - records.end} bytes too many")
+    decoded = place_layers(records, previous)
+    return decoded.faces, decoded.positions, decoded.state
+
+
+@dataclass(frozen=True, slots=True)
+class DecodedLayers:
+    """A group as decoded."""
+
+    faces: Int32[np.ndarray, "F 3"]
+    positions: Float64[np.ndarray, "T V 3"]
+    state: LayersState
+    spare: Int32[np.ndarray, "N 3"]  # room behind the positions
+
+
+def place_layers(
+    records: LayersRecords, previous: LayersState | None, place: Placement | None = None, spare: bool = False
+) -> DecodedLayers:
+    """What records decode to; with `place`, vertices as placed by it, which the state never is.
+
+    With `spare`, there is room for faces of each frame, too: where a group's memory is one block, the next group gets
+    it again, without the page faults that would take as long as decoding.
+    """
+    head = records.head
     previous = previous if head.origin == Origin.PREVIOUS else None
     base = _base(head, previous)
     known = decode_trajectories(head.motion, base, head.frames, head.has_mean == Presence.PRESENT)
-    faces = base.faces
-    scalars: list[Float64[np.ndarray, "_ T"]] = []
+    last = np.ascontiguousarray(known[:, :, -1])
+    faces, room = base.faces, _Room.of(head.frames, 0, 0)
+    scalars: list[Float64[np.ndarray, " _"]] = []
     finer: list[Connectivity] = []
-    finest = head.levels if levels is None else min(levels, head.levels)
-    positions = frames_of(known)
-    for number in range(1, finest + 1):
-        record, offset = unpack(LayersLevel, data, offset)
-        finer.append(_connectivity(previous, number) or connectivity(faces, len(known)))
-        level = finer[-1].level
-        if 3 * head.frames * level.count > MOST_NUMBERS:
-            raise FormatError(f"{head.frames} frames of {len(level.faces)} faces exceed {MOST_NUMBERS} numbers")
-        scalars.append(decode_level(record, finer[-1].siblings, head.frames, _before(previous, number)))
-        if number < finest:
-            known = refine_rows(known, level, scalars[-1], record.curvature)
+    for number, record in enumerate(records.levels, 1):
+        near = _connectivity(previous, number) or connectivity(faces, len(known))
+        if 3 * head.frames * near.level.count > MOST_NUMBERS:
+            raise FormatError(f"{head.frames} frames of {len(near.level.faces)} faces exceed {MOST_NUMBERS} numbers")
+        before = _before(previous, number)
+        if number < len(records.levels):
+            known, offsets = decode_level(record, near, known, before)
         else:
-            positions = refine_frames(known, level, scalars[-1], record.curvature)
-        faces = level.faces
-    if levels is None and offset != len(data):
-        raise FormatError(f"layers: {len(data) - offset} bytes too many")
-    return faces, positions, replace(_state(base, positions, scalars), finer=tuple(finer))
+            room = _Room.of(head.frames, near.level.count, len(near.level.faces) * spare)
+            offsets = decode_last(record, near, known, before, Shown(room.positions, place))
+        faces = near.level.faces
+        finer.append(near)
+        scalars.append(offsets)
+    positions = room.positions if records.levels else frames_of(known, place)
+    return DecodedLayers(faces, positions, LayersState(base.faces, last, tuple(scalars), tuple(finer)), room.faces)
 
 
-def layers_end(data: bytes, levels: int | None = None) -> tuple[LayersGroup, int]:
-    """The head of a payload, and where its levels end, or the first so many. FormatError on damaged bytes."""
-    head, offset = unpack(LayersGroup, data)
-    for _ in range(head.levels if levels is None else min(levels, head.levels)):
-        _, offset = unpack(LayersLevel, data, offset)
-    return head, offset
+@dataclass(frozen=True, slots=True)
+class _Room:
+    """One block of memory."""
+
+    positions: Float64[np.ndarray, "T V 3"]
+    faces: Int32[np.ndarray, "N 3"]
+
+    @staticmethod
+    def of(frames: int, vertices: int, faces: int) -> _Room:
+        """For so many of each in every frame."""
+        size = 3 * frames * vertices
+        block = np.empty(size + (3 * frames * faces + 1) // 2)
+        rows = block[size:].view(np.int32)[: 3 * frames * faces]
+        return _Room(block[:size].reshape(frames, vertices, 3), rows.reshape(-1, 3))
 
 
 def layers_parts(data: bytes) -> dict[str, int]:
@@ -208,10 +260,3 @@ def _before(previous: LayersState | None, number: int) -> Float64[np.ndarray, " 
 def _connectivity(previous: LayersState | None, number: int) -> Connectivity | None:
     """That of a level of the group before, whose faces a group has which is predicted from it."""
     return previous.finer[number - 1] if previous is not None and number <= len(previous.finer) else None
-
-
-def _state(
-    base: Mesh, positions: Float64[np.ndarray, "T V 3"], scalars: list[Float64[np.ndarray, "_ T"]]
-) -> LayersState:
-    last = positions[-1, : len(base.vertices)].copy()
-    return LayersState(base.faces, last, tuple(level[:, -1].copy() for level in scalars))

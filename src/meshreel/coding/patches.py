@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
+from .. import _core
 from ..errors import FormatError, InputError
 from ..format.layout import LayersPatches
 from ..geometry.topology import drop_unreferenced
-from ..types import Mesh
+from ..types import Mesh, Placement
 from . import entropy
 from .mesh import decode_mesh, encode_mesh
 from .steps import LEVELS, step_of
@@ -30,12 +31,36 @@ class Patches:
     dropped: Bool[np.ndarray, "T F"]  # faces that a frame is shown without
     meshes: tuple[Mesh, ...]  # what it is shown with besides; possibly empty
 
-    def apply(self, positions: Float64[np.ndarray, "T V 3"], faces: Int32[np.ndarray, "F 3"]) -> list[Mesh]:
-        """The frames as shown: vertices and faces of the patch are behind the template's."""
+    def apply(
+        self,
+        positions: Float64[np.ndarray, "T V 3"],
+        faces: Int32[np.ndarray, "F 3"],
+        place: Placement | None = None,
+        spare: Int32[np.ndarray, "N 3"] | None = None,
+    ) -> list[Mesh]:
+        """The frames as shown: vertices and faces of the patch are behind the template's.
+
+        With `place`, in metres; `positions` are already placed then. `spare` is room for the faces of all frames.
+        """
+        shown = self._shown(faces, spare)
         return [
-            _joined(points, faces if not gone.any() else faces[~gone], patch)
-            for points, gone, patch in zip(positions, self.dropped, self.meshes, strict=True)
+            _joined(points, kept, patch if place is None or patch.is_empty else place.of(patch))
+            for points, kept, patch in zip(positions, shown, self.meshes, strict=True)
         ]
+
+    def _shown(
+        self, faces: Int32[np.ndarray, "F 3"], spare: Int32[np.ndarray, "N 3"] | None
+    ) -> list[Int32[np.ndarray, "_ 3"]]:
+        """The faces of each frame."""
+        shown = [faces] * len(self.dropped)
+        changed = np.flatnonzero(self.dropped.any(axis=1))
+        room = np.empty((len(changed) * len(faces), 3), np.int32) if spare is None or not len(spare) else spare
+        used = 0
+        for t in changed:
+            count = _core.keep_faces(faces, self.dropped[t].view(np.uint8), room[used : used + len(faces)])
+            shown[t] = room[used : used + count]
+            used += count
+        return shown
 
 
 def reach(step_level: int, frames: int) -> tuple[float, float]:
@@ -91,7 +116,7 @@ def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[
     turned, rest = _filled(rest, frames * count)
     if len(rest):
         raise FormatError(f"patches: {len(rest)} runs too many")
-    dropped[:, ever] = np.logical_xor.accumulate(turned.reshape(frames, count), axis=0)
+    dropped[:, np.flatnonzero(ever)] = np.logical_xor.accumulate(turned.reshape(frames, count), axis=0)
     return dropped
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Float64, Int32
 
 from .. import _core
 from ..errors import FormatError
-from ..types import Mesh
+from ..types import Mesh, Placement
 from .topology import vertex_normals
 
 LEAST_COSINE = 0.3  # between direction and the surface's normal; below, the tangent plane says nothing
@@ -87,33 +87,16 @@ def refine(
     the midpoint lies from the edge's.
     """
     rows = np.ascontiguousarray(known.transpose(1, 2, 0))
-    return refine_frames(rows, level, np.ascontiguousarray(scalars.T), curvature)
+    return checked(*_core.refine(rows, level.coarse, level.edges, np.ascontiguousarray(scalars.T), curvature))
 
 
-def refine_rows(
-    known: Float64[np.ndarray, "V 3 T"], level: Level, scalars: Float64[np.ndarray, "E T"], curvature: int
-) -> Float64[np.ndarray, "W 3 T"]:
-    """As `refine`, of rows: all frames of a number are neighbours in memory, and take the same steps together."""
-    rows = np.empty((level.count, *known.shape[1:]))
-    rows[: level.vertices] = known
-    _core.refine(rows, level.vertices, level.coarse, level.edges, scalars, curvature)
-    return rows
+def frames_of(rows: Float64[np.ndarray, "V 3 T"], place: Placement | None = None) -> Float64[np.ndarray, "T V 3"]:
+    """The frames of rows: all frames of a number are neighbours in memory. FormatError where they are not finite."""
+    return checked(*_core.frames_of_rows(rows, None if place is None else place.numbers))
 
 
-def refine_frames(
-    known: Float64[np.ndarray, "V 3 T"], level: Level, scalars: Float64[np.ndarray, "E T"], curvature: int
-) -> Float64[np.ndarray, "T W 3"]:
-    """`refine_rows` as frames, without a copy. Raises FormatError where they are not finite."""
-    frames, finite = _core.refine_frames(known, level.coarse, level.edges, scalars, curvature)
-    return _checked(frames, finite)
-
-
-def frames_of(rows: Float64[np.ndarray, "V 3 T"]) -> Float64[np.ndarray, "T V 3"]:
-    """The frames of rows. Raises FormatError where they are not finite."""
-    return _checked(*_core.frames_of_rows(rows))
-
-
-def _checked(frames: Float64[np.ndarray, "T V 3"], finite: bool) -> Float64[np.ndarray, "T V 3"]:
+def checked(frames: Float64[np.ndarray, "T V 3"], finite: bool) -> Float64[np.ndarray, "T V 3"]:
+    """Frames which the core says are finite. Raises FormatError where it does not."""
     if not finite:
         raise FormatError("vertices that are not finite")
     return frames

@@ -1,0 +1,26 @@
+// The way out of the C ABI: nothing is thrown across it.
+#pragma once
+
+#include <new>
+
+namespace meshreel {
+
+// What `body` gives, `no_memory` where there was none for it, and `failed` where it threw anything else.
+template <class Body>
+int guarded(int no_memory, int failed, Body body) {
+    try {
+        return body();
+    } catch (const std::bad_alloc&) {
+        return no_memory;
+    } catch (...) {
+        return failed;
+    }
+}
+
+// The same of a body that can throw only for want of memory: std::bad_alloc, or std::length_error.
+template <class Body>
+int guarded(int no_memory, Body body) {
+    return guarded(no_memory, no_memory, body);
+}
+
+}  // namespace meshreel
