@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from meshreel import _core
 from meshreel.coding import fields, orthonormal
-from meshreel.coding.fields import Rate, Surface, decode_field, encode_field
+from meshreel.coding.fields import Rate, SurfaceWeight, decode_field, encode_field
 from meshreel.coding.graph import hierarchy, siblings
 from meshreel.coding.steps import LEVELS
 from meshreel.errors import FormatError, InputError
@@ -24,7 +24,7 @@ GRAPH = hierarchy(MESH).graph
 COUNT = len(MESH.vertices)
 
 
-ROUND = Surface(np.tile(vertex_normals(MESH)[hierarchy(MESH).order], 4), 0.4)
+ROUND = SurfaceWeight(np.tile(vertex_normals(MESH)[hierarchy(MESH).order], 4), 0.4)
 
 
 def trajectories(frames: int = 4) -> np.ndarray:
@@ -80,7 +80,7 @@ def test_a_price_on_bits_saves_more_than_it_spoils() -> None:
 def test_errors_move_to_where_they_do_not_show() -> None:
     wanted, errors, bits = trajectories(), [], []
     for tangential in (1.0, 0.3):
-        coded = encode_field(wanted, GRAPH, Rate(72, 0.12), Surface(ROUND.normals, tangential))
+        coded = encode_field(wanted, GRAPH, Rate(72, 0.12), SurfaceWeight(ROUND.normals, tangential))
         error = (coded.decoded - wanted).reshape(COUNT, -1, 3)
         errors.append(((error * ROUND.normals.reshape(COUNT, -1, 3)).sum(axis=2) ** 2).mean())
         bits.append(coded.symbol_bits)

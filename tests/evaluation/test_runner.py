@@ -14,7 +14,8 @@ from meshreel.evaluation import runner
 from meshreel.evaluation.bridges import count_bridges
 from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import CODECS, make_codec
-from meshreel.evaluation.datasets import Backwards, open_dataset
+from meshreel.evaluation.datasets import open_dataset
+from meshreel.evaluation.derived import Backwards
 from meshreel.evaluation.fresh import peak_rss_mb
 from meshreel.evaluation.peers import equal_anchor, run_fresh
 from meshreel.evaluation.rows import Point, read_rows

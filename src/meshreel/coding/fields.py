@@ -41,7 +41,7 @@ class Rate:
 
 
 @dataclass(frozen=True, slots=True)
-class Surface:
+class SurfaceWeight:
     """Where a field of places is seen from: errors along the surface count less than those across it."""
 
     normals: Float64[np.ndarray, "V C"]  # of each vertex in each frame, of unit length or zero
@@ -91,7 +91,7 @@ class FieldValues:
 
 
 def encode_field(
-    trajectories: Float64[np.ndarray, "V C"], graph: Graph, rate: Rate, surface: Surface | None = None
+    trajectories: Float64[np.ndarray, "V C"], graph: Graph, rate: Rate, surface: SurfaceWeight | None = None
 ) -> EncodedField:
     """The columns that pay, quantised in a closed loop; with a surface, of places on it, which have a mean."""
     width = trajectories.shape[1]
@@ -141,7 +141,7 @@ class _Columns:
         basis: klt.Basis,
         graph: Graph,
         rate: Rate,
-        surface: Surface | None,
+        surface: SurfaceWeight | None,
     ) -> None:
         self.rate = rate
         count, width = len(basis.energies), trajectories.shape[1]
@@ -156,7 +156,7 @@ class _Columns:
         self.stream, self.sizes = _core.encode_field(self.symbols, graph.starts, graph.near)
 
     def _quantized(
-        self, graph: Graph, surface: Surface | None
+        self, graph: Graph, surface: SurfaceWeight | None
     ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]:
         step, price = self.rate.step, self.rate.price
         if surface is None:

@@ -15,7 +15,7 @@ from ..format.layout import CodedField
 from ..geometry.levels import frames_of
 from ..geometry.topology import vertex_normals
 from ..types import Mesh
-from .fields import EncodedField, Rate, Surface, decode_field, encode_field
+from .fields import EncodedField, Rate, SurfaceWeight, decode_field, encode_field
 from .graph import Hierarchy, hierarchy
 
 
@@ -30,7 +30,7 @@ def encode_trajectories(
     offsets = np.moveaxis(positions - base.vertices, 0, 1)[places.order]
     frames = [vertex_normals(Mesh(np.ascontiguousarray(frame), base.faces)) for frame in positions]
     normals = np.stack(frames, axis=1)[places.order].reshape(len(base.vertices), -1)
-    surface = Surface(np.ascontiguousarray(normals), tangential)
+    surface = SurfaceWeight(np.ascontiguousarray(normals), tangential)
     field = encode_field(offsets.reshape(len(base.vertices), -1), places.graph, rate, surface)
     return field, frames_of(_placed(field.decoded, base, places))
 

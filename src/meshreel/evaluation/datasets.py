@@ -5,7 +5,6 @@ A sequence is cut to its first `frames` frames where that is asked for; every lo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from ..capture.procedural import SoftBodiesOptions, soft_bodies
@@ -31,27 +30,6 @@ def open_dataset(name: str, data: Path, frames: int | None = None, cache: Path |
         source = _open_files(REMESHED[name], data, min(frames or REMESHED_FRAMES, REMESHED_FRAMES))
         return RemeshedSequence(source, None if cache is None else cache / name)
     return _open_files(name, data, frames)
-
-
-class Backwards:
-    """The frames of a sequence from the last to the first, as a MeshSequence."""
-
-    def __init__(self, source: MeshSequence) -> None:
-        self._source = source
-
-    @property
-    def frame_rate(self) -> float:
-        """Frames per second, 1/s."""
-        return self._source.frame_rate
-
-    def __len__(self) -> int:
-        return len(self._source)
-
-    def __iter__(self) -> Iterator[Mesh]:
-        return (self[index] for index in range(len(self)))
-
-    def __getitem__(self, index: int) -> Mesh:
-        return self._source[range(len(self))[::-1][index]]
 
 
 def _open_files(name: str, data: Path, frames: int | None) -> FileSequence:

@@ -25,10 +25,10 @@ class Promise:
         return {None: "not measured", True: "met", False: "MISSED"}[self.met]
 
 
-Measure = Callable[[Row], tuple[str, bool]]
+Reading = Callable[[Row], tuple[str, bool]]
 
 
-def of_row(text: str, bound: str, row: Row | None, measure: Measure) -> Promise:
+def of_row(text: str, bound: str, row: Row | None, measure: Reading) -> Promise:
     """The promise as `measure` finds it in a row: the value as text, and whether it holds."""
     return Promise(text, bound) if row is None else Promise(text, bound, *_told(measure(row), [row]))
 

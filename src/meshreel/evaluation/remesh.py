@@ -7,7 +7,6 @@ the seed: midpoint subdivision, vertices moved along the surface, QEM, vertices 
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from ..geometry.topology import subdivide_midpoint, unique_edges, vertex_normals
 from ..io.meshes import read_mesh
 from ..io.write import write_mesh
 from ..types import Mesh, MeshSequence
+from .derived import DerivedSequence
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,27 +37,17 @@ class RemeshOptions:
             raise InputError(f"remeshing with {text}: give at least 4 vertices, levels 0 to 4, jitter 0 to 0.5")
 
 
-class RemeshedSequence:
+class RemeshedSequence(DerivedSequence):
     """The frames of a sequence, remeshed when they are asked for; kept as PLY files where a folder is given.
 
     The files are a cache: a frame is the same with and without it, and two processes may fill it at once.
     """
 
     def __init__(self, source: MeshSequence, folder: Path | None = None, options: RemeshOptions = RemeshOptions()):
-        self._source, self._folder, self._options = source, folder, options
+        super().__init__(source)
+        self._folder, self._options = folder, options
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)
-
-    @property
-    def frame_rate(self) -> float:
-        """Frames per second, 1/s."""
-        return self._source.frame_rate
-
-    def __len__(self) -> int:
-        return len(self._source)
-
-    def __iter__(self) -> Iterator[Mesh]:
-        return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[operator.index(index)]

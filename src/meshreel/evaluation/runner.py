@@ -26,7 +26,8 @@ from .bridges import count_bridges, count_degenerate
 from .codec import Codec
 from .codecs import make_codec
 from .codecs.draco import lattice_step
-from .datasets import Backwards, open_dataset
+from .datasets import open_dataset
+from .derived import Backwards
 from .fresh import peak_rss_mb
 from .groups import group_records
 from .peers import cheapest_forms, measure_pair, run_fresh
