@@ -101,14 +101,18 @@ def _on_one_frame(
         sizes = [len(encode_intra([reduced], step, 0)) for step in steps]
         if min(sizes) > budget:
             return  # more vertices cost more
+        affordable = [(step, size) for step, size in zip(steps, sizes, strict=True) if size <= budget]
         for levels in options.levels:
-            for step, size in zip(steps, sizes, strict=True):
-                if size > budget:
-                    break  # finer steps cost more
-                payload = encode_intra([reduced], step, levels)
-                if measure([frame], decode_intra(payload)).reaches(target):
+            if not _reaches(frame, reduced, affordable[-1][0], levels, target):
+                continue  # the finest step is the best one
+            for step, size in affordable:
+                if step == affordable[-1][0] or _reaches(frame, reduced, step, levels, target):
                     yield size, fraction, step, levels
                     break
+
+
+def _reaches(frame: Mesh, reduced: Mesh, step: float, levels: int, target: Quality) -> bool:
+    return measure([frame], decode_intra(encode_intra([reduced], step, levels))).reaches(target)
 
 
 def _reduced(frame: Mesh, fraction: float) -> Mesh:
