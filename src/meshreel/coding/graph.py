@@ -64,7 +64,9 @@ class Connectivity:
     @property
     def nbytes(self) -> int:
         """Memory, bytes; the coarser level's faces are another's."""
-        return self.level.edges.nbytes + self.level.faces.nbytes + self.siblings.starts.nbytes + self.siblings.near.nbytes
+        return (
+            self.level.edges.nbytes + self.level.faces.nbytes + self.siblings.starts.nbytes + self.siblings.near.nbytes
+        )
 
 
 def connectivity(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Connectivity:
