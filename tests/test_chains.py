@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 import meshreel
+from meshreel import decoder
 from meshreel.coding.intra import encode_empty
 from meshreel.coding.layers import encode_layers
 from meshreel.container.reader import ReelReader
@@ -191,3 +193,33 @@ def test_threads_that_share_a_video_get_the_frames_they_asked_for():
     with ThreadPoolExecutor(4) as executor:
         found = list(executor.map(lambda frame: frame_record(video[frame]), frames))
     assert found == [WHOLE[frame] for frame in frames]
+
+
+@pytest.mark.parametrize("most", [0, 30_000, 60_000])
+def test_what_is_kept_of_a_chain_is_bounded_and_frames_stay_the_same(monkeypatch: pytest.MonkeyPatch, most: int):
+    free, bound = meshreel.open(DATA), meshreel.open(DATA)
+    for frame in range(COUNT - EMPTY):
+        assert frame_record(free[frame]) == WHOLE[frame]
+    alone = _states_after(DATA, 0).size
+    monkeypatch.setattr(decoder, "MOST_KEPT", most)
+    for frame in [*range(COUNT), *reversed(range(COUNT)), 7, 2, 8, 4]:
+        assert frame_record(bound[frame]) == WHOLE[frame]
+        assert _size(bound._states) == bound._states.size <= max(most, alone)
+    assert most > 0 or len(bound._states.known) == 1
+
+
+def test_groups_of_a_chain_share_what_follows_from_their_faces():
+    first, both = _states_after(DATA, 0), _states_after(DATA, 3)
+    assert list(both.known) == [0, 1]
+    assert first.size < both.size < 1.5 * first.size
+
+
+def _size(states: decoder._States) -> int:
+    known = [None, *states.known.values()]
+    return sum(state.nbytes_beyond(before) for before, state in pairwise(known) if state is not None)
+
+
+def _states_after(data: bytes, frame: int) -> decoder._States:
+    video = meshreel.open(data)
+    video[frame]
+    return video._states

@@ -92,10 +92,12 @@ bool decode_integers(const nb::bytes& data, const Array<int32_t, 1>& values) {
 
 }  // namespace
 
+// What is written to is never converted: a copy would be, and the array given would stay as it was.
 void bind_entropy(nb::module_& m) {
     m.def("encode_weights", &encode_weights);
-    m.def("decode_weights", &decode_weights);
-    m.def("weight_contexts", &weight_contexts);
+    m.def("decode_weights", &decode_weights, nb::arg("data"), nb::arg("sizes"), nb::arg("columns").noconvert(), nb::arg("starts"), nb::arg("indices"));
+    m.def("weight_contexts", &weight_contexts, nb::arg("columns"), nb::arg("starts"), nb::arg("indices"), nb::arg("classes").noconvert(),
+          nb::arg("signs").noconvert());
     m.def("encode_integers", &encode_integers);
-    m.def("decode_integers", &decode_integers);
+    m.def("decode_integers", &decode_integers, nb::arg("data"), nb::arg("values").noconvert());
 }

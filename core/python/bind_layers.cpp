@@ -262,7 +262,7 @@ nb::tuple frames_of_rows(In<double, 3> rows, Place place) {
     const mr_placement placement = placement_of(place);
     Buffer<double> positions(3 * frames * vertices);
     mr_frames out{positions.data(), place ? &placement : nullptr, 0};
-    mr_frames_of_rows(rows.data(), frames, vertices, &out);
+    check(mr_frames_of_rows(rows.data(), frames, vertices, &out));
     return nb::make_tuple(positions.three(frames, vertices, 3), out.finite != 0);
 }
 
@@ -309,6 +309,7 @@ bool decode_field(const nb::bytes& data, InOut<int32_t, 2> columns, In<int64_t, 
 
 }  // namespace
 
+// What is written to is never converted: a copy would be, and the array given would stay as it was.
 void bind_layers(nb::module_& m) {
     m.def("hierarchy", &hierarchy);
     m.def("predict_forward", &predict_forward);
@@ -323,9 +324,9 @@ void bind_layers(nb::module_& m) {
     m.def("refine", &refine);
     m.def("refine_field", &refine_field);
     m.def("refine_field_frames", &refine_field_frames, "rows"_a, "faces"_a, "edges"_a, "field"_a, "curvature"_a, "place"_a.none(),
-          "positions"_a);
+          "positions"_a.noconvert());
     m.def("frames_of_rows", &frames_of_rows, "rows"_a, "place"_a.none());
-    m.def("keep_faces", &keep_faces);
+    m.def("keep_faces", &keep_faces, "faces"_a, "dropped"_a, "room"_a.noconvert());
     m.def("encode_field", &encode_field);
-    m.def("decode_field", &decode_field);
+    m.def("decode_field", &decode_field, "data"_a, "columns"_a.noconvert(), "starts"_a, "near"_a);
 }

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "guarded.h"
@@ -17,7 +18,7 @@ void reflect(const double* u, double uu, size_t first, size_t width, double* v) 
 }  // namespace
 
 int mr_orthonormal_inverse(const int32_t* symbols, size_t count, size_t width, double* vectors) {
-    if (count > width) return MR_LAYERS_BAD_INPUT;
+    if (count > width || width > INT32_MAX) return MR_LAYERS_BAD_INPUT;
     return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&]() -> int {
         std::vector<double> mirrors(count * width, 0.0), squares(count, 0.0);
         for (size_t k = 0; k < count; symbols += width - k, ++k) {

@@ -238,8 +238,11 @@ int mr_refine_field_frames(const mr_level* level, const mr_field* field, const d
     }); });
 }
 
-void mr_frames_of_rows(const double* rows, size_t count, size_t vertices, mr_frames* frames) {
-    Frames out(*frames, count, vertices);
-    out.set(0, rows, vertices);
-    frames->finite = out.are_finite();
+int mr_frames_of_rows(const double* rows, size_t count, size_t vertices, mr_frames* frames) {
+    return guarded(MR_LAYERS_NO_MEMORY, [&] {
+        Frames out(*frames, count, vertices);
+        out.set(0, rows, vertices);
+        frames->finite = out.are_finite();
+        return int{MR_LAYERS_OK};
+    });
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 #include <functional>
 #include <utility>
@@ -61,7 +62,8 @@ size_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, in
 }  // namespace
 
 int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer, size_t* edge_count) {
-    if (!meshreel::in_range(faces, 3 * face_count, vertices) || vertices + 3 * face_count > INT32_MAX) return MR_LAYERS_BAD_INPUT;
+    if (vertices > INT32_MAX || vertices + 3 * face_count > INT32_MAX) return MR_LAYERS_BAD_INPUT;
+    if (!meshreel::in_range(faces, 3 * face_count, vertices)) return MR_LAYERS_BAD_INPUT;
     return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&] {
         std::vector<int32_t> numbers(3 * face_count);
         *edge_count = number_edges(faces, face_count, vertices, edges, numbers.data());
@@ -77,6 +79,7 @@ int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32
 }
 
 int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts, int32_t* near) {
+    if (vertices > INT32_MAX || edge_count > INT32_MAX) return MR_LAYERS_BAD_INPUT;
     const int64_t first = static_cast<int64_t>(vertices);
     const auto in_face = [&](size_t f, int k) { return finer[12 * f + 9 + static_cast<size_t>(k)] - first; };
     for (size_t f = 0; f < face_count; ++f)

@@ -19,6 +19,8 @@ from .errors import FormatError, InputError
 from .format.layout import ChunkKind
 from .types import Mesh, Placement
 
+MOST_KEPT = 1 << 29  # bytes of states: a few bytes may say groups that take as much as a file may claim, each
+
 
 def open(source: str | Path | bytes | Source) -> Video:
     """The video in a .reel file, in bytes, or behind any source of byte ranges.
@@ -44,6 +46,28 @@ class _Decoded:
     state: LayersState | None
 
 
+@dataclass(frozen=True, slots=True)
+class _States:
+    """Of the groups of one chain: playing backwards asks for each."""
+
+    known: dict[int, LayersState | None]
+    size: int = 0  # bytes
+
+    def of(self, number: int | None) -> LayersState | None:
+        """That of a group, None where there is none."""
+        return None if number is None else self.known.get(number)
+
+    def add(self, number: int, state: LayersState | None, before: LayersState | None) -> _States:
+        """With that of a group in `known`; without those of other groups where they would be too much."""
+        if number in self.known:
+            return self
+        size = 0 if state is None else state.nbytes_beyond(before)
+        if self.size + size > MOST_KEPT:
+            return _States({number: state}, 0 if state is None else state.nbytes_beyond(None))
+        self.known[number] = state
+        return _States(self.known, self.size + size)
+
+
 class Video(Sequence[Mesh]):
     """Frames of a .reel file as a sequence of meshes; random access decodes one group, and those it depends on.
 
@@ -57,7 +81,7 @@ class Video(Sequence[Mesh]):
         self._close = close
         self._place = Placement(reader.header.scale, reader.header.origin)  # undoes the encoder's normalisation
         self._group = _Decoded(-1, [], None)
-        self._states: dict[int, LayersState | None] = {}  # of the groups of one chain: playing backwards asks for each
+        self._states = _States({})
 
     def at(self, quality: int | None) -> Video:
         """The same video from at most this many layers of a group beyond the first: fewer bytes, still valid.
@@ -118,13 +142,14 @@ class Video(Sequence[Mesh]):
             return known.frames
         chain = [chunk]
         states = self._states
-        while (before := self._group_before(chain[-1])) is not None and before not in states:
+        while (before := self._group_before(chain[-1])) is not None and before not in states.known:
             chain.append(self.reader.chunks[before])
-        state = states.get(before) if before is not None else None
-        states = {} if before is None else dict(states)
+        state = states.of(before)
+        states = _States({}) if before is None else _States(dict(states.known), states.size)
         for link in reversed(chain):
-            meshes, state = self._decode(link, state)
-            states[link.number] = state
+            meshes, after = self._decode(link, state)
+            states = states.add(link.number, after, state)
+            state = after
         self._states = states  # replaced, not changed: other threads may read it
         known = _Decoded(chunk.number, meshes, state)
         self._group = known

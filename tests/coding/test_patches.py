@@ -12,10 +12,11 @@ from hypothesis.extra.numpy import arrays
 from meshreel import _core
 from meshreel.coding.group import continue_group, decode_group, payload_parts
 from meshreel.coding.layers import encode_layers
-from meshreel.coding.patches import Patches, decode_patches, decode_runs, encode_patches, encode_runs
+from meshreel.coding.patches import Patches, _parted, decode_patches, decode_runs, encode_patches, encode_runs
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersPatches
 from meshreel.format.records import pack
+from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh, Placement
 
 from .bodies import ball, moving
@@ -202,3 +203,23 @@ def test_frames_without_changes_keep_the_templates_faces_themselves() -> None:
     plain = Patches(np.zeros((1, FACES), bool), (Mesh.empty(),))
     assert plain.apply(CODED.positions[:1], BALL.base.faces)[0].faces is BALL.base.faces
     assert isinstance(RECORD, LayersPatches)
+
+
+def test_each_frame_gets_its_faces_and_the_vertices_they_use_in_their_order() -> None:
+    generator = np.random.default_rng(5)
+    of_vertices = generator.integers(0, 6, 300)
+    of_vertices[of_vertices == 3] = 2  # a frame without any
+    groups = [np.flatnonzero(of_vertices == t) for t in (0, 1, 2, 4, 5)]
+    faces = np.concatenate([generator.choice(group, (30, 3)) for group in groups])
+    mesh = Mesh.of(generator.normal(size=(300, 3)), generator.permutation(faces))
+    of_faces = of_vertices[mesh.faces[:, 0]]
+    for t, part in enumerate(_parted(mesh, of_vertices, of_faces, 6)):
+        wanted = drop_unreferenced(Mesh(mesh.vertices, mesh.faces[of_faces == t]))
+        np.testing.assert_array_equal(part.vertices, wanted.vertices)
+        np.testing.assert_array_equal(part.faces, wanted.faces)
+
+
+def test_patches_of_absurd_size_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("meshreel.coding.mesh.MAX_FACES", 100)
+    with pytest.raises(FormatError, match="over 100"):
+        decode_patches(RECORD, FRAMES, FACES)

@@ -110,7 +110,7 @@ int mr_refine_field(const struct mr_level* level, const struct mr_field* field, 
 int mr_refine_field_frames(const struct mr_level* level, const struct mr_field* field, const double* rows, double* last,
                            struct mr_frames* frames);
 // Rows as they are.
-void mr_frames_of_rows(const double* rows, size_t count, size_t vertices, struct mr_frames* frames);
+int mr_frames_of_rows(const double* rows, size_t count, size_t vertices, struct mr_frames* frames);
 
 // Copies the faces of which `dropped` is 0; their number. `kept` has room for all.
 size_t mr_keep_faces(const int32_t* faces, const uint8_t* dropped, size_t face_count, int32_t* kept);

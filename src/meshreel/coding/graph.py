@@ -61,6 +61,13 @@ class Connectivity:
     level: Level
     siblings: Siblings
 
+    @property
+    def nbytes(self) -> int:
+        """Memory, bytes; the coarser level's faces are another's."""
+        return (
+            self.level.edges.nbytes + self.level.faces.nbytes + self.siblings.starts.nbytes + self.siblings.near.nbytes
+        )
+
 
 def connectivity(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Connectivity:
     """Of the next level. Raises FormatError where a face names none of the vertices."""

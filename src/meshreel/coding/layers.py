@@ -72,6 +72,12 @@ class LayersState:
     scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each level decoded
     finer: tuple[Connectivity, ...] = ()  # of the levels as far as they are at hand; from the faces alone
 
+    def nbytes_beyond(self, previous: LayersState | None) -> int:
+        """Memory that it has not in common with the state it was predicted from, bytes."""
+        shared = () if previous is None else previous.finer
+        own = [near.nbytes for near in self.finer if not any(near is other for other in shared)]
+        return self.faces.nbytes + self.base.nbytes + sum(level.nbytes for level in self.scalars) + sum(own)
+
 
 @dataclass(frozen=True, slots=True)
 class EncodedLayers:
