@@ -78,7 +78,7 @@ def _best(quality: float) -> EncoderOptions:
         layers=LayersOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
         fit=FitOptions(restart=False, pull=0.3, second_smoothing=0.7),  # the defaults are those of `paper`
-        groups=GroupOptions(worth=3.0),  # likewise
+        groups=GroupOptions(worth=0.9),  # likewise
     )
 
 

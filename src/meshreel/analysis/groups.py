@@ -21,7 +21,7 @@ class GroupOptions:
     limit: float = 2.0  # a frame whose residual is above this many times the target is not followed
     tolerance: float = 2.0  # nor is one above the target and this many times the group's median
     depth: int = 1  # cuts inside cuts; frames that are still not followed are coded one by one
-    worth: float = math.inf  # squared targets, summed over a group's frames, that a base mesh of its own is worth
+    worth: float = math.inf  # squared targets, mean over a group's frames, that a group more is worth
 
     def __post_init__(self) -> None:
         if self.limit < 1 or self.tolerance < 1 or self.depth < 0 or not self.worth > 0:
@@ -38,7 +38,7 @@ def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int |
     most alike (least squares on their logarithms): frames that are followed well and those that are not end up apart.
     """
     limit = min(options.limit, max(1.0, options.tolerance * float(np.median(residuals))))
-    if len(residuals) < 2 or (residuals.max() <= limit and _excess(residuals).sum() <= options.worth):
+    if len(residuals) < 2 or (residuals.max() <= limit and _excess(residuals).mean() <= options.worth):
         return None
     logs = np.log(np.clip(residuals, 1e-6, 1e6))
     spread = [_scatter(logs[:cut]) + _scatter(logs[cut:]) for cut in range(1, len(logs))]
@@ -48,10 +48,10 @@ def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int |
 def leading(residuals: Float64[np.ndarray, " T"], usual: float, options: GroupOptions) -> int:
     """How many of the first frames a template still follows that usually left `usual`; units of the distance to reach.
 
-    Until a frame is lost, or until what a new template would save is worth its base mesh.
+    Until a frame is lost, or until what a new template would save is worth a new group.
     """
     lost = residuals > options.limit * max(usual, 1.0)
-    spent = np.cumsum(np.maximum(residuals**2 - usual**2, 0.0)) > options.worth
+    spent = np.cumsum(np.maximum(residuals**2 - usual**2, 0.0)) > options.worth * len(residuals)
     stop = np.flatnonzero(lost | spent)
     return int(stop[0]) if len(stop) else len(residuals)
 

@@ -13,7 +13,7 @@ from ..promises import Promise
 from ..rows import Point, Row, curve_rows
 from . import layers
 
-BODIES = ("dancer", "basketball_player")
+BODIES = ("dancer",)
 WHOLE = (20.0, 50.0, 80.0)  # qualities of the whole: its curve reaches around every variant's
 QUALITIES = (35.0, 65.0)  # of the variants
 PARTS = (
