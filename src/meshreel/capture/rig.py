@@ -150,15 +150,19 @@ def read_rig(folder: Path) -> Rig:
     return Rig(folder, cameras, files, float(rate))
 
 
-def write_rig(folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float) -> list[Path]:
-    """Writes `rig.json` and makes a folder for each camera's depth pictures; the folders."""
+def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:
+    """Makes a folder for each camera's depth pictures, where `rig.json` will name it."""
     folders = [folder / camera.name / "depth" for camera in cameras]
     for place in folders:
         place.mkdir(parents=True, exist_ok=True)
+    return folders
+
+
+def write_rig(folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float) -> None:
+    """Writes `rig.json`."""
     entries = [camera.record() | {"depth": f"{camera.name}/depth"} for camera in cameras]
     with replacing(folder / RIG) as file:
         file.write((json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n").encode())
-    return folders
 
 
 def _camera(path: Path, number: int, entry: Any) -> DepthCamera:
