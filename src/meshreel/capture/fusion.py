@@ -1,0 +1,117 @@
+"""Depth pictures of one moment become one mesh: TSDF, marching cubes, fragments dropped (paper, section 4.1).
+
+In: what each camera of a rig measured. Out: a mesh in world coordinates, on one voxel grid for all frames, so that what
+stands still has the same grid around it always. The same pictures give the same mesh, whatever the number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import UInt16
+
+from ..errors import InputError
+from ..geometry.topology import clean, components, drop_unreferenced, face_normals, weld
+from ..types import Mesh
+from .rig import DepthCamera
+
+BLOCK = 8  # voxels, side of a block of the sparse grid
+BLOCKS = 20_000  # that there is room for at first; more is made when needed
+SEEN = 0.5  # measurements of a voxel above which it counts: one is enough
+
+
+@dataclass(frozen=True, slots=True)
+class FusionOptions:
+    """How depth becomes surface."""
+
+    voxel: float = 0.02  # m, side of a voxel
+    truncation: float = 3.0  # voxels that a depth says something about before and behind it
+    fragment: float = 0.01  # m^2: connected pieces with less area are dropped
+
+    def __post_init__(self) -> None:
+        if not 1e-4 <= self.voxel <= 1:
+            raise InputError(f"voxel {self.voxel:g}: give metres, 0.0001 to 1; 0.02 suits a room")
+        if not 1 <= self.truncation <= 20 or not 0 <= self.fragment < np.inf:
+            raise InputError(
+                f"truncation {self.truncation:g}, fragment {self.fragment:g}: give 1 to 20 voxels and an area from 0 on"
+            )
+
+
+def fuse_depths(
+    depths: Sequence[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]], options: FusionOptions = FusionOptions()
+) -> Mesh:
+    """The surface that these cameras see; empty where none has measured anything in its range.
+
+    Every camera is integrated into the blocks of all: where one sees through what another took for surface (flying
+    pixels, noise), it carves it away.
+    """
+    views = [(camera, inside) for camera, depth in depths if (inside := camera.in_range(depth)).any()]
+    if not views:
+        return Mesh.empty()
+    grid, blocks = _grid(options), []
+    for view in views:
+        found = grid.compute_unique_block_coordinates(*_pinhole(view), *_depth(view, options))
+        blocks.append(found.numpy())
+    union = np.unique(np.concatenate(blocks), axis=0)
+    for view in views:
+        grid.integrate(_tensor(union), *_pinhole(view), *_depth(view, options))
+    return without_fragments(_extracted(grid), options.fragment)
+
+
+def without_fragments(mesh: Mesh, least: float) -> Mesh:
+    """The mesh without connected pieces of less area, m^2."""
+    if mesh.is_empty:
+        return mesh
+    labels = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
+    areas = np.bincount(labels, face_normals(mesh)[1])
+    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[areas[labels] >= least]))
+
+
+def _grid(options: FusionOptions) -> Any:
+    import open3d as o3d
+
+    kinds, one = (o3d.core.float32, o3d.core.float32), o3d.core.SizeVector([1])
+    return o3d.t.geometry.VoxelBlockGrid(("tsdf", "weight"), kinds, (one, one), options.voxel, BLOCK, BLOCKS)
+
+
+def _tensor(values: np.ndarray) -> Any:
+    import open3d as o3d
+
+    return o3d.core.Tensor.from_numpy(np.ascontiguousarray(values))
+
+
+def _pinhole(view: tuple[DepthCamera, np.ndarray]) -> tuple[Any, Any, Any]:
+    """A view's picture, intrinsics and extrinsics as Open3D takes them."""
+    import open3d as o3d
+
+    camera, depth = view
+    return o3d.t.geometry.Image(_tensor(depth)), _tensor(camera.intrinsic), _tensor(camera.extrinsic)
+
+
+def _depth(view: tuple[DepthCamera, np.ndarray], options: FusionOptions) -> tuple[float, float, float]:
+    """Units in a metre, the farthest depth, m, and the truncation, voxels."""
+    camera, _ = view
+    return 1.0 / camera.depth_unit, float(camera.depth_range[1]), options.truncation
+
+
+def _extracted(grid: Any) -> Mesh:
+    """The zero level as a mesh whose order of vertices and faces follows from their places alone."""
+    found = grid.extract_triangle_mesh(weight_threshold=SEEN)
+    if "indices" not in found.triangle or len(found.triangle["indices"]) == 0:
+        return Mesh.empty()
+    vertices = found.vertex["positions"].numpy().astype(np.float64)
+    return _ordered(clean(weld(Mesh(vertices, found.triangle["indices"].numpy().astype(np.int32)))))
+
+
+def _ordered(mesh: Mesh) -> Mesh:
+    """No two vertices are in one place."""
+    order = np.lexsort(mesh.vertices.T[::-1])
+    rank = np.empty(len(order), np.int32)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    faces = rank[mesh.faces]
+    first = np.argmin(faces, axis=1)[:, None]
+    faces = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
+    return Mesh.of(mesh.vertices[order], faces[np.lexsort(faces.T[::-1])])

@@ -1,0 +1,238 @@
+"""A rig: depth cameras that stand still around a scene, and what each has recorded.
+
+In -> out: a folder with `rig.json` <-> cameras and, frame by frame, their depths. A folder with one `camera.json` and
+`depth/` is a rig of one camera. Frames of different cameras belong together by the number in their file names.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64, UInt16
+
+from ..errors import InputError
+from ..io.depth import picture_size, read_depth
+from ..io.write import replacing
+
+RIG, SINGLE = "rig.json", "camera.json"
+MOST_PIXELS = 16_384  # of a picture's side
+RIGID = 1e-3  # that an entry of R R^T may be off
+_NUMBER = re.compile(r"(\d+)(?!.*\d)")
+
+
+@dataclass(frozen=True, slots=True)
+class DepthCamera:
+    """A pinhole camera that measures depth along its optical axis; x right, y down, z forward."""
+
+    name: str
+    width: int  # pixels
+    height: int  # pixels
+    focal: tuple[float, float]  # fx, fy, pixels
+    center: tuple[float, float]  # cx, cy, pixels
+    camera_to_world: Float64[np.ndarray, "4 4"]  # m
+    depth_unit: float = 0.001  # m, what 1 means in a depth picture
+    depth_range: tuple[float, float] = (0.1, 10.0)  # m, nearest and farthest depth that counts
+
+    def __post_init__(self) -> None:
+        if not (8 <= self.width <= MOST_PIXELS and 8 <= self.height <= MOST_PIXELS):
+            raise InputError(f"camera {self.name}: pictures of {self.width} x {self.height}: give 8 to {MOST_PIXELS}")
+        if not all(math.isfinite(f) and f > 0 for f in self.focal) or not all(map(math.isfinite, self.center)):
+            raise InputError(
+                f"camera {self.name}: focal {self.focal}, center {self.center}: give pixels, focal above 0"
+            )
+        near, far = self.depth_range
+        if not (math.isfinite(self.depth_unit) and self.depth_unit > 0 and 0 <= near < far < math.inf):
+            text = f"depth unit {self.depth_unit:g}, range {near:g} to {far:g}"
+            raise InputError(f"camera {self.name}: {text}: give metres, unit above 0 and 0 <= nearest < farthest")
+        broken = _broken(self.camera_to_world)
+        if broken:
+            raise InputError(
+                f"camera {self.name}: camera_to_world {broken}; calibrate it again, or leave the camera out"
+            )
+
+    @property
+    def intrinsic(self) -> Float64[np.ndarray, "3 3"]:
+        """Camera coordinates to homogeneous pixels."""
+        (fx, fy), (cx, cy) = self.focal, self.center
+        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+    @property
+    def extrinsic(self) -> Float64[np.ndarray, "4 4"]:
+        """World to camera."""
+        return np.linalg.inv(self.camera_to_world)
+
+    def in_range(self, depth: UInt16[np.ndarray, "H W"]) -> UInt16[np.ndarray, "H W"]:
+        """Depths that count, as they are; the others are 0, no measurement."""
+        near, far = self.depth_range
+        metres = depth * self.depth_unit
+        return np.where((metres >= near) & (metres <= far), depth, 0).astype(np.uint16)
+
+    def record(self) -> dict[str, Any]:
+        """The camera as `rig.json` has it."""
+        (fx, fy), (cx, cy), (near, far) = self.focal, self.center, self.depth_range
+        record = {"name": self.name, "width": self.width, "height": self.height, "fx": fx, "fy": fy, "cx": cx, "cy": cy}
+        record |= {"depth_unit_m": self.depth_unit, "depth_min_m": near, "depth_max_m": far}
+        return record | {"camera_to_world": self.camera_to_world.tolist()}
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """Cameras, and the depth pictures of each by frame number."""
+
+    folder: Path
+    cameras: tuple[DepthCamera, ...]
+    files: tuple[dict[int, Path], ...]  # of each camera
+    frame_rate: float  # 1/s
+
+    @property
+    def frames(self) -> list[int]:
+        """The numbers of the frames that any camera has, in order."""
+        return sorted(set().union(*self.files))
+
+    def depths(self, frame: int) -> list[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]]:
+        """What the cameras measured that have this frame. Raises InputError where a picture is of another size."""
+        there = [number for number, files in enumerate(self.files) if frame in files]
+        return [(self.cameras[number], self.depth(number, frame)) for number in there]
+
+    def depth(self, number: int, frame: int) -> UInt16[np.ndarray, "H W"]:
+        """What one camera, by its number, measured in a frame that it has; what is out of its range is 0."""
+        camera, path = self.cameras[number], self.files[number][frame]
+        depth = read_depth(path)
+        if depth.shape != (camera.height, camera.width):
+            size, wanted = f"{depth.shape[1]} x {depth.shape[0]}", f"{camera.width} x {camera.height}"
+            raise InputError(f"{path}: {size} pixels where camera {camera.name} has {wanted}; mend either")
+        return camera.in_range(depth)
+
+    def missing(self) -> list[str]:
+        """For each camera that lacks some frames, a line that says so."""
+        frames, told = set(self.frames), []
+        for camera, files in zip(self.cameras, self.files, strict=True):
+            lost = sorted(frames - set(files))
+            if lost:
+                told.append(
+                    f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, as {lost[0]}: fused without"
+                )
+        return told
+
+
+def read_rig(folder: Path) -> Rig:
+    """The rig in a folder. Raises InputError where its description or a camera's pictures are missing or wrong."""
+    path, single = folder / RIG, folder / SINGLE
+    if path.exists():
+        record = _json(path)
+        entries = record.get("cameras")
+        if not isinstance(entries, list) or not entries:
+            raise InputError(f"{path}: has no list `cameras`; describe one camera at least")
+    elif single.exists():
+        path = single
+        record = _json(path)
+        entries = [{"name": folder.resolve().name, "depth": "depth"} | record]
+    else:
+        raise InputError(f"{folder}: has neither {RIG} nor {SINGLE}; describe its cameras in one of them")
+    rate = record.get("frames_per_second")
+    if not isinstance(rate, (int, float)) or not (math.isfinite(rate) and rate > 0):
+        raise InputError(f"{path}: frames_per_second is {rate!r}; give a number above 0")
+    cameras = tuple(_camera(path, number, entry) for number, entry in enumerate(entries))
+    names = [camera.name for camera in cameras]
+    if len(set(names)) < len(names):
+        raise InputError(f"{path}: two cameras have one name ({', '.join(names)}); name each differently")
+    folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
+    files = tuple(_pictures(place, camera) for place, camera in zip(folders, cameras, strict=True))
+    for entry, camera in zip(entries, cameras, strict=True):
+        if "color" in entry:
+            _check_color(folder / str(entry["color"]), camera)
+    return Rig(folder, cameras, files, float(rate))
+
+
+def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:
+    """Makes a folder for each camera's depth pictures, where `rig.json` will name it."""
+    folders = [folder / camera.name / "depth" for camera in cameras]
+    for place in folders:
+        place.mkdir(parents=True, exist_ok=True)
+    return folders
+
+
+def write_rig(folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float) -> None:
+    """Writes `rig.json`."""
+    entries = [camera.record() | {"depth": f"{camera.name}/depth"} for camera in cameras]
+    with replacing(folder / RIG) as file:
+        file.write((json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n").encode())
+
+
+def _camera(path: Path, number: int, entry: Any) -> DepthCamera:
+    try:
+        name = str(entry.get("name", f"camera{number}"))
+        pose = np.array(entry["camera_to_world"], dtype=np.float64)
+        if pose.shape != (4, 4):
+            raise InputError(f"camera {name}: camera_to_world has the shape {pose.shape}; give 4 rows of 4 numbers")
+        return DepthCamera(
+            name,
+            int(entry["width"]),
+            int(entry["height"]),
+            (float(entry["fx"]), float(entry["fy"])),
+            (float(entry["cx"]), float(entry["cy"])),
+            pose,
+            float(entry.get("depth_unit_m", 0.001)),
+            (float(entry.get("depth_min_m", 0.1)), float(entry.get("depth_max_m", 10.0))),
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InputError(
+            f"{path}: camera number {number} is not described ({error!r}); see `meshreel capture --help`"
+        ) from None
+
+
+def _broken(pose: Float64[np.ndarray, "4 4"]) -> str:
+    """What is wrong with a pose; empty where nothing is."""
+    if not np.isfinite(pose).all():
+        return "has a number that is not finite"
+    if not np.allclose(pose[3], (0, 0, 0, 1)):
+        return "does not end in the row 0 0 0 1"
+    turn = pose[:3, :3]
+    if np.abs(turn @ turn.T - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0:
+        return "is no rotation with a translation"
+    return ""
+
+
+def _pictures(folder: Path, camera: DepthCamera) -> dict[int, Path]:
+    """The depth pictures in a folder by the last number in their names."""
+    try:
+        paths = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and not p.name.startswith("."))
+    except OSError as error:
+        raise InputError(f"{folder}: depth of camera {camera.name} cannot be read ({error.strerror})") from None
+    found: dict[int, Path] = {}
+    for path in paths:
+        number = _NUMBER.search(path.stem)
+        if number is None:
+            raise InputError(f"{path}: has no frame number in its name; name it as depth_00012.png")
+        if (key := int(number[1])) in found:
+            raise InputError(f"{path}: is frame {key}, as {found[key].name} is; keep one of them")
+        found[key] = path
+    if not found:
+        raise InputError(f"{folder}: camera {camera.name} has no depth pictures (*.png); record some, or leave it out")
+    return found
+
+
+def _check_color(folder: Path, camera: DepthCamera) -> None:
+    """Colour is not fused; pictures of another size mean that depth was not aligned with them."""
+    first = next((p for p in sorted(folder.glob("*")) if p.suffix.lower() in (".png", ".jpg", ".jpeg")), None)
+    if first is not None and (size := picture_size(first)) != (camera.width, camera.height):
+        text = f"{first}: {size[0]} x {size[1]} pixels where depth has {camera.width} x {camera.height}"
+        raise InputError(f"{text}; align both, or leave `color` out of the rig")
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        record = json.loads(path.read_text())
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"{path}: cannot be read ({error}); give JSON") from None
+    if not isinstance(record, dict):
+        raise InputError(f"{path}: is not a JSON object; see `meshreel capture --help`")
+    return record

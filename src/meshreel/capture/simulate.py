@@ -1,0 +1,224 @@
+"""A simulated rig: what depth cameras would measure of known meshes, with a sensor's errors (paper, section 4.1).
+
+In: meshes of a scene frame by frame, cameras. Out: a rig's folder as `rig.py` reads it, and beside it the truth: the
+clean mesh of each frame and which of its faces move. Everything follows from the seed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float64, UInt16
+
+from ..errors import InputError
+from ..geometry.nearest import Surface
+from ..geometry.topology import face_normals
+from ..io.depth import write_depth
+from ..io.write import replacing, write_mesh
+from ..types import Mesh
+from .rig import RIG, DepthCamera, make_folders, write_rig
+
+TRUTH = "truth"  # folder of the clean meshes
+DEEPEST = 65_535  # units that a depth picture holds
+
+
+@dataclass(frozen=True, slots=True)
+class SensorOptions:
+    """What is wrong with a depth camera."""
+
+    noise: float = 0.4  # in units of 15, 20 and 25 mm of standard deviation at 2, 3 and 4 m
+    correlation: float = 0.0  # pixels over which the noise is alike (standard deviation of a Gaussian); 0: none
+    grazing: float = 80.0  # degrees between ray and normal above which nothing is measured
+    holes: float = 0.002  # share of the pixels that measure nothing
+    flying: float = 0.3  # share of the pixels beside a jump that measure between both sides
+    jump: float = 0.05  # m between neighbours, that is one
+    pose_error: tuple[float, float] = (0.0, 0.0)  # m, degrees: standard deviation of what the rig's file is wrong by
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        lengths = (self.noise, self.correlation, *self.pose_error)
+        if not all(math.isfinite(value) and value >= 0 for value in lengths) or not self.jump > 0:
+            text = f"noise {self.noise:g}, correlation {self.correlation:g}, pose error {self.pose_error}"
+            raise InputError(f"sensor with {text}, jump {self.jump:g}: give numbers from 0 on, jump above 0")
+        if not 0 < self.grazing <= 90 or not (0 <= self.holes <= 1 and 0 <= self.flying <= 1):
+            text = f"grazing {self.grazing:g}, holes {self.holes:g}, flying {self.flying:g}"
+            raise InputError(f"sensor with {text}: give degrees up to 90 and shares from 0 to 1")
+
+
+@dataclass(frozen=True, slots=True)
+class SceneFrame:
+    """The clean mesh of a moment, and what of it moves."""
+
+    mesh: Mesh
+    dynamic: Bool[np.ndarray, " F"]
+
+    @staticmethod
+    def of(still: Sequence[Mesh], moving: Sequence[Mesh]) -> SceneFrame:
+        """All parts in one mesh."""
+        parts = [*still, *moving]
+        starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+        vertices = np.concatenate([part.vertices for part in parts] or [np.zeros((0, 3))])
+        faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
+        labels = [np.full(len(part.faces), number >= len(still)) for number, part in enumerate(parts)]
+        joined = np.concatenate(faces or [np.zeros((0, 3))])
+        return SceneFrame(Mesh.of(vertices, joined), np.concatenate(labels or [np.zeros(0, bool)]).astype(bool))
+
+    def labels_for(self, fused: Mesh) -> Bool[np.ndarray, " F"]:
+        """Which faces of a fused mesh move: as the clean face nearest to the middle of each."""
+        if fused.is_empty or self.mesh.is_empty:
+            return np.zeros(len(fused.faces), bool)
+        middles = fused.vertices[fused.faces].mean(axis=1)
+        return self.dynamic[Surface(self.mesh).closest(middles).faces]
+
+
+def corner_cameras(
+    low: Float64[np.ndarray, " 3"], high: Float64[np.ndarray, " 3"], count: int = 4, up: int = 1
+) -> tuple[DepthCamera, ...]:
+    """Cameras of the paper's size (640 x 576, 75 x 65 degrees) around a box, high up, that look down at its middle.
+
+    `low` and `high` are the box's corners, m; they stand on an ellipse through its vertical edges, the first at 45
+    degrees. `up` is the number of the axis that points up.
+    """
+    if count < 1:
+        raise InputError(f"{count} cameras: give one at least")
+    across = [(up + 1) % 3, (up + 2) % 3]
+    middle, half = (low + high) / 2, (high - low) / 2
+    target = middle.copy()
+    target[up] = low[up] + 0.4 * (high[up] - low[up])
+    cameras = []
+    for number in range(count):
+        angle = math.pi / 4 + 2 * math.pi * number / count
+        eye = middle.copy()
+        eye[across] += math.sqrt(2) * half[across] * (math.cos(angle), math.sin(angle))
+        eye[up] = low[up] + 0.9 * (high[up] - low[up])
+        forward = target - eye
+        forward /= np.linalg.norm(forward)
+        right = np.cross(forward, np.eye(3)[up])
+        right /= np.linalg.norm(right)
+        pose = np.eye(4)
+        pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+        pose[:3, 3] = eye
+        size = {"width": 640, "height": 576, "focal": (417.0, 452.0), "center": (319.5, 287.5)}
+        cameras.append(DepthCamera(f"corner{number}", camera_to_world=pose, depth_range=(0.25, 8.0), **size))
+    return tuple(cameras)
+
+
+def simulate_rig(
+    folder: Path,
+    frames: Iterable[SceneFrame],
+    cameras: tuple[DepthCamera, ...],
+    frame_rate: float,
+    sensor: SensorOptions = SensorOptions(),
+    tell: Callable[[int], None] = lambda _done: None,
+) -> int:
+    """Writes what the cameras measure of each frame, and the truth; the number of frames.
+
+    `rig.json` comes last: a folder without it is not complete. `tell` hears how many frames are done.
+    """
+    places = make_folders(folder, cameras)
+    (folder / TRUTH).mkdir(parents=True, exist_ok=True)
+    labels, count = {}, 0
+    for number, frame in enumerate(frames):
+        scene = _Rays(frame.mesh)
+        for which, (camera, place) in enumerate(zip(cameras, places, strict=True)):
+            random = np.random.default_rng([sensor.seed, number, which])
+            write_depth(_measured(scene, camera, sensor, random), place / f"depth_{number:05}.png")
+        write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
+        labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
+        count = number + 1
+        tell(count)
+    with replacing(folder / TRUTH / "dynamic.npz") as file:
+        np.savez_compressed(file, **labels)
+    with replacing(folder / TRUTH / RIG) as file:
+        record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}
+        file.write((json.dumps(record, indent=1) + "\n").encode())
+    random = np.random.default_rng([sensor.seed, 1 << 30])
+    write_rig(folder, tuple(_mistaken(camera, sensor, random) for camera in cameras), frame_rate)
+    return count
+
+
+class _Rays:
+    """A mesh prepared for ray casting."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        import open3d as o3d
+
+        self._tensor = o3d.core.Tensor.from_numpy
+        self._normals = face_normals(mesh)[0]
+        self._scene = o3d.t.geometry.RaycastingScene()
+        if not mesh.is_empty:
+            faces = mesh.faces.astype(np.uint32)
+            self._scene.add_triangles(self._tensor(mesh.vertices.astype(np.float32)), self._tensor(faces))
+
+    def cast(self, camera: DepthCamera) -> tuple[Float64[np.ndarray, "H W"], Float64[np.ndarray, "H W"]]:
+        """Depth along the optical axis, m, infinite for a miss; and the cosine between ray and normal."""
+        rows, columns = np.mgrid[: camera.height, : camera.width]
+        (fx, fy), (cx, cy) = camera.focal, camera.center
+        ahead = np.stack([(columns - cx) / fx, (rows - cy) / fy, np.ones(rows.shape)], axis=-1)
+        turn, eye = camera.camera_to_world[:3, :3], camera.camera_to_world[:3, 3]
+        directions = ahead @ turn.T
+        rays = np.concatenate([np.broadcast_to(eye, directions.shape), directions], axis=-1).astype(np.float32)
+        answer = self._scene.cast_rays(self._tensor(rays))
+        depth = answer["t_hit"].numpy().astype(np.float64)  # directions go one metre along the axis
+        cosines = np.zeros(depth.shape)
+        hit = np.isfinite(depth)
+        faces = answer["primitive_ids"].numpy()[hit].astype(np.int64)
+        along = directions[hit] / np.linalg.norm(directions[hit], axis=1)[:, None]
+        cosines[hit] = np.abs((self._normals[faces] * along).sum(axis=1))
+        return depth, cosines
+
+
+def _measured(
+    scene: _Rays, camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator
+) -> UInt16[np.ndarray, "H W"]:
+    depth, cosines = scene.cast(camera)
+    depth = np.where(cosines >= math.cos(math.radians(sensor.grazing)), depth, np.inf)
+    depth = _flown(depth, sensor, random)
+    seen = np.isfinite(depth) & (random.random(depth.shape) >= sensor.holes)
+    depth = np.where(seen, depth, 0.0)
+    depth += sensor.noise * (0.005 + 0.005 * depth) * _noise(depth.shape, sensor.correlation, random)
+    units = np.rint(depth / camera.depth_unit)
+    return camera.in_range(np.where(seen & (units > 0) & (units <= DEEPEST), units, 0).astype(np.uint16))
+
+
+def _flown(
+    depth: Float64[np.ndarray, "H W"], sensor: SensorOptions, random: np.random.Generator
+) -> Float64[np.ndarray, "H W"]:
+    """Some pixels beside a jump of depth measure a mixture of both sides."""
+    found = depth.copy()
+    for axis in (0, 1):
+        beside = np.roll(depth, 1, axis=axis)
+        with np.errstate(invalid="ignore"):  # two misses side by side
+            jumps = np.isfinite(depth) & np.isfinite(beside) & (np.abs(depth - beside) > sensor.jump)
+        np.moveaxis(jumps, axis, 0)[0] = False  # the first row has no neighbour
+        mixed = jumps & (random.random(depth.shape) < sensor.flying)
+        share = random.random(depth.shape)
+        found[mixed] = share[mixed] * depth[mixed] + (1 - share[mixed]) * beside[mixed]
+    return found
+
+
+def _noise(shape: tuple[int, ...], correlation: float, random: np.random.Generator) -> Float64[np.ndarray, "H W"]:
+    """Normal noise of unit deviation, alike over so many pixels."""
+    from scipy.ndimage import gaussian_filter
+
+    white = random.standard_normal(shape)
+    if correlation == 0:
+        return white
+    smooth = gaussian_filter(white, correlation, mode="wrap")
+    return smooth / smooth.std()
+
+
+def _mistaken(camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator) -> DepthCamera:
+    """The camera as its calibration has it."""
+    from scipy.spatial.transform import Rotation
+
+    apart, degrees = sensor.pose_error
+    pose = camera.camera_to_world.copy()
+    pose[:3, :3] = Rotation.from_rotvec(degrees * random.standard_normal(3), degrees=True).as_matrix() @ pose[:3, :3]
+    pose[:3, 3] += apart * random.standard_normal(3)
+    return replace(camera, camera_to_world=pose)

@@ -1,0 +1,48 @@
+"""A ball in front of a wall as depth cameras see it: exact depths, by arithmetic alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from meshreel.capture.rig import DepthCamera, make_folders, write_rig
+from meshreel.io.depth import write_depth
+
+RADIUS, WALL = 0.4, 1.2  # m; the ball is at the origin, the wall behind it at z = WALL
+
+
+def camera(name="front", side=0.0, size=96, **changed):
+    """A camera two metres from the ball, `side` degrees around the vertical axis, that looks at it."""
+    angle = np.radians(side)
+    turn = np.array([[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]])
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, turn @ [0, 0, -2]
+    values = {"focal": (float(size), float(size)), "center": (size / 2 - 0.5, size / 2 - 0.5), "camera_to_world": pose}
+    return DepthCamera(name, size, size, **(values | {"depth_range": (0.2, 4.0)} | changed))
+
+
+def measured(camera, ball=(0.0, 0.0, 0.0), wall=True):
+    """What a camera measures of the ball and the wall, in its unit; 0 where it sees neither."""
+    rows, columns = np.mgrid[: camera.height, : camera.width]
+    (fx, fy), (cx, cy) = camera.focal, camera.center
+    rays = np.stack([(columns - cx) / fx, (rows - cy) / fy, np.ones(rows.shape)], axis=-1)
+    turn, eye = camera.camera_to_world[:3, :3], camera.camera_to_world[:3, 3]
+    rays = rays @ turn.T
+    away = eye - np.asarray(ball)
+    a, b, c = (rays**2).sum(axis=-1), rays @ away, away @ away - RADIUS**2
+    inside = b * b - a * c
+    depth = np.where(inside >= 0, (-b - np.sqrt(np.maximum(inside, 0))) / a, np.inf)
+    if wall:
+        with np.errstate(divide="ignore"):
+            behind = (WALL - eye[2]) / rays[..., 2]
+        depth = np.minimum(depth, np.where(behind > 0, behind, np.inf))
+    return np.where(np.isfinite(depth), np.rint(depth / camera.depth_unit), 0).astype(np.uint16)
+
+
+def record(folder, cameras, balls, wall=True):
+    """A rig's folder: a frame for each place of the ball."""
+    places = make_folders(folder, tuple(cameras))
+    write_rig(folder, tuple(cameras), 15.0)
+    for one, place in zip(cameras, places, strict=True):
+        for number, ball in enumerate(balls):
+            write_depth(measured(one, ball, wall), place / f"depth_{number:05}.png")
+    return folder

@@ -1,0 +1,84 @@
+"""Fusion on exact depths: the surface is where it is, once, the same each time, and without fragments."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from meshreel.capture.fusion import FusionOptions, fuse_depths, without_fragments
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.errors import InputError
+from meshreel.geometry.topology import components, face_normals
+from meshreel.types import Mesh
+from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
+
+AROUND = [camera(f"at{side}", side) for side in (0, 90, 180, 270)]
+FINE = FusionOptions(voxel=0.02)
+
+
+def views(cameras, **scene):
+    return [(one, measured(one, **scene)) for one in cameras]
+
+
+def test_a_ball_seen_from_all_sides_is_a_closed_ball_of_its_size():
+    mesh = fuse_depths(views(AROUND, wall=False), FINE)
+    radii = np.linalg.norm(mesh.vertices, axis=1)
+    assert abs(np.median(radii) - RADIUS) < 0.002 and np.abs(radii - RADIUS).max() < 1.5 * FINE.voxel
+    assert len(np.unique(components(mesh.faces, len(mesh.vertices)))) == 1
+    outward = (face_normals(mesh)[0] * mesh.vertices[mesh.faces[:, 0]]).sum(axis=1)
+    assert (outward > 0).mean() > 0.99  # counter-clockwise from outside
+
+
+def test_the_wall_stands_where_it_is_with_the_shadow_of_the_ball():
+    mesh = fuse_depths(views(AROUND[:1]), FINE)
+    wall = mesh.vertices[mesh.vertices[:, 2] > 1]
+    assert len(wall) and np.abs(wall[:, 2] - WALL).max() < 0.005
+    assert np.linalg.norm(wall[:, :2], axis=1).min() > RADIUS  # nothing was seen behind the ball
+
+
+def test_another_camera_carves_away_what_one_has_flying():
+    flying = views(AROUND[:2], wall=False)
+    flying[0][1][:8, :8] = 1500  # a piece that is not there, which the second camera sees through
+    alone = fuse_depths(flying[:1], replace(FINE, fragment=0.0))
+    both = fuse_depths([(flying[0]), (AROUND[1], measured(AROUND[1], wall=True))], replace(FINE, fragment=0.0))
+
+    def pieces(mesh):
+        away = mesh.vertices[np.linalg.norm(mesh.vertices, axis=1) > RADIUS + 0.1]
+        return len(away[away[:, 2] < 0])
+
+    assert pieces(alone) > 0 and pieces(both) <= pieces(alone)
+
+
+def test_the_order_of_cameras_and_the_run_do_not_change_the_mesh():
+    first, again = fuse_depths(views(AROUND), FINE), fuse_depths(views(AROUND), FINE)
+    assert np.array_equal(first.vertices, again.vertices) and np.array_equal(first.faces, again.faces)
+    turned = fuse_depths(views(AROUND[::-1]), FINE)
+    assert np.abs(turned.vertices - first.vertices).max() < 1e-4 and np.array_equal(turned.faces, first.faces)
+
+
+def test_what_is_out_of_range_or_not_measured_is_no_surface():
+    near = camera(depth_range=(0.2, 2.5))
+    mesh = fuse_depths([(near, measured(near))], FINE)
+    assert mesh.vertices[:, 2].max() < 0.6  # the wall is 3.2 m away
+    assert fuse_depths([(near, np.zeros((96, 96), np.uint16))], FINE).is_empty and fuse_depths([], FINE).is_empty
+
+
+def test_fragments_are_dropped_by_their_area():
+    [ball] = sliding_sphere(1, levels=2)
+    crumb = Mesh(ball.vertices * 0.01 + 3, ball.faces)
+    both = Mesh(
+        np.concatenate([ball.vertices, crumb.vertices]), np.concatenate([ball.faces, ball.faces + len(ball.vertices)])
+    )
+    area = face_normals(crumb)[1].sum()
+    assert len(without_fragments(both, 0.99 * area).faces) == 2 * len(ball.faces)
+    kept = without_fragments(both, 1.01 * area)
+    assert np.array_equal(kept.vertices, ball.vertices) and np.array_equal(kept.faces, ball.faces)
+    assert without_fragments(Mesh.empty(), 1.0).is_empty
+
+
+@pytest.mark.parametrize("wrong", [{"voxel": 0.0}, {"voxel": 2.0}, {"truncation": 0.5}, {"fragment": -1.0}])
+def test_options_out_of_range_are_refused(wrong):
+    with pytest.raises(InputError, match="give"):
+        FusionOptions(**wrong)

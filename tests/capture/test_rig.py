@@ -1,0 +1,167 @@
+"""Rigs on disk: what is written is read, and what is wrong is named."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from meshreel.capture.record import open_recording
+from meshreel.capture.rig import read_rig
+from meshreel.errors import InputError
+from meshreel.io.depth import read_depth, write_depth
+from tests.capture.depth_scenes import camera, measured, record
+
+STILL = [(0.0, 0.0, 0.0)] * 3
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return record(tmp_path / "rig", [camera(), camera("side", 90)], STILL)
+
+
+def test_what_is_written_is_read(folder):
+    rig = read_rig(folder)
+    assert rig.frames == [0, 1, 2] and rig.frame_rate == 15 and rig.missing() == []
+    for found, wanted in zip(rig.cameras, (camera(), camera("side", 90)), strict=True):
+        assert found.record() == wanted.record()
+    for one, depth in rig.depths(1):
+        assert np.array_equal(depth, one.in_range(measured(one)))
+
+
+def test_a_folder_with_one_camera_is_a_rig(tmp_path):
+    (tmp_path / "depth").mkdir()
+    entry = camera().record() | {"frames_per_second": 8}
+    del entry["name"]
+    (tmp_path / "camera.json").write_text(json.dumps(entry))
+    write_depth(measured(camera()), tmp_path / "depth" / "take2_0639.png")
+    rig = read_rig(tmp_path)
+    assert rig.frames == [639] and rig.frame_rate == 8 and rig.cameras[0].name == tmp_path.name
+
+
+def test_frames_that_one_camera_lacks_are_told_and_fused_without(folder):
+    (folder / "side" / "depth" / "depth_00001.png").unlink()
+    rig = read_rig(folder)
+    assert [len(rig.depths(frame)) for frame in rig.frames] == [2, 1, 2]
+    assert rig.missing() == ["camera side lacks 1 of 3 frames, as 1: fused without"]
+
+
+def changed(folder, change):
+    path = folder / "rig.json"
+    rig = json.loads(path.read_text())
+    change(rig)
+    path.write_text(json.dumps(rig))
+
+
+def mirrored(rig):
+    rig["cameras"][1]["camera_to_world"][0][0] = 7
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (mirrored, "camera side: camera_to_world is no rotation"),
+        (lambda r: r["cameras"][0].update(camera_to_world=[[1, 0], [0, 1]]), r"camera front: .*\(2, 2\)"),
+        (lambda r: r["cameras"][0]["camera_to_world"][0].__setitem__(3, float("nan")), "front.*not finite"),
+        (lambda r: r["cameras"][0]["camera_to_world"][3].__setitem__(3, 2), "front.*0 0 0 1"),
+        (lambda r: r["cameras"][0].pop("fx"), "camera number 0 .*fx"),
+        (lambda r: r["cameras"][0].update(fx=0), "focal"),
+        (lambda r: r["cameras"][0].update(width=4), "4 x 96"),
+        (lambda r: r["cameras"][0].update(depth_unit_m=0), "depth unit 0"),
+        (lambda r: r["cameras"][0].update(depth_min_m=9), "range 9 to 4"),
+        (lambda r: r["cameras"][1].update(name="front"), "two cameras"),
+        (lambda r: r["cameras"][1].update(depth="nowhere"), "nowhere"),
+        (lambda r: r.update(cameras=[]), "no list"),
+        (lambda r: r.update(frames_per_second=0), "frames_per_second"),
+    ],
+)
+def test_a_rig_that_is_wrong_is_refused_with_the_reason(folder, change, words):
+    changed(folder, change)
+    with pytest.raises(InputError, match=words):
+        read_rig(folder)
+
+
+def test_a_folder_without_a_rig_or_with_none_that_can_be_read_is_told(tmp_path):
+    with pytest.raises(InputError, match=r"neither rig\.json nor camera\.json"):
+        read_rig(tmp_path)
+    (tmp_path / "rig.json").write_text("[1")
+    with pytest.raises(InputError, match="cannot be read"):
+        read_rig(tmp_path)
+    (tmp_path / "rig.json").write_text("[1]")
+    with pytest.raises(InputError, match="not a JSON object"):
+        read_rig(tmp_path)
+
+
+def test_colour_of_another_size_is_refused(folder):
+    changed(folder, lambda rig: rig["cameras"][0].update(color="front/color"))
+    read_rig(folder)  # there are no pictures of it: legal
+    (folder / "front" / "color").mkdir()
+    Image.new("RGB", (50, 40)).save(folder / "front" / "color" / "0.png")
+    with pytest.raises(InputError, match="50 x 40 pixels where depth has 96 x 96"):
+        read_rig(folder)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("still.png", "no frame number"), ("again_1.png", "is frame 1, as"), ("x_00007.png", None)]
+)
+def test_names_must_number_frames(folder, name, words):
+    write_depth(measured(camera()), folder / "front" / "depth" / name)
+    if words is None:
+        assert read_rig(folder).frames == [0, 1, 2, 7]
+        return
+    with pytest.raises(InputError, match=words):
+        read_rig(folder)
+
+
+def test_a_camera_without_pictures_is_told(folder):
+    for path in (folder / "side" / "depth").iterdir():
+        path.unlink()
+    with pytest.raises(InputError, match="camera side has no depth pictures"):
+        read_rig(folder)
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (lambda path: Image.new("L", (96, 96)).save(path), "8 bits a pixel; store depth as 16-bit"),
+        (lambda path: Image.new("RGB", (96, 96)).save(path), "mode RGB"),
+        (lambda path: path.write_bytes(b"no picture"), "is no picture"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-60]), "cannot be read"),
+        (lambda path: write_depth(np.ones((8, 9), np.uint16), path), "9 x 8 pixels where camera front has 96 x 96"),
+    ],
+)
+def test_pictures_that_are_no_depth_are_refused(folder, made, words):
+    made(folder / "front" / "depth" / "depth_00001.png")
+    with pytest.raises(InputError, match=words):
+        read_rig(folder).depths(1)
+
+
+def test_depth_pictures_keep_every_bit(tmp_path):
+    depth = np.arange(60_000, 60_000 + 99 * 7, dtype=np.uint16).reshape(99, 7)
+    write_depth(depth, tmp_path / "1.png")
+    assert np.array_equal(read_depth(tmp_path / "1.png"), depth)
+
+
+def test_a_recording_gives_frames_and_says_what_is_blind(folder):
+    blank = np.zeros((96, 96), np.uint16)
+    for number in range(3):
+        write_depth(blank, folder / "side" / "depth" / f"depth_{number:05}.png")
+    recording, warnings = open_recording(folder)
+    assert warnings == ["camera side measures nothing in 3 of 3 frames looked at"]
+    assert len(recording) == 3 and recording.frame_rate == 15 and not recording[2].is_empty
+    assert len(list(recording)) == 3
+
+
+def test_a_camera_that_moves_is_found_by_what_it_sees(tmp_path):
+    walking = [(0.3 * number - 1, 0.0, 0.0) for number in range(6)]
+    recording, _ = open_recording(
+        record(tmp_path / "still", [camera()], walking)
+    )  # the ball moves, the camera does not
+    assert len(recording) == 6
+    moving = record(tmp_path / "moving", [camera()], walking)
+    for number in range(6):
+        write_depth(measured(camera(side=8.0 * number)), moving / "front" / "depth" / f"depth_{number:05}.png")
+    with pytest.raises(InputError, match=r"camera front seems to move: .* stand still"):
+        open_recording(moving)

@@ -1,0 +1,117 @@
+"""Simulated rigs: depth that is exact without a sensor's errors, errors as asked for, a truth that labels carry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from meshreel.capture.fusion import FusionOptions, fuse_depths
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.capture.rig import read_rig
+from meshreel.capture.simulate import TRUTH, SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from meshreel.errors import InputError
+from meshreel.io.depth import read_depth
+from meshreel.io.sequence import open_sequence
+from meshreel.types import Mesh
+from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
+
+EXACT = SensorOptions(noise=0.0, grazing=90.0, holes=0.0, flying=0.0)
+UNIT = sliding_sphere(1, levels=5)[0]
+BALL = Mesh(UNIT.vertices / np.linalg.norm(UNIT.vertices, axis=1).max() * RADIUS, UNIT.faces)
+PLATE = Mesh.of([[-9, -9, WALL], [9, -9, WALL], [9, 9, WALL], [-9, 9, WALL]], [[0, 2, 1], [0, 3, 2]])
+SCENE = SceneFrame.of([PLATE], [BALL])
+
+
+def seen(folder, sensor, cameras=(camera(),), frames=(SCENE,)):
+    """The depths of the first camera in every frame."""
+    simulate_rig(folder, frames, cameras, 30.0, sensor)
+    rig = read_rig(folder)
+    return np.stack([read_depth(rig.files[0][number]) for number in rig.frames])
+
+
+def test_without_errors_depth_is_that_of_the_surface(tmp_path):
+    [found] = seen(tmp_path, EXACT)
+    wanted = camera().in_range(measured(camera()))
+    apart = np.abs(found.astype(int) - wanted)
+    assert (found > 0).all() and np.median(apart) <= 1
+    assert np.percentile(apart, 97) <= 2  # mm; at the ball's rim a ray grazes it or not
+
+
+@pytest.mark.parametrize("correlation", [0.0, 3.0])
+def test_noise_is_as_large_as_asked_for_and_grows_with_depth(tmp_path, correlation):
+    still = SceneFrame.of([PLATE], [])
+    exact = seen(tmp_path / "exact", EXACT, frames=[still])[0].astype(float)
+    noisy = seen(tmp_path / "noisy", replace(EXACT, noise=1.0, correlation=correlation), frames=[still] * 8)
+    errors = noisy.astype(float) - exact
+    assert abs(errors.std() - 21) < 2 and abs(errors.mean()) < 3  # mm; the wall is 3.2 m away
+    alike = np.mean([np.corrcoef(e[:, 1:].ravel(), e[:, :-1].ravel())[0, 1] for e in errors])
+    assert (alike > 0.8) if correlation else (abs(alike) < 0.05)
+
+
+def test_holes_flying_pixels_and_grazing_angles(tmp_path):
+    [exact] = seen(tmp_path / "exact", EXACT)
+    [holes] = seen(tmp_path / "holes", replace(EXACT, holes=0.1))
+    assert abs((holes == 0).mean() - 0.1) < 0.02
+    [flying] = seen(tmp_path / "flying", replace(EXACT, flying=1.0))
+    between = (flying > 2100) & (flying < 3100)  # neither ball nor wall is there
+    assert 50 < between.sum() < 400 and not ((exact > 2100) & (exact < 3100)).any()
+    [grazing] = seen(tmp_path / "grazing", replace(EXACT, grazing=60.0))
+    lost = (grazing == 0) & (exact < 2500)
+    rows, columns = np.nonzero(lost)
+    assert lost.sum() > 100 and np.hypot(rows - 47.5, columns - 47.5).min() > 12  # around the rim only
+
+
+def test_the_same_seed_gives_the_same_pictures_and_frames_differ(tmp_path):
+    sensor = SensorOptions(seed=3)
+    first, again = (seen(tmp_path / name, sensor, frames=[SCENE] * 2) for name in ("a", "b"))
+    other = seen(tmp_path / "c", SensorOptions(seed=4))
+    assert np.array_equal(first, again) and (first[0] != first[1]).any() and (first[0] != other[0]).any()
+
+
+def test_a_pose_error_is_in_the_rig_and_not_in_the_truth(tmp_path):
+    wrong = replace(EXACT, pose_error=(0.01, 0.5))
+    simulate_rig(tmp_path / "wrong", [SCENE], (camera(),), 30.0, wrong)
+    [known] = read_rig(tmp_path / "wrong").cameras
+    away = np.linalg.norm(known.camera_to_world[:3, 3] - camera().camera_to_world[:3, 3])
+    assert 0.001 < away < 0.05 and (tmp_path / "wrong" / TRUTH / "rig.json").exists()
+
+
+def test_the_truth_has_clean_meshes_and_labels_that_fused_faces_take(tmp_path):
+    cameras = tuple(camera(f"at{side}", side) for side in (0, 30, 330))
+    simulate_rig(tmp_path, [SCENE], cameras, 30.0, EXACT)
+    [clean] = open_sequence(tmp_path / TRUTH)
+    assert len(clean.faces) == len(SCENE.mesh.faces)
+    with np.load(tmp_path / TRUTH / "dynamic.npz") as labels:
+        found = np.unpackbits(labels["frame_00000"])[: len(SCENE.dynamic)].astype(bool)
+    assert np.array_equal(found, SCENE.dynamic) and found.sum() == len(BALL.faces)
+    fused = fuse_depths(read_rig(tmp_path).depths(0), FusionOptions())
+    dynamic = SCENE.labels_for(fused)
+    middles = fused.vertices[fused.faces].mean(axis=1)
+    assert np.array_equal(dynamic, np.linalg.norm(middles, axis=1) < RADIUS + 0.2) and 0 < dynamic.mean() < 1
+    assert not SceneFrame.of([], []).labels_for(fused).any() and len(SCENE.labels_for(Mesh.empty())) == 0
+
+
+@pytest.mark.parametrize("up", [1, 2])
+def test_cameras_in_the_corners_look_down_at_the_middle(up):
+    low, high = np.array([-3.0, -1.0, -2.0]), np.array([3.0, 2.0, 2.0])
+    cameras = corner_cameras(low, high, 4, up)
+    assert len({one.name for one in cameras}) == 4
+    for one in cameras:
+        eye, forward, down = one.camera_to_world[:3, 3], one.camera_to_world[:3, 2], one.camera_to_world[:3, 1]
+        across = [axis for axis in range(3) if axis != up]
+        assert np.allclose(np.abs(eye - (low + high) / 2)[across], ((high - low) / 2)[across])
+        assert forward[up] < 0 and down[up] < -0.5  # it looks down, and its y axis points down
+        ahead = (one.extrinsic @ [*((low + high) / 2), 1])[:3]
+        assert ahead[2] > 0 and np.abs(ahead[:2] / ahead[2]).max() < 0.3
+    with pytest.raises(InputError, match="0 cameras"):
+        corner_cameras(low, high, 0)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"noise": -1.0}, {"grazing": 0.0}, {"holes": 1.5}, {"jump": 0.0}, {"pose_error": (0.0, float("nan"))}]
+)
+def test_sensors_that_cannot_be_are_refused(wrong):
+    with pytest.raises(InputError, match="sensor with"):
+        SensorOptions(**wrong)

@@ -1,0 +1,73 @@
+"""`meshreel capture`: a rig's folder becomes frames, all of them, also after an interruption."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from meshreel.cli import main
+from meshreel.io.sequence import open_sequence
+from tests.capture.depth_scenes import RADIUS, camera, record
+
+BALLS = [(0.1 * number, 0.0, 0.0) for number in range(3)]
+
+
+@pytest.fixture
+def rig(tmp_path):
+    return record(tmp_path / "rig", [camera(), camera("side", 90), camera("back", 180)], BALLS, wall=False)
+
+
+def test_a_recording_becomes_a_mesh_per_frame(rig, tmp_path, capsys):
+    out = tmp_path / "frames"
+    assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.04", "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)
+    assert (row["frames"], row["fused"], row["frame_rate"]) == (3, 3, 15)
+    frames = open_sequence(out)
+    assert [path.name for path in sorted(out.glob("*.ply"))] == [f"frame_{i:05}.ply" for i in range(3)]
+    for mesh, ball in zip(frames, BALLS, strict=True):
+        assert abs(np.median(np.linalg.norm(mesh.vertices - ball, axis=1)) - RADIUS) < 0.01
+
+
+def test_an_interrupted_run_goes_on_and_gives_the_same_bytes(rig, tmp_path, capsys):
+    out = tmp_path / "frames"
+    command = ["capture", str(rig), "-o", str(out), "--voxel", "0.04", "--json"]
+    assert main(command) == 0
+    before = {path.name: path.read_bytes() for path in out.glob("*.ply")}
+    (out / "frame_00001.ply").unlink()
+    capsys.readouterr()
+    assert main(command) == 0
+    assert json.loads(capsys.readouterr().out)["fused"] == 1
+    assert {path.name: path.read_bytes() for path in out.glob("*.ply")} == before
+
+
+def test_a_range_of_frames_is_taken(rig, tmp_path, capsys):
+    out = tmp_path / "frames"
+    command = ["capture", str(rig), "-o", str(out), "--voxel", "0.05", "--json", "--frames"]
+    assert main([*command, "1:"]) == 0 and json.loads(capsys.readouterr().out)["frames"] == 2
+    assert json.loads((out / "capture.json").read_text())["frames"] == [1, 2]
+    assert main([*command, "3:"]) == 2 and "leave 0" in capsys.readouterr().err
+
+
+def test_frames_of_other_options_are_not_mixed(rig, tmp_path, capsys):
+    out = tmp_path / "frames"
+    assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 0
+    assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.04"]) == 2
+    assert "another rig or of other options" in capsys.readouterr().err
+    (out / "capture.json").write_text("{")
+    assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 2
+    (out / "capture.json").unlink()
+    assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 2
+    assert "no capture.json tells" in capsys.readouterr().err
+
+
+def test_what_is_missing_is_told_once_and_errors_take_one_line(rig, tmp_path, capsys):
+    (rig / "side" / "depth" / "depth_00002.png").unlink()
+    assert main(["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.05"]) == 0
+    assert capsys.readouterr().err.count("camera side lacks 1 of 3 frames") == 1
+    assert main(["capture", str(tmp_path / "nothing"), "-o", str(tmp_path / "other")]) == 2
+    error = capsys.readouterr().err
+    assert "neither rig.json nor camera.json" in error and error.count("\n") == 1
+    assert main(["capture", str(rig), "-o", str(tmp_path / "other"), "--voxel", "9"]) == 2
+    assert "voxel 9" in capsys.readouterr().err and not (tmp_path / "other").exists()
