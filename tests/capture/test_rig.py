@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 
 import numpy as np
 import pytest
@@ -135,6 +137,19 @@ def test_a_camera_without_pictures_is_told(folder):
 def test_pictures_that_are_no_depth_are_refused(folder, made, words):
     made(folder / "front" / "depth" / "depth_00001.png")
     with pytest.raises(InputError, match=words):
+        read_rig(folder).depths(1)
+
+
+def bomb(path):
+    """A picture of 60 000 x 60 000 pixels, by its head."""
+    head = struct.pack(">IIBBBBB", 60_000, 60_000, 16, 0, 0, 0, 0)
+    chunk = struct.pack(">I", len(head)) + b"IHDR" + head + struct.pack(">I", zlib.crc32(b"IHDR" + head))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk + path.read_bytes()[33:])
+
+
+def test_a_picture_that_says_it_is_enormous_is_refused(folder):
+    bomb(folder / "front" / "depth" / "depth_00001.png")
+    with pytest.raises(InputError, match="cannot be read"):
         read_rig(folder).depths(1)
 
 

@@ -14,7 +14,7 @@ from jaxtyping import UInt16
 from ..errors import InputError
 from .write import replacing
 
-_DEEP = ("I;16", "I;16B", "I;16L")  # modes of Pillow with 16 bits a pixel
+_DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow give 16 bits a pixel
 
 
 def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
@@ -29,7 +29,7 @@ def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
             return np.array(image, dtype=np.uint16)
     except UnidentifiedImageError:
         raise InputError(f"{path}: is no picture; store depth as 16-bit grayscale PNG") from None
-    except (OSError, SyntaxError, ValueError) as error:  # Pillow's PNG reader raises SyntaxError on damaged chunks
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:  # SyntaxError: a damaged chunk
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({reason}); record the frame again, or delete the file") from None
 
@@ -51,5 +51,5 @@ def picture_size(path: Path) -> tuple[int, int]:
     try:
         with Image.open(path) as image:
             return image.size
-    except (OSError, SyntaxError, ValueError) as error:
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise InputError(f"{path}: cannot be read ({error}); delete it, or give a picture") from None
