@@ -103,8 +103,8 @@ def corner_cameras(
         pose = np.eye(4)
         pose[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
         pose[:3, 3] = eye
-        size = {"width": 640, "height": 576, "focal": (417.0, 452.0), "center": (319.5, 287.5)}
-        cameras.append(DepthCamera(f"corner{number}", camera_to_world=pose, depth_range=(0.25, 8.0), **size))
+        name, focal, center = f"corner{number}", (417.0, 452.0), (319.5, 287.5)
+        cameras.append(DepthCamera(name, 640, 576, focal, center, pose, depth_range=(0.25, 8.0)))
     return tuple(cameras)
 
 
@@ -133,7 +133,7 @@ def simulate_rig(
         count = number + 1
         tell(count)
     with replacing(folder / TRUTH / "dynamic.npz") as file:
-        np.savez_compressed(file, **labels)
+        np.savez_compressed(file, allow_pickle=False, **labels)
     with replacing(folder / TRUTH / RIG) as file:
         record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}
         file.write((json.dumps(record, indent=1) + "\n").encode())
