@@ -42,7 +42,8 @@ class Surface:
         """The closest point of the surface to each query, its face and its barycentric weights."""
         import open3d as o3d
 
-        answer = self._scene.compute_closest_points(o3d.core.Tensor.from_numpy(queries.astype(np.float32)))
+        points = o3d.core.Tensor.from_numpy(queries.astype(np.float32))
+        answer = self._scene.compute_closest_points(points, nthreads=1)  # more cost a tenth of the time and win nothing
         faces = answer["primitive_ids"].numpy().astype(np.int64)
         uv = answer["primitive_uvs"].numpy().astype(np.float64)
         barycentric = np.stack([1 - uv[:, 0] - uv[:, 1], uv[:, 0], uv[:, 1]], axis=1)
