@@ -146,9 +146,6 @@ class _Normalised(Frames):
     def __len__(self) -> int:
         return len(self._window)
 
-    def __iter__(self) -> Iterator[Mesh]:
-        return (self[number] for number in range(len(self)))
-
     def __getitem__(self, index: int) -> Mesh:
         return self._seen.normalise(self._sequence[self._window[index]])
 

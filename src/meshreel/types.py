@@ -64,13 +64,17 @@ class Placement:
 
 @runtime_checkable
 class Frames(Protocol):
-    """Meshes by number: `len`, `frames[i]` and iteration; a list, or what reads them when they are asked for."""
+    """Meshes by number: `len`, `frames[i]` and iteration; a list, or what reads them when they are asked for.
+
+    A class that inherits from it need not say how to iterate.
+    """
 
     def __len__(self) -> int: ...
 
     def __getitem__(self, index: int) -> Mesh: ...
 
-    def __iter__(self) -> Iterator[Mesh]: ...
+    def __iter__(self) -> Iterator[Mesh]:
+        return (self[index] for index in range(len(self)))
 
 
 @runtime_checkable

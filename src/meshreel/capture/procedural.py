@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import InputError
 from ..geometry.topology import subdivide_midpoint
-from ..types import Mesh, MeshList
+from ..types import Mesh, MeshList, MeshSequence
 from .figure import Pose, figure
 from .implicit import Body, Grid, polygonize
 
@@ -51,7 +50,7 @@ class SoftBodiesOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class SoftBodies:
+class SoftBodies(MeshSequence):
     """The frames of `soft_bodies`: a MeshSequence."""
 
     options: SoftBodiesOptions
@@ -63,9 +62,6 @@ class SoftBodies:
 
     def __len__(self) -> int:
         return self.options.frames
-
-    def __iter__(self) -> Iterator[Mesh]:
-        return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> Mesh:
         number = range(len(self))[operator.index(index)]

@@ -6,7 +6,6 @@ its own data: the pixels of one that stands still mostly see what they always se
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..io.sequence import SequenceOptions
-from ..types import Mesh
+from ..types import Mesh, MeshSequence
 from .fusion import FusionOptions, fuse_depths
 from .rig import Rig, read_rig
 
@@ -24,14 +23,12 @@ MOVED = 0.5  # share of the pixels that see something else than usual, in the us
 LEAST = 0.3  # share of the pixels with a measurement below which nothing is said: there may be no background in view
 
 
-class Recording:
+class Recording(MeshSequence):
     """The frames of a rig as a MeshSequence, in world coordinates."""
 
     def __init__(self, rig: Rig, options: FusionOptions = FusionOptions(), frames: str = ":") -> None:
         numbers = rig.frames
         chosen = SequenceOptions(frames=frames).chosen(len(numbers))
-        if not chosen:
-            raise InputError(f"frames {frames!r} of {len(numbers)} frames leave 0; choose at least one")
         self.rig, self.options = rig, options
         self.numbers = [numbers[index] for index in chosen]  # of the frames, in the files' names
 
@@ -42,9 +39,6 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.numbers)
-
-    def __iter__(self) -> Iterator[Mesh]:
-        return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> Mesh:
         return fuse_depths(self.rig.depths(self.numbers[index]), self.options)

@@ -18,7 +18,7 @@ from jaxtyping import Float64, UInt16
 
 from ..errors import InputError
 from ..io.depth import picture_size, read_depth
-from ..io.write import replacing
+from ..io.write import make_folder, replacing
 
 RIG, SINGLE = "rig.json", "camera.json"
 MOST_PIXELS = 16_384  # of a picture's side
@@ -154,7 +154,7 @@ def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:
     """Makes a folder for each camera's depth pictures, where `rig.json` will name it."""
     folders = [folder / camera.name / "depth" for camera in cameras]
     for place in folders:
-        place.mkdir(parents=True, exist_ok=True)
+        make_folder(place)
     return folders
 
 

@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..geometry.nearest import Surface
 from ..geometry.topology import face_normals
 from ..io.depth import write_depth
-from ..io.write import replacing, write_mesh
+from ..io.write import make_folder, replacing, write_mesh
 from ..types import Mesh
 from .rig import RIG, DepthCamera, make_folders, write_rig
 
@@ -121,7 +121,7 @@ def simulate_rig(
     `rig.json` comes last: a folder without it is not complete. `tell` hears how many frames are done.
     """
     places = make_folders(folder, cameras)
-    (folder / TRUTH).mkdir(parents=True, exist_ok=True)
+    make_folder(folder / TRUTH)
     labels, count = {}, 0
     for number, frame in enumerate(frames):
         scene = _Rays(frame.mesh)

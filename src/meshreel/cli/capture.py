@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from ..capture.fusion import FusionOptions
 from ..capture.record import Recording, open_recording
 from ..errors import InputError
-from ..io.write import replacing, write_mesh
+from ..io.write import frame_names, make_folder, replacing, write_mesh
 from .console import Common
 
 MADE = "capture.json"  # in the output: from what and how it was made
@@ -59,7 +59,7 @@ def command(
     options = FusionOptions(voxel, truncation, fragment)
     recording, warnings = open_recording(rig, options, frames)
     common.warn(warnings)
-    names = [f"frame_{i:0{max(5, len(str(len(recording) - 1)))}}.{format}" for i in range(len(recording))]
+    names = frame_names(len(recording), format)
     missing = _started(output, _made(rig, recording), names)
     with common.stages(len(recording)) as progress:
         for index, name in enumerate(names):
@@ -87,10 +87,7 @@ def _made(rig: Path, recording: Recording) -> dict[str, Any]:
 def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
     """The files that are still to be made; the folder says from what. Raises InputError where it is of another run."""
     path = output / MADE
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{output}: cannot be made a folder ({error.strerror}); choose another") from None
+    make_folder(output)
     there = {name for name in names if (output / name).exists()}
     if path.exists():
         try:

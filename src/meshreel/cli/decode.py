@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from ..decoder import open as open_video
 from ..errors import FormatError, InputError
-from ..io.write import write_mesh
+from ..io.write import frame_names, make_folder, write_mesh
 from .console import Common
 
 
@@ -39,11 +39,8 @@ def command(
     if layers is not None and layers < 0:
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{output}: cannot be made a folder ({error.strerror}); choose another") from None
-    names = [f"frame_{i:0{max(5, len(str(len(video) - 1)))}}.{format}" for i in range(len(video))]
+    make_folder(output)
+    names = frame_names(len(video), format)
     others = {path.name for path in output.glob(f"frame_*.{format}")} - set(names)
     if others:
         common.warn([f"{output} holds {len(others)} other frame files, as {min(others)}; they are not of this video"])

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator
-
 from ..types import Mesh, MeshSequence
 
 
-class DerivedSequence(ABC):
+class DerivedSequence(MeshSequence):
     """A MeshSequence of as many frames as its source; a subclass says what a frame is."""
 
     def __init__(self, source: MeshSequence) -> None:
@@ -21,12 +18,6 @@ class DerivedSequence(ABC):
 
     def __len__(self) -> int:
         return len(self._source)
-
-    def __iter__(self) -> Iterator[Mesh]:
-        return (self[index] for index in range(len(self)))
-
-    @abstractmethod
-    def __getitem__(self, index: int) -> Mesh: ...
 
 
 class Backwards(DerivedSequence):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..types import Mesh
+from ..types import Mesh, MeshSequence
 from .archive import Archive
 from .meshes import Loaded, read_mesh
 from .names import find_frames
@@ -42,9 +42,12 @@ class SequenceOptions:
             raise InputError(f"frames {self.frames!r} is not a range; give A:B, A: or :B, as 0:10")
 
     def chosen(self, count: int) -> range:
-        """The frames that are wanted out of `count`."""
+        """The frames that are wanted out of `count`. Raises InputError where there are none."""
         begin, end = (int(part) if part else None for part in self.frames.split(":"))
-        return range(count)[begin:end]
+        wanted = range(count)[begin:end]
+        if len(wanted) == 0:
+            raise InputError(f"frames {self.frames!r} of {count} frames leave 0; choose at least one")
+        return wanted
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,14 +78,12 @@ class _Seen:
     largest: tuple[float, int] | None = None
 
 
-class FileSequence:
+class FileSequence(MeshSequence):
     """Frames read from files when they are asked for; nothing of them is kept but counts."""
 
     def __init__(self, frames: Files | Archive, options: SequenceOptions, remarks: Sequence[str] = ()) -> None:
         self._frames, self._options, self._remarks, self._seen = frames, options, tuple(remarks), _Seen()
         self._chosen = options.chosen(len(frames))
-        if len(self._chosen) == 0:
-            raise InputError(f"frames {options.frames!r} of {len(frames)} frames leave 0; choose at least one")
 
     @property
     def frame_rate(self) -> float:
@@ -96,9 +97,6 @@ class FileSequence:
 
     def __len__(self) -> int:
         return len(self._chosen)
-
-    def __iter__(self) -> Iterator[Mesh]:
-        return (self[index] for index in range(len(self)))
 
     def __getitem__(self, index: int) -> Mesh:
         number = self._chosen[operator.index(index)]

@@ -20,6 +20,20 @@ from ..types import Mesh
 _TOLERANCE = 1e-6  # of the diagonal: what rounding a coordinate may cost
 
 
+def frame_names(count: int, extension: str) -> list[str]:
+    """The names of the files of so many frames: frame_00000.ply and so on."""
+    digits = max(5, len(str(count - 1)))
+    return [f"frame_{number:0{digits}}.{extension}" for number in range(count)]
+
+
+def make_folder(path: Path) -> None:
+    """Makes a folder, and those above it, where it is not there. Raises InputError where it cannot be made."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be made a folder ({error.strerror}); choose another") from None
+
+
 def write_mesh(mesh: Mesh, path: Path) -> None:
     """Write the mesh to a .ply, .obj or .glb file; the name appears once every byte is on the disk."""
     pack = _FORMATS.get(path.suffix.lower())
