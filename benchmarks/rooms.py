@@ -25,7 +25,7 @@ PEOPLE = {
     "crane": (0.2, 0.0, 3.0),
     "samba": (-0.9, 0.0, 2.85),
 }  # m: where there is room to walk
-SPEEDS = {"room2": 1.0, "room2-standing": 0.1}  # of the people
+SPEEDS = {"room2": 1.0, "room2-standing": 0.4}  # of the people
 FRAME_RATE = 30.0  # 1/s
 CAMERAS = 4
 
