@@ -8,10 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32
+from jaxtyping import Bool, Float32, Float64, Int32
 
 from ..types import Mesh
 from .cameras import PinholeCamera
+from .topology import face_normals
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,7 @@ class Rays:
         self._tensor = o3d.core.Tensor.from_numpy
         self._scene = o3d.t.geometry.RaycastingScene()
         self._origin = _middle(mesh) if origin is None else origin
+        self._normals = face_normals(mesh)[0]
         if not mesh.is_empty:
             vertices = (mesh.vertices - self._origin).astype(np.float32)
             self._scene.add_triangles(self._tensor(vertices), self._tensor(mesh.faces.astype(np.uint32)))
@@ -60,6 +62,16 @@ class Rays:
         answer = self._cast(np.broadcast_to(camera.eye, ahead.shape), ahead @ np.linalg.inv(camera.extrinsic[:3, :3]).T)
         shape = (camera.height, camera.width)
         return Seen(_faces(answer).reshape(shape), answer["t_hit"].numpy().reshape(shape))
+
+    def backs(self, camera: PinholeCamera, seen: Seen) -> Bool[np.ndarray, "H W"]:
+        """Where a camera sees the back of a face; `seen` is what it sees."""
+        hit = seen.faces >= 0
+        rows, columns = np.nonzero(hit)
+        _, directions = camera.rays(np.column_stack([columns, rows]) + 0.5)
+        normals = self._normals[seen.faces[hit]] @ camera.extrinsic[:3, :3].T
+        found = np.zeros(seen.faces.shape, bool)
+        found[hit] = (normals * directions).sum(axis=1) > 0
+        return found
 
     def _cast(self, origins: np.ndarray, directions: np.ndarray) -> dict:
         rays = np.concatenate([origins - self._origin, directions], axis=1).astype(np.float32)

@@ -1,0 +1,80 @@
+"""A sparse grid of cubic cells over space: which cells points lie in, which cells are beside each other, and points
+spread over faces so that no cell that a surface crosses is missed by much.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int32, Int64
+
+from ..types import Mesh
+
+_SIDE = 1 << 20  # cells along an axis that a key has room for
+_MOST_PARTS = 512  # of a face's side: more is beyond what a scene of one scale has
+_AROUND = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)])
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Cubic cells of one size; a cell's key orders cells by their place."""
+
+    origin: Float64[np.ndarray, " 3"]  # m, below all points
+    size: float  # m
+
+    def keys(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
+        """The key of the cell that each point lies in; points outside of what keys have room for are at its border."""
+        cells = np.floor((points - self.origin) / self.size)
+        return _key(np.clip(cells, 1, _SIDE - 2).astype(np.int64))
+
+    def centers(self, keys: Int64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 3"]:
+        """The middles of cells."""
+        return self.origin + (_cells(keys) + 0.5) * self.size
+
+
+def neighbours(keys: Int64[np.ndarray, " P"]) -> Int32[np.ndarray, "P 26"]:
+    """For each of some sorted cells the numbers, among them, of the cells around it; its own where there is none."""
+    table = np.empty((len(keys), len(_AROUND)), np.int32)
+    own = np.arange(len(keys), dtype=np.int32)
+    for column, offset in enumerate(_AROUND):
+        asked = keys + _key(offset)
+        at = np.minimum(np.searchsorted(keys, asked), max(len(keys) - 1, 0))
+        table[:, column] = np.where(keys[at] == asked, at, own) if len(keys) else own
+    return table
+
+
+def spread(mesh: Mesh, spacing: float) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]:
+    """Points on a mesh no farther apart than about `spacing`, and the face of each, rising; each face has one."""
+    corners = mesh.vertices[mesh.faces]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    parts = np.clip(np.ceil(sides.max(axis=1, initial=0) / spacing), 1, _MOST_PARTS).astype(np.int64)
+    points, owners = [], []
+    for count in np.unique(parts):
+        faces = np.flatnonzero(parts == count)
+        weights = _middles(int(count))
+        points.append(np.einsum("mk,nkd->nmd", weights, corners[faces]).reshape(-1, 3))
+        owners.append(np.repeat(faces, len(weights)))
+    if not points:
+        return np.zeros((0, 3)), np.zeros(0, np.int64)
+    owner = np.concatenate(owners)
+    order = np.argsort(owner, kind="stable")
+    return np.concatenate(points)[order], owner[order]
+
+
+def _middles(count: int) -> Float64[np.ndarray, "M 3"]:
+    """Barycentric middles of the count^2 equal parts of a triangle."""
+    row, column = np.meshgrid(np.arange(count), np.arange(count), indexing="ij")
+    up, down = row + column < count, row + column < count - 1
+    first = np.concatenate([row[up] + 1 / 3, row[down] + 2 / 3]) / count
+    second = np.concatenate([column[up] + 1 / 3, column[down] + 2 / 3]) / count
+    return np.column_stack([1 - first - second, first, second])
+
+
+def _key(cells: Int64[np.ndarray, "... 3"]) -> Int64[np.ndarray, "..."]:
+    return (cells[..., 0] * _SIDE + cells[..., 1]) * _SIDE + cells[..., 2]
+
+
+def _cells(keys: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, "P 3"]:
+    return np.stack([keys // (_SIDE * _SIDE), keys // _SIDE % _SIDE, keys % _SIDE], axis=1)
