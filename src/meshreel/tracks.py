@@ -62,7 +62,6 @@ class Track(Frames):
         self.reader = reader
         self.number = number
         self.quality = quality
-        self._most = MOST_KEPT // len(reader.tracks)
         self._place = placement(reader)
         self._group = _Decoded(-1, [], None)
         self._states = _States({})
@@ -91,9 +90,10 @@ class Track(Frames):
             chain.append(before)
         state = None if before is None else states.of(before.number)
         states = _States({}) if before is None else _States(dict(states.known), states.size)
+        most = MOST_KEPT // len(self.reader.tracks)  # all tracks together keep no more than one alone would
         for link in reversed(chain):
             meshes, after = self._decode(link, state)
-            states = states.add(link.number, after, state, self._most)
+            states = states.add(link.number, after, state, most)
             state = after
         self._states = states  # replaced, not changed: other threads may read it
         known = _Decoded(chunk.number, meshes, state, _nbytes(meshes))

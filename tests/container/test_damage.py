@@ -103,7 +103,7 @@ def test_other_files_are_not_reel_files():
 
 
 def test_a_form_that_differs_from_the_index_is_refused():
-    entry = IndexEntry(ChunkKind.GROUP, Form.DRACO, 5, (), (Layer(1, zlib.crc32(b"\x04")),))
+    entry = IndexEntry(ChunkKind.GROUP, Form.DRACO, 5, 0, (), (Layer(1, zlib.crc32(b"\x04")),))
     reader = ReelReader(BytesSource(pack_head(HEADER, Index((entry,))) + b"\x04"))
     with pytest.raises(FormatError, match="its form is 4, the index says 3"):
         reader.read_chunk(0)
@@ -119,7 +119,7 @@ def test_a_source_that_gives_less_than_it_promised_is_refused():
         ReelReader(Shrinking(DATA[:-1])).read_chunk(3)
 
 
-GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 65_535, (), (Layer((1 << 64) - 1, 0),))
+GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 65_535, 0, (), (Layer((1 << 64) - 1, 0),))
 
 
 def with_head(body: bytes, head_size: int | None = None) -> bytes:
