@@ -13,7 +13,6 @@ from typing import overload
 from .container.reader import ReelReader
 from .container.sources import BytesSource, FileSource, Source
 from .errors import FormatError, InputError
-from .format.layout import Form
 from .geometry.topology import concatenate
 from .tracks import Background, Track, moving_of_frame
 from .types import Mesh
@@ -102,16 +101,6 @@ class Video(Sequence[Mesh]):
 
     def __iter__(self) -> Iterator[Mesh]:
         return (self[i] for i in range(len(self)))
-
-    @property
-    def has_background(self) -> bool:
-        """Whether some frame is shown with a background."""
-        return any(group.depends_on and self.reader.static_of_frame(group.first_frame) for group in self.reader.groups)
-
-    @property
-    def has_moving(self) -> bool:
-        """Whether some frame has a moving body."""
-        return any(group.form != Form.EMPTY for group in self.reader.groups)
 
     def parts(self, index: int) -> dict[str, Mesh]:
         """The meshes that frame `index` is made of, as they are kept: "background" where it has one, "track 0" ...

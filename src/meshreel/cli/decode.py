@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..decoder import Video
+from ..container.reader import ReelReader
 from ..decoder import open as open_video
 from ..errors import FormatError, InputError
 from ..io.write import frame_names, make_folder, write_mesh
@@ -45,7 +45,7 @@ def command(
     if layers is not None and layers < 0:
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
-    _check_part(file, video, only)
+    _check_part(file, video.reader, only)
     look: dict[str, Callable[[int], Mesh]]
     look = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
     make_folder(output)
@@ -69,9 +69,9 @@ def command(
     common.result(row, f"{output}: {len(video)} {format} files")
 
 
-def _check_part(file: Path, video: Video, only: str) -> None:
+def _check_part(file: Path, reader: ReelReader, only: str) -> None:
     """InputError where a file has no frame with the part that is asked for."""
-    if only == "background" and not video.has_background:
+    if only == "background" and not reader.has_background:
         raise InputError(f"{file}: has no background, leave out --only background")
-    if only == "moving" and not video.has_moving:
+    if only == "moving" and not reader.has_moving:
         raise InputError(f"{file}: has nothing that moves, leave out --only moving")

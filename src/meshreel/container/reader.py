@@ -80,6 +80,16 @@ class ReelReader:
         """The chunks that a truncated file has lost, whole or in part; none in a whole file."""
         return tuple(chunk for chunk in self.chunks if chunk.end > self._source.size)
 
+    @property
+    def has_background(self) -> bool:
+        """Whether some frame is shown with one."""
+        return any(self._is_static(number) for group in self.groups for number in group.depends_on)
+
+    @property
+    def has_moving(self) -> bool:
+        """Whether some frame has a moving body."""
+        return any(group.form != Form.EMPTY for group in self.groups)
+
     def timestamp(self, frame: int) -> float:
         """The time of a frame, s. IndexError as chunk_of_frame."""
         self.chunk_of_frame(frame)
