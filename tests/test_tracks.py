@@ -6,19 +6,23 @@ import io
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import meshreel
 from meshreel import tracks
-from meshreel.coding.background import encode_background
-from meshreel.coding.intra import encode_empty, encode_intra
+from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
+from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
 from meshreel.coding.layers import encode_layers
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter, pack_head
 from meshreel.errors import FormatError
 from meshreel.format.layout import ChunkKind, Form, Index, IndexEntry, Layer
+from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement
 from tests.coding.bodies import ball, moving
 from tests.coding.test_laplacian import icosahedron
@@ -32,6 +36,16 @@ CHANGED = 4  # the first frame that is shown with the second state of the backgr
 CHUNKS = meshreel.open(SCENE).reader.chunks
 TRACKS = [list(track) for track in meshreel.open(SCENE).tracks]
 VISITS = range(4, 9)  # frames that the second body is there
+
+
+STEP = 0.001
+BODIES = [Mesh.of(0.3 * icosahedron(k).vertices - k, icosahedron(k).faces) for k in range(3)]
+FLOOR = encode_background(icosahedron(1), STEP)
+ONE = decode_background(FLOOR)
+COME = encode_change(ONE, np.zeros(len(ONE.faces), bool), BODIES[2], STEP)
+TWO = decode_change(COME, ONE)
+GO = encode_change(TWO, np.arange(len(TWO.faces)) % 3 == 0, Mesh.empty(), STEP)
+STATES, BACKGROUNDS = (FLOOR, COME, GO), (ONE, TWO, decode_change(GO, TWO))
 
 
 class Counted(BytesSource):
@@ -242,6 +256,47 @@ def test_a_flipped_byte_anywhere_gives_no_wrong_frame():
                 found.add(frame)
         hit = next(chunk.number for chunk in CHUNKS if chunk.offset <= place < chunk.end)
         assert found == {frame for frame in (0, 5, 8, 13) if frame not in NEEDED[hit]}
+
+
+@st.composite
+def plans(draw) -> list[list[tuple[int, bool, int | None]]]:
+    """For each track its groups: frames, whether the body is there, and the state of the background that it names."""
+    length = draw(st.integers(1, 12))
+    made = []
+    for _ in range(draw(st.integers(1, 3))):
+        cuts = sorted(draw(st.sets(st.integers(1, max(length - 1, 1)), max_size=3)) - {length})
+        sizes = [b - a for a, b in pairwise([0, *cuts, length])]
+        made.append([(size, draw(st.booleans()), draw(st.sampled_from([None, 0, 1, 2]))) for size in sizes])
+    return made
+
+
+@settings(max_examples=60, deadline=None)
+@given(plans(), st.randoms())
+def test_any_scene_is_frame_by_frame_the_newest_background_and_the_bodies_that_are_there(plan, random):
+    file = io.BytesIO()
+    placed = [
+        (sum(group[0] for group in groups[:k]), track, *groups[k])
+        for track, groups in enumerate(plan)
+        for k in range(len(groups))
+    ]
+    with ReelWriter(file, HEADER) as writer:
+        for payload, before in zip(STATES, [(), (0,), (1,)], strict=True):
+            writer.add_static(payload, depends_on=before)
+        for first, track, size, there, state in sorted(placed):
+            payload = encode_intra([BODIES[track]] * size, STEP, 0) if there else encode_empty()
+            writer.add_group(first, size, payload, (), () if state is None else (state,), track)
+    video = meshreel.open(file.getvalue())
+    frames = list(range(len(video)))
+    random.shuffle(frames)
+    for frame in frames:
+        own = [group for group in placed if group[0] <= frame < group[0] + group[2]]
+        named = [state for *_, state in own if state is not None]
+        parts = [BACKGROUNDS[max(named)]] if named else []
+        wanted = concatenate([*parts, *(decode_intra(encode_intra([BODIES[g[1]]], STEP, 0))[0] for g in own if g[3])])
+        np.testing.assert_array_equal(video[frame].vertices, Placement(HEADER.scale, HEADER.origin).of(wanted).vertices)
+        np.testing.assert_array_equal(video[frame].faces, wanted.faces)
+        assert ("background" in video.parts(frame)) == bool(named)
+        assert [not mesh.is_empty for mesh in video.parts(frame).values()][len(parts) :] == [g[3] for g in own]
 
 
 def test_threads_that_share_a_scene_get_the_frames_they_asked_for():

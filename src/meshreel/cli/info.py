@@ -49,7 +49,9 @@ def describe_file(file: Path) -> dict[str, Any]:
             raise FormatError(f"{file}: {error}") from error
         there = source.size
         groups = [_describe_group(reader, chunk, there) for chunk in reader.groups]
-        states = [_describe_state(reader, chunk, there) for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC]
+        shown = _shown(reader)
+        static = [chunk for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC]
+        states = [_describe_state(reader, chunk, there, shown.get(chunk.number, [])) for chunk in static]
     tracks = [_describe_track(reader, number, groups) for number in range(len(reader.tracks))]
     parts = _sum([{"header and index": reader.head_size}, *(state["parts"] for state in states)])
     several = len(tracks) > 1
@@ -84,12 +86,20 @@ def _describe_group(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, A
     return row | _parts(reader, chunk, there, payload_parts)
 
 
-def _describe_state(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, Any]:
+def _shown(reader: ReelReader) -> dict[int, list[tuple[int, int]]]:
+    """The ranges of frames that each state of the background is shown in, by its chunk; it changes where groups do."""
+    ranges: dict[int, list[tuple[int, int]]] = {}
+    starts = sorted({group.first_frame for group in reader.groups})
+    for start, end in pairwise([*starts, reader.frame_count]):
+        if (chunk := reader.static_of_frame(start)) is not None:
+            ranges.setdefault(chunk.number, []).append((start, end))
+    return ranges
+
+
+def _describe_state(reader: ReelReader, chunk: Chunk, there: int, shown: Iterable[tuple[int, int]]) -> dict[str, Any]:
     """A state of the background: the one it changes, if any, and the frames that are shown with it."""
     row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form.name.lower(), "bytes": chunk.size}
     row["changes"] = chunk.depends_on[0] if chunk.depends_on else None
-    starts = sorted({group.first_frame for group in reader.groups})
-    shown = [(a, b) for a, b in pairwise([*starts, reader.frame_count]) if reader.static_of_frame(a) == chunk]
     row["spans"] = _spans(shown)
     return row | _parts(reader, chunk, there, lambda payload: {"background": len(payload)})
 
