@@ -384,7 +384,7 @@ def test_a_patch_that_does_not_fit_its_background_is_refused_and_the_chunk_named
         meshreel.open(scene_of((other, ()), (patch, (0,))))[0]
 
 
-def test_an_index_of_any_number_of_patches_costs_no_more_than_its_bytes():
+def test_a_file_with_more_patches_upon_each_other_than_are_allowed_is_refused():
     static = IndexEntry(ChunkKind.STATIC, Form.DRACO, 0, 0, (), (Layer(1, 0),))
     patches = [replace(static, form=Form.PATCH, depends_on=(number,)) for number in range(1000)]
     group = replace(static, kind=ChunkKind.GROUP, form=Form.EMPTY, frames=1)
