@@ -1,18 +1,22 @@
 """Makes the golden files of a format version: tiny .reel files and, beside each, what they must decode to, bit for bit.
 
-Run once when a version is released: `python benchmarks/make_golden.py conformance/v1`. They stay as they are for ever:
-a reader that no longer decodes them to these bits is wrong.
+`python benchmarks/make_golden.py conformance/v1` writes those that are not there. The others stay as they are for ever,
+whatever today's encoder would make of them: a reader that no longer decodes them to these bits is wrong.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from meshreel.capture.procedural import deforming_sphere
+from meshreel.coding.background import decode_background, encode_background, encode_change
 from meshreel.coding.displacements import DisplacementOptions
 from meshreel.coding.group import encode_group
 from meshreel.coding.intra import encode_empty, encode_intra
@@ -24,6 +28,7 @@ from meshreel.decoder import Video
 from meshreel.decoder import open as open_video
 from meshreel.format.layout import Header
 from meshreel.format.records import pack
+from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
 from tests.golden import frame_record
 
@@ -32,7 +37,7 @@ Group = tuple[int, bytes, tuple[int, ...], bool]  # frames, payload, layer ends,
 
 
 def main(folder: Path) -> None:
-    """Writes every golden file and its record."""
+    """Writes every golden file that is not there, and its record."""
     folder.mkdir(parents=True, exist_ok=True)
     moving, still, nothing = laplacian_group(), draco_group(), (2, encode_empty(), (), False)
     files: dict[str, tuple[Header, list[Group]]] = {
@@ -45,12 +50,57 @@ def main(folder: Path) -> None:
         "mixed": (header(intervals=(40_000, 20_000, 33_333) * 3), [nothing, moving, still, (1, *nothing[1:])]),
     }
     for name, (head, groups) in files.items():
-        path = folder / f"{name}.reel"
-        with ReelWriter(path, head) as writer:
-            for frames, payload, layers, predicted in groups:
-                before = (writer.last_group,) if predicted and writer.last_group is not None else ()
-                writer.add_group(writer.frame_count, frames, payload, layers, before)
+        with golden(folder, name, head) as writer:
+            for group in groups:
+                add(writer, group)
+    with golden(folder, "scene", header()) as writer:
+        add_scene(writer)
+
+
+@contextmanager
+def golden(folder: Path, name: str, head: Header) -> Iterator[ReelWriter]:
+    """A writer of a file and then of what it must decode to; of nothing where the file is there."""
+    path = folder / f"{name}.reel"
+    kept = path.exists()
+    with ReelWriter(io.BytesIO() if kept else path, head) as writer:
+        yield writer
+    if not kept:
         path.with_suffix(".json").write_text(json.dumps(record(open_video(path)), indent=1) + "\n")
+
+
+def add(writer: ReelWriter, group: Group, track: int = 0, background: tuple[int, ...] = ()) -> None:
+    """The next group of a track, shown with the background."""
+    frames, payload, layers, predicted = group
+    last = writer.last_of(track)
+    before = (last,) if predicted and last is not None else ()
+    writer.add_group(writer.frames_of(track), frames, payload, layers, (*background, *before), track)
+
+
+def add_scene(writer: ReelWriter) -> None:
+    """A floor with a box that goes and a ball that comes, a body that is always there, and one that comes and leaves.
+
+    The second body's middle group already shows the change, while the first body's still names the floor before it.
+    """
+    reference = patches()
+    always = layers_groups(reference, (6, 4, 4))
+    floor, box = Mesh.of(8 * reference.mesh.vertices, reference.mesh.faces), deforming_sphere(1, levels=1)[0]
+    whole = concatenate([floor, Mesh.of(0.5 * box.vertices + [1.0, 1.5, 0.5], box.faces)])
+    step = 0.01
+    before = encode_background(whole, step)
+    decoded = decode_background(before)
+    dropped = (decoded.vertices[decoded.faces][:, :, 2] > 0.4).any(axis=1)
+    change = encode_change(decoded, dropped, Mesh.of(0.3 * box.vertices - [1.0, 0.5, 0.0], box.faces), step)
+    first = writer.add_static(before)
+    shown = (first,)
+    add(writer, always[0], 0, shown)
+    add(writer, (4, encode_empty(), (), False), 1, shown)
+    second = writer.add_static(change, depends_on=(first,))
+    visiting = patched_groups()
+    add(writer, visiting[0], 1, (second,))
+    add(writer, always[1], 0, (second,))
+    add(writer, visiting[1], 1, (second,))
+    add(writer, (5, encode_empty(), (), False), 1, (second,))
+    add(writer, always[2], 0, (second,))
 
 
 def header(intervals: tuple[int, ...] = ()) -> Header:

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel import decoder
+from meshreel import tracks
 from meshreel.coding.intra import encode_empty
 from meshreel.coding.layers import encode_layers
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
-from meshreel.decoder import _Decoded
 from meshreel.errors import FormatError
 from meshreel.format.layout import Header
+from meshreel.tracks import Track, _Decoded
 from tests.coding.bodies import ball, moving
 from tests.golden import frame_record
 
@@ -169,14 +169,14 @@ def test_a_group_that_depends_on_one_without_layers_is_refused():
         meshreel.open(file.getvalue())[2]
 
 
-class Contended(meshreel.Video):
+class Contended(Track):
     """As if another thread had always just put group 1 in the place of the last one."""
 
     @property
     def _group(self) -> _Decoded:
         video = meshreel.open(DATA)
         video[3]
-        return video._group
+        return video.tracks[0]._group
 
     @_group.setter
     def _group(self, group: _Decoded) -> None:
@@ -184,7 +184,7 @@ class Contended(meshreel.Video):
 
 
 def test_what_another_thread_left_is_used_only_where_it_is_right():
-    assert [frame_record(mesh) for mesh in Contended(ReelReader(BytesSource(DATA)))] == WHOLE
+    assert [frame_record(mesh) for mesh in Contended(ReelReader(BytesSource(DATA)), 0)] == WHOLE
 
 
 def test_threads_that_share_a_video_get_the_frames_they_asked_for():
@@ -201,11 +201,12 @@ def test_what_is_kept_of_a_chain_is_bounded_and_frames_stay_the_same(monkeypatch
     for frame in range(COUNT - EMPTY):
         assert frame_record(free[frame]) == WHOLE[frame]
     alone = _states_after(DATA, 0).size
-    monkeypatch.setattr(decoder, "MOST_KEPT", most)
+    monkeypatch.setattr(tracks, "MOST_KEPT", most)
     for frame in [*range(COUNT), *reversed(range(COUNT)), 7, 2, 8, 4]:
         assert frame_record(bound[frame]) == WHOLE[frame]
-        assert _size(bound._states) == bound._states.size <= max(most, alone)
-    assert most > 0 or len(bound._states.known) == 1
+        states = bound.tracks[0]._states
+        assert _size(states) == states.size <= max(most, alone)
+    assert most > 0 or len(states.known) == 1
 
 
 def test_groups_of_a_chain_share_what_follows_from_their_faces():
@@ -214,12 +215,12 @@ def test_groups_of_a_chain_share_what_follows_from_their_faces():
     assert first.size < both.size < 1.5 * first.size
 
 
-def _size(states: decoder._States) -> int:
+def _size(states: tracks._States) -> int:
     known = [None, *states.known.values()]
     return sum(state.nbytes_beyond(before) for before, state in pairwise(known) if state is not None)
 
 
-def _states_after(data: bytes, frame: int) -> decoder._States:
+def _states_after(data: bytes, frame: int) -> tracks._States:
     video = meshreel.open(data)
     video[frame]
-    return video._states
+    return video.tracks[0]._states

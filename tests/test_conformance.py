@@ -7,6 +7,7 @@ import json
 import pytest
 
 import meshreel
+from meshreel.format.layout import ChunkKind
 from tests.golden import GOLDEN, frame_record
 
 FILES = sorted(GOLDEN.glob("*.reel"))
@@ -15,6 +16,8 @@ FILES = sorted(GOLDEN.glob("*.reel"))
 def test_there_is_a_golden_file_for_each_form():
     forms = {group.form.name for path in FILES for group in meshreel.open(path).reader.groups}
     assert forms == {"LAPLACIAN", "LAYERS", "DRACO", "EMPTY"}
+    chunks = [chunk for path in FILES for chunk in meshreel.open(path).reader.chunks]
+    assert {chunk.form.name for chunk in chunks if chunk.kind == ChunkKind.STATIC} == {"DRACO", "PATCH"}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)

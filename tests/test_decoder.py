@@ -13,10 +13,10 @@ from meshreel.coding.group import decode_group
 from meshreel.coding.mesh import encode_mesh
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
-from meshreel.decoder import _Decoded
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import AnchorRule, DisplacementHead, Form, LaplacianGroup
 from meshreel.format.records import pack
+from meshreel.tracks import Track, _Decoded
 from tests.golden import GOLDEN, frame_record
 
 MIXED = (GOLDEN / "mixed.reel").read_bytes()  # empty 0-1, laplacian 2-5, draco 6-8, empty 9
@@ -202,7 +202,7 @@ def test_a_missing_file_is_an_input_error(tmp_path):
         meshreel.open(tmp_path / "none.reel")
 
 
-class Contended(meshreel.Video):
+class Contended(Track):
     """As if another thread had always just put its own group in the place of the last one."""
 
     @property
@@ -215,7 +215,7 @@ class Contended(meshreel.Video):
 
 
 def test_threads_that_share_a_video_get_the_frames_they_asked_for():
-    assert digests(Contended(ReelReader(BytesSource(MIXED)))) == WHOLE
+    assert digests(Contended(ReelReader(BytesSource(MIXED)), 0)) == WHOLE
 
 
 @pytest.mark.parametrize(("levels", "frames"), [(0, 65535), (8, 1000), (12, 4)])

@@ -38,7 +38,7 @@ print([name for name in {ENCODER_SIDE!r} if "meshreel." + name in loaded])
 
 
 def test_decoding_loads_no_heavy_package_and_nothing_of_the_encoder():
-    command = [sys.executable, "-c", LOOK, str(GOLDEN / "mixed.reel"), str(GOLDEN / "layers.reel")]
+    command = [sys.executable, "-c", LOOK, *(str(GOLDEN / f"{name}.reel") for name in ("mixed", "layers", "scene"))]
     answer = subprocess.run(command, capture_output=True, text=True, check=True)
     assert answer.stdout.split("\n")[:2] == ["[]", "[]"]
 

@@ -22,7 +22,7 @@ from .format.layout import LayersPatches
 from .format.records import pack
 from .geometry.decimate import decimate
 from .geometry.nearest import Surface
-from .geometry.topology import clean, components, drop_unreferenced, face_normals
+from .geometry.topology import clean, components, concatenate, drop_unreferenced, face_normals
 from .types import Mesh
 
 BODY = 0.98  # of the surface; the rest are the tails
@@ -181,7 +181,7 @@ class _Search:
             worth, small = max(tried, key=lambda pair: pair[0], default=(0.0, None))
             if small is not None and worth > 0:
                 chosen.append(small)
-        return _joined(chosen)
+        return drop_unreferenced(concatenate(chosen))
 
     def _reduced(self, frame: _Frame, faces: Int64[np.ndarray, " S"]) -> Iterator[Mesh]:
         mesh = clean(Mesh(frame.original.vertices, frame.original.faces[faces]))
@@ -317,11 +317,3 @@ def _regions(faces: Int32[np.ndarray, "F 3"], far: Bool[np.ndarray, "T F"]) -> I
     labels = np.full(far.shape, -1)
     labels[far] = components(triples, len(used))[triples[: len(at), 0]]
     return labels
-
-
-def _joined(meshes: Sequence[Mesh]) -> Mesh:
-    if not meshes:
-        return Mesh.empty()
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return drop_unreferenced(Mesh.of(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces)))

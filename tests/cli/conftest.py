@@ -17,6 +17,7 @@ from tests.golden import GOLDEN
 from tests.small_options import quick
 
 FILE = GOLDEN / "mixed.reel"
+SCENE = GOLDEN / "scene.reel"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ import pytest
 
 import meshreel
 from meshreel.io.sequence import open_sequence
-from tests.cli.conftest import FILE, failed
+from tests.cli.conftest import FILE, SCENE, failed
+from tests.golden import GOLDEN
 
 
 @pytest.mark.parametrize("kind", ["ply", "obj", "glb"])
@@ -52,6 +53,42 @@ def test_a_damaged_group_costs_only_its_frames_and_the_exit_code(run, tmp_path):
     said = run("decode", tmp_path / "a.reel", "-o", tmp_path / "out")
     assert failed(said, "frames 2 to 5", "4 of 10 frames are lost")
     assert len(list((tmp_path / "out").iterdir())) == 6
+
+
+@pytest.mark.parametrize("only", ["all", "background", "moving"])
+def test_of_a_scene_all_or_what_moves_or_what_does_not(run, tmp_path, only):
+    arguments = [] if only == "all" else ["--only", only]
+    assert run("decode", SCENE, "-o", tmp_path, *arguments, "--json").row["frames"] == 14
+    video = meshreel.open(SCENE)
+    look = {"all": video.__getitem__, "background": video.background, "moving": video.moving}[only]
+    for frame, mesh in enumerate(open_sequence(tmp_path)):
+        wanted = look(frame)
+        assert len(mesh.faces) == len(wanted.faces) > 0
+        assert np.abs(mesh.vertices[mesh.faces] - wanted.vertices[wanted.faces]).max() < 1e-5
+
+
+def test_a_part_that_a_file_does_not_have_is_told_before_anything_is_written(run, tmp_path):
+    folder = tmp_path / "out"
+    assert failed(run("decode", FILE, "-o", folder, "--only", "background"), "mixed.reel", "no background")
+    empty = GOLDEN / "empty.reel"
+    assert failed(run("decode", empty, "-o", folder, "--only", "moving"), "empty.reel", "nothing that moves")
+    assert failed(run("decode", SCENE, "-o", folder, "--only", "people"), "people")
+    assert not folder.exists()
+    assert run("decode", FILE, "-o", folder, "--only", "moving").code == 0
+
+
+def test_damage_of_a_body_leaves_the_frames_without_it_and_the_background(run, tmp_path):
+    data, chunk = bytearray(SCENE.read_bytes()), meshreel.open(SCENE).reader.chunks[4]
+    data[chunk.offset + 60] ^= 4
+    (tmp_path / "a.reel").write_bytes(data)
+    said = run("decode", tmp_path / "a.reel", "-o", tmp_path / "out")
+    assert failed(said, "chunk 4 (track 1, frames 4 to 6)", "5 of 14 frames are lost")  # the next group needs it
+    assert len(list((tmp_path / "out").iterdir())) == 9
+    assert run("decode", tmp_path / "a.reel", "-o", tmp_path / "still", "--only", "background").code == 0
+    data[meshreel.open(SCENE).reader.chunks[3].offset + 9] ^= 4
+    (tmp_path / "a.reel").write_bytes(data)
+    said = run("decode", tmp_path / "a.reel", "-o", tmp_path / "still", "--only", "background")
+    assert failed(said, "background of frame 4: chunk 3 (static)", "10 of 14 frames are lost")
 
 
 @pytest.mark.parametrize(

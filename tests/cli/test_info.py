@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import meshreel
-from tests.cli.conftest import FILE, failed
+from meshreel.coding.intra import encode_empty
+from meshreel.container.writer import ReelWriter
+from tests.cli.conftest import FILE, SCENE, failed
+from tests.container.files import HEADER
 from tests.golden import GOLDEN
 
 
@@ -61,6 +64,70 @@ def test_of_a_truncated_file_what_is_there_and_what_is_missing_is_told(run, tmp_
     )
     assert "group 2: " in said.err and "group 3: " in said.err and "group 1" not in said.err
     assert "missing" not in run("info", FILE).out and run("info", FILE, "--json").row["bytes_missing"] == 0
+
+
+def test_of_a_scene_it_tells_when_each_body_is_there_and_what_it_is_made_of(run):
+    row = run("info", SCENE, "--json").row
+    assert [track["spans"] for track in row["tracks"]] == [[[0, 13]], [[4, 8]]]
+    assert [track["groups"] for track in row["tracks"]] == [3, 4]
+    assert sum(row["parts"].values()) == row["bytes"] == SCENE.stat().st_size
+    for number, track in enumerate(row["tracks"]):
+        own = [group for group in row["groups"] if group["track"] == number]
+        assert track["bytes"] == sum(group["bytes"] for group in own) == sum(track["parts"].values())
+        assert track["parts"] == {
+            name.removeprefix(f"track {number}: "): size
+            for name, size in row["parts"].items()
+            if name.startswith(f"track {number}: ")
+        }
+    assert row["parts"]["track 1: patches"] > 0 and "track 0: patches" not in row["parts"]
+    said = run("info", SCENE)
+    assert (said.code, said.err) == (0, "")
+    assert all(words in said.out for words in ("is there in frames", "4-8", "track 1: base mesh", "background"))
+
+
+def test_of_a_scene_it_tells_the_states_of_the_background(run):
+    row = run("info", SCENE, "--json").row
+    states = row["background"]
+    assert [(s["chunk"], s["form"], s["changes"], s["spans"]) for s in states] == [
+        (0, "draco", None, [[0, 3]]),
+        (3, "patch", 0, [[4, 13]]),
+    ]
+    assert row["parts"]["background"] == sum(state["bytes"] for state in states)
+    assert "is shown in frames" in run("info", SCENE).out and "is shown in frames" not in run("info", FILE).out
+    assert run("info", FILE, "--json").row["background"] == []
+
+
+def test_a_body_that_comes_back_has_two_spans_and_one_that_never_comes_none(run, tmp_path):
+    payload = meshreel.open(FILE).reader.read_chunk(2)
+    with ReelWriter(tmp_path / "a.reel", HEADER) as writer:
+        for first in range(0, 12, 3):
+            writer.add_group(first, 3, encode_empty() if first == 6 else payload)
+            writer.add_group(first, 3, encode_empty(), track=1)
+    row = run("info", tmp_path / "a.reel", "--json").row
+    assert [track["spans"] for track in row["tracks"]] == [[[0, 5], [9, 11]], []]
+    assert "0-5, 9-11" in run("info", tmp_path / "a.reel").out and "none" in run("info", tmp_path / "a.reel").out
+
+
+def test_damage_of_a_scene_is_reported_by_chunk_track_and_frames(run, tmp_path):
+    chunks = meshreel.open(SCENE).reader.chunks
+    for number, words in ((3, "background: chunk 3 (static)"), (4, "group 2: chunk 4 (track 1, frames 4 to 6)")):
+        data = bytearray(SCENE.read_bytes())
+        data[chunks[number].offset + 9] ^= 4
+        (tmp_path / "a.reel").write_bytes(data)
+        said = run("info", tmp_path / "a.reel", "--json")
+        assert said.code == 0 and words in said.err and said.err.count("\n") == 1
+        assert said.row["parts"]["damaged"] == chunks[number].size
+        assert sum(said.row["parts"].values()) == len(data)
+
+
+def test_of_a_truncated_scene_what_is_missing_is_told(run, tmp_path):
+    data, chunks = SCENE.read_bytes(), meshreel.open(SCENE).reader.chunks
+    cut = chunks[3].offset + 10
+    (tmp_path / "a.reel").write_bytes(data[:cut])
+    row = run("info", tmp_path / "a.reel", "--json").row
+    assert row["parts"]["missing"] == row["bytes_missing"] == len(data) - cut
+    assert row["background"][1]["parts"] == {"damaged": 10, "missing": chunks[3].size - 10}
+    assert sum(row["parts"].values()) == len(data)
 
 
 def test_other_files_are_told(run, tmp_path):

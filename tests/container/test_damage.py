@@ -103,7 +103,7 @@ def test_other_files_are_not_reel_files():
 
 
 def test_a_form_that_differs_from_the_index_is_refused():
-    entry = IndexEntry(ChunkKind.GROUP, Form.DRACO, 5, (), (Layer(1, zlib.crc32(b"\x04")),))
+    entry = IndexEntry(ChunkKind.GROUP, Form.DRACO, 5, 0, (), (Layer(1, zlib.crc32(b"\x04")),))
     reader = ReelReader(BytesSource(pack_head(HEADER, Index((entry,))) + b"\x04"))
     with pytest.raises(FormatError, match="its form is 4, the index says 3"):
         reader.read_chunk(0)
@@ -119,7 +119,10 @@ def test_a_source_that_gives_less_than_it_promised_is_refused():
         ReelReader(Shrinking(DATA[:-1])).read_chunk(3)
 
 
-GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 65_535, (), (Layer((1 << 64) - 1, 0),))
+GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 65_535, 0, (), (Layer((1 << 64) - 1, 0),))
+
+
+PATCH = replace(GROUP, kind=ChunkKind.STATIC, form=Form.PATCH, frames=0, depends_on=(0,))
 
 
 def with_head(body: bytes, head_size: int | None = None) -> bytes:
@@ -139,6 +142,10 @@ def with_head(body: bytes, head_size: int | None = None) -> bytes:
         with_head(pack(HEADER) + b"\x01\0\0\0" + pack(replace(GROUP, layers=()))[:-2] + b"\xff\xff" + bytes(100)),
         pack_head(HEADER, Index((GROUP,) * 100)),
         pack_head(HEADER, Index((replace(GROUP, depends_on=(1 << 63,)),))),
+        pack_head(HEADER, Index((replace(GROUP, track=(1 << 64) - 1),))),
+        pack_head(HEADER, Index(tuple(replace(GROUP, track=track) for track in range(300)))),
+        pack_head(HEADER, Index((replace(PATCH, depends_on=(1,)), PATCH, GROUP))),
+        pack_head(HEADER, Index((replace(GROUP, depends_on=(0,) * 255),))),
         pack_head(replace(HEADER, scale=1e300), Index((GROUP,))),
         pack_head(HEADER, Index((GROUP, replace(GROUP, frames=0)))),
     ],

@@ -14,9 +14,11 @@ from meshreel.container.reader import FIRST_REQUEST, ReelReader
 from meshreel.container.sources import BytesSource, FileSource, Source
 from meshreel.container.writer import ReelWriter
 from meshreel.errors import InputError
+from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import ChunkKind, EmptyGroup, Form
 from meshreel.format.records import pack
 from tests.container.files import FRAMES, HEADER, PAYLOADS, small_file
+from tests.golden import GOLDEN
 
 
 class CountingSource:
@@ -110,6 +112,57 @@ def test_among_many_groups_each_frame_is_found():
             writer.add_group(10 * number, 10, pack(EmptyGroup(Form.EMPTY)))
     reader = ReelReader(BytesSource(file.getvalue()))
     assert [reader.chunk_of_frame(frame).number for frame in range(1000)] == [frame // 10 for frame in range(1000)]
+
+
+SCENE = (GOLDEN / "scene.reel").read_bytes()  # chunks 0 and 3 static, 1, 5, 8 of track 0, 2, 4, 6, 7 of track 1
+
+
+def test_a_scene_has_the_groups_of_each_track_and_those_of_a_frame():
+    reader = ReelReader(BytesSource(SCENE))
+    assert [[group.number for group in groups] for groups in reader.tracks] == [[1, 5, 8], [2, 4, 6, 7]]
+    assert [group.number for group in reader.groups] == [1, 2, 4, 5, 6, 7, 8]
+    assert [[g.first_frame for g in groups] for groups in reader.tracks] == [[0, 6, 10], [0, 4, 7, 9]]
+    assert reader.frame_count == 14
+    found = [tuple(chunk.number for chunk in reader.chunks_of_frame(frame)) for frame in range(14)]
+    assert found == [(1, 2)] * 4 + [(1, 4)] * 2 + [(5, 4)] + [(5, 6)] * 2 + [(5, 7)] + [(8, 7)] * 4
+    for frame in (-1, 14):
+        with pytest.raises(IndexError, match="frames 0 to 13"):
+            reader.chunks_of_frame(frame)
+
+
+def test_a_frame_is_shown_with_the_newest_state_that_a_group_of_it_names():
+    reader = ReelReader(BytesSource(SCENE))
+    shown = [reader.static_of_frame(frame) for frame in range(14)]
+    assert [chunk.number for chunk in shown if chunk is not None] == [0] * 4 + [3] * 10
+    assert [reader.static_of_frame(frame) is None for frame in (0, 10)] == [False, False]
+    sequence = ReelReader(BytesSource(small_file()))
+    assert [sequence.static_of_frame(frame) is None for frame in (0, 10)] == [False, True]
+
+
+def test_a_group_is_predicted_from_one_of_its_track():
+    reader = ReelReader(BytesSource(SCENE))
+    before = [reader.group_before(chunk) for chunk in reader.groups]
+    assert [chunk and chunk.number for chunk in before] == [None, None, None, 1, 4, None, 5]
+
+
+def test_where_there_are_several_tracks_a_chunk_names_its_own():
+    reader = ReelReader(BytesSource(SCENE))
+    assert [str(reader.chunks[n]) for n in (0, 4, 5)] == [
+        "chunk 0 (static)",
+        "chunk 4 (track 1, frames 4 to 6)",
+        "chunk 5 (track 0, frames 6 to 9)",
+    ]
+
+
+def test_as_many_tracks_as_are_allowed_are_found_at_once():
+    file = io.BytesIO()
+    with ReelWriter(file, HEADER) as writer:
+        for first in range(0, 100, 10):
+            for track in range(MOST_TRACKS):
+                writer.add_group(first, 10, pack(EmptyGroup(Form.EMPTY)), track=track)
+    reader = ReelReader(BytesSource(file.getvalue()))
+    assert [chunk.track for chunk in reader.chunks_of_frame(57)] == list(range(MOST_TRACKS))
+    assert {chunk.first_frame for chunk in reader.chunks_of_frame(57)} == {50}
 
 
 def test_times_are_uniform_from_the_first():

@@ -18,11 +18,13 @@ from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource, FileSource
 from meshreel.container.writer import ReelWriter
 from meshreel.errors import InputError
-from meshreel.format.layout import EmptyGroup, Form
+from meshreel.format.layout import EmptyGroup, Form, StaticPatch
 from meshreel.format.records import pack
 from tests.container.files import HEADER, PAYLOADS, small_file
 
 EMPTY = pack(EmptyGroup(Form.EMPTY))
+STATIC = PAYLOADS[0]
+PATCH = pack(StaticPatch(Form.PATCH, 0.001, 0, b"", b"mesh"))
 BIG = bytes([Form.DRACO]) + bytes(999_999)
 
 IN_A_CHILD = """
@@ -148,7 +150,7 @@ def test_a_header_without_meaning_is_refused_before_any_work(change):
 
 def test_a_file_without_frames_is_an_input_error(tmp_path):
     with pytest.raises(InputError, match="no frames"), ReelWriter(tmp_path / "out.reel", HEADER) as writer:
-        writer.add_static(EMPTY)
+        writer.add_static(STATIC)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -163,16 +165,21 @@ def test_a_file_without_frames_is_an_input_error(tmp_path):
         ({"layers": (5, 5, 10)}, "must rise"),
         ({"layers": (0, 10)}, "must rise"),
         ({"layers": (5,)}, "payload's 10 bytes"),
-        ({"depends_on": (0, 1, 3)}, "last group only"),
-        ({"depends_on": (2,)}, "last group only"),
-        ({"depends_on": (-1,)}, "last group only"),
+        ({"depends_on": (0, 1, 3)}, "last group of its track"),
+        ({"depends_on": (2,)}, "last group of its track"),
+        ({"depends_on": (-1,)}, "IndexEntry.depends_on"),
+        ({"depends_on": (0, 0)}, "twice"),
+        ({"track": 1}, "frame 0 comes next"),
+        ({"track": 2, "first_frame": 0}, "track 2 after 1"),
+        ({"track": -1}, "of track -1"),
+        ({"payload": b"\x05" + bytes(9)}, "a group of form PATCH"),
     ],
 )
 def test_a_group_that_cannot_be_is_refused_and_the_file_goes_on(arguments, message):
     file = io.BytesIO()
     good = {"first_frame": 10, "frame_count": 5, "payload": b"\x03" + bytes(9), "layers": (4, 10), "depends_on": (0,)}
     with ReelWriter(file, HEADER) as writer:
-        assert writer.add_static(EMPTY) == 0
+        assert writer.add_static(STATIC) == 0
         assert writer.add_group(0, 10, EMPTY) == 1
         with pytest.raises(InputError, match=message):
             writer.add_group(**(good | arguments))
@@ -185,14 +192,66 @@ def test_a_group_may_depend_on_the_one_before_it_and_on_no_other():
     with ReelWriter(file, HEADER) as writer:
         assert writer.last_group is None
         writer.add_group(0, 10, EMPTY)
-        writer.add_static(EMPTY)  # may lie between them
+        writer.add_static(STATIC)  # may lie between them
         writer.add_group(10, 5, EMPTY, depends_on=(0, 1))
         assert writer.last_group == 2
-        with pytest.raises(InputError, match="last group only"):
+        with pytest.raises(InputError, match="last group of its track"):
             writer.add_group(15, 3, EMPTY, depends_on=(0,))
         writer.add_group(15, 3, EMPTY, depends_on=(writer.last_group,))
     groups = ReelReader(BytesSource(file.getvalue())).groups
     assert [group.depends_on for group in groups] == [(), (0, 1), (2,)]
+
+
+def test_tracks_interleave_and_each_has_its_own_frames_and_last_group():
+    file = io.BytesIO()
+    with ReelWriter(file, HEADER) as writer:
+        assert (writer.frames_of(1), writer.last_of(1)) == (0, None)
+        background = writer.add_static(STATIC)
+        writer.add_group(0, 10, EMPTY, depends_on=(background,))
+        writer.add_group(0, 4, EMPTY, depends_on=(background,), track=1)
+        changed = writer.add_static(PATCH, depends_on=(background,))
+        assert (writer.frames_of(0), writer.frames_of(1), writer.last_of(0), writer.last_of(1)) == (10, 4, 1, 2)
+        writer.add_group(4, 8, EMPTY, depends_on=(changed, 2), track=1)
+        with pytest.raises(InputError, match="chunk 5: track 2 from frame 0 behind track 1 from frame 4"):
+            writer.add_group(0, 12, EMPTY, track=2)
+        writer.add_group(10, 2, EMPTY, depends_on=(1, changed))
+        assert (writer.frame_count, writer.last_group) == (12, 5)
+    reader = ReelReader(BytesSource(file.getvalue()))
+    assert [[group.number for group in groups] for groups in reader.tracks] == [[1, 5], [2, 4]]
+    assert [chunk.depends_on for chunk in reader.chunks] == [(), (0,), (0,), (0,), (3, 2), (1, 3)]
+
+
+def test_a_file_whose_tracks_differ_in_length_is_an_input_error(tmp_path):
+    with (
+        pytest.raises(InputError, match="track 1 has 9 frames, track 0 has 10"),
+        ReelWriter(tmp_path / "out.reel", HEADER) as writer,
+    ):
+        writer.add_group(0, 10, EMPTY)
+        writer.add_group(0, 9, EMPTY, track=1)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("payload", "depends_on", "message"),
+    [
+        (EMPTY, (), "static chunk of form EMPTY"),
+        (STATIC, (0,), "form DRACO depends on"),
+        (PATCH, (), "form PATCH depends on"),
+        (PATCH, (1,), "no static chunk before it"),
+        (PATCH, (2,), "no static chunk before it"),
+        (PATCH, (0, 0), "twice"),
+        (PATCH, (-1,), "IndexEntry.depends_on"),
+    ],
+)
+def test_a_background_that_cannot_be_is_refused_and_the_file_goes_on(payload, depends_on, message):
+    file = io.BytesIO()
+    with ReelWriter(file, HEADER) as writer:
+        writer.add_static(STATIC)
+        writer.add_group(0, 10, EMPTY)
+        with pytest.raises(InputError, match=message):
+            writer.add_static(payload, depends_on=depends_on)
+        assert writer.add_static(PATCH, depends_on=(0,)) == 2
+    assert len(ReelReader(BytesSource(file.getvalue())).chunks) == 3
 
 
 def test_memory_does_not_grow_with_the_file(tmp_path):

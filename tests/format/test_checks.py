@@ -5,14 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from meshreel.errors import FormatError
-from meshreel.format.checks import check_header, check_index, parse_metadata
+from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS, check_header, check_index, parse_metadata
 from meshreel.format.layout import ChunkKind, Form, Header, Index, IndexEntry, Layer
+from tests.format.strategies import records
+
+# The run-time type checker draws items of tuples at random, which hypothesis takes for the test's own doing.
+pytestmark = pytest.mark.filterwarnings("ignore:Do not use the `random` module")
 
 HEADER = Header(30.0, (0.0, 0.0, 0.0), 1.7, (-0.5, -0.5, -0.5), (0.5, 0.5, 0.5), "{}")
-STATIC = IndexEntry(ChunkKind.STATIC, Form.DRACO, 0, (), (Layer(9, 0),))
-GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 5, (), (Layer(9, 0),))
+STATIC = IndexEntry(ChunkKind.STATIC, Form.DRACO, 0, 0, (), (Layer(9, 0),))
+GROUP = IndexEntry(ChunkKind.GROUP, Form.DRACO, 5, 0, (), (Layer(9, 0),))
+SECOND = replace(GROUP, track=1)
+PATCH = replace(STATIC, form=Form.PATCH, depends_on=(0,))
 
 
 def test_what_the_encoder_writes_passes():
@@ -20,6 +28,9 @@ def test_what_the_encoder_writes_passes():
     check_header(replace(HEADER, intervals=(1, 2)), 3)
     check_index(Index((STATIC, replace(GROUP, depends_on=(0,)))))
     check_index(Index((GROUP, STATIC, replace(GROUP, depends_on=(0, 1)), replace(GROUP, depends_on=(2,)))))
+    check_index(
+        Index((STATIC, GROUP, SECOND, PATCH, replace(GROUP, depends_on=(1, 3)), replace(SECOND, depends_on=(2,))))
+    )
     assert parse_metadata('{"quality": 50}') == {"quality": 50}
 
 
@@ -51,7 +62,7 @@ def test_a_header_that_means_nothing_is_refused(change):
         ((replace(GROUP, layers=()),), "without bytes"),
         ((replace(GROUP, layers=(Layer(3, 0), Layer(0, 0))),), "without bytes"),
         ((GROUP, GROUP, replace(GROUP, depends_on=(0,))), "neither a static chunk"),
-        ((GROUP, replace(STATIC, depends_on=(0,))), "that depends on group 0"),
+        ((GROUP, replace(STATIC, depends_on=(0,))), r"chunk 1: a static chunk of form DRACO depends on \(0,\)"),
         ((replace(GROUP, depends_on=(0,)),), "neither a static chunk"),
         ((replace(GROUP, depends_on=(1 << 60,)),), "neither a static chunk"),
     ],
@@ -59,6 +70,94 @@ def test_a_header_that_means_nothing_is_refused(change):
 def test_an_index_that_contradicts_itself_is_refused(chunks, message):
     with pytest.raises(FormatError, match=message):
         check_index(Index(chunks))
+
+
+@pytest.mark.parametrize(
+    ("chunks", "message"),
+    [
+        ((SECOND,), "chunk 0: track 1 after 0"),
+        ((GROUP, replace(GROUP, track=2)), "chunk 1: track 2 after 1"),
+        ((replace(GROUP, track=1 << 63),), "at most 256"),
+        ((GROUP, GROUP, SECOND), "chunk 2: track 1 from frame 0 behind track 0 from frame 5"),
+        ((GROUP, SECOND, SECOND, GROUP), "chunk 3: track 0 from frame 5 behind track 1 from frame 5"),
+        ((GROUP, SECOND, replace(SECOND, frames=3), replace(GROUP, frames=4)), "chunk 3: track 0 from frame 5 behind"),
+        ((GROUP, replace(SECOND, frames=4)), "track 1 has 4 frames, track 0 has 5"),
+        ((GROUP, SECOND, GROUP), "track 1 has 5 frames, track 0 has 10"),
+        ((GROUP, replace(SECOND, depends_on=(0,))), "nor the last group of its track"),
+        ((GROUP, SECOND, replace(GROUP, depends_on=(1,))), "nor the last group of its track"),
+        ((GROUP, replace(GROUP, depends_on=(0, 0))), "twice"),
+        ((STATIC, STATIC, replace(GROUP, depends_on=(0, 1))), "several static chunks"),
+        ((replace(GROUP, form=Form.PATCH),), "a group of form PATCH"),
+    ],
+)
+def test_tracks_that_cannot_be_played_while_they_arrive_are_refused(chunks, message):
+    with pytest.raises(FormatError, match=message):
+        check_index(Index(chunks))
+
+
+@pytest.mark.parametrize(
+    ("chunks", "message"),
+    [
+        ((replace(PATCH, depends_on=()),), r"chunk 0: .* of form PATCH depends on \(\)"),
+        ((PATCH,), "depends on 0, which is no static chunk before it"),
+        ((STATIC, replace(PATCH, depends_on=(1,))), "depends on 1, which is no static chunk before it"),
+        ((STATIC, replace(PATCH, depends_on=(2,)), replace(PATCH, depends_on=(1,))), "depends on 2"),
+        ((STATIC, replace(PATCH, depends_on=(1 << 60,))), "no static chunk before it"),
+        ((GROUP, PATCH), "depends on 0, which is no static chunk before it"),
+        ((STATIC, STATIC, replace(PATCH, depends_on=(0, 1))), r"depends on \(0, 1\)"),
+        ((STATIC, STATIC, replace(STATIC, depends_on=(1,))), r"of form DRACO depends on \(1,\)"),
+        ((replace(STATIC, form=Form.LAYERS),), "static chunk of form LAYERS"),
+        ((replace(STATIC, form=Form.EMPTY),), "static chunk of form EMPTY"),
+        ((replace(STATIC, track=1),), "and track 1"),
+    ],
+)
+def test_a_background_that_leads_to_no_mesh_is_refused(chunks, message):
+    with pytest.raises(FormatError, match=message):
+        check_index(Index((*chunks, GROUP)))
+
+
+def test_as_many_tracks_and_changes_as_are_allowed_pass_and_one_more_is_refused():
+    tracks = [replace(GROUP, track=number) for number in range(MOST_TRACKS + 1)]
+    check_index(Index(tuple(tracks[:-1])))
+    with pytest.raises(FormatError, match=f"track {MOST_TRACKS} after {MOST_TRACKS}"):
+        check_index(Index(tuple(tracks)))
+    chain = [STATIC, *(replace(PATCH, depends_on=(number,)) for number in range(MOST_CHANGES + 1))]
+    check_index(Index((*chain[:-1], GROUP)))
+    check_index(Index((*chain[:-1], STATIC, replace(PATCH, depends_on=(len(chain) - 1,)), GROUP)))
+    with pytest.raises(FormatError, match=f"patch {MOST_CHANGES + 1} of one background"):
+        check_index(Index((*chain, GROUP)))
+
+
+@settings(deadline=None)
+@given(st.lists(st.lists(st.integers(1, 9), min_size=1, max_size=6), min_size=1, max_size=5), st.randoms())
+def test_groups_of_any_tracks_of_one_length_pass_in_one_order_only(tracks, random):
+    length = max(map(sum, tracks))
+    placed = []
+    for track, sizes in enumerate(tracks):
+        sizes = [*sizes, length - sum(sizes)] if sum(sizes) < length else sizes
+        starts = [sum(sizes[:k]) for k in range(len(sizes))]
+        placed += [(start, track, size) for start, size in zip(starts, sizes, strict=True)]
+    placed.sort()
+    in_order = [replace(GROUP, track=track, frames=size) for _, track, size in placed]
+    check_index(Index(tuple(in_order)))
+    turns = [group.track for group in in_order]
+    random.shuffle(turns)
+    waiting = [iter([group for group in in_order if group.track == track]) for track in range(len(tracks))]
+    shuffled = [next(waiting[track]) for track in turns]
+    if shuffled != in_order:
+        with pytest.raises(FormatError):
+            check_index(Index(tuple(shuffled)))
+
+
+@settings(deadline=None)
+@given(records(Index))
+def test_any_index_passes_or_is_refused_and_what_passes_leads_somewhere(index):
+    try:
+        check_index(index)
+    except FormatError:
+        return
+    for number, entry in enumerate(index.chunks):
+        assert all(other < number for other in entry.depends_on)
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from meshreel.coding import entropy, laplacian
+from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.layers import LayersOptions, LayersState, decode_layers, encode_layers
 from meshreel.coding.mesh import decode_mesh
@@ -18,7 +19,7 @@ from meshreel.coding.patches import encode_patches
 from meshreel.coding.reference import code_reference
 from meshreel.coding.steps import step_of
 from meshreel.format import records
-from meshreel.format.layout import AnchorRule, DisplacementHead, LayersGroup, LayersLevel, Origin
+from meshreel.format.layout import AnchorRule, DisplacementHead, LayersGroup, LayersLevel, Origin, StaticPatch
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
@@ -133,6 +134,21 @@ def test_the_document_decodes_layers_to_the_bit(decoder: dict[str, Any], frames:
         told, told_faces, left = told_by(decoder, payload, left)
         np.testing.assert_array_equal(told_faces, faces)
         np.testing.assert_array_equal(told, positions)
+
+
+def test_the_document_decodes_a_change_of_the_background_to_the_bit(decoder: dict[str, Any]) -> None:
+    generator, step = np.random.default_rng(7), 2.0**-12
+    before = decode_background(encode_background(body(), step))
+    shape = [tuple(v) for v in before.vertices.tolist()], [tuple(f) for f in before.faces.tolist()]
+    for more in (body(), Mesh.empty()):
+        for density in (0.0, 0.1, 0.9, 1.0):
+            data = encode_change(before, generator.random(len(before.faces)) < density, more, step)
+            record, after = records.unpack_all(StaticPatch, data), decode_change(data, before)
+            one = decode_mesh(record.mesh, step)
+            lists = [tuple(v) for v in one.vertices.tolist()], [tuple(f) for f in one.faces.tolist()]
+            vertices, faces = decoder["decode_change"](record, *shape, lists)
+            np.testing.assert_array_equal(np.reshape(vertices, (-1, 3)), after.vertices)
+            np.testing.assert_array_equal(np.reshape(faces, (-1, 3)), after.faces)
 
 
 def test_the_document_decodes_patches_to_the_bit(decoder: dict[str, Any]) -> None:

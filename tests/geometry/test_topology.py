@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from meshreel.geometry.topology import (
     clean,
     components,
+    concatenate,
     drop_unreferenced,
     face_normals,
     subdivide_midpoint,
@@ -112,3 +113,19 @@ def test_components_are_those_of_a_search_in_the_order_of_their_first_vertex(
             expected[v] = label
         label += 1
     assert components(np.array(faces, dtype=np.int32).reshape(-1, 3), count).tolist() == expected
+
+
+def test_meshes_that_are_concatenated_keep_their_vertices_and_faces_in_order():
+    one, two = (Mesh.of(np.random.default_rng(k).normal(size=(5, 3)), [[0, 1, 2], [4, 3, 2]]) for k in (1, 2))
+    loose = Mesh.of(np.ones((2, 3)), np.zeros((0, 3)))  # vertices without faces count
+    both = concatenate([Mesh.empty(), one, loose, Mesh.empty(), two])
+    np.testing.assert_array_equal(both.vertices, np.concatenate([one.vertices, loose.vertices, two.vertices]))
+    np.testing.assert_array_equal(both.faces, np.concatenate([one.faces, two.faces + 7]))
+    assert both.vertices.dtype == np.float64 and both.faces.dtype == np.int32
+
+
+def test_one_mesh_among_empty_ones_is_itself():
+    one, nothing = Mesh.of(np.eye(3), [[0, 1, 2]]), Mesh.empty()
+    assert concatenate([nothing, one, Mesh.empty()]) is one
+    assert concatenate([nothing, Mesh.empty()]) is nothing
+    assert concatenate([]).is_empty

@@ -31,7 +31,7 @@ COMMANDS = {
     "capture": "Fuse recordings of depth cameras into a mesh per frame.",
     "encode": "Encode a sequence of meshes into one .reel file.",
     "decode": "Decode a .reel file into a directory of meshes.",
-    "info": "Show rate by part, groups, forms and the quality recorded when the file was encoded.",
+    "info": "Show rate by part, objects over time, groups, forms and the quality recorded when the file was encoded.",
     "compare": "Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.",
     "bench": "Measure codecs against each other, and make tables and plots of the rows.",
     "demo": "Make a short capture of moving people, encode it, and measure what comes back.",

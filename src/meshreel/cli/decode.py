@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from ..container.reader import ReelReader
 from ..decoder import open as open_video
 from ..errors import FormatError, InputError
 from ..io.write import frame_names, make_folder, write_mesh
+from ..types import Mesh
 from .console import Common
 
 
@@ -20,6 +23,7 @@ def command(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     format: Literal["ply", "obj", "glb"] = "ply",
     layers: int | None = None,
+    only: Literal["all", "background", "moving"] = "all",
     common: Common = Common(),
 ) -> None:
     """Decode a .reel file into a directory of meshes.
@@ -35,10 +39,15 @@ def command(
     layers
         Use at most this many layers of a group beyond its first (subdivisions, or KLT components): a coarser, still
         valid shape.
+    only
+        Of a scene, what does not move or what moves; all of every frame if not given.
     """
     if layers is not None and layers < 0:
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
+    _check_part(file, video.reader, only)
+    look: dict[str, Callable[[int], Mesh]]
+    look = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
     make_folder(output)
     names = frame_names(len(video), format)
     others = {path.name for path in output.glob(f"frame_*.{format}")} - set(names)
@@ -48,7 +57,7 @@ def command(
     with common.stages(len(video)) as progress:
         for i, name in enumerate(names):
             try:
-                mesh = video[i]
+                mesh = look[only](i)
             except FormatError as error:
                 failed.append(error)
             else:
@@ -58,3 +67,11 @@ def command(
         raise FormatError(f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")
+
+
+def _check_part(file: Path, reader: ReelReader, only: str) -> None:
+    """InputError where a file has no frame with the part that is asked for."""
+    if only == "background" and not reader.has_background:
+        raise InputError(f"{file}: has no background, leave out --only background")
+    if only == "moving" and not reader.has_moving:
+        raise InputError(f"{file}: has nothing that moves, leave out --only moving")

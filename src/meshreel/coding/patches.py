@@ -103,7 +103,7 @@ def encode_runs(dropped: Bool[np.ndarray, "T F"]) -> Int32[np.ndarray, " N"]:
     ever = dropped.any(axis=0)
     known = dropped[:, ever]
     turned = known ^ np.concatenate([np.zeros((1, known.shape[1]), bool), known[:-1]])
-    return np.concatenate([_lengths(np.asarray(ever)), _lengths(turned.reshape(-1))])
+    return np.concatenate([run_lengths(np.asarray(ever)), run_lengths(turned.reshape(-1))])
 
 
 def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[np.ndarray, "T F"]:
@@ -111,22 +111,23 @@ def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[
     dropped = np.zeros((frames, faces), bool)
     if len(runs) == 0:
         return dropped
-    ever, rest = _filled(runs, faces)
+    ever, rest = fill_runs(runs, faces)
     count = int(ever.sum())
-    turned, rest = _filled(rest, frames * count)
+    turned, rest = fill_runs(rest, frames * count)
     if len(rest):
         raise FormatError(f"patches: {len(rest)} runs too many")
     dropped[:, np.flatnonzero(ever)] = np.logical_xor.accumulate(turned.reshape(frames, count), axis=0)
     return dropped
 
 
-def _lengths(bits: Bool[np.ndarray, " N"]) -> Int32[np.ndarray, " R"]:
+def run_lengths(bits: Bool[np.ndarray, " N"]) -> Int32[np.ndarray, " R"]:
+    """Lengths of the runs of bits that are not set and that are, in turn; only the first may be 0."""
     turns = np.flatnonzero(np.diff(bits, prepend=False))
     return np.diff(np.concatenate([[0], turns, [len(bits)]])).astype(np.int32)
 
 
-def _filled(runs: Int32[np.ndarray, " N"], count: int) -> tuple[Bool[np.ndarray, " C"], Int32[np.ndarray, " R"]]:
-    """So many bits from the first runs, and the runs that are left."""
+def fill_runs(runs: Int32[np.ndarray, " N"], count: int) -> tuple[Bool[np.ndarray, " C"], Int32[np.ndarray, " R"]]:
+    """So many bits from the first runs, and the runs that are left. FormatError where no run ends with the bits."""
     if (runs < 0).any():
         raise FormatError("patches: a run of negative length")
     ends = np.cumsum(runs.astype(np.int64))

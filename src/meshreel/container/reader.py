@@ -28,9 +28,11 @@ class Chunk:
     form: Form
     first_frame: int  # 0 for STATIC
     frame_count: int  # 0 for STATIC
-    depends_on: tuple[int, ...]  # numbers of STATIC chunks and, where it is predicted, of the group before it
+    depends_on: tuple[int, ...]  # numbers of a STATIC chunk and, where it is predicted, of the group before it
     offset: int  # bytes from the start of the file
     layers: tuple[Layer, ...]
+    track: int = 0  # 0 for STATIC
+    is_alone: bool = True  # whether the file has no other track
 
     @property
     def size(self) -> int:
@@ -45,7 +47,8 @@ class Chunk:
     def __str__(self) -> str:
         if self.kind == ChunkKind.STATIC:
             return f"chunk {self.number} (static)"
-        return f"chunk {self.number} (frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"
+        track = "" if self.is_alone else f"track {self.track}, "
+        return f"chunk {self.number} ({track}frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"
 
 
 class ReelReader:
@@ -57,13 +60,14 @@ class ReelReader:
         check_index(index)
         self.chunks = _chunks(index, self.head_size)
         self.groups = tuple(chunk for chunk in self.chunks if chunk.kind == ChunkKind.GROUP)
-        self.frame_count = self.groups[-1].first_frame + self.groups[-1].frame_count
+        self.tracks = _by_track(self.groups)  # the groups of each
+        self.frame_count = self.tracks[0][-1].first_frame + self.tracks[0][-1].frame_count
         check_header(self.header, self.frame_count)
         self.metadata = parse_metadata(self.header.metadata)
         self.size = self.chunks[-1].end  # bytes of the whole file, whether they are there or not
         if source.size > self.size:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
-        self._first_frames = [group.first_frame for group in self.groups]
+        self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
 
     @property
@@ -76,6 +80,16 @@ class ReelReader:
         """The chunks that a truncated file has lost, whole or in part; none in a whole file."""
         return tuple(chunk for chunk in self.chunks if chunk.end > self._source.size)
 
+    @property
+    def has_background(self) -> bool:
+        """Whether some frame is shown with one."""
+        return any(self._is_static(number) for group in self.groups for number in group.depends_on)
+
+    @property
+    def has_moving(self) -> bool:
+        """Whether some frame has a moving body."""
+        return any(group.form != Form.EMPTY for group in self.groups)
+
     def timestamp(self, frame: int) -> float:
         """The time of a frame, s. IndexError as chunk_of_frame."""
         self.chunk_of_frame(frame)
@@ -83,11 +97,27 @@ class ReelReader:
             return self._times[frame] / 1e6
         return self.header.first_time / 1e6 + frame / self.header.frame_rate
 
-    def chunk_of_frame(self, frame: int) -> Chunk:
-        """The GROUP chunk that holds a frame. IndexError outside 0 .. frame_count - 1."""
+    def chunk_of_frame(self, frame: int, track: int = 0) -> Chunk:
+        """The GROUP chunk of a track that holds a frame. IndexError outside 0 .. frame_count - 1."""
         if not 0 <= frame < self.frame_count:
             raise IndexError(f"frame {frame}: the file has frames 0 to {self.frame_count - 1}")
-        return self.groups[bisect_right(self._first_frames, frame) - 1]
+        return self.tracks[track][bisect_right(self._first_frames[track], frame) - 1]
+
+    def chunks_of_frame(self, frame: int) -> tuple[Chunk, ...]:
+        """The GROUP chunks that hold a frame, in the order of their tracks. IndexError as chunk_of_frame."""
+        return tuple(self.chunk_of_frame(frame, track) for track in range(len(self.tracks)))
+
+    def static_of_frame(self, frame: int) -> Chunk | None:
+        """The STATIC chunk that a frame is shown with: the newest that a group of it names. IndexError as above."""
+        named = [n for chunk in self.chunks_of_frame(frame) for n in chunk.depends_on if self._is_static(n)]
+        return self.chunks[max(named)] if named else None
+
+    def group_before(self, chunk: Chunk) -> Chunk | None:
+        """The GROUP chunk that one is predicted from."""
+        return next((self.chunks[n] for n in chunk.depends_on if not self._is_static(n)), None)
+
+    def _is_static(self, number: int) -> bool:
+        return self.chunks[number].kind == ChunkKind.STATIC
 
     def read_chunk(self, number: int, layers: int | None = None) -> bytes:
         """The payload of a chunk, or its first `layers` (at least one). FormatError names chunk and frames."""
@@ -126,14 +156,24 @@ def _read_head(source: Source) -> tuple[Header, Index, int]:
 
 def _chunks(index: Index, offset: int) -> tuple[Chunk, ...]:
     chunks: list[Chunk] = []
-    frame = 0
+    frames = [0] * (1 + max(entry.track for entry in index.chunks))
     for number, entry in enumerate(index.chunks):
-        first = frame if entry.kind == ChunkKind.GROUP else 0
-        chunk = Chunk(number, entry.kind, entry.form, first, entry.frames, entry.depends_on, offset, entry.layers)
+        first = frames[entry.track] if entry.kind == ChunkKind.GROUP else 0
+        place = (number, entry.kind, entry.form, first, entry.frames, entry.depends_on, offset, entry.layers)
+        chunk = Chunk(*place, entry.track, len(frames) == 1)
         chunks.append(chunk)
         offset = chunk.end
-        frame += entry.frames
+        frames[entry.track] += entry.frames
     return tuple(chunks)
+
+
+def _by_track(groups: tuple[Chunk, ...]) -> tuple[tuple[Chunk, ...], ...]:
+    tracks: list[list[Chunk]] = []
+    for group in groups:
+        if group.track == len(tracks):
+            tracks.append([])
+        tracks[group.track].append(group)
+    return tuple(map(tuple, tracks))
 
 
 def _check_payload(chunk: Chunk, payload: bytes, layers: tuple[Layer, ...]) -> None:

@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import IO, Any, Protocol, runtime_checkable
 
 from ..errors import FormatError, InputError
-from ..format.checks import check_header, check_index, parse_metadata
+from ..format.checks import IndexChecks, check_header, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, IndexEntry, Layer, Preamble
 from ..format.records import least_size, pack
 
@@ -43,8 +43,25 @@ class ReelWriter:
         self._target = Path(target) if isinstance(target, str | Path) else target
         self.header = header  # may be replaced until the block ends: what was measured goes into its metadata
         self._entries: list[IndexEntry] = []
-        self.frame_count = 0  # so far
-        self.last_group: int | None = None  # number of the newest chunk of frames
+        self._checks = IndexChecks()
+
+    @property
+    def frame_count(self) -> int:
+        """Frames so far, of the first track."""
+        return self.frames_of(0)
+
+    @property
+    def last_group(self) -> int | None:
+        """Number of the newest chunk of frames of the first track; None where there is none."""
+        return self.last_of(0)
+
+    def frames_of(self, track: int) -> int:
+        """Frames of a track so far; where its next group begins."""
+        return self._checks.frames[track] if track < len(self._checks.frames) else 0
+
+    def last_of(self, track: int) -> int | None:
+        """Number of a track's newest chunk, which its next may be predicted from; None where there is none."""
+        return self._checks.groups[track] if track < len(self._checks.groups) else None
 
     def __enter__(self) -> ReelWriter:
         with _as_input_error(self._target):
@@ -63,9 +80,14 @@ class ReelWriter:
             with suppress(OSError):
                 self._spool.close()
 
-    def add_static(self, payload: bytes, layers: Sequence[int] = ()) -> int:
-        """The number of a new chunk that belongs to no frame; `layers` as for a group."""
-        return self._add(IndexEntry(ChunkKind.STATIC, _form(payload), 0, (), _layers(payload, layers)), payload)
+    def add_static(self, payload: bytes, layers: Sequence[int] = (), depends_on: Sequence[int] = ()) -> int:
+        """The number of a new chunk that is a state of the background; `layers` as for a group.
+
+        Of form DRACO, or of form PATCH: then `depends_on` is the number of the state that it changes.
+        """
+        form = _form(payload)
+        entry = IndexEntry(ChunkKind.STATIC, form, 0, 0, tuple(depends_on), _layers(payload, layers))
+        return self._add(entry, payload)
 
     def add_group(
         self,
@@ -74,41 +96,40 @@ class ReelWriter:
         payload: bytes,
         layers: Sequence[int] = (),
         depends_on: Sequence[int] = (),
+        track: int = 0,
     ) -> int:
-        """The number of a new chunk of frames; the first comes right behind those of the group before.
+        """The number of a new chunk of frames; the first comes right behind those of the group before in its track.
 
-        `layers` are the ends of the payload's layers, bytes, rising to its length; none: it is one layer. `depends_on`
-        are numbers of static chunks and, where it is predicted from them, of the group before it.
+        Groups of all tracks come in order of their first frame, then of their track. `layers` are the ends of the
+        payload's layers, bytes, rising to its length; none: it is one layer. `depends_on` are numbers: of the static
+        chunk that the frames are shown with, and, where it is predicted from it, of the group before it in its track.
         """
-        if first_frame != self.frame_count:
-            raise InputError(f"group at frame {first_frame}: frame {self.frame_count} comes next, add groups in order")
+        if track < 0 or first_frame != self.frames_of(track):
+            raise InputError(
+                f"group at frame {first_frame} of track {track}: frame {self.frames_of(max(track, 0))} comes next, "
+                "add groups in order"
+            )
         if frame_count < 1:
             raise InputError(f"group at frame {first_frame}: {frame_count} frames, add at least one")
-        if any(
-            not 0 <= n < len(self._entries) or (self._entries[n].frames and n != self.last_group) for n in depends_on
-        ):
-            raise InputError(
-                f"group at frame {first_frame}: depends on {tuple(depends_on)}, "
-                "name static chunks and the last group only"
-            )
         form = _form(payload)
-        entry = IndexEntry(ChunkKind.GROUP, form, frame_count, tuple(depends_on), _layers(payload, layers))
-        self.last_group = self._add(entry, payload)
-        return self.last_group
+        entry = IndexEntry(ChunkKind.GROUP, form, frame_count, track, tuple(depends_on), _layers(payload, layers))
+        return self._add(entry, payload)
 
     def _add(self, entry: IndexEntry, payload: bytes) -> int:
         pack(entry)  # refuses what does not fit its field
+        try:
+            number = self._checks.add(entry)
+        except FormatError as error:
+            raise InputError(f"a file that no reader would take: {error}") from error
         with _as_input_error(self._target):
             self._spool.write(payload)
         self._entries.append(entry)
-        self.frame_count += entry.frames
-        return len(self._entries) - 1
+        return number
 
     def _finish(self) -> None:
-        index = Index(tuple(self._entries))
-        check_index(index)
+        self._checks.finish()
         check_header(self.header, self.frame_count)
-        head = pack_head(self.header, index)
+        head = pack_head(self.header, Index(tuple(self._entries)))
         if self._spool.seek(0, os.SEEK_END) != sum(layer.size for entry in self._entries for layer in entry.layers):
             raise InputError(f"{self._target}: a chunk could not be written, encode again")
         self._spool.seek(0)

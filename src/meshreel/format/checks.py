@@ -6,10 +6,12 @@ import json
 from typing import Any, NoReturn
 
 from ..errors import FormatError
-from .layout import ChunkKind, Header, Index
+from .layout import ChunkKind, Form, Header, Index, IndexEntry
 
 LARGEST = 1e15  # of every number in a header: keeps all that is computed from them finite
 SMALLEST = 1e-15
+MOST_TRACKS = 256  # a frame needs a group of each
+MOST_CHANGES = 255  # of a background, one upon the other: random access decodes all of them
 
 
 def check_header(header: Header, frame_count: int) -> None:
@@ -30,25 +32,90 @@ def check_header(header: Header, frame_count: int) -> None:
         raise FormatError("Header.intervals: one is 0, two frames at the same time")
 
 
-def check_index(index: Index) -> None:
-    """At least one frame, bytes in every layer, references only to earlier STATIC chunks and the last GROUP."""
-    last_group = -1
-    for number, entry in enumerate(index.chunks):
+class IndexChecks:
+    """The laws of an index, entry by entry, so that who writes one and who reads one have the same."""
+
+    def __init__(self) -> None:
+        self.frames: list[int] = []  # of each track so far
+        self.groups: list[int] = []  # number of the newest group of each track
+        self._changes: dict[int, int] = {}  # for each STATIC chunk, how many patches lead to it
+        self._place = (0, -1)  # first frame and track of the newest group
+        self._count = 0
+
+    def add(self, entry: IndexEntry) -> int:
+        """The number of the next entry. FormatError, and nothing changed, where it breaks a law."""
+        number = self._count
         if (entry.kind == ChunkKind.STATIC) != (entry.frames == 0):
             raise FormatError(f"chunk {number}: {entry.kind.name} of {entry.frames} frames")
         if not entry.layers or any(layer.size == 0 for layer in entry.layers):
             raise FormatError(f"chunk {number}: a chunk or a layer without bytes")
-        for other in entry.depends_on:
-            if other >= number or (index.chunks[other].kind != ChunkKind.STATIC and other != last_group):
-                raise FormatError(
-                    f"chunk {number}: depends on {other}, which is neither a static chunk before it nor the last group"
-                )
-        if entry.kind == ChunkKind.GROUP:
-            last_group = number
-        elif last_group in entry.depends_on:
-            raise FormatError(f"chunk {number}: a static chunk that depends on group {last_group}")
-    if sum(entry.frames for entry in index.chunks) == 0:
-        raise FormatError("no frames: the index names no group")
+        if len(set(entry.depends_on)) != len(entry.depends_on):
+            raise FormatError(f"chunk {number}: depends on {entry.depends_on}, on one of them twice")
+        if entry.kind == ChunkKind.STATIC:
+            self._changes[number] = self._changes_of(entry)
+        else:
+            self._add_group(entry)
+        self._count += 1
+        return number
+
+    def finish(self) -> None:
+        """FormatError where there are no frames, or a track has others than the first."""
+        if not self.frames:
+            raise FormatError("no frames: the index names no group")
+        for track, frames in enumerate(self.frames):
+            if frames != self.frames[0]:
+                raise FormatError(f"track {track} has {frames} frames, track 0 has {self.frames[0]}")
+
+    def _changes_of(self, entry: IndexEntry) -> int:
+        """How many patches lead to a STATIC chunk: none to a mesh, one more than to what it changes to a patch."""
+        number = self._count
+        if entry.form not in (Form.DRACO, Form.PATCH) or entry.track:
+            raise FormatError(f"chunk {number}: a static chunk of form {entry.form.name} and track {entry.track}")
+        if len(entry.depends_on) != (entry.form == Form.PATCH):
+            raise FormatError(f"chunk {number}: a static chunk of form {entry.form.name} depends on {entry.depends_on}")
+        if entry.form == Form.DRACO:
+            return 0
+        [before] = entry.depends_on
+        if before not in self._changes:
+            raise FormatError(f"chunk {number}: a patch that depends on {before}, which is no static chunk before it")
+        if self._changes[before] == MOST_CHANGES:
+            raise FormatError(f"chunk {number}: patch {MOST_CHANGES + 1} of one background, at most {MOST_CHANGES}")
+        return self._changes[before] + 1
+
+    def _add_group(self, entry: IndexEntry) -> None:
+        number, track = self._count, entry.track
+        if entry.form == Form.PATCH:
+            raise FormatError(f"chunk {number}: a group of form PATCH")
+        if track > len(self.frames) or track >= MOST_TRACKS:
+            raise FormatError(f"chunk {number}: track {track} after {len(self.frames)}, at most {MOST_TRACKS}")
+        begun = track < len(self.frames)
+        place = (self.frames[track] if begun else 0, track)
+        if place <= self._place:
+            raise FormatError(
+                f"chunk {number}: track {track} from frame {place[0]} behind track {self._place[1]} from frame "
+                f"{self._place[0]}; groups are in order of first frame and track"
+            )
+        others = [other for other in entry.depends_on if other not in self._changes]
+        if others and (not begun or others != [self.groups[track]]):
+            raise FormatError(
+                f"chunk {number}: depends on {others}, neither a static chunk before it nor the last group of its track"
+            )
+        if len(entry.depends_on) - len(others) > 1:
+            raise FormatError(f"chunk {number}: depends on {entry.depends_on}, on several static chunks")
+        if not begun:
+            self.frames.append(0)
+            self.groups.append(number)
+        self.frames[track] += entry.frames
+        self.groups[track] = number
+        self._place = place
+
+
+def check_index(index: Index) -> None:
+    """FormatError, naming the chunk, where an entry breaks a law; see IndexChecks."""
+    checks = IndexChecks()
+    for entry in index.chunks:
+        checks.add(entry)
+    checks.finish()
 
 
 def parse_metadata(text: str) -> dict[str, Any]:

@@ -21,8 +21,8 @@ VERSION = 1
 class ChunkKind(IntEnum):
     """What a chunk is for."""
 
-    STATIC = 1  # belongs to no frame; groups refer to it
-    GROUP = 2  # a group of consecutive frames
+    STATIC = 1  # a state of the background; groups refer to it
+    GROUP = 2  # a group of consecutive frames of one track
 
 
 class Form(IntEnum):
@@ -32,6 +32,7 @@ class Form(IntEnum):
     LAYERS = 2  # coarse mesh and its motion, then one scalar a vertex and level of subdivision
     DRACO = 3  # one Draco mesh a frame
     EMPTY = 4  # frames without a surface
+    PATCH = 5  # a background: another one without some of its faces, and with a Draco mesh
 
 
 class AnchorRule(IntEnum):
@@ -85,17 +86,20 @@ class IndexEntry:
     kind: Annotated[ChunkKind, Choice(U8, ChunkKind), "what it is for"]
     form: Annotated[Form, Choice(U8, Form), "how it is coded; equal to its first byte"]
     frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC"]
+    track: Annotated[int, Varint(), "which moving body's frames these are, from 0; 0 if STATIC"]
     depends_on: Annotated[
         tuple[int, ...],
         List(U8, Varint()),
-        "numbers of the chunks before it that it needs: STATIC ones, and the GROUP right before it",
+        "numbers of the chunks before it that it needs: "
+        "of a GROUP, the STATIC one it is shown with and the GROUP right before it in its track; "
+        "of a STATIC of form PATCH, the STATIC one that it changes",
     ]
     layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]
 
 
 @dataclass(frozen=True, slots=True)
 class Index:
-    """All chunks in the order of their bytes; the frames of GROUP chunks follow one another from 0."""
+    """All chunks in the order of their bytes; in each track the frames of GROUP chunks follow one another from 0."""
 
     chunks: Annotated[tuple[IndexEntry, ...], List(U32, Nested(IndexEntry)), "chunk 0, 1 ..."]
 
@@ -213,6 +217,17 @@ class DracoGroup:
 
 
 @dataclass(frozen=True, slots=True)
+class StaticPatch:
+    """The payload of a STATIC chunk of form PATCH: what it changes of the background that it depends on."""
+
+    form: Annotated[Form, Choice(U8, Form), "PATCH"]
+    step: Annotated[float, F64, "spacing of the mesh's lattice, above 0: decoded vertices are rounded to multiples"]
+    runs: Annotated[int, Varint(), "number of integers in `dropped`"]
+    dropped: Annotated[bytes, Blob(Varint()), "integers: lengths of runs of faces, kept and dropped in turn"]
+    mesh: Annotated[bytes, Blob(Varint()), "what is added, Draco; no bytes: nothing"]
+
+
+@dataclass(frozen=True, slots=True)
 class EmptyGroup:
     """The payload of a group of form EMPTY."""
 
@@ -230,4 +245,5 @@ PAYLOADS = (
     LayersPatches,
     DracoGroup,
     EmptyGroup,
+    StaticPatch,
 )

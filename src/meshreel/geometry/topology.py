@@ -5,6 +5,8 @@ Pure array functions on vertices (V x 3) and faces (F x 3); no I/O, no heavy imp
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
@@ -97,6 +99,21 @@ def drop_unreferenced(mesh: Mesh) -> Mesh:
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.faces.reshape(-1)] = True
     return Mesh.of(mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces])
+
+
+def concatenate(meshes: Sequence[Mesh]) -> Mesh:
+    """All meshes as one, vertices and faces in their order; the mesh itself where no other has vertices."""
+    meshes = [mesh for mesh in meshes if len(mesh.vertices)] or list(meshes[:1])
+    if len(meshes) <= 1:
+        return meshes[0] if meshes else Mesh.empty()
+    vertices = np.empty((sum(len(mesh.vertices) for mesh in meshes), 3))
+    faces = np.empty((sum(len(mesh.faces) for mesh in meshes), 3), np.int32)
+    v = f = 0
+    for mesh in meshes:
+        vertices[v : v + len(mesh.vertices)] = mesh.vertices
+        np.add(mesh.faces, np.int32(v), out=faces[f : f + len(mesh.faces)])
+        v, f = v + len(mesh.vertices), f + len(mesh.faces)
+    return Mesh(vertices, faces)
 
 
 def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:
