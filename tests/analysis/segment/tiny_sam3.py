@@ -15,9 +15,16 @@ def write_tiny_sam3(folder: Path) -> None:
     from transformers import Sam3Config, Sam3TrackerVideoConfig, Sam3VideoConfig, Sam3VideoModel
 
     backbone = {
-        **{"model_type": "sam3_vit_model", "hidden_size": 32, "intermediate_size": 64, "num_hidden_layers": 2},
-        **{"num_attention_heads": 4, "image_size": SIZE, "patch_size": PATCH, "window_size": 4},
-        **{"global_attn_indexes": [1], "pretrain_image_size": SIZE},
+        "model_type": "sam3_vit_model",
+        "hidden_size": 32,
+        "intermediate_size": 64,
+        "num_hidden_layers": 2,
+        "num_attention_heads": 4,
+        "image_size": SIZE,
+        "patch_size": PATCH,
+        "window_size": 4,
+        "global_attn_indexes": [1],
+        "pretrain_image_size": SIZE,
     }
     vision = {
         "model_type": "sam3_vision_model",
@@ -26,6 +33,7 @@ def write_tiny_sam3(folder: Path) -> None:
     }
     text = {"hidden_size": 32, "intermediate_size": 64, "num_hidden_layers": 1, "num_attention_heads": 4}
     text |= {"vocab_size": 60, "max_position_embeddings": 32, "projection_dim": 32, "model_type": "clip_text_model"}
+    text |= {"bos_token_id": 52, "eos_token_id": 53, "pad_token_id": 53}
     small = {"num_layers": 1, "intermediate_size": 64}
     detector = Sam3Config(
         vision_config=vision,
@@ -51,6 +59,7 @@ def write_tiny_sam3(folder: Path) -> None:
         max_num_objects=3,
         hotstart_delay=0,
     )
+    config.image_size = SIZE  # the parts come with their own
     torch.manual_seed(0)
     Sam3VideoModel(config).save_pretrained(folder)
     write_tokenizer(folder)

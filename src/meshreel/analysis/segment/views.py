@@ -25,6 +25,7 @@ from ...types import Frames, Mesh
 
 _TOUCHES = 1e-3  # of a ray's length: what it meets so near its end is the sample itself
 _INSIDE = 0.5  # share of what a place sees from behind from which on it is taken to be inside of something
+_SURE = 0.9  # that a face which has a whole pixel is met: where all is seen, further views go where fewest see
 _WAYS = np.array([w for w in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(w)])
 _UP = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0)}
 
@@ -39,6 +40,7 @@ class ViewsOptions:
     fov: float = 75.0  # degrees, horizontal
     up: str = "y"  # the axis that points up in the pictures: y, z, -y or -z
     places: int = 6  # of candidates, along the longest side of the box
+    reach: float = 1.0  # of the box that views stand in, in the scene's own: 2 for a body that stands alone
     frames: int = 4  # looked at, spread over what is given
     samples: int = 2048  # points of the surface of each of them
 
@@ -51,6 +53,8 @@ class ViewsOptions:
             raise InputError(f"field of view {self.fov:g}: give 10 to 150 degrees")
         if self.up not in _UP:
             raise InputError(f"up axis {self.up!r}: give {', '.join(_UP)}")
+        if not 1 <= self.reach <= 10:
+            raise InputError(f"reach {self.reach:g}: give 1 to 10 boxes")
         if not (2 <= self.places <= 16 and 1 <= self.frames <= 64 and 16 <= self.samples <= 65_536):
             text = f"{self.places} places, {self.frames} frames, {self.samples} samples"
             raise InputError(f"{text}: give 2 to 16, 1 to 64 and 16 to 65536")
@@ -68,7 +72,7 @@ def place_views(meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOp
         raise InputError(f"none of {len(chosen)} frames looked at has a surface; views need one")
     low = np.min([s.mesh.vertices[s.mesh.faces].min(axis=(0, 1)) for s in samples], axis=0)
     high = np.max([s.mesh.vertices[s.mesh.faces].max(axis=(0, 1)) for s in samples], axis=0)
-    places = _outside(_grid(low, high, options.places), samples)
+    places = _outside(_grid(low, high, options), samples)
     candidates = [_looking(eye, turn, options) for eye, _ in places for turn in _turns(options)]
     pixels = [_pixels(eye, sees, samples, options) for eye, sees in places]
     return _greedy(candidates, np.concatenate(pixels), options.count)
@@ -105,9 +109,11 @@ class _Samples:
         return free, free & ((self.normals * ahead).sum(axis=1) > 0)
 
 
-def _grid(low: np.ndarray, high: np.ndarray, count: int) -> list[Float64[np.ndarray, " 3"]]:
-    """Places in the middles of equal cells of the box, `count` of them along its longest side."""
-    step = float((high - low).max()) / count or 1.0
+def _grid(low: np.ndarray, high: np.ndarray, options: ViewsOptions) -> list[Float64[np.ndarray, " 3"]]:
+    """Places in the middles of equal cells of the box."""
+    more = (high - low) * (options.reach - 1) / 2
+    low, high = low - more, high + more
+    step = float((high - low).max()) / options.places or 1.0
     parts = [max(1, round(side / step)) for side in (high - low).tolist()]
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in parts), indexing="ij"), axis=-1).reshape(-1, 3)
     return list(low + (high - low) * (cells + 0.5) / parts)
@@ -156,7 +162,8 @@ def _greedy(
     for _ in range(min(count, len(candidates))):
         best = int(np.argmax(pixels @ unseen))
         chosen.append(candidates[best])
-        unseen *= 1 - pixels[best]
+        unseen *= 1 - _SURE * pixels[best]
+        pixels[best] = 0  # no view twice
     return tuple(chosen)
 
 
