@@ -64,7 +64,7 @@ class Sam3Masks:
         if not moving.objects.any():
             return np.zeros((len(views), views[0].height, views[0].width), np.int32)
         order = tour(views, self._reference(views))
-        tracked = self._tracker.follow([normal_picture(seen[number], views[number]) for number in order])
+        tracked = self._tracker.through_views([normal_picture(seen[number], views[number]) for number in order])
         found = moving_in_views(tracked, moving, frame, self._options.hypotheses)
         return found[np.argsort(order)]
 
@@ -72,7 +72,7 @@ class Sam3Masks:
         """Stage 1, once."""
         if self._moving is None:
             assert self._pictures, "observe the frames first"
-            self._moving = hypotheses(self._tracker.follow(self._pictures), self._options.hypotheses)
+            self._moving = hypotheses(self._tracker.over_time(self._pictures), self._options.hypotheses)
             self._pictures = []
         return self._moving
 
@@ -105,8 +105,20 @@ class _Tracker:
         self._torch, self._prompts = torch, prompts
         self._size = int(self._model.config.image_size)
 
-    def follow(self, pictures: list[UInt8[np.ndarray, "H W 3"]]) -> Tracked:
-        """The objects of a video."""
+    def over_time(self, pictures: list[UInt8[np.ndarray, "H W 3"]]) -> Tracked:
+        """The objects of a view's pictures at one moment after the other."""
+        return self._follow(pictures, self._model.config.hotstart_delay)
+
+    def through_views(self, pictures: list[UInt8[np.ndarray, "H W 3"]]) -> Tracked:
+        """The objects of the pictures that all views have of one moment.
+
+        Most views do not see an object, which in a video would say that it was none: no picture takes it back here.
+        """
+        return self._follow(pictures, 0)
+
+    def _follow(self, pictures: list[UInt8[np.ndarray, "H W 3"]], taken_back: int) -> Tracked:
+        """The objects of a video; within so many pictures one that is not found again counts as never found."""
+        self._model.hotstart_delay = taken_back
         height, width, _ = pictures[0].shape
         session = self._session(pictures)
         objects = np.zeros((len(pictures), height, width), np.int32)
