@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.record import open_recording
 from meshreel.capture.rig import read_rig
 from meshreel.errors import InputError
+from meshreel.geometry.raycast import Rays
 from meshreel.io.depth import read_depth, write_depth
 from tests.capture.depth_scenes import camera, measured, record
 
@@ -180,3 +182,14 @@ def test_a_camera_that_moves_is_found_by_what_it_sees(tmp_path):
         write_depth(measured(camera(side=8.0 * number)), moving / "front" / "depth" / f"depth_{number:05}.png")
     with pytest.raises(InputError, match=r"camera front seems to move: .* stand still"):
         open_recording(moving)
+
+
+def test_a_view_of_a_camera_sees_points_half_a_pixel_from_their_numbers():
+    one = camera("side", 30.0)
+    points = np.random.default_rng(0).uniform(-0.3, 0.3, (20, 3))
+    local = points @ one.extrinsic[:3, :3].T + one.extrinsic[:3, 3]
+    numbers = (local @ one.intrinsic.T)[:, :2] / local[:, 2:]
+    assert np.allclose(one.view.project(local), numbers + 0.5)
+    assert np.allclose(one.view.eye, one.camera_to_world[:3, 3]) and (one.view.width, one.view.height) == (96, 96)
+    depth = Rays(sliding_sphere(1, levels=2)[0]).look(one.view).depth
+    assert np.isfinite(depth[47, 47]) and np.isinf(depth[0, 0])

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float64, UInt16
 
 from ..errors import InputError
+from ..geometry.cameras import PinholeCamera
 from ..io.depth import picture_size, read_depth
 from ..io.write import make_folder, replacing
 
@@ -66,6 +67,12 @@ class DepthCamera:
     def extrinsic(self) -> Float64[np.ndarray, "4 4"]:
         """World to camera."""
         return np.linalg.inv(self.camera_to_world)
+
+    @property
+    def view(self) -> PinholeCamera:
+        """What the camera looks through; there the middle of a pixel is half a pixel from its number."""
+        shifted = self.intrinsic + np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
+        return PinholeCamera(self.width, self.height, shifted, self.extrinsic)
 
     def in_range(self, depth: UInt16[np.ndarray, "H W"]) -> UInt16[np.ndarray, "H W"]:
         """Depths that count, as they are; the others are 0, no measurement."""

@@ -23,7 +23,7 @@ class PinholeCamera:
 
     width: int
     height: int
-    intrinsic: Float64[np.ndarray, "3 3"]  # pixels
+    intrinsic: Float64[np.ndarray, "3 3"]  # pixels; the last row is 0 0 1
     extrinsic: Float64[np.ndarray, "4 4"]  # world to camera
 
     @property
@@ -88,5 +88,7 @@ def _camera(entry: dict[str, Any]) -> PinholeCamera:
         raise ValueError("a matrix is not finite")
     if not (8 <= width <= 16384 and 8 <= height <= 16384):
         raise ValueError(f"image size {width} x {height}")
+    if not np.array_equal(intrinsic[2], (0, 0, 1)):
+        raise ValueError(f"an intrinsic matrix whose last row is {intrinsic[2].tolist()} and not 0 0 1")
     np.linalg.inv(intrinsic), np.linalg.inv(extrinsic)  # raises where singular
     return PinholeCamera(width, height, intrinsic, extrinsic)

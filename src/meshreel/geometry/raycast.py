@@ -56,12 +56,14 @@ class Rays:
 
     def look(self, camera: PinholeCamera) -> Seen:
         """What a camera sees."""
-        rows, columns = np.mgrid[: camera.height, : camera.width]
-        _, directions = camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
-        ahead = directions / directions[:, 2:]  # one metre along the axis: distances are depths
-        answer = self._cast(np.broadcast_to(camera.eye, ahead.shape), ahead @ np.linalg.inv(camera.extrinsic[:3, :3]).T)
-        shape = (camera.height, camera.width)
-        return Seen(_faces(answer).reshape(shape), answer["t_hit"].numpy().reshape(shape))
+        columns, rows = np.arange(camera.width) + 0.5, np.arange(camera.height)[:, None] + 0.5
+        turned = np.linalg.inv(camera.extrinsic[:3, :3]) @ np.linalg.inv(camera.intrinsic)
+        rays = np.empty((camera.height, camera.width, 6), np.float32)
+        rays[..., :3] = camera.eye - self._origin
+        for axis, (right, down, ahead) in enumerate(turned):  # one metre along the axis: distances are depths
+            rays[..., 3 + axis] = right * columns + (down * rows + ahead)
+        answer = self._scene.cast_rays(self._tensor(rays))
+        return Seen(_faces(answer), answer["t_hit"].numpy())
 
     def backs(self, camera: PinholeCamera, seen: Seen) -> Bool[np.ndarray, "H W"]:
         """Where a camera sees the back of a face; `seen` is what it sees."""
@@ -78,7 +80,7 @@ class Rays:
         return self._scene.cast_rays(self._tensor(rays))
 
 
-def _faces(answer: dict) -> Int32[np.ndarray, " N"]:
+def _faces(answer: dict) -> Int32[np.ndarray, "..."]:
     """A miss is 2^32 - 1 there and -1 here."""
     return answer["primitive_ids"].numpy().view(np.int32)
 

@@ -12,11 +12,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64, UInt16
+from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays
+from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, neighbours, spread
 from ...types import Mesh
 
@@ -45,6 +46,13 @@ class Places:
     beside: Int32[np.ndarray, "P 26"]  # numbers of the cells around each; its own for none
     occupied: Bool[np.ndarray, "T P"]  # there is surface in or beside the cell
     free: Bool[np.ndarray, "T P"]  # and not: seen past
+    normals: Float64[np.ndarray, "P 3"]  # mean of what was there, of unit length; 0 where they cancel
+
+    @property
+    def free_share(self) -> Float64[np.ndarray, " P"]:
+        """The share of the frames that know a place in which it is seen free."""
+        known = self.free.sum(axis=0) + self.occupied.sum(axis=0)
+        return self.free.sum(axis=0) / np.maximum(known, 1)
 
     def of(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
         """The number of the cell that each point lies in; -1 where no frame that was looked at has surface."""
@@ -57,13 +65,18 @@ def find_places(
     frames: Iterable[Mesh], views: Sequence[PinholeCamera], lattice: Lattice, options: PlacesOptions = PlacesOptions()
 ) -> Places:
     """The places of a scene; one frame in memory at a time."""
-    cells, depths, unit = [], [], lattice.size / 16
+    cells, sums, depths, unit = [], [], [], lattice.size / 16
     for mesh in frames:
-        cells.append(np.unique(lattice.keys(spread(mesh, 1.5 * lattice.size)[0])))
+        own, normals = _cells(mesh, lattice)
+        cells.append(own)
+        sums.append(normals)
         rays = Rays(mesh)
         depths.append([_stored(rays, view, unit) for view in views])
     keys = np.unique(np.concatenate(cells)) if cells else np.zeros(0, np.int64)
     beside = neighbours(keys)
+    mean = np.zeros((len(keys), 3), np.float32)
+    for own, normals in zip(cells, sums, strict=True):
+        mean[np.searchsorted(keys, own)] += normals
     occupied = np.stack([_near(keys, beside, own) for own in cells])
     seen = np.zeros((len(cells), len(keys)), np.uint8)
     middles = lattice.centers(keys)
@@ -72,7 +85,18 @@ def find_places(
         limit = (depth + options.past * lattice.size) / unit
         for frame, pictures in enumerate(depths):
             seen[frame, inside[pictures[number].reshape(-1)[pixels] > limit]] += 1
-    return Places(lattice, keys, beside, occupied, (seen >= options.views) & ~occupied)
+    length = np.linalg.norm(mean, axis=1, keepdims=True)
+    normals = (mean / np.where(length > 0, length, 1)).astype(np.float64)
+    return Places(lattice, keys, beside, occupied, (seen >= options.views) & ~occupied, normals)
+
+
+def _cells(mesh: Mesh, lattice: Lattice) -> tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]:
+    """The cells that a mesh has surface in, sorted, and the sum of its normals there."""
+    points, faces = spread(mesh, 1.5 * lattice.size)
+    keys, cell = np.unique(lattice.keys(points), return_inverse=True)
+    normals = face_normals(mesh)[0][faces]
+    sums = [np.bincount(cell.reshape(-1), normals[:, axis], len(keys)) for axis in range(3)]
+    return keys, np.stack(sums, axis=1).astype(np.float32)
 
 
 def _stored(rays: Rays, view: PinholeCamera, unit: float) -> UInt16[np.ndarray, "H W"]:

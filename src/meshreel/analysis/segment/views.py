@@ -1,36 +1,48 @@
 """Where to look from: views that all frames share and that together see nearly every face (paper, section 3.2).
 
-In: a few frames of a scene. Out: cameras, placed greedily: each next one sees the most area that none before it saw.
+In: a few frames of a scene. Out: cameras. Candidates stand on a grid in the scene's box and look several ways; of
+those, each next one is taken that is expected to see most of the surface that those before it do not.
 
-Differs from the paper: it does not say where its viewpoints are; ours are found.
+Differs from the paper: it does not say where its viewpoints are.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float32, Float64, Int64
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
-from ...types import Mesh
+from ...types import Frames, Mesh
+
+_TOUCHES = 1e-3  # of a ray's length: what it meets so near its end is the sample itself
+_INSIDE = 0.5  # share of what a place sees from behind from which on it is taken to be inside of something
+_SURE = 0.9  # that a face which has a whole pixel is met: where all is seen, further views go where fewest see
+_WAYS = np.array([w for w in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(w)])
+_UP = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0)}
 
 
 @dataclass(frozen=True, slots=True)
 class ViewsOptions:
-    """How many views, of what size, and among how many places they are chosen."""
+    """How many views, of what size, and how carefully their places are chosen."""
 
     count: int = 14
     width: int = 320  # pixels
     height: int = 240  # pixels
     fov: float = 75.0  # degrees, horizontal
-    places: int = 4  # grid points along the longest side of the box
-    directions: int = 8  # ways to look at each place, around the vertical and as many again downwards
+    up: str = "y"  # the axis that points up in the pictures: y, z, -y or -z
+    places: int = 6  # of candidates, along the longest side of the box
+    reach: float = 1.0  # of the box that views stand in, in the scene's own: 2 for a body that stands alone
+    frames: int = 4  # looked at, spread over what is given
+    samples: int = 2048  # points of the surface of each of them
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= 1000:
@@ -39,68 +51,139 @@ class ViewsOptions:
             raise InputError(f"views of {self.width} x {self.height} pixels: give 8 to 4096 a side")
         if not 10 <= self.fov <= 150:
             raise InputError(f"field of view {self.fov:g}: give 10 to 150 degrees")
-        if not (2 <= self.places <= 32 and 2 <= self.directions <= 64):
-            raise InputError(f"{self.places} places, {self.directions} directions: give 2 to 32 and 2 to 64")
+        if self.up not in _UP:
+            raise InputError(f"up axis {self.up!r}: give {', '.join(_UP)}")
+        if not 1 <= self.reach <= 10:
+            raise InputError(f"reach {self.reach:g}: give 1 to 10 boxes")
+        if not (2 <= self.places <= 16 and 1 <= self.frames <= 64 and 16 <= self.samples <= 65_536):
+            text = f"{self.places} places, {self.frames} frames, {self.samples} samples"
+            raise InputError(f"{text}: give 2 to 16, 1 to 64 and 16 to 65536")
 
 
-def place_views(meshes: Sequence[Mesh], options: ViewsOptions = ViewsOptions()) -> tuple[PinholeCamera, ...]:
-    """Views that see as much of the meshes as so many can; the same for the same meshes.
+def place_views(meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOptions()) -> tuple[PinholeCamera, ...]:
+    """Views that together see nearly all of the meshes; the same for the same meshes.
 
-    Raises InputError where no mesh has a surface.
+    Only `options.frames` of the meshes are read. Raises InputError where none of those has a surface. Some 2 s for
+    four frames of 400,000 faces.
     """
-    meshes = [mesh for mesh in meshes if not mesh.is_empty]
-    if not meshes:
-        raise InputError("views of frames without surface: give frames that have some")
-    low, high = _box(meshes)
-    candidates = [view for place in _grid(low, high, options.places) for view in _around(place, options)]
-    areas = np.concatenate([face_normals(mesh)[1] for mesh in meshes])
-    sees = [_seen(meshes, view) for view in candidates]
-    unseen = np.ones(len(areas), bool)
+    chosen = sorted({int(k) for k in np.linspace(0, len(meshes) - 1, options.frames)}) if len(meshes) else []
+    samples = [_Samples.of(mesh, options.samples) for mesh in (meshes[k] for k in chosen) if not mesh.is_empty]
+    if not samples:
+        raise InputError(f"none of {len(chosen)} frames looked at has a surface; views need one")
+    low = np.min([s.mesh.vertices[s.mesh.faces].min(axis=(0, 1)) for s in samples], axis=0)
+    high = np.max([s.mesh.vertices[s.mesh.faces].max(axis=(0, 1)) for s in samples], axis=0)
+    places = _outside(_grid(low, high, options), samples)
+    candidates = [_looking(eye, turn, options) for eye, _ in places for turn in _turns(options)]
+    pixels = [_pixels(eye, sees, samples, options) for eye, sees in places]
+    return _greedy(candidates, np.concatenate(pixels), options.count)
+
+
+@dataclass(frozen=True, slots=True)
+class _Samples:
+    """Points of a mesh, even by area, and the faces they are on."""
+
+    mesh: Mesh
+    rays: Rays
+    points: Float64[np.ndarray, "N 3"]
+    faces: Int64[np.ndarray, " N"]
+    normals: Float64[np.ndarray, "N 3"]
+    areas: Float64[np.ndarray, " N"]  # of the faces
+
+    @staticmethod
+    def of(mesh: Mesh, count: int) -> _Samples:
+        normals, areas = face_normals(mesh)
+        ends = np.cumsum(areas)
+        steps = np.arange(count)
+        faces = np.minimum(np.searchsorted(ends, (steps + 0.5) / count * ends[-1]), len(areas) - 1)
+        # A sequence that is even in the square, folded into the triangle; no chance in it.
+        u, v = (steps * 0.7548776662466927) % 1, (steps * 0.5698402909980532) % 1
+        u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
+        points = np.einsum("kn,nkd->nd", np.stack([1 - u - v, u, v]), mesh.vertices[mesh.faces[faces]])
+        return _Samples(mesh, Rays(mesh), points, faces, normals[faces], areas[faces])
+
+    def seen_from(self, eye: Float64[np.ndarray, " 3"]) -> tuple[np.ndarray, np.ndarray]:
+        """Of each sample, whether nothing stands before it; and whether the ray to it ends on a face's back."""
+        ahead = self.points - eye
+        hit = self.rays.cast(np.broadcast_to(eye, ahead.shape), ahead)
+        free = (hit.faces == self.faces) | (hit.distances > 1 - _TOUCHES)
+        return free, free & ((self.normals * ahead).sum(axis=1) > 0)
+
+
+def _grid(low: np.ndarray, high: np.ndarray, options: ViewsOptions) -> list[Float64[np.ndarray, " 3"]]:
+    """Places in the middles of equal cells of the box."""
+    more = (high - low) * (options.reach - 1) / 2
+    low, high = low - more, high + more
+    step = float((high - low).max()) / options.places or 1.0
+    parts = [max(1, round(side / step)) for side in (high - low).tolist()]
+    cells = np.stack(np.meshgrid(*(np.arange(n) for n in parts), indexing="ij"), axis=-1).reshape(-1, 3)
+    return list(low + (high - low) * (cells + 0.5) / parts)
+
+
+def _outside(
+    eyes: list[Float64[np.ndarray, " 3"]], samples: list[_Samples]
+) -> list[tuple[Float64[np.ndarray, " 3"], list[np.ndarray]]]:
+    """The places that are not inside of something in any frame, and which samples are seen from each.
+
+    All places where none is outside: the faces' order says nothing then.
+    """
+    places, outside = [], []
+    for eye in eyes:
+        looks = [part.seen_from(eye) for part in samples]
+        places.append((eye, [free for free, _ in looks]))
+        outside.append(all(back.sum() <= _INSIDE * free.sum() for free, back in looks))
+    return [place for place, out in zip(places, outside, strict=True) if out] or places
+
+
+def _pixels(
+    eye: np.ndarray, sees: list[np.ndarray], samples: list[_Samples], options: ViewsOptions
+) -> Float32[np.ndarray, "W N"]:
+    """The share of a pixel that the face of each sample has in each way to look; all samples in a row, at most 1."""
+    across = math.tan(math.radians(options.fov) / 2)
+    high = across * options.height / options.width
+    focal = options.width / 2 / across
+    found = []
+    for part, free in zip(samples, sees, strict=True):
+        ahead = part.points - eye
+        distance = np.maximum(np.linalg.norm(ahead, axis=1), 1e-12)
+        facing = np.abs((part.normals * ahead).sum(axis=1)) / distance
+        whole = np.where(free, focal**2 * facing * part.areas / distance**2, 0).astype(np.float32)  # on the axis
+        x, y, z = np.moveaxis((ahead / distance[:, None]).astype(np.float32) @ _turns(options).swapaxes(1, 2), 2, 0)
+        within = (np.abs(x) < across * z) & (np.abs(y) < high * z)
+        found.append(np.where(within, np.minimum(whole / np.maximum(z, 1e-3) ** 3, 1), 0))
+    return np.concatenate(found, axis=1).astype(np.float32)
+
+
+def _greedy(
+    candidates: list[PinholeCamera], pixels: Float32[np.ndarray, "C N"], count: int
+) -> tuple[PinholeCamera, ...]:
+    """The views that, each after those before it, promise to see most of the samples."""
+    unseen = np.ones(pixels.shape[1], np.float32)  # probability that no pixel of the views so far meets the face
     chosen: list[PinholeCamera] = []
-    for _ in range(min(options.count, len(candidates))):
-        gains = [float(areas[ids[unseen[ids]]].sum()) for ids in sees]
-        best = int(np.argmax(gains))
+    for _ in range(min(count, len(candidates))):
+        best = int(np.argmax(pixels @ unseen))
         chosen.append(candidates[best])
-        unseen[sees[best]] = False
+        unseen *= 1 - _SURE * pixels[best]
+        pixels[best] = 0  # no view twice
     return tuple(chosen)
 
 
-def _box(meshes: Sequence[Mesh]) -> tuple[np.ndarray, np.ndarray]:
-    used = [mesh.vertices[mesh.faces.reshape(-1)] for mesh in meshes]
-    return np.min([v.min(axis=0) for v in used], axis=0), np.max([v.max(axis=0) for v in used], axis=0)
-
-
-def _grid(low: np.ndarray, high: np.ndarray, count: int) -> list[np.ndarray]:
-    step = float((high - low).max()) / count or 1.0
-    axes = [_spread(a, b, step) for a, b in zip(low, high, strict=True)]
-    return [np.array(place) for place in np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)]
-
-
-def _spread(low: float, high: float, step: float) -> np.ndarray:
-    """The middles of as many equal parts of an interval as steps fit, one at least."""
-    parts = max(1, round((high - low) / step))
-    return low + (high - low) * (np.arange(parts) + 0.5) / parts
-
-
-def _around(place: Float64[np.ndarray, " 3"], options: ViewsOptions) -> list[PinholeCamera]:
+def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], options: ViewsOptions) -> PinholeCamera:
+    """A view from a place, turned so."""
     focal = options.width / 2 / math.tan(math.radians(options.fov) / 2)
     intrinsic = np.array([[focal, 0, options.width / 2], [0, focal, options.height / 2], [0, 0, 1.0]])
-    views = []
-    for axis in np.concatenate([np.eye(3), -np.eye(3)]):
-        up = np.eye(3)[(int(np.abs(axis).argmax()) + 1) % 3]
-        right = np.cross(axis, up)
-        turn = np.stack([right, np.cross(axis, right), axis])
-        extrinsic = np.eye(4)
-        extrinsic[:3, :3], extrinsic[:3, 3] = turn, -turn @ place
-        views.append(PinholeCamera(options.width, options.height, intrinsic, extrinsic))
-    return views
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3], extrinsic[:3, 3] = turn, -turn @ eye
+    return PinholeCamera(options.width, options.height, intrinsic, extrinsic)
 
 
-def _seen(meshes: Sequence[Mesh], view: PinholeCamera) -> np.ndarray:
-    """The faces of all meshes, numbered through, that a view sees."""
-    starts = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
-    found = []
-    for mesh, start in zip(meshes, starts, strict=False):
-        ids = np.unique(Rays(mesh).look(view).faces)
-        found.append(ids[ids >= 0].astype(np.int64) + start)
-    return np.concatenate(found)
+@cache
+def _turns(options: ViewsOptions) -> Float64[np.ndarray, "W 3 3"]:
+    """World to camera for each way to look; upright where the way is not vertical."""
+    up = np.array(_UP[options.up])
+    turns = []
+    for way in _WAYS:
+        forward = way / np.linalg.norm(way)
+        right = np.cross(forward, np.roll(up, 1) if abs(forward @ up) > 0.99 else up)
+        right /= np.linalg.norm(right)
+        turns.append(np.stack([right, np.cross(forward, right), forward]))
+    return np.array(turns)

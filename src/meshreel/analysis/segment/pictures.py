@@ -1,0 +1,67 @@
+"""What the views see as pictures that a person, or a tool that makes masks, can look at (paper, section 3.2).
+
+In: what a view sees. Out: normals as colors, the paper's coloring; and folders of such pictures, laid out as the
+folders of masks are that `ImageMasks` reads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64, UInt8
+
+from ...geometry.cameras import PinholeCamera, pack_cameras
+from ...geometry.raycast import Rays, Seen
+from ...io.masks import write_picture
+from ...io.write import frame_names, make_folder, replacing
+from ...types import Frames
+from .masks import CAMERAS, one_size
+
+
+def normal_picture(seen: Seen, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"]:
+    """Normals n in world axes as colors (n + 1) / 2; white where nothing is seen.
+
+    They follow from the depths of neighbouring pixels, so they face the camera whatever the order of a face's corners.
+    """
+    rows, columns = np.mgrid[: view.height, : view.width]
+    ahead = np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1) @ np.linalg.inv(view.intrinsic).T
+    hit = np.isfinite(seen.depth)
+    points = np.where(hit, seen.depth, np.nan)[..., None] * ahead
+    normals = np.nan_to_num(np.cross(_step(points, 1), _step(points, 0)))
+    normals *= -np.sign((normals * ahead).sum(axis=-1, keepdims=True))
+    world = normals @ view.extrinsic[:3, :3]
+    world /= np.maximum(np.linalg.norm(world, axis=-1, keepdims=True), 1e-30)
+    colors = np.rint(255 * (world + 1) / 2).astype(np.uint8)
+    return np.where(hit[..., None], colors, np.uint8(255))
+
+
+def write_views(
+    folder: Path, frames: Frames, views: Sequence[PinholeCamera], tell: Callable[[int], None] = lambda _done: None
+) -> None:
+    """Writes what the views see of each frame: view00/frame_00000.png ..., and `cameras.json` last.
+
+    A tool that keeps names and sizes makes of it the folder of masks; it needs the same `cameras.json`.
+    `tell` hears how many frames are done.
+    """
+    views = one_size(views, "views")
+    places = [folder / f"view{number:02}" for number in range(len(views))]
+    for place in places:
+        make_folder(place)
+    for number, name in enumerate(frame_names(len(frames), "png")):
+        rays = Rays(frames[number])
+        for view, place in zip(views, places, strict=True):
+            write_picture(normal_picture(rays.look(view), view), place / name)
+        tell(number + 1)
+    with replacing(folder / CAMERAS) as file:
+        file.write(pack_cameras(views))
+
+
+def _step(points: Float64[np.ndarray, "H W 3"], axis: int) -> Float64[np.ndarray, "H W 3"]:
+    """From each pixel's point to its neighbour's: to the one whose depth is nearer, so that edges stay sharp."""
+    ahead = np.diff(points, axis=axis)
+    none = np.full_like(np.take(points, [0], axis=axis), np.nan)
+    after, before = np.concatenate([ahead, none], axis=axis), np.concatenate([none, ahead], axis=axis)
+    costs = [np.where(np.isnan(step[..., 2:]), np.inf, np.abs(step[..., 2:])) for step in (after, before)]
+    return np.where(costs[0] <= costs[1], after, before)

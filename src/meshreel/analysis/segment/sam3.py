@@ -1,0 +1,198 @@
+"""Masks by SAM3, in the paper's two stages (section 3.2): a view over time, then the views of each moment.
+
+In: pictures of the views. Out: masks, and which object each pixel sees. Stage 1 follows what the prompts name through
+a reference view and keeps what moves; stage 2 follows the same prompts through the views of a frame, as if they were
+a video, and keeps what is one of those. The extra `sam3`; weights come from a folder that the user gives.
+
+Differs from the paper: it does not say what SAM3 is asked for; ours are words, and without any, `AUTOMATIC`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Int32, UInt8
+
+from ...errors import InputError
+from ...geometry.cameras import PinholeCamera
+from ...geometry.raycast import Seen
+from .hypotheses import Hypotheses, HypothesisOptions, Tracked, hypotheses, moving_in_views, tour
+from .pictures import normal_picture
+
+AUTOMATIC = ("person", "animal", "vehicle", "object")  # what may move; what of it does, its masks over time say
+_WORDS = 32  # tokens of a prompt
+_TOKENIZER = "tokenizer.json, or vocab.json with merges.txt"
+_NEEDED = f"config.json, model.safetensors (or its shards) and {_TOKENIZER}: the files of facebook/sam3"
+
+
+@dataclass(frozen=True, slots=True)
+class Sam3Options:
+    """How SAM3 is used."""
+
+    reference: int = 0  # the view that is followed over time; `hypotheses.reference_view` finds a good one
+    device: str = "cpu"  # as torch names it: cpu, cuda, cuda:1 ...
+    hypotheses: HypothesisOptions = field(default_factory=HypothesisOptions)
+
+
+class Sam3Masks:
+    """A Masker that must first have observed the reference view in every frame: two passes over the frames."""
+
+    def __init__(self, path: Path, prompts: Sequence[str] | None = None, options: Sam3Options = Sam3Options()) -> None:
+        """Loads the weights in the folder `path`. Raises InputError where they or the extra are not there."""
+        self._tracker = _Tracker(path, tuple(prompts or AUTOMATIC), options.device)
+        self._options = options
+        self._pictures: list[UInt8[np.ndarray, "H W 3"]] = []
+        self._moving: Hypotheses | None = None
+
+    def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
+        """Takes note of a frame; frames come in order from 0 on, all before the first masks."""
+        assert frame == len(self._pictures) and self._moving is None, "frames are observed in order, before masks"
+        number = self._reference(views)
+        self._pictures.append(normal_picture(seen[number], views[number]))
+
+    def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Bool[np.ndarray, "X H W"]:
+        """The masks of a frame that was observed; True: dynamic."""
+        return self.objects(frame, seen, views) > 0
+
+    def objects(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Int32[np.ndarray, "X H W"]:
+        """The moving object that each pixel sees, by one number in all frames; 0: none."""
+        moving = self._hypotheses()
+        if not moving.objects.any():
+            return np.zeros((len(views), views[0].height, views[0].width), np.int32)
+        order = tour(views, self._reference(views))
+        tracked = self._tracker.through_views([normal_picture(seen[number], views[number]) for number in order])
+        found = moving_in_views(tracked, moving, frame, self._options.hypotheses)
+        return found[np.argsort(order)]
+
+    def _hypotheses(self) -> Hypotheses:
+        """Stage 1, once."""
+        if self._moving is None:
+            assert self._pictures, "observe the frames first"
+            self._moving = hypotheses(self._tracker.over_time(self._pictures), self._options.hypotheses)
+            self._pictures = []
+        return self._moving
+
+    def _reference(self, views: Sequence[PinholeCamera]) -> int:
+        number = self._options.reference
+        if not 0 <= number < len(views):
+            raise InputError(f"reference view {number} of {len(views)}: give 0 to {len(views) - 1}")
+        return number
+
+
+class _Tracker:
+    """SAM3's video model: what some words name, found in every picture of a video and followed through it."""
+
+    def __init__(self, path: Path, prompts: tuple[str, ...], device: str) -> None:
+        torch, transformers = _libraries()
+        _check_files(path)
+        try:
+            self._device = torch.device(device)
+            model, told = transformers.Sam3VideoModel.from_pretrained(
+                path, local_files_only=True, output_loading_info=True, dtype=torch.float32
+            )
+            self._model = model.to(self._device).eval()
+            self._tokenizer = transformers.AutoTokenizer.from_pretrained(path, local_files_only=True)
+        except Exception as error:  # whatever the library makes of files that are not what they should be
+            raise InputError(f"{path}: SAM3 cannot be loaded ({error}); the folder must hold {_NEEDED}") from error
+        if told["missing_keys"]:
+            some = sorted(told["missing_keys"])[0]
+            text = f"{path}: the weights lack {len(told['missing_keys'])} of SAM3's tensors, as {some}"
+            raise InputError(f"{text}; the folder must hold {_NEEDED}")
+        self._torch, self._prompts = torch, prompts
+        self._size = int(self._model.config.image_size)
+
+    def over_time(self, pictures: list[UInt8[np.ndarray, "H W 3"]]) -> Tracked:
+        """The objects of a view's pictures at one moment after the other."""
+        return self._follow(pictures, self._model.config.hotstart_delay)
+
+    def through_views(self, pictures: list[UInt8[np.ndarray, "H W 3"]]) -> Tracked:
+        """The objects of the pictures that all views have of one moment.
+
+        Most views do not see an object, which in a video would say that it was none: no picture takes it back here.
+        """
+        return self._follow(pictures, 0)
+
+    def _follow(self, pictures: list[UInt8[np.ndarray, "H W 3"]], taken_back: int) -> Tracked:
+        """The objects of a video; within so many pictures one that is not found again counts as never found."""
+        self._model.hotstart_delay = taken_back
+        height, width, _ = pictures[0].shape
+        session = self._session(pictures)
+        objects = np.zeros((len(pictures), height, width), np.int32)
+        for output in self._model.propagate_in_video_iterator(session):
+            hidden = set(output.suppressed_obj_ids or ()) | set(session.hotstart_removed_obj_ids)
+            numbers = [number for number in sorted(output.obj_id_to_mask) if number not in hidden]
+            scores = np.array([output.obj_id_to_tracker_score.get(number, 0.0) for number in numbers])
+            for place in np.argsort(scores, kind="stable"):  # the surest last: a pixel is of the one it takes
+                mask = self._whole(output.obj_id_to_mask[numbers[place]], height, width)
+                objects[output.frame_idx][mask] = numbers[place] + 1
+        found = np.unique(objects[objects > 0]).tolist()
+        return Tracked(objects, {k: session.prompts[session.obj_id_to_prompt_id[k - 1]] for k in found})
+
+    def _session(self, pictures: list[UInt8[np.ndarray, "H W 3"]]) -> Any:
+        from transformers.models.sam3_video.modeling_sam3_video import Sam3VideoInferenceSession
+
+        height, width, _ = pictures[0].shape
+        session = Sam3VideoInferenceSession(
+            video_height=height,
+            video_width=width,
+            inference_device=self._device,
+            inference_state_device=self._device,
+            video_storage_device=self._device,
+            dtype=self._torch.float32,
+        )
+        session.processed_frames = _Video(pictures, self._size, self._torch)
+        for prompt in self._prompts:
+            number = session.add_prompt(prompt)
+            words = self._tokenizer(
+                prompt, return_tensors="pt", padding="max_length", max_length=_WORDS, truncation=True
+            ).to(self._device)
+            session.prompt_input_ids[number] = words.input_ids
+            session.prompt_attention_masks[number] = words.attention_mask
+        return session
+
+    def _whole(self, logits: Any, height: int, width: int) -> Bool[np.ndarray, "H W"]:
+        """A mask of the picture's size from what the model gives for its own."""
+        logits = logits.float().reshape(1, 1, *logits.shape[-2:])
+        whole = self._torch.nn.functional.interpolate(logits, size=(height, width), mode="bilinear")
+        return np.asarray((whole[0, 0] > 0).cpu())
+
+
+class _Video:
+    """Pictures as the model takes them, made when it asks: a whole video of them would be gigabytes."""
+
+    def __init__(self, pictures: list[UInt8[np.ndarray, "H W 3"]], size: int, torch: Any) -> None:
+        self._pictures, self._size, self._torch = pictures, size, torch
+
+    def __len__(self) -> int:
+        return len(self._pictures)
+
+    def __getitem__(self, number: int) -> Any:
+        """3 x size x size, -1 to 1, as SAM3's own processor does; that needs torchvision, and this does not."""
+        picture = self._torch.from_numpy(np.ascontiguousarray(self._pictures[number])).permute(2, 0, 1)[None].float()
+        square = self._torch.nn.functional.interpolate(
+            picture, size=(self._size, self._size), mode="bilinear", antialias=True
+        )
+        return square[0] / 127.5 - 1
+
+
+def _libraries() -> tuple[Any, Any]:
+    try:
+        import torch
+        import transformers
+        from transformers import Sam3VideoModel  # noqa: F401
+    except ImportError as error:
+        raise InputError(f"SAM3 needs the extra sam3 ({error}): pip install 'meshreel[sam3]'") from None
+    transformers.utils.logging.disable_progress_bar()
+    return torch, transformers
+
+
+def _check_files(path: Path) -> None:
+    there = {child.name for child in path.iterdir()} if path.is_dir() else set()
+    weights = any(name.endswith(".safetensors") for name in there)
+    words = "tokenizer.json" in there or {"vocab.json", "merges.txt"} <= there
+    if not ("config.json" in there and weights and words):
+        raise InputError(f"{path}: holds no weights of SAM3; the folder must hold {_NEEDED}")

@@ -1,0 +1,86 @@
+"""Pictures of views and masks of them: 8-bit PNG, a folder a view.
+
+In -> out: a file <-> object numbers, 0 for what stands still (DAVIS and most mask tools store them so, as gray or as
+palette indices); a folder -> its files by view and by frame.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from ..errors import InputError
+from .write import replacing
+
+_NUMBER = re.compile(r"(\d+)(?!.*\d)")
+_LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
+
+
+def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
+    """The object numbers of an 8-bit gray or palette PNG. Raises InputError where it cannot be read or is another."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            if image.mode not in ("L", "P", "1"):
+                raise InputError(f"{path}: a mask of mode {image.mode}; store object numbers as 8-bit gray PNG")
+            return np.array(image).astype(np.uint8)
+    except UnidentifiedImageError:
+        raise InputError(f"{path}: is no picture; store object numbers as 8-bit gray PNG") from None
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:  # SyntaxError: a damaged chunk
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({reason}); make the mask again") from None
+
+
+def write_picture(picture: UInt8[np.ndarray, "H W *C"], path: Path) -> None:
+    """A gray (H x W) or colored (H x W x 3) picture as PNG."""
+    from PIL import Image
+
+    packed = io.BytesIO()
+    Image.fromarray(picture).save(packed, format="PNG")
+    with replacing(path) as file:
+        file.write(packed.getvalue())
+
+
+def find_masks(folder: Path, views: int, frames: int) -> list[list[Path]]:
+    """The files of the masks, view by view, frame by frame; views and frames are the last numbers of their names.
+
+    Raises InputError where a view or a frame has none, or two.
+    """
+    places = _numbered(folder, (path for path in _listed(folder) if path.is_dir()), "view")
+    found = []
+    for view in range(views):
+        if view not in places:
+            raise InputError(f"{folder}: has no folder of view {view} of {views}; {_LIKE}")
+        pictures = (path for path in _listed(places[view]) if path.suffix.lower() == ".png")
+        files = _numbered(places[view], pictures, "frame")
+        lost = [frame for frame in range(frames) if frame not in files]
+        if lost:
+            text = f"{places[view]}: has no mask of frame {lost[0]} ({len(lost)} of {frames} are missing)"
+            raise InputError(f"{text}; {_LIKE}; where nothing moves, give a black one")
+        found.append([files[frame] for frame in range(frames)])
+    return found
+
+
+def _listed(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    except OSError as error:
+        raise InputError(f"{folder}: masks cannot be read ({error.strerror}); check the path and its rights") from None
+
+
+def _numbered(folder: Path, paths: Iterable[Path], what: str) -> dict[int, Path]:
+    found: dict[int, Path] = {}
+    for path in paths:
+        number = _NUMBER.search(path.stem if path.suffix.lower() == ".png" else path.name)
+        if number is None:
+            continue
+        if (key := int(number[1])) in found:
+            raise InputError(f"{folder}: {found[key].name} and {path.name} are both {what} {key}; keep one of them")
+        found[key] = path
+    return found

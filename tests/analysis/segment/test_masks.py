@@ -1,0 +1,74 @@
+"""Masks of another tool: found, checked, lifted to the faces that they were painted on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from meshreel.analysis.segment.masks import CAMERAS, ImageMasks, Masker, one_size, read_views
+from meshreel.analysis.segment.pictures import write_views
+from meshreel.analysis.segment.views import ViewsOptions, place_views
+from meshreel.analysis.segment.votes import Votes
+from meshreel.errors import InputError
+from meshreel.geometry.cameras import pack_cameras
+from meshreel.geometry.raycast import Rays
+from meshreel.io.masks import write_picture
+from tests.analysis.segment.test_views import ROOM
+from tests.metrics.shapes import sphere
+
+BALL = len(sphere().faces)  # the last faces of the room are the ball's
+VIEWS = place_views([ROOM], ViewsOptions(count=3, width=80, height=60))
+SEEN = [Rays(ROOM).look(view) for view in VIEWS]
+
+
+@pytest.fixture
+def masks(tmp_path: Path) -> Path:
+    """Two frames in which the ball is object 3."""
+    write_views(tmp_path, [ROOM, ROOM], VIEWS)  # type: ignore[arg-type]
+    for view, seen in enumerate(SEEN):
+        painted = np.where(seen.faces >= len(ROOM.faces) - BALL, 3, 0).astype(np.uint8)
+        for frame in range(2):
+            write_picture(painted, tmp_path / f"view{view:02}" / f"frame_{frame:05}.png")
+    return tmp_path
+
+
+def test_painted_pictures_find_the_faces_they_were_painted_on(masks: Path):
+    given = ImageMasks(masks, 2)
+    assert isinstance(given, Masker)
+    found = given.masks(1, SEEN, given.views)
+    assert found.shape == (3, 60, 80) and found.dtype == bool and set(np.unique(given.objects(0))) == {0, 3}
+    votes = Votes.of(np.stack([seen.faces for seen in SEEN]), found, len(ROOM.faces))
+    dynamic = votes.score >= 0.5
+    assert dynamic[-BALL:][votes.seen[-BALL:] > 0].all() and not dynamic[:-BALL].any() and dynamic.sum() > 10
+
+
+def test_the_views_of_the_folder_are_those_it_was_made_for(masks: Path):
+    for ours, other in zip(VIEWS, read_views(masks), strict=True):
+        assert np.array_equal(ours.extrinsic, other.extrinsic) and np.array_equal(ours.intrinsic, other.intrinsic)
+
+
+def test_a_missing_frame_is_told_before_any_is_read(masks: Path):
+    (masks / "view01" / "frame_00001.png").unlink()
+    with pytest.raises(InputError, match=r"view01: has no mask of frame 1"):
+        ImageMasks(masks, 2)
+    assert len(ImageMasks(masks, 1).views) == 3
+
+
+def test_a_mask_of_another_size_is_told_with_its_frame_and_size(masks: Path):
+    write_picture(np.zeros((30, 40), np.uint8), masks / "view02" / "frame_00001.png")
+    with pytest.raises(InputError, match=r"frame_00001\.png \(frame 1\): 40 x 30 pixels where its camera has 80 x 60"):
+        ImageMasks(masks, 2)
+
+
+def test_a_folder_without_cameras_or_with_cameras_of_two_sizes_is_refused(masks: Path):
+    (masks / CAMERAS).write_bytes(pack_cameras([VIEWS[0], replace(VIEWS[1], width=100)]))
+    with pytest.raises(InputError, match=r"cameras of 80 x 60 and 100 x 60 pixels; give cameras of one size"):
+        ImageMasks(masks, 2)
+    (masks / CAMERAS).unlink()
+    with pytest.raises(InputError, match=rf"{CAMERAS}: cannot be read .*give the cameras that the masks were made for"):
+        ImageMasks(masks, 2)
+    with pytest.raises(InputError, match="nothing: has 0 cameras"):
+        one_size([], "nothing")

@@ -1,0 +1,112 @@
+"""SAM3: the whole loop, from pictures to faces, with a model that knows nothing; and folders that are no weights."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from meshreel.analysis.segment import sam3
+from meshreel.analysis.segment.hypotheses import HypothesisOptions
+from meshreel.analysis.segment.masks import Masker
+from meshreel.analysis.segment.views import ViewsOptions, place_views
+from meshreel.analysis.segment.votes import Votes
+from meshreel.errors import InputError
+from meshreel.geometry.raycast import Rays
+from tests.analysis.segment.test_views import box, together
+from tests.metrics.shapes import moved, sphere
+
+WALLS = box((0, 0, 0), (5, 2.5, 4), inwards=True)
+FRAMES = [together(WALLS, moved(sphere(0.4, levels=2), (x, 1.2, 2))) for x in (1.0, 1.8, 2.6, 3.4)]
+VIEWS = place_views(FRAMES, ViewsOptions(count=3, width=80, height=60))
+SEEN = [[Rays(mesh).look(view) for view in VIEWS] for mesh in FRAMES]
+EASILY = sam3.Sam3Options(reference=1, hypotheses=HypothesisOptions(variation=0.001, overlap=0.01))
+
+
+@pytest.fixture(scope="module")
+def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    for library in ("torch", "transformers"):
+        pytest.importorskip(library, reason="the extra sam3 is not installed: MESHREEL_SAM3=1 ./scripts/setup")
+    from tests.analysis.segment.tiny_sam3 import write_tiny_sam3
+
+    folder = tmp_path_factory.mktemp("weights")
+    write_tiny_sam3(folder)
+    return folder
+
+
+def observed(weights: Path, prompts: tuple[str, ...] | None = ("person", "ball")) -> sam3.Sam3Masks:
+    masker = sam3.Sam3Masks(weights, prompts, EASILY)
+    for frame, seen in enumerate(SEEN):
+        masker.observe(frame, seen, VIEWS)
+    return masker
+
+
+def test_pictures_become_masks_and_masks_become_votes(weights: Path):
+    masker = observed(weights)
+    assert isinstance(masker, Masker)
+    found = masker.masks(2, SEEN[2], VIEWS)
+    assert found.shape == (3, 60, 80) and found.dtype == bool and 0 < found.mean() < 1
+    votes = Votes.of(np.stack([one.faces for one in SEEN[2]]), found, len(FRAMES[2].faces))
+    assert ((votes.score >= 0) & (votes.score <= 1)).all() and votes.dynamic.sum() == found.sum()  # a closed room
+
+
+def test_objects_have_numbers_and_the_same_pictures_give_the_same(weights: Path):
+    first, again = observed(weights), observed(weights)
+    for frame in (0, 3):
+        objects = first.objects(frame, SEEN[frame], VIEWS)
+        assert np.array_equal(objects, again.objects(frame, SEEN[frame], VIEWS))
+        assert np.array_equal(objects > 0, first.masks(frame, SEEN[frame], VIEWS)) and objects.max() <= 4
+
+
+def test_without_prompts_it_looks_for_what_may_move(weights: Path):
+    found = observed(weights, prompts=None).masks(0, SEEN[0], VIEWS)
+    assert found.shape == (3, 60, 80)
+
+
+def test_where_nothing_varies_nothing_moves(weights: Path):
+    masker = sam3.Sam3Masks(weights, ("person",), sam3.Sam3Options(hypotheses=HypothesisOptions(variation=1.0)))
+    for frame in range(3):
+        masker.observe(frame, SEEN[0], VIEWS)
+    assert not masker.masks(1, SEEN[0], VIEWS).any()
+
+
+def test_a_reference_view_that_is_not_there_is_refused(weights: Path):
+    masker = sam3.Sam3Masks(weights, ("person",), sam3.Sam3Options(reference=3))
+    with pytest.raises(InputError, match="reference view 3 of 3: give 0 to 2"):
+        masker.observe(0, SEEN[0], VIEWS)
+
+
+def test_weights_that_lack_a_part_are_refused(weights: Path, tmp_path: Path):
+    from safetensors.numpy import load_file, save_file
+
+    for name in ("config.json", "vocab.json", "merges.txt", "tokenizer_config.json"):
+        (tmp_path / name).write_bytes((weights / name).read_bytes())
+    tensors = load_file(weights / "model.safetensors")
+    tensors.pop(sorted(tensors)[0])
+    save_file(tensors, tmp_path / "model.safetensors", metadata={"format": "pt"})
+    with pytest.raises(InputError, match=r"lack 1 of SAM3's tensors"):
+        sam3.Sam3Masks(tmp_path)
+    (tmp_path / "model.safetensors").write_bytes(b"weights")
+    with pytest.raises(InputError, match="SAM3 cannot be loaded"):
+        sam3.Sam3Masks(tmp_path)
+
+
+@pytest.mark.parametrize("files", [None, [], ["config.json"], ["config.json", "model.safetensors"]])
+@pytest.mark.usefixtures("weights")
+def test_a_folder_without_weights_is_told_what_it_must_hold(tmp_path: Path, files: list[str] | None):
+    folder = tmp_path / "sam3"
+    if files is not None:
+        folder.mkdir()
+        for name in files:
+            (folder / name).write_text(json.dumps({}))
+    with pytest.raises(InputError, match=r"sam3: holds no weights of SAM3.*config\.json, model\.safetensors.*facebook"):
+        sam3.Sam3Masks(folder)
+
+
+def test_without_the_extra_an_error_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(InputError, match=r"pip install 'meshreel\[sam3\]'"):
+        sam3.Sam3Masks(tmp_path)

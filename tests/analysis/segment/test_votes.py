@@ -1,0 +1,61 @@
+"""Votes: what the equations 1 to 4 say, for any masks."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from meshreel.analysis.segment.views import ViewsOptions, place_views
+from meshreel.analysis.segment.votes import Votes, primitive_ids
+from meshreel.geometry.raycast import Rays
+from tests.metrics.shapes import sphere
+
+FACES = 7
+ids_of_views = arrays(np.int32, (2, 3, 4), elements=st.integers(-1, FACES - 1))
+masks_of_views = arrays(np.bool_, (2, 3, 4))
+
+
+@given(ids_of_views, masks_of_views)
+def test_votes_are_the_sums_of_the_paper(ids, masks):
+    votes = Votes.of(ids, masks, FACES)
+    for face in range(FACES):
+        assert votes.dynamic[face] == sum(p == face and m for p, m in zip(ids.ravel(), masks.ravel(), strict=True))
+        assert votes.seen[face] == (ids == face).sum()
+    assert (votes.dynamic <= votes.seen).all() and ((votes.score >= 0) & (votes.score <= 1)).all()
+    assert votes.seen.sum() == (ids >= 0).sum()
+
+
+@given(ids_of_views, masks_of_views)
+def test_all_pixels_give_one_and_none_give_zero_and_opposite_masks_share_the_votes(ids, masks):
+    everything, nothing = (Votes.of(ids, np.full(ids.shape, value), FACES) for value in (True, False))
+    seen = everything.seen > 0
+    assert (everything.score[seen] == 1).all() and (everything.score[~seen] == 0).all()
+    assert (nothing.score == 0).all()
+    one, other = Votes.of(ids, masks, FACES), Votes.of(ids, ~masks, FACES)
+    assert np.array_equal(one.dynamic + other.dynamic, one.seen)
+
+
+@given(ids_of_views, masks_of_views)
+def test_the_order_of_the_views_does_not_matter(ids, masks):
+    one, other = Votes.of(ids, masks, FACES), Votes.of(ids[::-1], masks[::-1], FACES)
+    assert np.array_equal(one.dynamic, other.dynamic) and np.array_equal(one.seen, other.seen)
+
+
+def test_a_mask_of_one_half_of_a_ball_finds_that_half():
+    ball = sphere(levels=4)
+    views = place_views([ball], ViewsOptions(count=12, width=160, height=120, reach=3.0))
+    rays = Rays(ball)
+    ids = primitive_ids(rays, views)
+    assert ids.shape == (12, 120, 160) and ids.dtype == np.int32
+    right = ball.vertices[ball.faces].mean(axis=1)[:, 0] > 0
+    votes = Votes.of(ids, (ids >= 0) & right[ids], len(ball.faces))
+    seen = votes.seen > 0
+    assert seen.mean() > 0.9 and np.array_equal((votes.score >= 0.5)[seen], right[seen])
+
+
+def test_an_empty_mesh_has_no_votes():
+    nothing = np.full((1, 2, 2), -1, np.int32)
+    votes = Votes.of(nothing, np.ones((1, 2, 2), bool), 0)
+    assert len(votes.score) == 0

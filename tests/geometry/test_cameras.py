@@ -1,0 +1,60 @@
+"""Pinhole cameras: rays and images undo each other, the eye is where rays start, and records come back."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from meshreel.errors import InputError
+from meshreel.geometry.cameras import PinholeCamera, pack_cameras, unpack_cameras
+
+angle, length = st.floats(-3, 3), st.floats(-1e3, 1e3)
+
+
+@st.composite
+def cameras(draw: st.DrawFn) -> PinholeCamera:
+    a, b = draw(angle), draw(angle)
+    about_x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
+    about_y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3], extrinsic[:3, 3] = about_x @ about_y, [draw(length), draw(length), draw(length)]
+    intrinsic = np.array([[draw(st.floats(50, 500)), 0, 31], [0, draw(st.floats(50, 500)), 25], [0, 0, 1.0]])
+    return PinholeCamera(64, 48, intrinsic, extrinsic)
+
+
+@given(cameras())
+def test_rays_go_through_the_pixels_that_their_points_fall_on(camera):
+    pixels = np.random.default_rng(0).uniform(0, 48, (20, 2))
+    origins, directions = camera.rays(pixels)
+    assert np.allclose(np.linalg.norm(directions, axis=1), 1)
+    assert np.allclose(camera.project(origins + 2 * directions), pixels)
+
+
+@given(cameras())
+def test_the_eye_is_the_origin_of_the_cameras_frame(camera):
+    assert np.allclose(camera.extrinsic @ [*camera.eye, 1], [0, 0, 0, 1], atol=1e-9)
+
+
+@given(st.lists(cameras(), min_size=1, max_size=3))
+def test_packed_cameras_come_back(given_cameras):
+    again = unpack_cameras(pack_cameras(given_cameras), "these")
+    for ours, other in zip(given_cameras, again, strict=True):
+        assert np.array_equal(ours.intrinsic, other.intrinsic) and np.array_equal(ours.extrinsic, other.extrinsic)
+        assert (ours.width, ours.height) == (other.width, other.height)
+
+
+@pytest.mark.parametrize("data", [b"", b"\xff", b"[1]", b'{"parameters": [1]}', b"[" * 100_000])
+def test_other_bytes_are_input_errors_that_name_their_source(data):
+    with pytest.raises(InputError, match="these"):
+        unpack_cameras(data, "these")
+
+
+def test_an_intrinsic_matrix_that_does_not_end_in_0_0_1_is_refused():
+    record = json.loads(pack_cameras([PinholeCamera(64, 48, np.eye(3), np.eye(4))]))
+    record["parameters"][0]["intrinsic"]["intrinsic_matrix"][8] = 2.0
+    with pytest.raises(InputError, match=r"0\.0, 2\.0"):
+        unpack_cameras(json.dumps(record).encode(), "these")
