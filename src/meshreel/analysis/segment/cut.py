@@ -49,7 +49,7 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
     moving = np.zeros(len(places.keys), bool)
     if not seeds.any():
         return moving
-    middles = places.lattice.centers(places.keys)
+    middles = places.middles
     near = np.flatnonzero(_distance(middles, middles[seeds]) <= options.reach)
     moves = np.where(share >= options.share / 2, options.evidence * share, 0.0)[near]
     always, around = options.still

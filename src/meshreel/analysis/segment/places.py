@@ -28,7 +28,7 @@ _DEEPEST = 65_535  # of a stored depth; 0: nothing seen
 class PlacesOptions:
     """How finely a scene is looked at, and what counts as seen free."""
 
-    frames: int = 64  # looked at, at most, spread over the sequence: memory does not grow with its length
+    frames: int = 32  # looked at, at most, spread over the sequence: memory does not grow with its length
     past: float = 2.0  # cells that a view must see past a cell's middle
     views: int = 2  # that must see past it
 
@@ -53,6 +53,18 @@ class Places:
         """The share of the frames that know a place in which it is seen free."""
         known = self.free.sum(axis=0) + self.occupied.sum(axis=0)
         return self.free.sum(axis=0) / np.maximum(known, 1)
+
+    @property
+    def middles(self) -> Float64[np.ndarray, "P 3"]:
+        """The middles of the cells."""
+        return self.lattice.centers(self.keys)
+
+    @staticmethod
+    def nowhere() -> Places:
+        """Of a scene without surface."""
+        none, table = np.zeros(0, np.int64), np.zeros((0, 26), np.int32)
+        never = np.zeros((0, 0), bool)
+        return Places(Lattice(np.zeros(3), 1.0), none, table, never, never, np.zeros((0, 3)))
 
     def of(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
         """The number of the cell that each point lies in; -1 where no frame that was looked at has surface."""

@@ -1,0 +1,198 @@
+"""Which faces of each frame move (paper, section 3.2): geometric change, or masks from elsewhere lifted by votes.
+
+In: the frames of a scene. Out: a Segmentation, which says of each frame's faces whether they move, one frame at a time.
+
+Differs from the paper: without masks, what moves is found in space, not in pictures, over the whole sequence
+(docs/decisions/0018-places.md); and labels are cleaned on the surface.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Bool, Float64
+
+from ...errors import InputError
+from ...geometry.cameras import PinholeCamera
+from ...geometry.raycast import Rays, Seen
+from ...geometry.topology import components, face_normals, unique_edges
+from ...geometry.voxels import Lattice, spread
+from ...types import Frames, Mesh
+from .cut import CutOptions, moving_places
+from .masks import Masker
+from .places import Places, PlacesOptions, find_places
+from .views import ViewsOptions, place_views
+from .votes import Votes
+
+_PROBES = 3  # frames that the views are placed by
+_BELOW = 2  # cells of room below the scene in the lattice
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentOptions:
+    """How a scene is taken apart."""
+
+    views: ViewsOptions = field(default_factory=ViewsOptions)
+    places: PlacesOptions = field(default_factory=PlacesOptions)
+    cut: CutOptions = field(default_factory=CutOptions)
+    threshold: float = 0.3  # the paper's tau: a low one, and clean-up, miss less than a high one
+    island: float = 0.01  # m^2: connected faces with less area take the label of what is around them
+
+    def __post_init__(self) -> None:
+        if not 0 < self.threshold <= 1 or not 0 <= self.island < np.inf:
+            raise InputError(f"threshold {self.threshold:g}, island {self.island:g} m^2: give (0, 1] and from 0 on")
+
+
+class Segmentation(Protocol):
+    """Says which faces of a frame move."""
+
+    def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """True for the faces of frame `frame`, which is `mesh`, that move."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class ByPlace:
+    """What is at a moving place moves, whenever it is there."""
+
+    places: Places
+    chosen: Bool[np.ndarray, " P"]
+    island: float  # m^2
+
+    def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """By where the faces are; the frame's number does not matter."""
+        if mesh.is_empty or not self.chosen.any():
+            return np.zeros(len(mesh.faces), bool)
+        points, faces = spread(mesh, 1.5 * self.places.lattice.size)
+        moves = np.bincount(faces, self._at(points), len(mesh.faces))
+        return without_islands(mesh, moves >= 0.5 * np.bincount(faces, minlength=len(mesh.faces)), self.island)
+
+    def _at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Whether each point is at a moving place; at one that was not looked at, as at the nearest that was."""
+        from scipy.spatial import cKDTree
+
+        number = self.places.of(points)
+        unknown = np.flatnonzero(number < 0)
+        if len(unknown):
+            number[unknown] = cKDTree(self.places.middles).query(points[unknown])[1]
+        return self.chosen[number]
+
+
+@dataclass(frozen=True, slots=True)
+class ByMasks:
+    """What most pixels that see it call moving (eqs. 1 to 4)."""
+
+    masker: Masker
+    views: Sequence[PinholeCamera]
+    options: SegmentOptions
+
+    def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """By the votes of the pixels; faces that no view sees take their neighbours' label."""
+        seen = _looks(mesh, self.views)
+        masks = self.masker.masks(frame, seen, self.views)
+        votes = Votes.of(np.stack([s.faces for s in seen]), masks, len(mesh.faces))
+        moves = votes.score >= self.options.threshold
+        moves = _filled(mesh, moves, votes.seen > 0)
+        return without_islands(mesh, moves, self.options.island)
+
+
+def segment(frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByPlace:
+    """What moves in a scene, by geometric change over the whole of it; at most so many frames are looked at."""
+    most = options.places.frames
+    chosen = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(most, len(frames)))})
+    chosen = [number for number in chosen if not frames[number].is_empty]
+    if not chosen:
+        return ByPlace(Places.nowhere(), np.zeros(0, bool), options.island)
+    views = place_views(_Some(frames, chosen[:: max(1, len(chosen) // _PROBES)]), options.views)
+    lattice = _lattice(frames, chosen)
+    places = find_places((frames[number] for number in chosen), views, lattice, options.places)
+    return ByPlace(places, moving_places(places, options.cut), options.island)
+
+
+def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
+    """What moves by somebody's masks. Who must see all frames before the first mask has a method `observe`."""
+    views = getattr(masker, "views", None) or place_views(_Some(frames, _probes(len(frames))), options.views)
+    if observe := getattr(masker, "observe", None):
+        for number in range(len(frames)):
+            observe(number, _looks(frames[number], views), views)
+    return ByMasks(masker, views, options)
+
+
+def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) -> Bool[np.ndarray, " F"]:
+    """The labels with connected faces of one label and less area given the other; the moving ones first.
+
+    A connected piece of the mesh that has one label keeps it if it rests: there is nothing around it.
+    """
+    areas = face_normals(mesh)[1]
+    small = _pieces(mesh, chosen, areas) < least
+    chosen = chosen & ~small
+    alone = _whole(mesh, ~chosen)
+    small = _pieces(mesh, ~chosen, areas) < least
+    return chosen | (small & ~alone)
+
+
+def _pieces(
+    mesh: Mesh, chosen: Bool[np.ndarray, " F"], areas: Float64[np.ndarray, " F"]
+) -> Float64[np.ndarray, " F"]:
+    """The area of the connected chosen faces that each chosen face belongs to; infinite for the others."""
+    found = np.full(len(mesh.faces), np.inf)
+    label = components(mesh.faces[chosen], len(mesh.vertices))[mesh.faces[chosen][:, 0]]
+    found[chosen] = np.bincount(label, areas[chosen])[label] if len(label) else 0.0
+    return found
+
+
+def _whole(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
+    """The faces of connected pieces of the mesh of which every face is chosen."""
+    label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
+    return (np.bincount(label, ~chosen) == 0)[label] if len(label) else np.zeros(0, bool)
+
+
+def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], known: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
+    """Labels carried from faces that are seen to their neighbours that are not, ring by ring."""
+    edges, face_edges = unique_edges(mesh.faces)
+    moves, known = moves & known, known.copy()
+    while True:
+        weight = np.bincount(face_edges[known].reshape(-1), minlength=len(edges))
+        votes = np.bincount(face_edges[known & moves].reshape(-1), minlength=len(edges))
+        reached = ~known & (weight[face_edges].sum(axis=1) > 0)
+        if not reached.any():
+            return moves
+        moves[reached] = 2 * votes[face_edges[reached]].sum(axis=1) > weight[face_edges[reached]].sum(axis=1)
+        known |= reached
+
+
+def _looks(mesh: Mesh, views: Sequence[PinholeCamera]) -> list[Seen]:
+    rays = Rays(mesh)
+    return [rays.look(view) for view in views]
+
+
+def _probes(count: int) -> list[int]:
+    return sorted({round(k) for k in np.linspace(0, count - 1, _PROBES)})
+
+
+def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
+    """Cells as large as the frames' edges are long, which is about a voxel of what they were fused on."""
+    low, edges = np.full(3, np.inf), []
+    for number in (chosen[0], chosen[len(chosen) // 2], chosen[-1]):
+        mesh = frames[number]
+        low = np.minimum(low, mesh.vertices.min(axis=0))
+        pairs = mesh.vertices[unique_edges(mesh.faces)[0]]
+        edges.append(np.median(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)))
+    size = float(np.median(edges))
+    return Lattice(low - size * _BELOW, size)
+
+
+class _Some(Frames):
+    """Some frames of a sequence, read when they are asked for."""
+
+    def __init__(self, frames: Frames, numbers: Sequence[int]) -> None:
+        self._frames, self._numbers = frames, list(numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self._frames[self._numbers[index]]
