@@ -12,7 +12,8 @@ from jaxtyping import Float64, Int32, Int64
 
 from ..types import Mesh
 
-_SIDE = 1 << 20  # cells along an axis that a key has room for
+_SIDE = 1 << 20  # cells along an axis that a key has room for, half of them on either side of the origin
+_HALF = _SIDE // 2
 _MOST_PARTS = 512  # of a face's side: more is beyond what a scene of one scale has
 _AROUND = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)])
 
@@ -21,17 +22,26 @@ _AROUND = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)
 class Lattice:
     """Cubic cells of one size; a cell's key orders cells by their place."""
 
-    origin: Float64[np.ndarray, " 3"]  # m, below all points
+    origin: Float64[np.ndarray, " 3"]  # m, a corner of a cell
     size: float  # m
 
     def keys(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
         """The key of the cell that each point lies in; points outside of what keys have room for are at its border."""
         cells = np.floor((points - self.origin) / self.size)
-        return _key(np.clip(cells, 1, _SIDE - 2).astype(np.int64))
+        return _key(np.clip(cells, 2 - _HALF, _HALF - 2).astype(np.int64) + _HALF)
+
+    def cells(self, keys: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, "P 3"]:
+        """Whole numbers of cells from the origin, along each axis."""
+        return np.stack([keys // (_SIDE * _SIDE), keys // _SIDE % _SIDE, keys % _SIDE], axis=1) - _HALF
 
     def centers(self, keys: Int64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 3"]:
         """The middles of cells."""
-        return self.origin + (_cells(keys) + 0.5) * self.size
+        return self.origin + (self.cells(keys) + 0.5) * self.size
+
+
+def moved(keys: Int64[np.ndarray, " P"], offset: Int64[np.ndarray, " 3"]) -> Int64[np.ndarray, " P"]:
+    """The cells so many cells farther along each axis."""
+    return keys + _key(offset)
 
 
 def neighbours(keys: Int64[np.ndarray, " P"]) -> Int32[np.ndarray, "P 26"]:
@@ -39,7 +49,7 @@ def neighbours(keys: Int64[np.ndarray, " P"]) -> Int32[np.ndarray, "P 26"]:
     table = np.empty((len(keys), len(_AROUND)), np.int32)
     own = np.arange(len(keys), dtype=np.int32)
     for column, offset in enumerate(_AROUND):
-        asked = keys + _key(offset)
+        asked = moved(keys, offset)
         at = np.minimum(np.searchsorted(keys, asked), max(len(keys) - 1, 0))
         table[:, column] = np.where(keys[at] == asked, at, own) if len(keys) else own
     return table
@@ -74,7 +84,3 @@ def _middles(count: int) -> Float64[np.ndarray, "M 3"]:
 
 def _key(cells: Int64[np.ndarray, "... 3"]) -> Int64[np.ndarray, "..."]:
     return (cells[..., 0] * _SIDE + cells[..., 1]) * _SIDE + cells[..., 2]
-
-
-def _cells(keys: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, "P 3"]:
-    return np.stack([keys // (_SIDE * _SIDE), keys // _SIDE % _SIDE, keys % _SIDE], axis=1)

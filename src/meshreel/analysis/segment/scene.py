@@ -28,7 +28,6 @@ from .views import ViewsOptions, place_views
 from .votes import Votes
 
 _PROBES = 3  # frames that the views are placed by
-_BELOW = 2  # cells of room below the scene in the lattice
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,14 +174,12 @@ def _probes(count: int) -> list[int]:
 
 def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
     """Cells as large as the frames' edges are long, which is about a voxel of what they were fused on."""
-    low, edges = np.full(3, np.inf), []
+    edges = []
     for number in (chosen[0], chosen[len(chosen) // 2], chosen[-1]):
         mesh = frames[number]
-        low = np.minimum(low, mesh.vertices.min(axis=0))
         pairs = mesh.vertices[unique_edges(mesh.faces)[0]]
         edges.append(np.median(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)))
-    size = float(np.median(edges))
-    return Lattice(low - size * _BELOW, size)
+    return Lattice(np.zeros(3), float(np.median(edges)))
 
 
 class _Some(Frames):
