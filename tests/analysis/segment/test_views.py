@@ -86,6 +86,11 @@ def test_far_away_scenes_are_seen_as_well():
     assert seen_share(far, place_views([far], ViewsOptions(count=14))) > 0.95
 
 
+def test_faces_without_area_do_no_harm():
+    flat = Mesh.of([[0, 0, 0], [1, 1, 1], [2, 2, 2]], [[0, 1, 2], [0, 0, 0]])
+    assert len(place_views([flat], SMALL)) == len(place_views([together(ROOM, flat)], SMALL)) == 14
+
+
 def test_empty_frames_are_passed_over_and_none_but_empty_ones_refused():
     assert len(place_views([Mesh.empty(), ROOM], SMALL)) == 14
     for frames in ([], [Mesh.empty()]):

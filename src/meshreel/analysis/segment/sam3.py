@@ -136,7 +136,7 @@ class _Tracker:
         from transformers.models.sam3_video.modeling_sam3_video import Sam3VideoInferenceSession
 
         height, width, _ = pictures[0].shape
-        session = Sam3VideoInferenceSession(
+        session: Any = Sam3VideoInferenceSession(
             video_height=height,
             video_width=width,
             inference_device=self._device,
