@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float64, UInt16
 
 from ..errors import InputError
 from ..geometry.nearest import Surface
+from ..geometry.raycast import Rays
 from ..geometry.topology import face_normals
 from ..io.depth import write_depth
 from ..io.write import make_folder, replacing, write_mesh
@@ -146,14 +147,9 @@ class _Rays:
     """A mesh prepared for ray casting."""
 
     def __init__(self, mesh: Mesh) -> None:
-        import open3d as o3d
-
-        self._tensor = o3d.core.Tensor.from_numpy
         self._normals = face_normals(mesh)[0]
-        self._scene = o3d.t.geometry.RaycastingScene()
-        if not mesh.is_empty:
-            faces = mesh.faces.astype(np.uint32)
-            self._scene.add_triangles(self._tensor(mesh.vertices.astype(np.float32)), self._tensor(faces))
+        # About the world's origin, as every simulated scene was: another would round depths differently.
+        self._rays = Rays(mesh, origin=np.zeros(3))
 
     def cast(self, camera: DepthCamera) -> tuple[Float64[np.ndarray, "H W"], Float64[np.ndarray, "H W"]]:
         """Depth along the optical axis, m, infinite for a miss; and the cosine between ray and normal."""
@@ -162,12 +158,11 @@ class _Rays:
         ahead = np.stack([(columns - cx) / fx, (rows - cy) / fy, np.ones(rows.shape)], axis=-1)
         turn, eye = camera.camera_to_world[:3, :3], camera.camera_to_world[:3, 3]
         directions = ahead @ turn.T
-        rays = np.concatenate([np.broadcast_to(eye, directions.shape), directions], axis=-1).astype(np.float32)
-        answer = self._scene.cast_rays(self._tensor(rays))
-        depth = answer["t_hit"].numpy().astype(np.float64)  # directions go one metre along the axis
+        answer = self._rays.cast(np.broadcast_to(eye, (rows.size, 3)), directions.reshape(-1, 3))
+        depth = answer.distances.reshape(rows.shape)  # directions go one metre along the axis
         cosines = np.zeros(depth.shape)
         hit = np.isfinite(depth)
-        faces = answer["primitive_ids"].numpy()[hit].astype(np.int64)
+        faces = answer.faces.reshape(rows.shape)[hit]
         along = directions[hit] / np.linalg.norm(directions[hit], axis=1)[:, None]
         cosines[hit] = np.abs((self._normals[faces] * along).sum(axis=1))
         return depth, cosines

@@ -1,14 +1,12 @@
 """The fixed views that renders and SSIM use, and their file (Open3D's pinhole camera JSON).
 
-Cameras look along +z of their own frame, x right and y down, as Open3D's and OpenCV's do. Pixel (column i, row j)
-covers [i, i + 1) x [j, j + 1); its ray goes through the middle.
+Axes and pixels are those of `geometry.cameras`.
 """
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -17,6 +15,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..geometry.cameras import PinholeCamera, pack_cameras, pinhole_record, unpack_cameras
 from ..io.write import replacing
 from ..types import Mesh
 
@@ -49,27 +48,6 @@ class Camera(Protocol):
     def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
         """Image positions of points in the camera frame; not finite where a point is not in front of the camera."""
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class PinholeCamera:
-    """A perspective camera."""
-
-    width: int
-    height: int
-    intrinsic: Float64[np.ndarray, "3 3"]  # pixels
-    extrinsic: Float64[np.ndarray, "4 4"]
-
-    def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
-        """Rays from the eye; directions have unit length."""
-        homogeneous = np.column_stack([pixels, np.ones(len(pixels))])
-        directions = homogeneous @ np.linalg.inv(self.intrinsic).T
-        return np.zeros_like(directions), directions / np.linalg.norm(directions, axis=1)[:, None]
-
-    def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
-        """Perspective projection."""
-        depth = np.where(points[:, 2:] > 0, points[:, 2:], np.nan)
-        return (points @ self.intrinsic.T)[:, :2] / depth
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,24 +159,16 @@ def parallel_views_around(box: Box, size: int = 512, up: str = "y") -> list[Orth
 def read_cameras(path: Path) -> list[PinholeCamera]:
     """The cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory JSON file."""
     try:
-        record = json.loads(path.read_text())
-        return [_parse(entry) for entry in record.get("parameters", [record])]
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        data = path.read_bytes()
+    except OSError as error:
         raise InputError(f"{path}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
-    except (KeyError, TypeError, ValueError, AttributeError, np.linalg.LinAlgError) as error:
-        raise InputError(f"{path}: not Open3D pinhole camera JSON ({error!r})") from error
+    return unpack_cameras(data, str(path))
 
 
-def write_cameras(path: Path, cameras: list[PinholeCamera]) -> None:
+def write_cameras(path: Path, cameras: Sequence[PinholeCamera]) -> None:
     """The cameras as an Open3D PinholeCameraTrajectory JSON file."""
-    record = {
-        "class_name": "PinholeCameraTrajectory",
-        "parameters": [camera_record(camera) for camera in cameras],
-        "version_major": 1,
-        "version_minor": 0,
-    }
     with replacing(path) as file:
-        file.write((json.dumps(record, indent=1) + "\n").encode())
+        file.write(pack_cameras(cameras))
 
 
 def camera_record(camera: PinholeCamera | OrthographicCamera) -> dict[str, Any]:
@@ -210,29 +180,7 @@ def camera_record(camera: PinholeCamera | OrthographicCamera) -> dict[str, Any]:
             "size": [camera.width, camera.height],
             "pixel_m": camera.pixel,
         }
-    return {
-        "class_name": "PinholeCameraParameters",
-        "extrinsic": camera.extrinsic.T.reshape(-1).tolist(),
-        "intrinsic": {
-            "height": camera.height,
-            "intrinsic_matrix": camera.intrinsic.T.reshape(-1).tolist(),
-            "width": camera.width,
-        },
-        "version_major": 1,
-        "version_minor": 0,
-    }
-
-
-def _parse(entry: dict[str, Any]) -> PinholeCamera:
-    intrinsic = np.array(entry["intrinsic"]["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T
-    extrinsic = np.array(entry["extrinsic"], dtype=np.float64).reshape(4, 4).T
-    width, height = int(entry["intrinsic"]["width"]), int(entry["intrinsic"]["height"])
-    if not (np.isfinite(intrinsic).all() and np.isfinite(extrinsic).all()):
-        raise ValueError("a matrix is not finite")
-    if not (8 <= width <= 16384 and 8 <= height <= 16384):
-        raise ValueError(f"image size {width} x {height}")
-    np.linalg.inv(intrinsic), np.linalg.inv(extrinsic)  # raises where singular
-    return PinholeCamera(width, height, intrinsic, extrinsic)
+    return pinhole_record(camera)
 
 
 def _extent(box: Box, up: str) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
+from ..geometry.raycast import Rays
 from ..types import Mesh
 from .cameras import Camera
 from .normals import interpolate, welded_normals
@@ -105,14 +106,7 @@ def _cast(
     directions: Float64[np.ndarray, "N 3"],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which rays hit, and for those the face and the barycentric weights."""
-    import open3d as o3d
-
-    tensor = o3d.core.Tensor.from_numpy
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(tensor(vertices.astype(np.float32)), tensor(faces.astype(np.uint32)))
-    rays = np.concatenate([origins, directions], axis=1).astype(np.float32)
-    answer = scene.cast_rays(tensor(rays))
-    hit = np.isfinite(answer["t_hit"].numpy())
-    uv = answer["primitive_uvs"].numpy()[hit].astype(np.float64)
-    found = answer["primitive_ids"].numpy()[hit].astype(np.int64)
-    return hit, found, np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)
+    rays = Rays(Mesh(vertices, faces), origin=np.zeros(3))  # the eye is the origin already
+    answer = rays.cast(origins, directions)
+    hit = answer.faces >= 0
+    return hit, answer.faces[hit], answer.barycentric[hit]

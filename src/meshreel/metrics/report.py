@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..geometry.cameras import PinholeCamera
 from ..types import Mesh
 from .cameras import (
     Box,
     OrthographicCamera,
     ParallelViewOptions,
-    PinholeCamera,
     ViewOptions,
     camera_record,
     parallel_views_around,

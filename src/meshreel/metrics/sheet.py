@@ -16,10 +16,11 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..geometry.cameras import PinholeCamera
 from ..geometry.nearest import Surface
 from ..io.write import replacing
 from ..types import Mesh
-from .cameras import Box, PinholeCamera, ViewOptions, views_around
+from .cameras import Box, ViewOptions, views_around
 from .distance import surface_errors
 from .render import View, Window, look
 from .samples import box_center, used_surface

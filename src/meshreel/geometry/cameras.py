@@ -1,0 +1,92 @@
+"""Pinhole cameras, and their record: Open3D's pinhole camera JSON.
+
+Cameras look along +z of their own frame, x right and y down, as Open3D's and OpenCV's do. Pixel (column i, row j)
+covers [i, i + 1) x [j, j + 1); its ray goes through the middle.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class PinholeCamera:
+    """A perspective camera."""
+
+    width: int
+    height: int
+    intrinsic: Float64[np.ndarray, "3 3"]  # pixels
+    extrinsic: Float64[np.ndarray, "4 4"]  # world to camera
+
+    @property
+    def eye(self) -> Float64[np.ndarray, " 3"]:
+        """Where the camera stands, world."""
+        return -np.linalg.solve(self.extrinsic[:3, :3], self.extrinsic[:3, 3])
+
+    def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
+        """Rays from the eye through image positions, camera frame; directions have unit length."""
+        homogeneous = np.column_stack([pixels, np.ones(len(pixels))])
+        directions = homogeneous @ np.linalg.inv(self.intrinsic).T
+        return np.zeros_like(directions), directions / np.linalg.norm(directions, axis=1)[:, None]
+
+    def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
+        """Perspective projection of points in the camera frame; not finite for those that are not in front of it."""
+        depth = np.where(points[:, 2:] > 0, points[:, 2:], np.nan)
+        return (points @ self.intrinsic.T)[:, :2] / depth
+
+
+def pinhole_record(camera: PinholeCamera) -> dict[str, Any]:
+    """The camera as Open3D's JSON has it: matrices column by column."""
+    return {
+        "class_name": "PinholeCameraParameters",
+        "extrinsic": camera.extrinsic.T.reshape(-1).tolist(),
+        "intrinsic": {
+            "height": camera.height,
+            "intrinsic_matrix": camera.intrinsic.T.reshape(-1).tolist(),
+            "width": camera.width,
+        },
+        "version_major": 1,
+        "version_minor": 0,
+    }
+
+
+def pack_cameras(cameras: Sequence[PinholeCamera]) -> bytes:
+    """The cameras as an Open3D PinholeCameraTrajectory, JSON."""
+    record = {
+        "class_name": "PinholeCameraTrajectory",
+        "parameters": [pinhole_record(camera) for camera in cameras],
+        "version_major": 1,
+        "version_minor": 0,
+    }
+    return (json.dumps(record, indent=1) + "\n").encode()
+
+
+def unpack_cameras(data: bytes, name: str) -> list[PinholeCamera]:
+    """The cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory; `name` is what an error calls it."""
+    try:
+        record = json.loads(data)
+        return [_camera(entry) for entry in record.get("parameters", [record])]
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"{name}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, np.linalg.LinAlgError) as error:
+        raise InputError(f"{name}: not Open3D pinhole camera JSON ({error!r})") from error
+
+
+def _camera(entry: dict[str, Any]) -> PinholeCamera:
+    intrinsic = np.array(entry["intrinsic"]["intrinsic_matrix"], dtype=np.float64).reshape(3, 3).T
+    extrinsic = np.array(entry["extrinsic"], dtype=np.float64).reshape(4, 4).T
+    width, height = int(entry["intrinsic"]["width"]), int(entry["intrinsic"]["height"])
+    if not (np.isfinite(intrinsic).all() and np.isfinite(extrinsic).all()):
+        raise ValueError("a matrix is not finite")
+    if not (8 <= width <= 16384 and 8 <= height <= 16384):
+        raise ValueError(f"image size {width} x {height}")
+    np.linalg.inv(intrinsic), np.linalg.inv(extrinsic)  # raises where singular
+    return PinholeCamera(width, height, intrinsic, extrinsic)
