@@ -89,7 +89,7 @@ def _pinhole(view: tuple[DepthCamera, np.ndarray]) -> tuple[Any, Any, Any]:
 
     camera, depth = view
     intrinsic = camera.intrinsic.copy()
-    intrinsic[:2, 2] += 0.5  # a rig's pixel has its middle at whole numbers; integration cuts off what is behind the point
+    intrinsic[:2, 2] += 0.5  # a rig's pixels have their middles at whole numbers; integration cuts projections off
     return o3d.t.geometry.Image(_tensor(depth)), _tensor(intrinsic), _tensor(camera.extrinsic)
 
 

@@ -48,8 +48,8 @@ def score_labels(found: Iterable[Labels], true: Iterable[Labels]) -> Segmentatio
             either = int((a | b).sum())
             overlaps.append(float((a & b).sum()) / either if either else 1.0)
             called, static = called + int((a & ~b).sum()), static + int((~b).sum())
-    except ValueError:
-        raise InputError(f"labels of {len(overlaps)} frames have no counterpart after them; label every frame") from None
+    except ValueError:  # of zip: InputError is none
+        raise InputError(f"only {len(overlaps)} frames have labels both found and true; label every frame") from None
     if not overlaps:
         raise InputError("labels of 0 frames; give one frame at least")
     return SegmentationScore(tuple(overlaps), called / max(static, 1))

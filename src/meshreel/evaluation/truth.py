@@ -61,7 +61,7 @@ def compare_with_truth(
 ) -> Row:
     """Means over the frames `numbers`: of the decoded meshes against the truth, and of the originals (noise floor).
 
-    JSON-ready; what is not finite, or is about a part that is not there, is None. `per_frame` has every frame.
+    JSON-ready; what is not finite, or is about a part that is not there, is None. `per_frame` has each of `frames`.
     """
     frames: list[Row] = []
     for done, number in enumerate(numbers, 1):
@@ -70,7 +70,7 @@ def compare_with_truth(
         frames.append({"noise_floor": floor, "decoded": scene_row(clean, clean.labelled(decoded[number]))})
         tell(done)
     means = {name: finite(scene_means([frame[name] for frame in frames])) for name in ("noise_floor", "decoded")}
-    told = [{"frame": n} | {k: finite(row) for k, row in frame.items()} for n, frame in zip(numbers, frames, strict=True)]
+    told = [{name: finite(row) for name, row in frame.items()} for frame in frames]
     return {"frames": list(numbers)} | means | {"per_frame": told}
 
 
