@@ -47,7 +47,7 @@ class SightOptions:
     people: int = 20_000  # points on what moves, of each mesh
     background: int = 60_000  # points on what stands
     near: float = 0.02  # m, at which surface counts as covered
-    grazing: float = 75.0  # degrees between ray and normal past which no camera is expected to measure
+    grazing: float = 65.0  # degrees between ray and normal past which depth is too coarse for surface to be expected
     slack: float = 0.005  # m that a point may lie behind what the ray meets first
 
     def __post_init__(self) -> None:

@@ -17,6 +17,7 @@ CODECS: dict[str, Callable[..., Codec]] = {
     "meshreel": MeshreelCodec,
     "scene_draco": SceneDracoCodec,
     "background_draco": BackgroundDracoCodec,
+    "labelled_draco": BackgroundDracoCodec,  # the same by labels that somebody else has found
 }
 
 

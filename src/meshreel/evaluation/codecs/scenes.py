@@ -21,7 +21,7 @@ from ...encoder import make_header
 from ...errors import InputError
 from ...geometry.decimate import decimate_faces
 from ...geometry.topology import drop_unreferenced
-from ...types import Frames, Mesh, MeshSequence
+from ...types import Mesh, MeshSequence
 from ..codec import Progress
 from ..scenes import TRUE, SceneFrames
 from .draco import check_qp, encode_frame
@@ -102,26 +102,17 @@ class BackgroundDracoCodec:
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, from the bytes alone."""
-        return _Together(open_video(data))
+        still, *frames = open_video(data)
+        return [_together(still, moving) for moving in frames]
 
     def background_bytes(self, data: bytes) -> int:
         """How much of the file is the background."""
         return open_video(data).reader.groups[0].size
 
 
-class _Together(Frames):
-    """The first frame and each later one in one mesh."""
-
-    def __init__(self, video: Frames) -> None:
-        self._video, self._still = video, video[0]
-
-    def __len__(self) -> int:
-        return len(self._video) - 1
-
-    def __getitem__(self, index: int) -> Mesh:
-        still, moving = self._still, self._video[range(1, len(self._video))[index]]
-        faces = np.concatenate([still.faces, moving.faces + len(still.vertices)])
-        return Mesh.of(np.concatenate([still.vertices, moving.vertices]), faces)
+def _together(still: Mesh, moving: Mesh) -> Mesh:
+    faces = np.concatenate([still.faces, moving.faces + len(still.vertices)])
+    return Mesh.of(np.concatenate([still.vertices, moving.vertices]), faces)
 
 
 def _check_share(share: float) -> None:
