@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import UInt8
 
 from ..errors import InputError
 from ..io.meshes import read_mesh
@@ -27,7 +26,7 @@ class Truth:
     """What a simulated rig has really seen, by frame."""
 
     paths: tuple[Path, ...]  # of the clean meshes
-    packed: tuple[UInt8[np.ndarray, " B"], ...]  # for each face a bit: it moves
+    packed: tuple[np.ndarray, ...]  # for each face a bit: it moves; from outside, checked frame by frame
     cameras: tuple[DepthCamera, ...]  # where they really stood
     frame_rate: float  # 1/s
 
@@ -57,7 +56,7 @@ def read_truth(folder: Path) -> Truth:
     return Truth(tuple(paths.values()), tuple(labels[name] for name in paths), cameras, rate)
 
 
-def _labels(path: Path) -> dict[str, UInt8[np.ndarray, " B"]]:
+def _labels(path: Path) -> dict[str, np.ndarray]:
     """Packed labels by the frame's name."""
     try:
         with np.load(path, allow_pickle=False) as archive:

@@ -6,15 +6,15 @@ and the share of the static faces that are called dynamic.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool
 
+from ..capture.simulate import SceneFrame
 from ..errors import InputError
 from ..types import Mesh
-from .truth import TrueFrames
 
 Labels = Bool[np.ndarray, " F"]  # True: the face moves
 
@@ -55,6 +55,8 @@ def score_labels(found: Iterable[Labels], true: Iterable[Labels]) -> Segmentatio
     return SegmentationScore(tuple(overlaps), called / max(static, 1))
 
 
-def score_segmentation(meshes: Sequence[Mesh], found: Sequence[Labels], truth: TrueFrames) -> SegmentationScore:
+def score_segmentation(
+    meshes: Iterable[Mesh], found: Iterable[Labels], truth: Iterable[SceneFrame]
+) -> SegmentationScore:
     """The score of labels of fused meshes: their true labels are those of the nearest clean faces."""
-    return score_labels(found, (truth[i].labels_for(mesh) for i, mesh in enumerate(meshes)))
+    return score_labels(found, (clean.labels_for(mesh) for clean, mesh in zip(truth, meshes, strict=True)))

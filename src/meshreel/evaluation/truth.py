@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from ..capture.rig import DepthCamera
 from ..capture.simulate import SceneFrame
@@ -19,6 +19,7 @@ from ..types import Frames
 Row = dict[str, Any]
 
 
+@runtime_checkable
 class TrueFrames(Protocol):
     """Clean frames by number, and the cameras that saw them."""
 

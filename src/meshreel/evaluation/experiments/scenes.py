@@ -104,7 +104,17 @@ def promises(rows: Sequence[Row]) -> list[Promise]:
     return found + [_gain(own, anchor) for anchor in ANCHORS]
 
 
-def comparisons(rows: Sequence[Row]) -> Iterator[str]:
+def comparisons(_rows: Sequence[Row]) -> Iterator[str]:
+    """Nothing a scene: what needs the noise floor is in `sections`."""
+    return iter(())
+
+
+def shown(_rows: Sequence[Row]) -> list[Row]:
+    """No rows in the common table: that of `sections` has all."""
+    return []
+
+
+def _rates(rows: Sequence[Row]) -> Iterator[str]:
     """Lines of Markdown on the rows of one scene: the noise floor, and BD-rates against both anchors."""
     floor = floors(rows)
     if floor:
@@ -119,13 +129,8 @@ def comparisons(rows: Sequence[Row]) -> Iterator[str]:
                     yield f"- BD-rate, {measure.name}{', below the noise floor' if limited else ''}: {found}"
 
 
-def shown(rows: Sequence[Row]) -> list[Row]:
-    """The rows of one scene that its table has: all."""
-    return list(rows)
-
-
 def sections(rows: Sequence[Row]) -> Iterator[str]:
-    """A table of everything against the truth, and how it was measured."""
+    """A table of everything against the truth, how it was measured, and BD-rates."""
     own = [row for row in rows if row["kind"] in (FLOOR, SCENE)]
     if not own:
         return
@@ -144,6 +149,8 @@ def sections(rows: Sequence[Row]) -> Iterator[str]:
         rate = f"{row['mbps']:.3f}" if "mbps" in row else ""
         cells = [row["sequence"], row["codec"], options, rate, size]
         yield f"| {' | '.join([*cells, *(_cell(row, key) for _, key in _COLUMNS)])} |"
+    yield ""
+    yield from _rates([row for row in rows if row["sequence"] == ROOM])
 
 
 _COLUMNS = (
@@ -158,6 +165,9 @@ _COLUMNS = (
     ("background within 20 mm %", "truth_background_covered"),
     ("all D2 dB", "truth_d2_psnr_backward"),
     ("all SSIM", "truth_ssim_masked"),
+    ("D2 to the input dB", "input_d2_psnr_forward"),
+    ("SSIM to the input", "input_ssim_masked"),
+    ("encode s/frame", "encode_s"),
 )
 
 
