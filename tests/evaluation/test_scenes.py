@@ -93,7 +93,8 @@ def test_an_anchor_decodes_to_the_scene(scene, name, options):
     row = compare_with_truth(SceneFrames(scene, (0, 2)), decoded, _Chosen(scene.truth, (0, 2)), [0, 1])
     assert row["decoded"]["people_median_m"] < 0.005 and row["decoded"]["background_median_m"] < 0.005
     assert row["decoded"]["covered"] > 0.9 and row["decoded"]["people_covered"] > 0.9
-    assert row["noise_floor"]["normal_error_deg"] > row["decoded"]["normal_error_deg"]  # decimation denoises
+    if not options.get("levels"):  # decimation denoises
+        assert row["noise_floor"]["normal_error_deg"] > row["decoded"]["normal_error_deg"]
     json.dumps(row, allow_nan=False)
 
 
