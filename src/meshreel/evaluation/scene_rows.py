@@ -10,6 +10,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +44,7 @@ def measure_scene(point: Point, data: Path, cache: Path | None) -> Row:
     head: Row = {"sequence": point.sequence, "options": point.options}
     if point.kind == MEMORY:
         return head | {"codec": point.codec} | _memory(point, data, cache)
-    scene = open_scene(point.sequence, data, cache, point.frames)
+    scene = _opened(point.sequence, data, cache, point.frames)
     head |= {"frames": len(scene.meshes), "frame_rate": scene.meshes.frame_rate}
     numbers = range(0, len(scene.meshes), MEASURED_EVERY)
     if point.kind == SEGMENTATION:
@@ -94,8 +95,7 @@ def _metrics(scene: SceneData, numbers: Sequence[int], decoded: Sequence[Mesh] |
     """Means against the truth, and against the input; of the input alone, and only against the truth, for None."""
     rows: dict[str, list[Row]] = {"truth": [], "input": []}
     for index, number in enumerate(numbers):
-        clean = true_scene(scene.truth, number)
-        noisy = Scene(scene.meshes[number], scene.labels(number), clean.sights, clean.options)
+        clean, noisy = _references(scene, number)
         found = noisy if decoded is None else clean.labelled(decoded[index])
         rows["truth"].append(scene_row(clean, found))
         if decoded is not None:
@@ -104,6 +104,19 @@ def _metrics(scene: SceneData, numbers: Sequence[int], decoded: Sequence[Mesh] |
     for against, frames in rows.items():
         means |= {f"{against}_{name}": value for name, value in finite(scene_means(frames)).items()}
     return means
+
+
+@lru_cache(maxsize=1)
+def _opened(name: str, data: Path, cache: Path, frames: int | None) -> SceneData:
+    """The scene that the last point was about, too."""
+    return open_scene(name, data, cache, frames)
+
+
+@lru_cache(maxsize=10)  # 2 GB: what is prepared for one point serves the next
+def _references(scene: SceneData, number: int) -> tuple[Scene, Scene]:
+    """The clean frame and the noisy one."""
+    clean = true_scene(scene.truth, number)
+    return clean, Scene(scene.meshes[number], scene.labels(number), clean.sights, clean.options)
 
 
 def _segmentation(scene: SceneData, source: str) -> Row:

@@ -34,7 +34,7 @@ TRUE = "truth"  # labels: those of the nearest clean faces
 FUSED_EVERY = 2  # frames of which a background is fused
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SceneData:
     """A captured scene with its truth."""
 

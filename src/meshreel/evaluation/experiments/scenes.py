@@ -22,10 +22,10 @@ COMPARISON = ComparisonOptions(ssim=True)  # scenes are looked at from where the
 ROOM, STANDING = SCENES
 SYSTEM = "meshreel best"
 GIVEN = "found"  # labels that the system has found: labels/found.npz in the folder of the scene
-WHOLE = ((0.2, 12), (0.1, 11), (0.05, 11), (0.02, 10), (0.01, 10))  # anchor a: share of the faces, bits
-WHOLE_SUBDIVIDED = ((0.05, 11), (0.02, 10), (0.01, 10))
+WHOLE = ((0.2, 12), (0.1, 11), (0.05, 11), (0.02, 10))  # anchor a: share of the faces, bits
+WHOLE_SUBDIVIDED = ((0.05, 11), (0.02, 10))
 PEOPLE = ((0.5, 11), (0.25, 11), (0.1, 10), (0.05, 10), (0.02, 9))  # anchor b, of what moves
-PEOPLE_SUBDIVIDED = ((0.1, 10), (0.05, 10), (0.02, 9))
+PEOPLE_SUBDIVIDED = ((0.1, 10), (0.02, 9))
 PEOPLE_GIVEN = ((0.25, 11), (0.1, 10))
 QUALITIES = (20.0, 35.0, 50.0, 65.0, 80.0)
 DEFAULT = 50.0
