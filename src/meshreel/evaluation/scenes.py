@@ -20,7 +20,9 @@ from ..capture.simulate import DEEPEST, TRUTH
 from ..capture.truth import Truth, read_truth
 from ..errors import InputError
 from ..geometry.decimate import decimate_faces
+from ..geometry.nearest import Surface
 from ..geometry.raycast import Rays
+from ..geometry.topology import drop_unreferenced
 from ..io.meshes import read_mesh
 from ..io.sequence import open_sequence
 from ..io.write import frame_names, make_folder, replacing, write_mesh
@@ -32,6 +34,7 @@ from .truth import pinhole
 SCENES = tuple(SPEEDS)
 TRUE = "truth"  # labels: those of the nearest clean faces
 FUSED_EVERY = 2  # frames of which a background is fused
+JUDGES, LEAST_VOTES, AGREED = 5, 2, 0.01  # frames; so many must have a face of the background within so many m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +82,19 @@ class SceneData:
             mesh, moves = self.meshes[number], self.labels(number, source)
             rays = Rays(mesh)
             depths += [(camera, _still(rays, moves, camera)) for camera in self.truth.cameras]
-        return fuse_depths(depths)
+        return self._agreed(fuse_depths(depths), source)
+
+    def _agreed(self, fused: Mesh, source: str) -> Mesh:
+        """What some frames have: what is only in one flew through it."""
+        middles = fused.vertices[fused.faces].mean(axis=1)
+        votes = np.zeros(len(middles), int)
+        for number in np.linspace(0, len(self.meshes) - 1, JUDGES).astype(int).tolist():
+            mesh = self.meshes[number]
+            still = Mesh.of(mesh.vertices, mesh.faces[~self.labels(number, source)])
+            if not still.is_empty:
+                apart = Surface(still).closest(middles).points - middles
+                votes += np.linalg.norm(apart, axis=1) < AGREED
+        return drop_unreferenced(Mesh.of(fused.vertices, fused.faces[votes >= LEAST_VOTES]))
 
 
 class SceneFrames(Chosen):
