@@ -82,3 +82,11 @@ def test_fragments_are_dropped_by_their_area():
 def test_options_out_of_range_are_refused(wrong):
     with pytest.raises(InputError, match="give"):
         FusionOptions(**wrong)
+
+
+@pytest.mark.parametrize("side", [-50.0, 50.0])
+def test_a_slanted_wall_is_where_it_is(side):
+    slanted = camera(side=side, size=192)
+    mesh = fuse_depths([(slanted, measured(slanted, ball=(0.0, 50.0, 0.0)))], FusionOptions(voxel=0.02))
+    seen = mesh.vertices[np.abs(mesh.vertices[:, :2]).max(axis=1) < 0.5]
+    assert len(seen) > 500 and abs(np.median(seen[:, 2]) - WALL) < 1e-3  # half a pixel would be several mm

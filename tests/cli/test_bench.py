@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from meshreel.capture.procedural import sliding_sphere
+from meshreel.cli.bench import describe
 from meshreel.evaluation.experiments import targets
 from meshreel.evaluation.rows import Point
+from meshreel.evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from tests.cli.conftest import failed
 
 
@@ -41,9 +43,26 @@ def test_a_run_writes_rows_and_goes_on_where_it_was(run, tiny):
     assert run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--quiet").err == ""
 
 
+def test_only_some_codecs_may_be_run(run, tiny):
+    said = run("bench", "run", "tiny", "-o", tiny / "r.jsonl", "--data", tiny, "--no-ssim", "--json", "--only", "draco")
+    assert said.row["rows"] == 1
+
+
+def test_rows_of_scenes_are_told_in_a_line():
+    row = {"sequence": "room2", "codec": "x", "options": {}, "truth_d2_psnr_backward": 61.0, "truth_ssim_masked": 0.7}
+    assert describe(row | {"kind": SCENE, "mbps": 0.5}) == "room2 x : 0.500 Mbps, to the truth 61.00 dB, SSIM 0.700"
+    assert describe(row | {"kind": FLOOR}) == "room2 x : to the truth 61.00 dB, SSIM 0.700"
+    assert "IoU 0.950, worst frame 0.900" in describe(row | {"kind": SEGMENTATION, "iou_mean": 0.95, "iou_worst": 0.9})
+    assert "60 frames, peak 900 MB" in describe(row | {"kind": MEMORY, "frames": 60, "peak_rss_mb": 900.0})
+
+
 def test_what_is_missing_is_told(run, tmp_path):
-    assert failed(run("bench", "run", "nothing", "-o", tmp_path / "r.jsonl"), "known: ablation, layers, targets")
+    assert failed(
+        run("bench", "run", "nothing", "-o", tmp_path / "r.jsonl"), "known: ablation, layers, scenes, targets"
+    )
     said = run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--data", tmp_path)
     assert failed(said, "dancer", "--data")
     assert failed(run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--jobs", "0"), "--jobs", "0")
+    said = run("bench", "run", "scenes", "-o", tmp_path / "r.jsonl", "--only", "nothing")
+    assert failed(said, "--only nothing", "no such points")
     assert failed(run("bench", "report", tmp_path / "none.jsonl", "-o", tmp_path), "none.jsonl", "bench run")

@@ -10,9 +10,12 @@ import pytest
 
 import meshreel
 from meshreel.capture.procedural import sliding_sphere
+from meshreel.capture.simulate import SceneFrame, simulate_rig
 from meshreel.container.writer import ReelWriter
+from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.types import Mesh
+from tests.capture.depth_scenes import camera
 from tests.cli.conftest import FILE, failed
 
 SMALL = ("--width", "64", "--height", "48")
@@ -121,3 +124,57 @@ def test_missing_things_are_told(run, balls, tmp_path):
 def test_a_reel_file_of_any_name_is_known_by_its_first_bytes(run, decoded, tmp_path):
     (tmp_path / "video.bin").write_bytes(FILE.read_bytes())
     assert run("compare", decoded, tmp_path / "video.bin", "--no-ssim", "--json").row["frames_compared"] == 10
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    """A simulated rig of three frames before a plate, and its truth's meshes once more as decoded ones."""
+    folder = tmp_path_factory.mktemp("rig")
+    plate = Mesh.of([[-3, -3, 0.8], [3, -3, 0.8], [3, 3, 0.8], [-3, 3, 0.8]], [[0, 2, 1], [0, 3, 2]])
+    balls = [Mesh.of(0.3 * mesh.vertices, mesh.faces) for mesh in sliding_sphere(3, levels=3)]
+    frames = [SceneFrame.of([plate], [ball]) for ball in balls]
+    simulate_rig(folder, frames, (camera(size=64), camera("side", 30.0, 64)), 30.0)
+    (folder / "larger").mkdir()
+    for number, (frame, ball) in enumerate(zip(frames, balls, strict=True)):
+        larger = SceneFrame.of([plate], [Mesh.of(ball.vertices * 1.05, ball.faces)])
+        write_mesh(larger.mesh, folder / "larger" / f"{number}.ply")
+        assert len(larger.mesh.faces) == len(frame.mesh.faces)
+    return folder
+
+
+def test_with_the_truth_both_are_compared_with_it(run, rig):
+    said = run("compare", rig / "truth", rig / "larger", "--no-ssim", "--json", "--truth", rig / "truth")
+    found = said.row["truth"]
+    assert found["frames"] == [0, 1, 2] and len(found["per_frame"]) == 3
+    floor, decoded = found["noise_floor"], found["decoded"]
+    assert floor["people_median_m"] < 1e-6 and floor["covered"] == 1 and floor["people_ssim_masked"] > 0.999
+    assert 0.003 < decoded["people_median_m"] < 0.016 and decoded["background_median_m"] < 1e-6
+    assert decoded["people_ssim_masked"] < 0.99 and "d2_psnr_paper" in said.row
+    told = run("compare", rig / "truth", rig / "larger", "--no-ssim", "--truth", rig / "truth", "--truth-every", "2")
+    assert "against the truth, 2 frames" in told.out and "people_coverage_rms_m" in told.out
+
+
+def test_the_truth_takes_the_frames_of_the_originals(run, rig):
+    (rig / "two").mkdir()
+    for number in (1, 2):
+        write_mesh(open_sequence(rig / "larger")[number], rig / "two" / f"{number}.ply")
+    command = (
+        "compare",
+        rig / "truth",
+        rig / "two",
+        "--no-ssim",
+        "--json",
+        "--truth",
+        rig / "truth",
+        "--frames",
+        "1:3",
+    )
+    row = run(*command).row["truth"]
+    assert row["noise_floor"]["people_median_m"] < 1e-6 and row["frames"] == [0, 1]
+
+
+def test_a_truth_that_does_not_fit_is_told(run, rig, balls, tmp_path):
+    assert failed(run("compare", rig / "two", rig / "two", "--truth", rig / "truth"), "truth of 3 frames", "have 2")
+    assert failed(run("compare", balls, balls, "--truth", tmp_path), "rig.json")
+    assert failed(run("compare", balls, balls, "--truth", rig / "truth", "--truth-every", "0"), "--truth-every 0")
+    assert failed(run("compare", balls, balls, "--truth", rig), "no clean meshes")

@@ -12,6 +12,7 @@ from meshreel.evaluation.codecs import make_codec
 from meshreel.evaluation.experiments import EXPERIMENTS, ablation, layers
 from meshreel.evaluation.report import write_report
 from meshreel.evaluation.rows import Point, join_rows
+from meshreel.evaluation.scene_rows import FLOOR, SEGMENTATION
 from meshreel.evaluation.variants import VARIANTS
 from meshreel.presets import PRESETS, preset_options
 
@@ -195,7 +196,8 @@ def test_every_experiment_has_all_that_a_run_and_a_report_need(chosen):
         assert points and len({point.key for point in points}) == len(points)
         for point in points:
             assert point == Point(**json.loads(point.key))
-            make_codec(point.codec, point.options)
+            if point.kind not in (FLOOR, SEGMENTATION):  # of what is given, and of labels
+                make_codec(point.codec, point.options)
 
 
 @pytest.mark.parametrize("name", VARIANTS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.geometry.decimate import decimate, has_boundary
+from meshreel.geometry.decimate import decimate, decimate_faces, has_boundary
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import clean, subdivide_midpoint
 from meshreel.types import Mesh
@@ -65,3 +65,16 @@ def test_a_mesh_that_is_small_enough_stays_and_an_empty_one_stays_empty() -> Non
 def test_an_impossible_count_is_refused() -> None:
     with pytest.raises(InputError, match="at least 4"):
         decimate(ball(1), 3)
+
+
+@pytest.mark.parametrize("mesh", [ball(4), sheet()], ids=["closed", "open"])
+def test_one_collapse_reaches_a_number_of_faces(mesh: Mesh) -> None:
+    small = decimate_faces(mesh, 500)
+    assert 480 <= len(small.faces) <= 500
+    assert decimate_faces(small, 5000).faces.shape == small.faces.shape
+    np.testing.assert_allclose(Surface(mesh).closest(small.vertices).points, small.vertices, atol=0.02)
+
+
+def test_too_few_faces_are_refused() -> None:
+    with pytest.raises(InputError, match="faces is 3"):
+        decimate_faces(ball(1), 3)

@@ -57,6 +57,14 @@ def test_only_the_overlap_counts():
     assert str(result) == "b against a: -50.0 % over 53 to 59"
 
 
+def test_qualities_above_a_limit_do_not_count():
+    anchor = Curve("a", [1, 2, 4, 8, 16], [28, 30, 32, 34, 36])
+    test = Curve("t", [0.5, 1, 2, 64, 128], [28, 30, 32, 34, 36])
+    assert bd_rate(anchor, test, 30).percent == pytest.approx(-50)
+    assert bd_rate(anchor, test, 30).high == 30 and bd_rate(anchor, test, 99) == bd_rate(anchor, test)
+    assert "no common quality below 28" in bd_rate(anchor, test, 28).reason
+
+
 def test_without_common_quality_there_is_no_number_and_a_reason():
     result = bd_rate(_curve("a", [1, 2], [50, 53]), _curve("b", [1, 2], [60, 63]))
     assert result.percent is None

@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..geometry.nearest import Surface
 from ..geometry.topology import components, drop_unreferenced, face_normals, unique_edges
 from ..geometry.tsdf import SIDE, extract, fill_grid
-from ..geometry.voxels import Lattice, moved, spread
+from ..geometry.voxels import Lattice, distinct, moved, spread
 from ..types import Mesh
 
 _AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
@@ -68,7 +68,7 @@ class _Sums:
             return
         keys = self._around(mesh)
         keys, distances = _signed(mesh, keys, self._lattice, self._reach * self._lattice.size)
-        union = np.union1d(self._keys, keys)
+        union = distinct(np.concatenate([self._keys, keys]))
         sums, counts = np.zeros(len(union)), np.zeros(len(union), np.int32)
         before, now = np.searchsorted(union, self._keys), np.searchsorted(union, keys)
         sums[before], counts[before] = self._sums, self._counts
@@ -93,10 +93,10 @@ class _Sums:
 
     def _around(self, mesh: Mesh) -> Int64[np.ndarray, " N"]:
         """The voxels within reach of a surface, about."""
-        keys = np.unique(self._lattice.keys(spread(mesh, self._lattice.size)[0]))
+        keys = distinct(self._lattice.keys(spread(mesh, self._lattice.size)[0]))
         steps = range(-self._reach, self._reach + 1)
         for axis in np.eye(3, dtype=np.int64):
-            keys = np.unique(np.concatenate([moved(keys, axis * step) for step in steps]))
+            keys = distinct(np.concatenate([moved(keys, axis * step) for step in steps]))
         return keys
 
 

@@ -88,7 +88,9 @@ def _pinhole(view: tuple[DepthCamera, np.ndarray]) -> tuple[Any, Any, Any]:
     import open3d as o3d
 
     camera, depth = view
-    return o3d.t.geometry.Image(_tensor(depth)), _tensor(camera.intrinsic), _tensor(camera.extrinsic)
+    intrinsic = camera.intrinsic.copy()
+    intrinsic[:2, 2] += 0.5  # a rig's pixels have their middles at whole numbers; integration cuts projections off
+    return o3d.t.geometry.Image(_tensor(depth)), _tensor(intrinsic), _tensor(camera.extrinsic)
 
 
 def _depth(view: tuple[DepthCamera, np.ndarray], options: FusionOptions) -> tuple[float, float, float]:

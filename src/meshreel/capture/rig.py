@@ -130,6 +130,23 @@ class Rig:
 
 def read_rig(folder: Path) -> Rig:
     """The rig in a folder. Raises InputError where its description or a camera's pictures are missing or wrong."""
+    entries, cameras, rate = _described(folder)
+    folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
+    files = tuple(_pictures(place, camera) for place, camera in zip(folders, cameras, strict=True))
+    for entry, camera in zip(entries, cameras, strict=True):
+        if "color" in entry:
+            _check_color(folder / str(entry["color"]), camera)
+    return Rig(folder, cameras, files, rate)
+
+
+def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:
+    """The cameras that a folder describes, and their frame rate, 1/s; no pictures need to be there."""
+    _, cameras, rate = _described(folder)
+    return cameras, rate
+
+
+def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float]:
+    """The description's entries, a camera each, these cameras, and their frame rate, 1/s."""
     path, single = folder / RIG, folder / SINGLE
     if path.exists():
         record = _json(path)
@@ -149,12 +166,7 @@ def read_rig(folder: Path) -> Rig:
     names = [camera.name for camera in cameras]
     if len(set(names)) < len(names):
         raise InputError(f"{path}: two cameras have one name ({', '.join(names)}); name each differently")
-    folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
-    files = tuple(_pictures(place, camera) for place, camera in zip(folders, cameras, strict=True))
-    for entry, camera in zip(entries, cameras, strict=True):
-        if "color" in entry:
-            _check_color(folder / str(entry["color"]), camera)
-    return Rig(folder, cameras, files, float(rate))
+    return entries, cameras, float(rate)
 
 
 def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:

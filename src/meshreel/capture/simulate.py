@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, UInt16
 
 from ..errors import InputError
-from ..geometry.nearest import Surface
+from ..geometry.nearest import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import face_normals
 from ..io.depth import write_depth
@@ -25,6 +25,7 @@ from ..types import Mesh
 from .rig import RIG, DepthCamera, make_folders, write_rig
 
 TRUTH = "truth"  # folder of the clean meshes
+LABELS = "dynamic.npz"  # there: by frame, a bit for each face of its mesh
 DEEPEST = 65_535  # units that a depth picture holds
 
 
@@ -71,10 +72,9 @@ class SceneFrame:
 
     def labels_for(self, fused: Mesh) -> Bool[np.ndarray, " F"]:
         """Which faces of a fused mesh move: as the clean face nearest to the middle of each."""
-        if fused.is_empty or self.mesh.is_empty:
+        if self.mesh.is_empty:
             return np.zeros(len(fused.faces), bool)
-        middles = fused.vertices[fused.faces].mean(axis=1)
-        return self.dynamic[Surface(self.mesh).closest(middles).faces]
+        return carried_labels(Surface(self.mesh), self.dynamic, fused)
 
 
 def corner_cameras(
@@ -133,7 +133,7 @@ def simulate_rig(
         labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
         count = number + 1
         tell(count)
-    with replacing(folder / TRUTH / "dynamic.npz") as file:
+    with replacing(folder / TRUTH / LABELS) as file:
         np.savez_compressed(file, allow_pickle=False, **labels)
     with replacing(folder / TRUTH / RIG) as file:
         record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}

@@ -17,6 +17,7 @@ from ..evaluation.promises import Promise
 from ..evaluation.report import write_report
 from ..evaluation.rows import Row, join_rows, read_rows
 from ..evaluation.runner import Bench, run_points
+from ..evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from .console import Common
 from .encode import workers
 
@@ -32,6 +33,7 @@ def run(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     data: Path = DATA,
     small: bool = False,
+    only: tuple[str, ...] = (),
     ssim: bool = True,
     jobs: int = 1,
     common: Common = Common(),
@@ -44,13 +46,15 @@ def run(
     Parameters
     ----------
     experiment
-        Which one: `layers`, `ablation` or `targets`.
+        Which one: `layers`, `ablation`, `targets` or `scenes`.
     output
         A JSON-lines file.
     data
         The folder of the sequences.
     small
         A few points on a few frames only: minutes.
+    only
+        Only the points of these codecs, as `scene_draco`; the others keep the rows they have.
     ssim
         Render and compare pictures too (slower).
     jobs
@@ -59,7 +63,9 @@ def run(
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     chosen = find_experiment(experiment)
-    points = list(chosen.points(small))
+    points = [point for point in chosen.points(small) if not only or point.codec in only]
+    if not points:
+        raise InputError(f"--only {' '.join(only)}: {experiment} has no such points")
     bench = Bench(data, experiment, replace(chosen.COMPARISON, ssim=ssim), output.with_suffix(".cache"))
     with common.stages(len(points)) as progress, workers(jobs) as executor:
 
@@ -109,8 +115,13 @@ def describe(row: Row) -> str:
     if row["kind"] == "decode":
         peer = f"DracoPy {row['draco_ms']:.2f}, with subdivision {row['subdivided_ms']:.2f}"
         return f"{head} {row['frame_ms']:.2f} ms/frame, {peer}"
-    if row["kind"] == "memory":
+    if row["kind"] in ("memory", MEMORY):
         return f"{head} {row['frames']} frames, peak {row['peak_rss_mb']:.0f} MB"
+    if row["kind"] == SEGMENTATION:
+        return f"{head} IoU {row['iou_mean']:.3f}, worst frame {row['iou_worst']:.3f}"
+    if row["kind"] in (FLOOR, SCENE):
+        rate = f"{row['mbps']:.3f} Mbps, " if "mbps" in row else ""
+        return f"{head} {rate}to the truth {row['truth_d2_psnr_backward']:.2f} dB, SSIM {row['truth_ssim_masked']:.3f}"
     quality = f"{row['d2_psnr_paper']:.2f} dB, {row['normal_error_deg']:.2f} degrees"
     return f"{head} {row['mbps']:.3f} Mbps, {quality}, {row['encode_s']:.2f} s/frame"
 

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
+from ..capture.rig import DepthCamera
+from ..capture.simulate import SceneFrame
+from ..capture.truth import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder import Video
 from ..decoder import open as open_video
 from ..errors import InputError
+from ..evaluation.truth import compare_with_truth
 from ..format.layout import MAGIC
 from ..geometry.topology import weld
 from ..io.sequence import FileSequence, SequenceOptions, open_sequence
 from ..metrics.report import compare_sequences
 from ..metrics.sheet import SheetOptions, write_sheet
-from ..types import Mesh, MeshSequence
+from ..types import Frames, Mesh, MeshSequence
 from .console import Common, StageBars
 from .info import describe_file
-from .reading import Looking, Reading
+from .reading import Knowing, Looking, Reading
 
 
 def command(
@@ -33,9 +37,13 @@ def command(
     reading: Reading = Reading(),
     looking: Looking = Looking(),
     sheet: Path | None = None,
+    knowing: Knowing = Knowing(),
     common: Common = Common(),
 ) -> None:
     """Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.
+
+    With --truth, a scene's original and decoded meshes are also compared with the clean ones: all of it, people (faces
+    whose nearest clean face moves) and background; the originals' numbers are the noise floor.
 
     Parameters
     ----------
@@ -57,8 +65,11 @@ def command(
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
     if isinstance(other, Video) and not options.keys:
         options = replace(options, keys=recorded_keys(other))
+    truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     with common.stages(len(sequence)) as progress:
         row = compare_sequences(sequence, counted(other, progress), options).to_row()
+        if truth is not None:
+            row |= {"truth": _against_truth(sequence, other, truth, knowing.truth_every, progress)}
     if sheet is not None:
         write_sheet(sequence, other, sheet, SheetOptions(up=looking.up))
     if reel:
@@ -66,8 +77,53 @@ def command(
         row = {name: described[name] for name in ("bytes", "mbps", "parts", "parts_mbps")} | row
     warnings = [*sequence.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
     common.warn(warnings)
-    texts = [f"picture: {sheet}"] if sheet is not None else []
+    texts: list[object] = [] if truth is None else [truth_table(row["truth"])]
+    texts += [f"picture: {sheet}"] if sheet is not None else []
     common.result({"warnings": warnings} | row, metric_table(row), *_cameras(row), *texts)
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenTruth:
+    """The clean frames that belong to the originals' --frames."""
+
+    truth: Truth
+    numbers: range
+
+    @property
+    def cameras(self) -> tuple[DepthCamera, ...]:
+        """Where they really stood."""
+        return self.truth.cameras
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __getitem__(self, index: int) -> SceneFrame:
+        return self.truth[self.numbers[index]]
+
+
+def open_truth(folder: Path, reading: Reading, count: int) -> ChosenTruth:
+    """The truth of `count` frames that were read so. Raises InputError where it is of another length."""
+    truth = read_truth(folder)
+    numbers = reading.options().chosen(len(truth))
+    if len(numbers) != count:
+        chosen = "" if len(numbers) == len(truth) else f" of {len(truth)} that --frames {reading.frames} leaves"
+        raise InputError(f"{folder} is the truth of {len(numbers)} frames{chosen}, the originals have {count}")
+    return ChosenTruth(truth, numbers)
+
+
+def _against_truth(
+    sequence: FileSequence, other: Frames, truth: ChosenTruth, every: int, progress: StageBars
+) -> dict[str, Any]:
+    numbers = range(0, len(sequence), every)
+    return compare_with_truth(sequence, other, truth, numbers, lambda done: progress("truth", done, len(numbers)))
+
+
+def truth_table(row: dict[str, Any]) -> Table:
+    """The means against the truth, one metric a line: of the originals, and of the decoded meshes."""
+    table = Table(f"against the truth, {len(row['frames'])} frames", "originals (noise floor)", "decoded")
+    for name in row["decoded"]:
+        table.add_row(name, *(_number(row[which][name]) for which in ("noise_floor", "decoded")))
+    return table
 
 
 def is_reel(path: str) -> bool:

@@ -8,6 +8,7 @@ from typing import Literal
 
 from cyclopts import Parameter
 
+from ..errors import InputError
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions
 from ..metrics.cameras import ViewOptions
@@ -55,3 +56,18 @@ class Looking:
     def options(self) -> ComparisonOptions:
         """The same for `compare_sequences`."""
         return ComparisonOptions(self.cameras, ViewOptions(self.width, self.height, up=self.up), self.ssim, self.keys)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Knowing:
+    """The truth, where it is known."""
+
+    truth: Path | None = None
+    """The folder `truth` of the simulated rig that the originals were captured from: both are compared with it, too."""
+    truth_every: int = 1
+    """Compare the first frame with the truth and every so many after it (seconds for half a million faces)."""
+
+    def __post_init__(self) -> None:
+        if self.truth_every < 1:
+            raise InputError(f"--truth-every {self.truth_every}: give 1 for all frames, 6 for every sixth")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..types import Mesh, MeshSequence
 
 
@@ -25,3 +27,23 @@ class Backwards(DerivedSequence):
 
     def __getitem__(self, index: int) -> Mesh:
         return self._source[range(len(self))[::-1][index]]
+
+
+class Chosen(DerivedSequence):
+    """Some frames of a sequence, by their numbers."""
+
+    def __init__(self, source: MeshSequence, numbers: Sequence[int]) -> None:
+        super().__init__(source)
+        self._numbers = tuple(numbers)
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self._source[self._numbers[index]]
+
+
+def forth_and_back(source: MeshSequence, count: int) -> Chosen:
+    """As many frames of a sequence that is played forth and back, over and over; ends are not repeated."""
+    once = [*range(len(source)), *range(len(source) - 2, 0, -1)]
+    return Chosen(source, [once[number % len(once)] for number in range(count)])

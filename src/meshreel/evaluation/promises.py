@@ -46,9 +46,9 @@ def _told(measured: tuple[str, bool], rows: Sequence[Row]) -> tuple[str, bool]:
     return (measured[0] if frames >= FRAMES else f"{measured[0]} ({frames} frames only)"), measured[1]
 
 
-def flat_memory(rows: Sequence[Row]) -> Promise:
+def flat_memory(rows: Sequence[Row], sequence: str = "collision") -> Promise:
     """Whether the longest of some encodes needs no more memory than the shortest."""
-    text = "memory of an encode does not grow with the number of frames (collision)"
+    text = f"memory of an encode does not grow with the number of frames ({sequence})"
     if len(rows) < 2:
         return Promise(text, "within 10 %")
     few, many = (pick(rows, key=lambda r: r["frames"]) for pick in (min, max))

@@ -14,6 +14,7 @@ from ..io.write import replacing
 from .curves import SSIM_WITHOUT_KEYS, curve_of, value
 from .promises import Promise
 from .rows import CURVE_KINDS, Row, curve_rows
+from .scene_rows import NOISE_FLOOR
 
 METRICS = (
     ("d2_psnr_paper", "D2-PSNR, paper form (dB)"),
@@ -40,8 +41,7 @@ def write_report(rows: Sequence[Row], experiments: dict[str, ModuleType], folder
         own = [row for row in rows if row.get("experiment", FIRST) == name]
         if own:
             plots += [
-                plot_curves(curve_rows(own, sequence), chosen.references(sequence), pictures / _plot(name, sequence))
-                for sequence in _sequences(own)
+                plot_curves(own, sequence, chosen, pictures / _plot(name, sequence)) for sequence in _sequences(own)
             ]
             lines += [*([""] if lines else []), *_page(own, name, chosen)]
     page = folder / "results.md"
@@ -50,12 +50,18 @@ def write_report(rows: Sequence[Row], experiments: dict[str, ModuleType], folder
     return [page, *plots]
 
 
-def plot_curves(rows: Sequence[Row], references: dict[str, list[tuple[float, float]]], path: Path) -> Path:
-    """Quality against rate of every codec in the rows of one sequence, one panel a metric."""
+def plot_curves(measured: Sequence[Row], sequence: str, chosen: ModuleType, path: Path) -> Path:
+    """Quality against rate of every codec on one sequence, one panel a metric; the noise floor is a line.
+
+    An experiment may have METRICS of its own, and `floors`: what the noisy input reaches, by metric.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    metrics = [(key, label) for key, label in METRICS if any(value(row, key) is not None for row in rows)]
+    rows, references = curve_rows(measured, sequence), chosen.references(sequence)
+    floors = chosen.floors([r for r in measured if r["sequence"] == sequence]) if hasattr(chosen, "floors") else {}
+    metrics = getattr(chosen, "METRICS", METRICS)
+    metrics = [(key, label) for key, label in metrics if any(value(row, key) is not None for row in rows)]
     figure = Figure(figsize=(5 * len(metrics), 4.6), layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(1, len(metrics), squeeze=False)[0]
@@ -66,14 +72,16 @@ def plot_curves(rows: Sequence[Row], references: dict[str, list[tuple[float, flo
             panel.plot([p[0] for p in points], [p[1] for p in points], marker="o", markersize=4, label=codec)
         for name, curve in references.items() if key in REFERENCED else ():
             panel.plot([p[0] for p in curve], [p[1] for p in curve], "k--", marker="x", label=name)
+        if key in floors:
+            panel.axhline(floors[key], color="gray", linestyle=":", label=NOISE_FLOOR)
         panel.set(xlabel="Mbps", ylabel=label, xscale="log")
         panel.set_xticks(RATES, [f"{rate:g}" for rate in RATES])
         panel.minorticks_off()
-        shown = [rate for line in panel.lines for rate in line.get_xdata()]
+        shown = [rate for line in panel.lines if line.get_label() != NOISE_FLOOR for rate in line.get_xdata()]
         panel.set_xlim(0.7 * min(shown), 1.4 * max(shown))
         panel.grid(alpha=0.3)
     figure.legend(*panels[0].get_legend_handles_labels(), fontsize=9, loc="outside lower center", ncols=4)
-    figure.suptitle(rows[0]["sequence"])
+    figure.suptitle(sequence)
     with replacing(path) as file:
         figure.savefig(file, format="png", dpi=110)
     return path
@@ -111,7 +119,8 @@ def _page(rows: Sequence[Row], name: str, chosen: ModuleType) -> Iterator[str]:
         own = curve_rows(rows, sequence)
         picture = f"![{sequence}](results/{_plot(name, sequence)})"
         yield from ("", f"## {sequence}, {own[0]['frames']} frames", "", picture, "")
-        yield from (*point_table(chosen.shown(own)), "", *chosen.comparisons(own))
+        shown = chosen.shown(own)
+        yield from (*(point_table(shown) if shown else ()), "", *chosen.comparisons(own))
     yield from chosen.sections(rows)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from ..errors import InputError
 
 Row = dict[str, Any]
-CURVE_KINDS = ("quality", "curve", "floor")  # rows that have a rate and metrics
+CURVE_KINDS = ("quality", "curve", "floor", "scene")  # rows that have a rate and metrics
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class Point:
     frames: int | None = None  # the first so many; None: all
     # "quality": rate, times, metrics; "curve": rate and metrics only; "floor": quality, and each group against Draco;
     # "backwards": "curve" of the frames in reverse; "memory": peak memory of an encode in a fresh process;
-    # "decode": decoding beside the anchor of equal quality
+    # "decode": decoding beside the anchor of equal quality; those of `scene_rows.KINDS` are about scenes
     kind: str = "quality"
 
     @property

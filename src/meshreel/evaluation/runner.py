@@ -32,6 +32,8 @@ from .fresh import peak_rss_mb
 from .groups import group_records
 from .peers import cheapest_forms, measure_pair, run_fresh
 from .rows import Point, Row, append_row, read_rows
+from .scene_rows import KINDS as SCENE_KINDS
+from .scene_rows import measure_scene
 
 PEER_QP = 9  # bits of the Draco meshes whose decoding is the yardstick
 AFTER = ("decode",)  # kinds of points that compare with rows measured before
@@ -192,6 +194,9 @@ class StageTimer:
 
 def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
     """The row of a point, by its kind; `rows` are those measured before, for the kinds of `AFTER`."""
+    head = {"point": point.key, "kind": point.kind, "experiment": bench.experiment}
+    if point.kind in SCENE_KINDS:
+        return head | measure_scene(point, bench.data, bench.cache)
     sequence = open_dataset(point.sequence, bench.data, point.frames, bench.cache)
     if point.kind == "backwards":
         sequence = Backwards(sequence)
@@ -205,7 +210,7 @@ def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
         by_kind = {"quality": run_point, "floor": run_floor_point}
         measure = by_kind.get(point.kind, run_curve_point)
         row = measure(point.sequence, sequence, codec, bench.comparison)
-    return {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | row
+    return head | row
 
 
 def _memory(point: Point, data: str, frames: int) -> Row:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 
 from ..types import Mesh
 from .topology import face_normals
@@ -49,3 +49,10 @@ class Surface:
         barycentric = np.stack([1 - uv[:, 0] - uv[:, 1], uv[:, 0], uv[:, 1]], axis=1)
         corners = self.mesh.vertices[self.mesh.faces[faces]]  # float64 again
         return Hits(np.einsum("nk,nkd->nd", barycentric, corners), faces, barycentric)
+
+
+def carried_labels(surface: Surface, labels: Bool[np.ndarray, " F"], mesh: Mesh) -> Bool[np.ndarray, " G"]:
+    """The labels of a surface's faces on another mesh: each face takes that of the face nearest to its middle."""
+    if mesh.is_empty:
+        return np.zeros(0, bool)
+    return labels[surface.closest(mesh.vertices[mesh.faces].mean(axis=1)).faces]

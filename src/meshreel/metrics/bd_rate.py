@@ -54,8 +54,8 @@ class BdRate:
         return f"{self.test} against {self.anchor}: {self.percent:+.1f} % over {self.low:.4g} to {self.high:.4g}"
 
 
-def bd_rate(anchor: Curve, test: Curve) -> BdRate:
-    """The mean change of rate at equal quality, over the overlap only; nothing is extrapolated.
+def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
+    """The mean change of rate at equal quality, over the overlap only, up to `highest`; nothing is extrapolated.
 
     A point that costs no less than another and is no better is dropped: quality must grow with rate.
     """
@@ -65,9 +65,10 @@ def bd_rate(anchor: Curve, test: Curve) -> BdRate:
         if len(points) < 2:
             reason = f"{curve.name} has {len(points)} usable points; at least 2 are needed"
             return BdRate(anchor.name, test.name, None, math.nan, math.nan, counts, reason)
-    low, high = float(max(a[0, 0], b[0, 0])), float(min(a[-1, 0], b[-1, 0]))
+    low, high = float(max(a[0, 0], b[0, 0])), float(min(a[-1, 0], b[-1, 0], highest))
     if low >= high:
-        reason = f"no common quality: {_range(anchor.name, a)}, {_range(test.name, b)}"
+        below = "" if math.isinf(highest) else f" below {highest:.4g}"
+        reason = f"no common quality{below}: {_range(anchor.name, a)}, {_range(test.name, b)}"
         return BdRate(anchor.name, test.name, None, low, high, counts, reason)
     mean = (_integral(b, low, high) - _integral(a, low, high)) / (high - low)
     return BdRate(anchor.name, test.name, 100 * math.expm1(mean), low, high, counts)

@@ -44,7 +44,7 @@ class SurfaceErrors:
     @property
     def d2_psnr_paper(self) -> float:
         """10 log10(p^2 / MSE) from the original vertices to the decoded surface, one way, as TSMC's authors have it."""
-        return _psnr(self.forward.point_mse, self.diagonal)
+        return psnr(self.forward.point_mse, self.diagonal)
 
     @property
     def d1_psnr(self) -> float:
@@ -52,12 +52,12 @@ class SurfaceErrors:
 
         From each vertex to the closest point of the surface, where MPEG has the nearest of the points it samples.
         """
-        return _psnr(max(self.forward.point_mse, self.backward.point_mse) / 3, self.diagonal)
+        return psnr(max(self.forward.point_mse, self.backward.point_mse) / 3, self.diagonal)
 
     @property
     def d2_psnr(self) -> float:
         """10 log10(3 p^2 / MSE), point to plane, the worse of both directions (MPEG PCC common test conditions)."""
-        return _psnr(max(self.forward.plane_mse, self.backward.plane_mse) / 3, self.diagonal)
+        return psnr(max(self.forward.plane_mse, self.backward.plane_mse) / 3, self.diagonal)
 
     @property
     def symmetric_rms(self) -> float:
@@ -70,7 +70,7 @@ class SurfaceErrors:
     @property
     def symmetric_psnr(self) -> float:
         """20 log10(p / symmetric_rms)."""
-        return _psnr(self.symmetric_rms**2, self.diagonal)
+        return psnr(self.symmetric_rms**2, self.diagonal)
 
     @property
     def hausdorff95(self) -> float:
@@ -121,7 +121,7 @@ def _one_way(source: Samples, found: Matches) -> OneWayErrors:
         point_mse=float(squared[:vertices].mean()),
         plane_mse=float(_plane_squared(found, squared)[:vertices].mean()),
         rms=float(np.sqrt(source.weights @ squared)),
-        hausdorff95=_quantile(found.distances, source.weights, 0.95),
+        hausdorff95=quantile(found.distances, source.weights, 0.95),
         maximum=float(found.distances.max()),
         angle=float(source.weights @ turned),
         vertex_angle=float(turned[:vertices].mean()),
@@ -133,13 +133,15 @@ def _plane_squared(found: Matches, squared: Float64[np.ndarray, " N"]) -> Float6
     return np.where(found.normals.any(axis=1), along, squared)  # without a normal there is no plane that forgives
 
 
-def _quantile(values: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"], share: float) -> float:
+def quantile(values: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"], share: float) -> float:
+    """The value that this share of the weights does not exceed; N > 0."""
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
     return float(values[order[min(np.searchsorted(reached, share * reached[-1]), len(values) - 1)]])
 
 
-def _psnr(mse: float, peak: float) -> float:
+def psnr(mse: float, peak: float) -> float:
+    """10 log10(peak^2 / mse), dB; 0 for no peak or an infinite error."""
     if mse <= (RESOLUTION * peak) ** 2:
         return math.inf
     if math.isinf(mse) or peak == 0:

@@ -18,7 +18,7 @@ from .cameras import Camera
 from .render import look, window_of
 
 _SIDE = 7  # pixels, side of the SSIM window
-_BORDER = _SIDE // 2
+BORDER = _SIDE // 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ def _ssim_view(original: Mesh, decoded: Mesh, camera: Camera) -> tuple[float, fl
     window = window_of([original, decoded], camera, border=2 * _SIDE)
     a, b = look(original, camera, window), look(decoded, camera, window)
     interior = np.zeros((camera.height, camera.width), dtype=bool)
-    interior[_BORDER:-_BORDER, _BORDER:-_BORDER] = True
+    interior[BORDER:-BORDER, BORDER:-BORDER] = True
     inside = interior[window.top : window.bottom, window.left : window.right]
     if min(window.shape) < _SIDE:  # the meshes are out of this picture or at its very edge
         return 1.0, None

@@ -18,7 +18,7 @@ from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
-from ...geometry.voxels import Lattice, neighbours, spread
+from ...geometry.voxels import Lattice, distinct, neighbours, spread
 from ...types import Mesh
 
 _DEEPEST = 65_535  # of a stored depth; 0: nothing seen
@@ -84,7 +84,7 @@ def find_places(
         sums.append(normals)
         rays = Rays(mesh)
         depths.append([_stored(rays, view, unit) for view in views])
-    keys = np.unique(np.concatenate(cells)) if cells else np.zeros(0, np.int64)
+    keys = distinct(np.concatenate(cells))
     beside = neighbours(keys)
     mean = np.zeros((len(keys), 3), np.float32)
     for own, normals in zip(cells, sums, strict=True):

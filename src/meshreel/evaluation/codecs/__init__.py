@@ -9,11 +9,15 @@ from ...errors import InputError
 from ..codec import Codec
 from .draco import DecimatedDracoCodec, DracoCodec
 from .meshreel import MeshreelCodec
+from .scenes import BackgroundDracoCodec, SceneDracoCodec
 
 CODECS: dict[str, Callable[..., Codec]] = {
     "draco": DracoCodec,
     "decimated_draco": DecimatedDracoCodec,
     "meshreel": MeshreelCodec,
+    "scene_draco": SceneDracoCodec,
+    "background_draco": BackgroundDracoCodec,
+    "labelled_draco": BackgroundDracoCodec,  # the same by labels that somebody else has found
 }
 
 

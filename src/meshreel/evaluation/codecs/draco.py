@@ -29,7 +29,7 @@ class DracoCodec:
     qp: int = 10
 
     def __post_init__(self) -> None:
-        _check_qp(self.qp)
+        check_qp(self.qp)
 
     @property
     def name(self) -> str:
@@ -62,7 +62,7 @@ class DecimatedDracoCodec:
     levels: int = 0
 
     def __post_init__(self) -> None:
-        _check_qp(self.qp)
+        check_qp(self.qp)
         if not 0 < self.fraction <= 1 or not 0 <= self.levels <= 4:
             raise InputError(f"fraction {self.fraction:g}, levels {self.levels}: give 0 < fraction <= 1, levels 0 to 4")
 
@@ -85,7 +85,7 @@ class DecimatedDracoCodec:
         return open_video(data)
 
 
-def _check_qp(qp: int) -> None:
+def check_qp(qp: int) -> None:
     if not 2 <= qp <= 20:
         raise InputError(f"qp {qp}: give 2 to 20 bits")
 
@@ -101,13 +101,13 @@ def _encode_frames(sequence: MeshSequence, point: tuple[int, float, int], progre
         path = Path(folder) / "anchor.reel"
         with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
             for i, frame in enumerate(sequence):
-                writer.add_group(i, 1, _encode_frame(seen.normalise(frame), *point))
+                writer.add_group(i, 1, encode_frame(seen.normalise(frame), *point))
                 if progress is not None:
                     progress("code", i + 1, len(sequence))
         return path.read_bytes()
 
 
-def _encode_frame(mesh: Mesh, qp: int, fraction: float, levels: int) -> bytes:
+def encode_frame(mesh: Mesh, qp: int, fraction: float, levels: int) -> bytes:
     if mesh.is_empty:
         return encode_empty()
     if fraction < 1:

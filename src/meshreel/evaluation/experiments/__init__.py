@@ -5,10 +5,10 @@ from __future__ import annotations
 from types import ModuleType
 
 from ...errors import InputError
-from . import ablation, layers, targets
+from . import ablation, layers, scenes, targets
 
 # In the order of the report. Each module has points, references, promises, comparisons, shown, sections, COMPARISON.
-EXPERIMENTS: dict[str, ModuleType] = {"layers": layers, "ablation": ablation, "targets": targets}
+EXPERIMENTS: dict[str, ModuleType] = {"scenes": scenes, "layers": layers, "ablation": ablation, "targets": targets}
 
 
 def experiment(name: str) -> ModuleType:

@@ -1,0 +1,65 @@
+"""The truth beside a simulated rig, as `simulate.py` writes it: clean meshes, which of their faces move, true cameras.
+
+In: the folder `truth` of a rig. Out: a SceneFrame a frame, read when it is asked for.
+"""
+
+from __future__ import annotations
+
+import operator
+import zipfile
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..io.meshes import read_mesh
+from .rig import DepthCamera, read_cameras
+from .simulate import LABELS, SceneFrame
+
+_DAMAGED = (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError)
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What a simulated rig has really seen, by frame."""
+
+    paths: tuple[Path, ...]  # of the clean meshes
+    packed: tuple[np.ndarray, ...]  # for each face a bit: it moves; from outside, checked frame by frame
+    cameras: tuple[DepthCamera, ...]  # where they really stood
+    frame_rate: float  # 1/s
+
+    def __len__(self) -> int:
+        return len(self.paths)
+
+    def __getitem__(self, index: int) -> SceneFrame:
+        number = range(len(self))[operator.index(index)]
+        mesh = read_mesh(self.paths[number]).mesh
+        bits, faces = self.packed[number], len(mesh.faces)
+        if bits.dtype != np.uint8 or bits.shape != ((faces + 7) // 8,):
+            text = f"{bits.dtype} {bits.shape} for {faces} faces"
+            raise InputError(f"{self.paths[number]}: {LABELS} has {text}, not a bit a face; simulate the rig again")
+        return SceneFrame(mesh, np.unpackbits(bits, count=faces).astype(bool))
+
+
+def read_truth(folder: Path) -> Truth:
+    """The truth in a folder. Raises InputError where a part of it is missing, is damaged or does not fit another."""
+    cameras, rate = read_cameras(folder)
+    paths = {path.stem: path for path in sorted(folder.glob("frame_*.ply"))}
+    if not paths:
+        raise InputError(f"{folder}: has no clean meshes (frame_00000.ply); give the folder `truth` of a simulated rig")
+    labels = _labels(folder / LABELS)
+    if unlike := sorted(labels.keys() ^ paths.keys()):
+        text = f"{len(paths)} clean meshes and labels of {len(labels)} frames, unlike in {unlike[0]}"
+        raise InputError(f"{folder}: {text}; simulate the rig again")
+    return Truth(tuple(paths.values()), tuple(labels[name] for name in paths), cameras, rate)
+
+
+def _labels(path: Path) -> dict[str, np.ndarray]:
+    """Packed labels by the frame's name."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except _DAMAGED as error:
+        raise InputError(f"{path}: labels cannot be read ({error}); simulate the rig again") from None

@@ -1,0 +1,153 @@
+"""The benchmark scenes, captured: noisy fused meshes, the truth, and labels of the faces that move.
+
+In: a scene's name, the benchmark data, a folder to keep things in. Out: a SceneData. What is made is kept: the rig
+(minutes), the fused meshes (a frame a second or two), the labels and the background that an anchor is given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, UInt16
+
+from ..capture.fusion import FusionOptions, fuse_depths
+from ..capture.record import open_recording
+from ..capture.rig import RIG, DepthCamera
+from ..capture.simulate import DEEPEST, TRUTH
+from ..capture.truth import Truth, read_truth
+from ..errors import InputError
+from ..geometry.decimate import decimate_faces
+from ..geometry.nearest import Surface
+from ..geometry.raycast import Rays
+from ..geometry.topology import drop_unreferenced
+from ..io.meshes import read_mesh
+from ..io.sequence import open_sequence
+from ..io.write import frame_names, make_folder, replacing, write_mesh
+from ..types import Mesh, MeshSequence
+from .derived import Chosen
+from .rooms import SPEEDS, RoomOptions, simulate_room
+from .truth import pinhole
+
+SCENES = tuple(SPEEDS)
+TRUE = "truth"  # labels: those of the nearest clean faces
+FUSED_EVERY = 2  # frames of which a background is fused
+JUDGES, LEAST_VOTES, AGREED = 5, 2, 0.01  # frames; so many must have a face of the background within so many m
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneData:
+    """A captured scene with its truth."""
+
+    name: str
+    folder: Path  # where everything about it is kept
+    meshes: MeshSequence
+    truth: Truth
+
+    def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
+        """Which faces of a frame move: `truth`, or what the file `labels/SOURCE.npz` says (a bit a face, by frame).
+
+        Raises InputError where that file is missing or does not fit.
+        """
+        if source == TRUE:
+            path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
+            return _kept_array(path, lambda: self.truth[number].labels_for(self.meshes[number]))
+        path, frame = self.folder / "labels" / f"{source}.npz", f"frame_{number:05}"
+        faces = len(self.meshes[number].faces)
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                bits = archive[frame]
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{path}: no labels of {frame} ({error}); write packed labels of every frame") from None
+        if bits.dtype != np.uint8 or bits.shape != ((faces + 7) // 8,):
+            raise InputError(f"{path}: {bits.dtype} {bits.shape} in {frame} for {faces} faces; give a bit a face")
+        return np.unpackbits(bits, count=faces).astype(bool)
+
+    def background(self, source: str = TRUE) -> Mesh:
+        """What stands, fused over time from what the rig's cameras see of the meshes' static faces."""
+        path = self.folder / "background" / f"{source}.ply"
+        return _kept_mesh(path, lambda: self._fused(source))
+
+    def decimated(self, number: int, share: float) -> Mesh:
+        """A whole frame with this share of its faces."""
+        path = self.folder / "decimated" / f"{share:g}-{number:05}.ply"
+        mesh = self.meshes[number]
+        return _kept_mesh(path, lambda: decimate_faces(mesh, round(share * len(mesh.faces))))
+
+    def _fused(self, source: str) -> Mesh:
+        depths = []
+        for number in range(0, len(self.meshes), FUSED_EVERY):
+            mesh, moves = self.meshes[number], self.labels(number, source)
+            rays = Rays(mesh)
+            depths += [(camera, _still(rays, moves, camera)) for camera in self.truth.cameras]
+        return self._agreed(fuse_depths(depths), source)
+
+    def _agreed(self, fused: Mesh, source: str) -> Mesh:
+        """What some frames have: what is only in one flew through it."""
+        middles = fused.vertices[fused.faces].mean(axis=1)
+        votes = np.zeros(len(middles), int)
+        for number in np.linspace(0, len(self.meshes) - 1, JUDGES).astype(int).tolist():
+            mesh = self.meshes[number]
+            still = Mesh.of(mesh.vertices, mesh.faces[~self.labels(number, source)])
+            if not still.is_empty:
+                apart = Surface(still).closest(middles).points - middles
+                votes += np.linalg.norm(apart, axis=1) < AGREED
+        return drop_unreferenced(Mesh.of(fused.vertices, fused.faces[votes >= LEAST_VOTES]))
+
+
+class SceneFrames(Chosen):
+    """Some frames of a captured scene, which anchors may ask for its labels."""
+
+    def __init__(self, scene: SceneData, numbers: Sequence[int]) -> None:
+        super().__init__(scene.meshes, numbers)
+        self.scene, self.numbers = scene, tuple(numbers)
+
+
+def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) -> SceneData:
+    """The scene called `name`, made below `cache` where it is not there yet; its first frames, where that is asked for.
+
+    Raises InputError for an unknown name and where the benchmark data are missing.
+    """
+    options = RoomOptions(name) if frames is None else RoomOptions(name, frames)
+    folder = cache / (name if frames is None else f"{name}-{frames}")
+    rig, meshes = folder / "rig", folder / "meshes"
+    if not (rig / RIG).exists():
+        simulate_room(rig, data, options)
+    _capture(rig, meshes)
+    truth = read_truth(rig / TRUTH)
+    return SceneData(name, folder, open_sequence(meshes), truth)
+
+
+def _capture(rig: Path, meshes: Path) -> None:
+    """Fuses the frames that are not there yet, as `meshreel capture` does."""
+    recording, _ = open_recording(rig, FusionOptions(), ":")
+    make_folder(meshes)
+    for number, name in enumerate(frame_names(len(recording), "ply")):
+        if not (meshes / name).exists():
+            write_mesh(recording[number], meshes / name)
+
+
+def _still(rays: Rays, moves: Bool[np.ndarray, " F"], camera: DepthCamera) -> UInt16[np.ndarray, "H W"]:
+    """The depth picture of the faces that stand; 0 where one that moves is in front, or none."""
+    seen = rays.look(pinhole(camera))
+    still = seen.faces >= 0
+    still[still] = ~moves[seen.faces[still]]
+    units = np.rint(np.where(still, seen.depth, 0) / camera.depth_unit)
+    return camera.in_range(np.where(units <= DEEPEST, units, 0).astype(np.uint16))
+
+
+def _kept_mesh(path: Path, make: Callable[[], Mesh]) -> Mesh:
+    if not path.exists():
+        make_folder(path.parent)
+        write_mesh(make(), path)
+    return read_mesh(path).mesh
+
+
+def _kept_array(path: Path, make: Callable[[], np.ndarray]) -> np.ndarray:
+    if not path.exists():
+        make_folder(path.parent)
+        with replacing(path) as file:
+            np.save(file, make())
+    return np.load(path)

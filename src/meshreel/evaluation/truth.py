@@ -1,0 +1,80 @@
+"""A decoded scene and its noisy input against the truth of a simulated rig (`metrics.truth` says what is measured).
+
+In: two sequences of meshes, the clean frames, their cameras -> rows of means and of frames.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+from ..capture.rig import DepthCamera
+from ..capture.simulate import SceneFrame
+from ..errors import InputError
+from ..geometry.cameras import PinholeCamera
+from ..metrics.truth import Scene, Sight, SightOptions, scene_means, scene_row
+from ..types import Frames
+
+Row = dict[str, Any]
+
+
+@runtime_checkable
+class TrueFrames(Protocol):
+    """Clean frames by number, and the cameras that saw them."""
+
+    @property
+    def cameras(self) -> tuple[DepthCamera, ...]:
+        """Where they really stood."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int) -> SceneFrame: ...
+
+
+def sights(cameras: Sequence[DepthCamera]) -> tuple[Sight, ...]:
+    """A rig's cameras as metrics have them: there a pixel's middle is half a pixel further."""
+    return tuple(Sight(pinhole(camera), *camera.depth_range) for camera in cameras)
+
+
+def pinhole(camera: DepthCamera) -> PinholeCamera:
+    """A rig's camera whose pixel (column i, row j) covers [i, i + 1) x [j, j + 1)."""
+    intrinsic = camera.intrinsic.copy()
+    intrinsic[:2, 2] += 0.5
+    return PinholeCamera(camera.width, camera.height, intrinsic, camera.extrinsic)
+
+
+def true_scene(truth: TrueFrames, number: int, options: SightOptions = SightOptions()) -> Scene:
+    """A clean frame, prepared. Raises InputError where it is empty: nothing can be told apart by it."""
+    frame = truth[number]
+    if frame.mesh.is_empty:
+        raise InputError(f"frame {number} of the truth has no faces; simulate the rig again")
+    return Scene(frame.mesh, frame.dynamic, sights(truth.cameras), options, complete=True)
+
+
+def compare_with_truth(
+    originals: Frames,
+    decoded: Frames,
+    truth: TrueFrames,
+    numbers: Sequence[int],
+    tell: Callable[[int], None] = lambda _done: None,
+) -> Row:
+    """Means over the frames `numbers`: of the decoded meshes against the truth, and of the originals (noise floor).
+
+    JSON-ready; what is not finite, or is about a part that is not there, is None. `per_frame` has each of `frames`.
+    """
+    frames: list[Row] = []
+    for done, number in enumerate(numbers, 1):
+        clean = true_scene(truth, number)
+        floor = scene_row(clean, clean.labelled(originals[number]))
+        frames.append({"noise_floor": floor, "decoded": scene_row(clean, clean.labelled(decoded[number]))})
+        tell(done)
+    means = {name: finite(scene_means([frame[name] for frame in frames])) for name in ("noise_floor", "decoded")}
+    told = [{name: finite(row) for name, row in frame.items()} for frame in frames]
+    return {"frames": list(numbers)} | means | {"per_frame": told}
+
+
+def finite(row: Row) -> Row:
+    """The row as JSON may have it."""
+    return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in row.items()}

@@ -1,0 +1,51 @@
+"""Points spread evenly over chosen faces of a mesh: each stands for the same area, and no random numbers are needed.
+
+The points walk along the faces in equal shares of area; inside a face they follow a sequence of low discrepancy (R2,
+M. Roberts 2018), folded into the triangle. The same mesh gives the same points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int64
+
+from ..geometry.topology import face_normals
+from ..types import Mesh
+
+_R2 = np.array([0.7548776662466927, 0.5698402909980532])  # 1 / g and 1 / g^2, where g^3 = g + 1
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """N points on a mesh."""
+
+    points: Float64[np.ndarray, "N 3"]  # in the mesh's unit
+    faces: Int64[np.ndarray, " N"]
+    barycentric: Float64[np.ndarray, "N 3"]  # weights of the face's three vertices
+    area: float  # of the chosen faces, in the mesh's unit, squared
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+def scatter(mesh: Mesh, chosen: Bool[np.ndarray, " F"], count: int) -> Scatter:
+    """`count` points on the chosen faces; none where these have no area."""
+    which = np.flatnonzero(chosen)
+    ends = np.cumsum(face_normals(mesh)[1][which])
+    area = float(ends[-1]) if len(ends) else 0.0
+    if area <= 0:
+        return Scatter(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 3)), 0.0)
+    steps = np.arange(count)
+    at = np.searchsorted(ends, (steps + 0.5) * (area / count), side="right")
+    faces = which[np.minimum(at, len(which) - 1)]
+    weights = _in_triangle((0.5 + _R2 * (steps[:, None] + 1)) % 1)
+    points = np.einsum("nk,nkd->nd", weights, mesh.vertices[mesh.faces[faces]])
+    return Scatter(points, faces, weights, area)
+
+
+def _in_triangle(square: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, "N 3"]:
+    """Barycentric weights of points in the unit square, its far half folded onto the near one."""
+    folded = np.where(square.sum(axis=1, keepdims=True) > 1, 1 - square, square)
+    return np.column_stack([1 - folded.sum(axis=1), folded])

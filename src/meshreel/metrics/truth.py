@@ -1,0 +1,277 @@
+"""A scene against the truth: accuracy and coverage of all, of what moves (people) and of what stands (background).
+
+In: two meshes of one frame whose faces are told apart, and the cameras that saw it -> a row of numbers. The truth is
+known only of simulated rigs. The same row is made against the noisy input, which then stands in the truth's place.
+
+- Accuracy (backward: from points spread evenly over the decoded area to the reference): median distance and RMS, m;
+  mean normal error, degrees (interpolated vertex normals, as everywhere); D2-PSNR, dB.
+- Coverage (forward: from the reference's area to the decoded one): RMS, m, the share within 20 mm, and D2-PSNR, dB. Of
+  a truth only what a camera can see counts: in its picture and range, not hidden, not edge-on (`SightOptions.grazing`).
+- The peak of both PSNRs is the diagonal of the whole reference scene, for its parts too. Forward is the paper's way,
+  and what is told of the noisy input; against a truth it says only how large the holes are: there, backward counts.
+- SSIM of normal renders from these cameras, over pixels where either mesh shows the part (masked SSIM).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float32, Float64
+
+from ..errors import InputError
+from ..geometry.cameras import PinholeCamera
+from ..geometry.nearest import Surface, carried_labels
+from ..geometry.raycast import Rays
+from ..geometry.topology import face_normals
+from ..types import Mesh
+from .distance import PSNR_CEILING, psnr, quantile
+from .normals import WORST_ANGLE, angles, interpolate, welded_normals
+from .render import BACKGROUND
+from .samples import box_center
+from .scatter import Scatter, scatter
+from .ssim import BORDER, ssim_map
+
+Row = dict[str, Any]
+PARTS = ("all", "people", "background")
+
+
+@dataclass(frozen=True, slots=True)
+class SightOptions:
+    """What counts as seen, and how finely surface is sampled."""
+
+    people: int = 20_000  # points on what moves, of each mesh
+    background: int = 60_000  # points on what stands
+    near: float = 0.02  # m, at which surface counts as covered
+    grazing: float = 65.0  # degrees between ray and normal past which depth is too coarse for surface to be expected
+    slack: float = 0.005  # m that a point may lie behind what the ray meets first
+
+    def __post_init__(self) -> None:
+        if min(self.people, self.background) < 1 or not (0 < self.near < math.inf and 0 <= self.slack < math.inf):
+            text = f"{self.people} and {self.background} points, near {self.near:g}, slack {self.slack:g}"
+            raise InputError(f"sight with {text}: give one point at least and metres from 0 on, near above 0")
+        if not 0 < self.grazing <= 90:
+            raise InputError(f"grazing {self.grazing:g}: give degrees above 0, up to 90")
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """A camera that stood before the scene."""
+
+    camera: PinholeCamera
+    near: float = 0.0  # m along the optical axis: nothing nearer is measured
+    far: float = math.inf  # m: nor farther
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """What a camera sees of a scene."""
+
+    colors: Float32[np.ndarray, "H W 3"]  # of normals, as `render` has them
+    covered: Bool[np.ndarray, "H W"]
+    dynamic: Bool[np.ndarray, "H W"]
+
+
+class Scene:
+    """A mesh of one frame, prepared to be measured; what costs much is made when it is first needed.
+
+    `dynamic` says which faces move. `complete` is for a truth: it has surface that no camera can see.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        dynamic: Bool[np.ndarray, " F"],
+        sights: Sequence[Sight],
+        options: SightOptions = SightOptions(),
+        complete: bool = False,
+    ) -> None:
+        if dynamic.shape != (len(mesh.faces),):
+            raise InputError(f"{len(dynamic)} labels for {len(mesh.faces)} faces: give one a face")
+        self.origin = box_center(mesh)  # closest points are found in float32
+        self.mesh, self.dynamic = Mesh.of(mesh.vertices - self.origin, mesh.faces), dynamic
+        self.sights, self.options, self.complete = tuple(sights), options, complete
+
+    def labelled(self, mesh: Mesh) -> Scene:
+        """Another mesh of the same frame: its faces move where the nearest of this scene's do. This one has faces."""
+        local = Mesh.of(mesh.vertices - self.origin, mesh.faces)
+        return Scene(mesh, carried_labels(self.surface, self.dynamic, local), self.sights, self.options)
+
+    @cached_property
+    def surface(self) -> Surface:
+        """For closest points, about `origin`."""
+        return Surface(self.mesh)
+
+    @cached_property
+    def normals(self) -> Float64[np.ndarray, "V 3"]:
+        """Unit vertex normals."""
+        return welded_normals(self.mesh)
+
+    @cached_property
+    def points(self) -> dict[str, Scatter]:
+        """Points on both parts, those of a complete scene only where a camera can see them, about `origin`."""
+        parts = (("people", self.dynamic, self.options.people), ("background", ~self.dynamic, self.options.background))
+        found = {name: scatter(self.mesh, chosen, count) for name, chosen, count in parts}
+        if self.complete:
+            found = {name: _only(points, visible(self, points)) for name, points in found.items()}
+        return found
+
+    @cached_property
+    def pictures(self) -> tuple[Picture, ...]:
+        """What each camera sees."""
+        return tuple(_picture(self, sight.camera) for sight in self.sights)
+
+    @cached_property
+    def rays(self) -> Rays:
+        """For ray casting, about `origin`."""
+        return Rays(self.mesh, np.zeros(3))
+
+
+def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:
+    """Which points on a scene's own surface some camera can measure."""
+    seen = np.zeros(len(points), bool)
+    normals = face_normals(scene.mesh)[0][points.faces]
+    for sight in scene.sights:
+        camera, options = sight.camera, scene.options
+        away = points.points + scene.origin - camera.eye
+        ahead = away @ camera.extrinsic[:3, :3].T
+        pixels = camera.project(ahead)
+        inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(axis=1)  # not a number: behind the eye
+        inside &= (ahead[:, 2] >= sight.near) & (ahead[:, 2] <= sight.far)
+        lengths = np.linalg.norm(away, axis=1)
+        turned = np.abs(np.einsum("nd,nd->n", normals, away))
+        which = np.flatnonzero(inside & ~seen & (turned >= math.cos(math.radians(options.grazing)) * lengths))
+        eye = np.broadcast_to(camera.eye - scene.origin, (len(which), 3))
+        met = scene.rays.cast(eye, away[which]).distances
+        seen[which] = met * lengths[which] >= lengths[which] - options.slack
+    return seen
+
+
+def scene_row(reference: Scene, decoded: Scene) -> Row:
+    """The metrics of one frame by name: `median_m` of all, `people_median_m`, `background_median_m`, and so on.
+
+    Where neither mesh has anything of a part, its numbers are None. Where the decoded one lacks it, errors are
+    infinite and 180 degrees.
+    """
+    row: Row = {"diagonal_m": reference.mesh.diagonal}
+    there, back = _Matched.of(decoded, reference), _Matched.of(reference, decoded)
+    for part in PARTS:
+        found = _accuracy(there.part(part), back.part(part), reference) | _coverage(back.part(part), reference)
+        row |= {name if part == "all" else f"{part}_{name}": value for name, value in found.items()}
+    return row | _ssim_row(reference.pictures, decoded.pictures)
+
+
+def scene_means(rows: Sequence[Row]) -> Row:
+    """The mean of every number over frames, those that are None left out; None where all are.
+
+    An infinite PSNR counts as `PSNR_CEILING`.
+    """
+    means: Row = {}
+    for name in rows[0] if rows else ():
+        values = [row[name] for row in rows if row[name] is not None]
+        if "psnr" in name:
+            values = [min(value, PSNR_CEILING) for value in values]
+        means[name] = float(np.mean(values)) if values else None
+    return means
+
+
+@dataclass(frozen=True, slots=True)
+class _Matched:
+    """Points of one scene and what they meet on another."""
+
+    people: Bool[np.ndarray, " N"]
+    weights: Float64[np.ndarray, " N"]  # m^2
+    distances: Float64[np.ndarray, " N"]  # m
+    turned: Float64[np.ndarray, " N"]  # degrees between the normals
+
+    @staticmethod
+    def of(source: Scene, target: Scene) -> _Matched:
+        parts = source.points
+        people = np.repeat([name == "people" for name in parts], [len(points) for points in parts.values()])
+        weights = np.concatenate([np.full(len(p), p.area / max(len(p), 1)) for p in parts.values()])
+        if target.mesh.is_empty or len(weights) == 0:
+            worst = np.full(len(weights), np.inf), np.full(len(weights), WORST_ANGLE)
+            return _Matched(people, weights, *worst)
+        points = np.concatenate([p.points for p in parts.values()]) + (source.origin - target.origin)
+        hits = target.surface.closest(points)
+        distances = np.linalg.norm(hits.points - points, axis=1)
+        corners = source.mesh.faces[np.concatenate([p.faces for p in parts.values()])]
+        own = interpolate(source.normals, corners, np.concatenate([p.barycentric for p in parts.values()]))
+        other = interpolate(target.normals, target.mesh.faces[hits.faces], hits.barycentric)
+        return _Matched(people, weights, distances, angles(own, other))
+
+    def part(self, name: str) -> _Matched:
+        """Of all, or of people or background alone."""
+        if name == "all":
+            return self
+        kept = self.people if name == "people" else ~self.people
+        return _Matched(self.people[kept], self.weights[kept], self.distances[kept], self.turned[kept])
+
+    @property
+    def mean_square(self) -> float:
+        """m^2, over the area."""
+        return float(np.average(self.distances**2, weights=self.weights))
+
+
+def _accuracy(found: _Matched, wanted: _Matched, reference: Scene) -> Row:
+    names = ("median_m", "rms_backward_m", "normal_error_deg", "d2_psnr_backward")
+    if len(found.weights):
+        median, square = quantile(found.distances, found.weights, 0.5), found.mean_square
+        angle = float(np.average(found.turned, weights=found.weights))
+        values: tuple[float | None, ...] = (median, math.sqrt(square), angle, psnr(square, reference.mesh.diagonal))
+    else:
+        values = (math.inf, math.inf, WORST_ANGLE, 0.0) if len(wanted.weights) else (None,) * len(names)
+    return dict(zip(names, values, strict=True))
+
+
+def _coverage(wanted: _Matched, reference: Scene) -> Row:
+    if len(wanted.weights) == 0:
+        return {"coverage_rms_m": None, "covered": None, "d2_psnr_forward": None}
+    within = float(np.average(wanted.distances <= reference.options.near, weights=wanted.weights))
+    square = wanted.mean_square
+    d2 = psnr(square, reference.mesh.diagonal)
+    return {"coverage_rms_m": math.sqrt(square), "covered": within, "d2_psnr_forward": d2}
+
+
+def _only(points: Scatter, kept: Bool[np.ndarray, " N"]) -> Scatter:
+    share = float(kept.mean()) if len(kept) else 0.0
+    return Scatter(points.points[kept], points.faces[kept], points.barycentric[kept], points.area * share)
+
+
+def _picture(scene: Scene, camera: PinholeCamera) -> Picture:
+    shape = (camera.height, camera.width)
+    colors = np.full((*shape, 3), BACKGROUND, np.float32)
+    covered, dynamic = np.zeros(shape, bool), np.zeros(shape, bool)
+    if not scene.mesh.is_empty:
+        rows, columns = np.mgrid[: camera.height, : camera.width]
+        _, ahead = camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
+        eye = np.broadcast_to(camera.eye - scene.origin, ahead.shape)
+        hit = scene.rays.cast(eye, ahead @ np.linalg.inv(camera.extrinsic[:3, :3]).T)
+        covered = (hit.faces >= 0).reshape(shape)
+        faces, weights = hit.faces[covered.ravel()], hit.barycentric[covered.ravel()]
+        colors[covered] = (interpolate(scene.normals, scene.mesh.faces[faces], weights) + 1) / 2
+        dynamic[covered] = scene.dynamic[faces]
+    return Picture(colors, covered, dynamic)
+
+
+def _ssim_row(reference: Sequence[Picture], decoded: Sequence[Picture]) -> Row:
+    scores: dict[str, list[float]] = {part: [] for part in PARTS}
+    for a, b in zip(reference, decoded, strict=True):
+        scored = ssim_map(a.colors.astype(np.float64), b.colors.astype(np.float64))
+        for part, mask in _masks(a, b):
+            if mask.any():
+                scores[part].append(float(scored[mask].mean()))
+    names = {part: "ssim_masked" if part == "all" else f"{part}_ssim_masked" for part in PARTS}
+    return {names[part]: float(np.mean(values)) if values else None for part, values in scores.items()}
+
+
+def _masks(a: Picture, b: Picture) -> Iterator[tuple[str, Bool[np.ndarray, "H W"]]]:
+    """Pixels of each part, but for the border that SSIM leaves out."""
+    inside = np.zeros(a.covered.shape, bool)
+    inside[BORDER:-BORDER, BORDER:-BORDER] = True
+    covered, people = (a.covered | b.covered) & inside, (a.dynamic | b.dynamic) & inside
+    yield from (("all", covered), ("people", people), ("background", covered & ~people))
