@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from .windows import EncoderOptions
 
+FOLLOWED = 6e-4  # RMS noise from which the second fit believes the coherent positions more than the frames
 LOST = 2.0  # RMS distances of the noise that a residual may have besides what it may have without
 
 
@@ -26,4 +27,9 @@ def above_noise(options: EncoderOptions) -> EncoderOptions:
         rekeyed=math.hypot(known.rekeyed, LOST * noise),
         lost=math.hypot(known.lost, LOST * noise),
     )
-    return replace(options, embedded=embedded)
+    stiffer = math.hypot(1.0, noise / FOLLOWED)
+    fit, tails = options.fit, options.tails
+    second = fit.smoothing[-1] if fit.second_smoothing is None else fit.second_smoothing
+    fit = replace(fit, pull=stiffer * fit.pull, second_smoothing=stiffer * second)
+    tails = tails and replace(tails, noise=noise)
+    return replace(options, embedded=embedded, fit=fit, tails=tails)
