@@ -16,6 +16,7 @@ from jaxtyping import Float64, Int32
 from .analysis.correspond import Course, choose_key, from_last
 from .analysis.fit import Fit, Guides, fit_targets
 from .analysis.fit_match import Target
+from .analysis.fused import fused_mesh
 from .analysis.groups import cut_at, leading
 from .analysis.template import base_mesh, shared_detail
 from .choice import NO_ERROR, measure
@@ -24,6 +25,7 @@ from .coding.layers import EncodedLayers, LayersState, encode_layers
 from .coding.reference import CodedReference, code_on_lattice
 from .format.layout import Form
 from .format.records import pack
+from .noise import above_noise
 from .tails import find_tails
 from .types import Frames, Mesh
 from .windows import EncodedGroup, EncoderOptions, Stages, cheaper, intra_only, laplacian, target_of
@@ -57,7 +59,7 @@ class Keyed:
 
 def encode_segment(frames: Frames, options: EncoderOptions, stages: Stages | None = None) -> Iterator[EncodedGroup]:
     """The groups of a segment, frames all empty or none is; only those of one group are held at a time."""
-    stages = stages or Stages(None, len(frames))
+    stages, options = stages or Stages(None, len(frames)), above_noise(options)
     if frames[0].is_empty:
         for start in range(0, len(frames), MOST_EMPTY):
             count = min(MOST_EMPTY, len(frames) - start)
@@ -90,7 +92,7 @@ def _continued(
 ) -> tuple[EncodedGroup, Followed | None] | None:
     """A group predicted from the one before, as long as its template fits; None where that is not long."""
     base = before.reference.base
-    still = _standing(before, targets)
+    still = _standing(before, targets, options)
     if still is not None:
         return _coded(ahead, before.reference, still, before, options)
     predictions = from_last(Mesh(before.positions, base.faces), targets, options.embedded)
@@ -101,18 +103,18 @@ def _continued(
     guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), levels))
     fit = Fit.at(base.faces, fit_targets(base.faces, predictions, targets, options.fit, guides), targets)
     target = target_of(ahead, options).distance
-    count = leading(fit.by_area / target, before.residual / target, options.groups)
+    count = leading(_residuals(fit, options) / target, before.residual / target, options.groups)
     if count < min(SHORTEST, len(ahead)):
         return None
     return _coded(ahead[:count], before.reference, fit.first(count), before, options)
 
 
-def _standing(before: Followed, targets: list[Target]) -> Fit | None:
+def _standing(before: Followed, targets: list[Target], options: EncoderOptions) -> Fit | None:
     """The template where it was, if it leaves no more over there than it usually does: a fit would only slide."""
     faces = before.reference.base.faces
     for some in (targets[-1:], targets):  # most bodies have moved by the last frame
         fit = Fit.at(faces, np.repeat(before.positions[None], len(some), axis=0), some)
-        if fit.by_area.max() > STILL * before.residual:
+        if _residuals(fit, options).max() > STILL * before.residual:
             return None
     return fit
 
@@ -142,22 +144,51 @@ def _course(targets: list[Target], options: EncoderOptions) -> Course:
 
 
 def _keyed(frames: Sequence[Mesh], targets: list[Target], course: Course, options: EncoderOptions) -> Keyed | None:
-    """The template of the course's key and its fit to the frames; None where nothing is left of its base mesh."""
-    lattice = options.layers.step * (LATTICE if len(frames) > 1 else LATTICE_ALONE)
-    reference = code_on_lattice(base_mesh(frames[course.key], options.template), lattice, options.template.levels)
+    """The template of the course's key and its fit to the frames; None where nothing is left of its base mesh.
+
+    It is the key frame's own surface, or that fused from all frames: the latter first where there is noise, the other
+    only where the first does not fit.
+    """
+    found = list[Keyed]()
+    for fuse in (options.noise > 0, options.noise == 0):
+        keyed = _laid(targets, course, fuse, options)
+        if keyed is not None:
+            found.append(keyed)
+            if len(frames) == 1 or _fitted(frames, keyed, options) == len(frames):
+                return keyed
+    return min(found, key=lambda one: float(np.mean(_residuals(one.fit, options) ** 2)), default=None)
+
+
+def _laid(targets: list[Target], course: Course, fuse: bool, options: EncoderOptions) -> Keyed | None:
+    key = targets[course.key].mesh
+    surface = fused_mesh(course.motion, targets, options.noise, options.fused) if fuse else key
+    if surface.is_empty:
+        return None
+    lattice = options.layers.step * (LATTICE if len(targets) > 1 else LATTICE_ALONE)
+    reference = code_on_lattice(base_mesh(surface, options.template), lattice, options.template.levels)
     base, faces = reference.mesh, reference.base.faces
     if base.is_empty:
         return None
-    guides = Guides(None, shared_detail(base.faces, len(base.vertices), reference.levels))
-    positions = fit_targets(faces, course.move(reference.base), targets, replace(options.fit, key=course.key), guides)
+    detail = shared_detail(base.faces, len(base.vertices), reference.levels)
+    template, rest = reference.base, None
+    if fuse:
+        rest = fit_targets(faces, template.vertices[None], [Target(surface)], options.fit)[0]
+        template = Mesh(rest, faces)
+    fit = replace(options.fit, key=course.key)
+    positions = fit_targets(faces, course.move(template), targets, fit, Guides(rest, detail))
     return Keyed(course.key, reference, Fit.at(faces, positions, targets))
+
+
+def _residuals(fit: Fit, options: EncoderOptions) -> Float64[np.ndarray, " T"]:
+    """What a fit leaves over of each frame; holes of noisy frames are no reason for another template."""
+    return fit.by_area if options.noise == 0 else fit.common
 
 
 def _fitted(frames: Sequence[Mesh], keyed: Keyed | None, options: EncoderOptions) -> int:
     """How many of the first frames a key frame should be looked for in: all where the template fits, 0 for no more."""
     if keyed is None:
         return 1 if len(frames) > 1 else 0
-    residuals, target = keyed.fit.by_area, target_of(frames, options).distance
+    residuals, target = _residuals(keyed.fit, options), target_of(frames, options).distance
     if len(frames) == 1:
         return 0 if residuals[0] > options.groups.limit * target else 1
     cut = cut_at(residuals / target, options.groups)
@@ -172,7 +203,7 @@ def _coded(
     payload, layers, decoded = _with_tails(frames, encoded, reference.base.faces, options)
     quality = measure(frames, decoded)
     group = EncodedGroup(Form.LAYERS, len(frames), payload, layers, quality, before is not None)
-    if quality.distance > TOO_COARSE * target_of(frames, options).distance:
+    if options.noise == 0 and quality.distance > TOO_COARSE * target_of(frames, options).distance:
         other = laplacian(frames, reference, fit.positions, options.displacements)
         if other.quality.reaches(quality) and len(other.payload) < len(group.payload):
             group = other
@@ -181,7 +212,7 @@ def _coded(
     group = cheaper(frames, group, options)
     if group.form != Form.LAYERS:
         return group, None
-    usual = before.residual if before else float(np.median(fit.by_area))
+    usual = before.residual if before else float(np.median(_residuals(fit, options)))
     return group, Followed(reference, encoded.state, fit.positions[-1], usual)
 
 

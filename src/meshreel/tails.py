@@ -41,6 +41,7 @@ class TailOptions:
     thresholds: tuple[float, ...] = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest
     shares: tuple[float, ...] = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept
     lattice: float = 2.0  # spacing of the patches' lattice, in RMS distances of the rest
+    noise: float = 0.0  # RMS distance from which on the thresholds count where the rest is nearer
     exchange: float = 1.33  # relative fall of the squared error for a relative rise of the rate: 4 dB a doubling
 
     def __post_init__(self) -> None:
@@ -50,6 +51,8 @@ class TailOptions:
             raise InputError(f"shares {self.shares}: give fractions of the vertices, in (0, 1]; none: no patches")
         if not self.lattice > 0 or not self.exchange > 0:
             raise InputError(f"lattice {self.lattice:g}, exchange {self.exchange:g}: give numbers above 0")
+        if not 0 <= self.noise < np.inf:
+            raise InputError(f"tails noise {self.noise:g}: give a distance, 0 where there is none")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +80,7 @@ def find_tails(
     if not EXACT**2 < usual < np.inf:
         return None
     price = options.exchange * len(frames) * usual / size
+    usual = max(usual, options.noise**2)
     search = _Search(shown, faces, usual, price, options, _step_level(frames, options.lattice * usual**0.5))
     best, least = None, search.cost(None)
     better = list[_Coded]()  # each than those before it

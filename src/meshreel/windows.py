@@ -8,6 +8,7 @@ Differs from the paper: groups are not all of one length, and frames that no ref
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -17,6 +18,7 @@ from jaxtyping import Float64
 from .analysis.correspond import PLACES
 from .analysis.embedded import EmbeddedOptions
 from .analysis.fit import Fit, FitOptions, fit_frames
+from .analysis.fused import FusedOptions
 from .analysis.groups import GroupOptions, cut_at
 from .analysis.reference import ReferenceOptions, extract_reference, predict
 from .analysis.template import TemplateOptions
@@ -29,12 +31,14 @@ from .coding.layers import LayersOptions
 from .coding.reference import CodedReference, code_reference
 from .errors import InputError, NoReferenceError
 from .format.layout import Form
+from .metrics.normals import WORST_ANGLE
 from .tails import TailOptions
 from .types import Centers, Frames, Mesh
 
 Progress = Callable[[str, int, int], None]  # stage, frames done in it, frames of the sequence
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it
 MOST_FOR_HALF = 2  # times the bytes that half the distance (6 dB) may cost; a finer template gives 4 dB for that
+MOST_NOISE = 0.05  # RMS, of the diagonal: beyond, nothing is left of a hand
 MOST_SECONDS = 600  # of a key interval: whoever joins late decodes as much before a picture is there
 
 
@@ -62,6 +66,8 @@ class EncoderOptions:
     template: TemplateOptions = field(default_factory=TemplateOptions)
     layers: LayersOptions = field(default_factory=LayersOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches (form LAYERS)
+    noise: float = 0.0  # RMS distance of the frames' surface from the truth, normalised; 0: a clean capture (form LAYERS)
+    fused: FusedOptions = field(default_factory=FusedOptions)
 
     def __post_init__(self) -> None:
         if not 0 <= self.quality <= 100:
@@ -76,6 +82,8 @@ class EncoderOptions:
             raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0 and at most {MOST_SECONDS}")
         if not 1 <= self.reference_bits <= 20 or not 0 <= self.levels <= 4:
             raise InputError(f"reference bits {self.reference_bits}, levels {self.levels}: give 1 to 20 and 0 to 4")
+        if not 0 <= self.noise <= MOST_NOISE:
+            raise InputError(f"noise {self.noise:g}: give it in units of the diagonal, 0 to {MOST_NOISE:g}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,6 +215,13 @@ def intra_only(frames: Sequence[Mesh], options: EncoderOptions) -> EncodedGroup:
 
 
 def target_of(frames: Sequence[Mesh], options: EncoderOptions) -> Quality:
-    """What these frames should be worth, normalised: relative to the smallest of them, so that none is lost."""
+    """What these frames should be worth, normalised: relative to the smallest of them, so that none is lost.
+
+    As far from noisy frames as the truth is; how their normals are turned says nothing then.
+    """
     diagonal = min(frame.diagonal for frame in frames)
-    return options.target.scaled(diagonal or 1.0)
+    target, noise = options.target.scaled(diagonal or 1.0), options.noise
+    if noise == 0:
+        return target
+    distance, worst = math.hypot(target.distance, noise), math.hypot(target.worst, noise)
+    return replace(target, distance=distance, worst=worst, angle=WORST_ANGLE)

@@ -23,9 +23,10 @@ from ..types import Mesh
 from .conjugate_gradients import Limits
 from .embedded_graph import DeformationGraph, area_samples, build_graph, farthest_first
 from .embedded_match import NORMAL_REACH, SampledTarget
-from .embedded_solve import GraphSolver, Planes, Pose, Rest, moved, rotation, turned
+from .embedded_solve import GraphSolver, Planes, Pose, Rest, moved, rotation, turned, unmoved
 from .fit_match import Target
 
+BACK_ROUNDS = 2  # which nodes move a point is known only where it comes from: the first round guesses
 UNUSUAL = 1.25  # times the median residual so far: tried again
 
 
@@ -226,6 +227,24 @@ class Motion:
         binding = self.graph.bind(points, self.graph.cells[vertices], self.neighbours)
         poses = (Pose(r, p) for r, p in zip(self.rotations, self.positions, strict=True))
         return np.stack([moved(points, self.graph.nodes, binding, pose) for pose in poses])
+
+    def back(self, frame: int, mesh: Mesh) -> Mesh:
+        """A mesh that lies on or near a frame, moved to where it would be in the key frame: the inverse of `move`.
+
+        Faces in which a point has no way back are left out.
+        """
+        pose = Pose(self.rotations[frame], self.positions[frame])
+        own = self.graph.bind(self.mesh.vertices, self.graph.cells, self.neighbours)
+        there = moved(self.mesh.vertices, self.graph.nodes, own, pose)
+        facing = turned(vertex_normals(self.mesh), own, pose)
+        asked = np.concatenate([mesh.vertices, NORMAL_REACH * vertex_normals(mesh)], axis=1)
+        near = cKDTree(np.concatenate([there, NORMAL_REACH * facing], axis=1)).query(asked)[1].reshape(-1)
+        points, cells = self.mesh.vertices[near], self.graph.cells[near]
+        for _ in range(BACK_ROUNDS):
+            points, known = unmoved(
+                mesh.vertices, self.graph.nodes, self.graph.bind(points, cells, self.neighbours), pose
+            )
+        return clean(Mesh(points, mesh.faces[known[mesh.faces].all(axis=1)]))
 
 
 def register(key_mesh: Mesh, frames: Sequence[Mesh], key: int, options: EmbeddedOptions | None = None) -> Motion:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
@@ -19,6 +19,7 @@ from .embedded_graph import Binding
 
 Blocks = Float64[np.ndarray, "B 6 6"]  # of the nodes, on the diagonal of the normal equations
 LARGEST_TURN = 0.5  # rad, of a node in one step
+FLATTEST = 0.1  # determinant of a blend of rotations below which it says nothing: they turn against each other
 STILL = 1e-4  # squared row weight of a turn times its lever: fixes what neither data nor neighbours do
 
 
@@ -62,10 +63,28 @@ def moved(
     points: Float64[np.ndarray, "P 3"], nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose
 ) -> Float64[np.ndarray, "P 3"]:
     """Bound points, which lie in the rest of the nodes, in a pose of the nodes."""
+    blended = _affine(nodes, binding, pose)
+    return np.einsum("pij,pj->pi", blended[:, :, :3], points) + blended[:, :, 3]
+
+
+def unmoved(
+    points: Float64[np.ndarray, "P 3"], nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose
+) -> tuple[Float64[np.ndarray, "P 3"], Bool[np.ndarray, " P"]]:
+    """Where bound points that lie in a pose of the nodes are at rest; False where the nodes' blend has no inverse."""
+    blended = _affine(nodes, binding, pose)
+    linear, offsets = blended[:, :, :3].copy(), points - blended[:, :, 3]
+    known = np.abs(np.linalg.det(linear)) > FLATTEST
+    linear[~known] = np.eye(3)
+    return np.linalg.solve(linear, offsets[:, :, None])[:, :, 0], known
+
+
+def _affine(
+    nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose
+) -> Float64[np.ndarray, "P 3 4"]:
+    """The blend of the nodes' motions at each bound point."""
     offsets = pose.positions - np.einsum("nij,nj->ni", pose.rotations, nodes)
     affine = np.concatenate([pose.rotations, offsets[:, :, None]], axis=2).reshape(-1, 12)
-    blended = _blend(affine, binding).reshape(-1, 3, 4)
-    return np.einsum("pij,pj->pi", blended[:, :, :3], points) + blended[:, :, 3]
+    return _blend(affine, binding).reshape(-1, 3, 4)
 
 
 def turned(vectors: Float64[np.ndarray, "P 3"], binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3"]:

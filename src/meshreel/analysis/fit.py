@@ -95,6 +95,11 @@ class Fit:
         """Symmetric RMS over the area of each frame."""
         return np.array([residual.by_area for residual in self.residuals])
 
+    @property
+    def common(self) -> Float64[np.ndarray, " T"]:
+        """The same, where the frames have surface."""
+        return np.array([residual.common for residual in self.residuals])
+
     def first(self, count: int) -> Fit:
         """The first so many frames."""
         return Fit(self.positions[:count], self.residuals[:count])

@@ -18,6 +18,8 @@ from .fit_border import border_edges, match_borders, sample_border
 from .fit_rows import Rows
 from .fit_system import Template
 
+ON_BORDER = 1e-6  # interpolated `inside` up to which a point of a surface lies on an open border
+
 
 @dataclass(frozen=True, slots=True)
 class MatchOptions:
@@ -57,7 +59,7 @@ def _from_target(mesh: Mesh, target: Target, options: MatchOptions) -> Rows:
     surface = Surface(mesh)
     points = target.mesh.vertices
     hits = surface.closest(points)
-    inside = _interpolated_scalar(_inside(mesh), mesh.faces, hits)
+    inside = interpolated_scalar(_inside(mesh), mesh.faces, hits)
     normals = target.normals
     weights = (
         _pair_weights(points - hits.points, normals, surface.normals[hits.faces], options) * inside * target.inside
@@ -79,7 +81,7 @@ def _from_template(template: Template, mesh: Mesh, target: Target, options: Matc
     hits = target.surface.closest(points)
     normals = target.normals_at(hits)
     weights = _pair_weights(points - hits.points, normals, own, options)
-    weights *= _interpolated_scalar(target.inside, target.mesh.faces, hits)
+    weights *= interpolated_scalar(target.inside, target.mesh.faces, hits)
     values = np.einsum("nd,nd->n", normals, hits.points)
     scale = np.where(np.arange(len(points)) < len(used), 1.0, 0.5)  # two faces a vertex
     return Rows(faces, corners, normals, values, weights * scale)
@@ -103,7 +105,8 @@ def interpolated(values: Float64[np.ndarray, "V 3"], faces: np.ndarray, hits: Hi
     return n / np.where(length > 0, length, 1.0)[:, None]
 
 
-def _interpolated_scalar(values: Float64[np.ndarray, " V"], faces: np.ndarray, hits: Hits) -> Float64[np.ndarray, " N"]:
+def interpolated_scalar(values: Float64[np.ndarray, " V"], faces: np.ndarray, hits: Hits) -> Float64[np.ndarray, " N"]:
+    """Numbers of a mesh's vertices at points of its surface."""
     return np.einsum("nk,nk->n", hits.barycentric, values[faces[hits.faces]])
 
 

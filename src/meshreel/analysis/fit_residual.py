@@ -13,7 +13,7 @@ from jaxtyping import Float64
 from ..geometry.nearest import Surface
 from ..geometry.topology import vertex_areas, vertex_normals
 from ..types import Mesh
-from .fit_match import Target, interpolated
+from .fit_match import ON_BORDER, Target, interpolated, interpolated_scalar
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,7 @@ class Residual:
     quantile: float  # 95 % of all these distances are less; the worse direction
     normals: float  # degrees, mean angle to the normal at the closest point; mean of both directions
     by_area: float  # RMS over the area, the worse direction: few vertices may span much of a surface that is left over
+    common: float  # the same, where the frame has surface: a hole in it says nothing about what should be there
 
     @property
     def rms(self) -> float:
@@ -32,7 +33,7 @@ class Residual:
         return max(self.to_fit, self.to_frame)
 
 
-NOTHING = Residual(np.inf, np.inf, np.inf, np.inf, np.inf)
+NOTHING = Residual(np.inf, np.inf, np.inf, np.inf, np.inf, np.inf)
 
 
 def residual_of(fitted: Mesh, target: Target) -> Residual:
@@ -46,8 +47,10 @@ def residual_of(fitted: Mesh, target: Target) -> Residual:
         + _mean_angle(normals, target.normals_at(back))
     ) / 2
     quantile = max(float(np.quantile(to_fit, 0.95)), float(np.quantile(to_frame, 0.95)))
-    by_area = max(_rms(to_fit, vertex_areas(target.mesh)), _rms(to_frame, vertex_areas(fitted)))
-    return Residual(_rms(to_fit), _rms(to_frame), quantile, angles, by_area)
+    lost, areas = _rms(to_fit, vertex_areas(target.mesh)), vertex_areas(fitted)
+    beside = interpolated_scalar(target.inside, target.mesh.faces, back) > ON_BORDER
+    by_area, common = max(lost, _rms(to_frame, areas)), max(lost, _rms(to_frame * beside, areas))
+    return Residual(_rms(to_fit), _rms(to_frame), quantile, angles, by_area, common)
 
 
 def _rms(distances: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"] | None = None) -> float:
