@@ -11,18 +11,28 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from .analysis.segment.probe import is_scene
 from .analysis.survey import Survey, survey
 from .choice import Quality
+from .coding.background import decode_background
 from .container.writer import ReelWriter
+from .decoder import open as open_video
 from .format.layout import Form, Header
+from .geometry.nearest import Surface
 from .layered import encode_segment
+from .metrics.distance import PSNR_CEILING
 from .presets import preset_options
+from .scene import TrackGroup, encode_bodies, encode_static, take_apart
 from .types import Frames, Mesh, MeshSequence
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
+
+MEASURED = 4  # frames of a scene that are compared with what is decoded
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +45,18 @@ class GroupSummary:
     quality: Quality
     predicted: bool = False  # from the group before
     key: int | None = None  # the frame of the sequence whose surface the others follow
+    track: int = 0  # the body of a scene
+
+
+@dataclass(frozen=True, slots=True)
+class SceneSummary:
+    """What is left of a scene's parts."""
+
+    background: int  # bytes, of all its copies
+    faces: int  # of the background, as decoded
+    noise: float  # m, RMS distance of a frame's still surface from the background
+    psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
+    tracks: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +66,18 @@ class Summary:
     size: int  # bytes of the file
     groups: tuple[GroupSummary, ...]
     warnings: tuple[str, ...] = ()  # what a user must know of frames that were not kept, a line each
+    scene: SceneSummary | None = None  # of a scene with a background
 
     @property
     def frame_count(self) -> int:
-        """Frames in all groups."""
-        return sum(group.frame_count for group in self.groups)
+        """Frames of the sequence."""
+        return sum(group.frame_count for group in self.groups if group.track == 0)
 
     @property
     def psnr(self) -> float:
-        """d2_psnr_paper, mean over the frames, dB."""
+        """d2_psnr_paper, mean over the frames, dB; of a scene, over those that were measured."""
+        if self.scene is not None:
+            return self.scene.psnr
         return sum(group.frame_count * group.quality.psnr for group in self.groups) / self.frame_count
 
 
@@ -71,6 +96,8 @@ def encode(
     """
     options = options or preset_options()
     stages = Stages(progress, len(sequence))
+    if not options.dynamic_only and len(sequence) and is_scene(sequence):
+        return _encode_scene(sequence, Path(path), options, executor, stages)
     seen = survey(sequence, stages)
     groups: list[GroupSummary] = []
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
@@ -86,6 +113,57 @@ def encode(
     return Summary(Path(path).stat().st_size, tuple(groups), _warnings(seen))
 
 
+def _encode_scene(
+    sequence: MeshSequence, path: Path, options: EncoderOptions, executor: Executor | None, stages: Stages
+) -> Summary:
+    """As `encode`, for a scene with a background."""
+    seen = survey(sequence, stages, cleaned=False)
+    parts = take_apart(sequence, seen, options, stages)
+    seen = replace(seen, scale=parts.unit)
+    static = b"" if parts.background.is_empty else encode_static(parts, seen, options.background)
+    refresh = options.background.refresh
+    copies = range(0, len(sequence), len(sequence) if refresh is None else max(1, round(refresh * sequence.frame_rate)))
+    with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
+        found = list(encode_bodies(sequence, seen, parts, options, executor, stages))
+        groups, shown = list[GroupSummary](), list[int]()
+        for each in sorted(found, key=lambda each: (each.first_frame, each.track)):
+            if static and each.track == 0 and len(shown) < len(copies) and each.first_frame >= copies[len(shown)]:
+                shown.append(writer.add_static(static))
+            groups.append(_added(writer, each, shown[-1:], parts.unit))
+        metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
+        writer.header = make_header(sequence.frame_rate, seen, metadata)
+    faces = len(decode_background(static).faces) if static else 0
+    psnr = _measured(sequence, path, seen.diagonal)
+    scene = SceneSummary(len(static) * len(shown), faces, parts.noise, psnr, max(group.track for group in groups) + 1)
+    return Summary(path.stat().st_size, tuple(groups), _warnings(seen), scene)
+
+
+def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
+    """Writes a group of a track; that of the first names the background of its frames."""
+    group, track, last = each.group, each.track, writer.last_of(each.track)
+    before = [last] if group.predicted and last is not None else []
+    shown = static if track == 0 else []
+    writer.add_group(each.first_frame, group.frame_count, group.payload, group.layers, (*shown, *before), track)
+    key = None if group.key is None else each.first_frame + group.key
+    quality = group.quality.scaled(unit)
+    return GroupSummary(group.form, group.frame_count, len(group.payload), quality, group.predicted, key, track)
+
+
+def _measured(sequence: MeshSequence, path: Path, diagonal: float) -> float:
+    """d2_psnr_paper, dB, mean over a few frames of a file."""
+    with open_video(path) as video:
+        numbers = sorted({round(k) for k in np.linspace(0, len(sequence) - 1, min(MEASURED, len(sequence)))})
+        found = []
+        for number in numbers:
+            points, shown = sequence[number].vertices, video[number]
+            if not len(points) or shown.is_empty:
+                found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
+                continue
+            gaps = Surface(shown).closest(points).points - points
+            found.append(10 * math.log10(diagonal**2 / max(float((gaps**2).sum(axis=1).mean()), 1e-30)))
+    return min(float(np.mean(found)), PSNR_CEILING)
+
+
 def _warnings(seen: Survey) -> tuple[str, ...]:
     found = []
     if seen.dropped:
@@ -99,11 +177,11 @@ def _warnings(seen: Survey) -> tuple[str, ...]:
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
     """The header of a file whose coordinates are normalised by `seen`."""
-    low, high = ((corner - seen.center) / seen.diagonal for corner in (seen.low, seen.high))
+    low, high = ((corner - seen.center) / seen.unit for corner in (seen.low, seen.high))
     return Header(
         frame_rate=frame_rate,
         origin=tuple(map(float, seen.center)),
-        scale=seen.diagonal,
+        scale=seen.unit,
         minimum=tuple(map(float, low)),
         maximum=tuple(map(float, high)),
         metadata=json.dumps(metadata, separators=(",", ":")),

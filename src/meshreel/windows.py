@@ -15,12 +15,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float64
 
+from .analysis.background import BackgroundOptions
+from .analysis.bodies import BodyOptions
 from .analysis.correspond import PLACES
 from .analysis.embedded import EmbeddedOptions
 from .analysis.fit import Fit, FitOptions, fit_frames
 from .analysis.fused import FusedOptions
 from .analysis.groups import GroupOptions, cut_at
 from .analysis.reference import ReferenceOptions, extract_reference, predict
+from .analysis.segment.scene import SegmentOptions
 from .analysis.template import TemplateOptions
 from .analysis.track import TrackOptions, track_centers
 from .choice import NO_ERROR, IntraOptions, Quality, cheapest_intra, finest_intra, measure
@@ -66,8 +69,12 @@ class EncoderOptions:
     template: TemplateOptions = field(default_factory=TemplateOptions)
     layers: LayersOptions = field(default_factory=LayersOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches (form LAYERS)
-    noise: float = 0.0  # RMS distance of the frames' surface from the truth, normalised; 0: a clean capture (form LAYERS)
+    noise: float = 0.0  # RMS distance of the frames' surface from the truth, normalised; 0: clean (form LAYERS)
     fused: FusedOptions = field(default_factory=FusedOptions)
+    dynamic_only: bool = False  # True: no background is looked for, everything may move
+    segment: SegmentOptions = field(default_factory=SegmentOptions)
+    background: BackgroundOptions = field(default_factory=BackgroundOptions)
+    bodies: BodyOptions = field(default_factory=BodyOptions)
 
     def __post_init__(self) -> None:
         if not 0 <= self.quality <= 100:

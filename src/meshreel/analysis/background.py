@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..geometry.nearest import Surface
 from ..geometry.topology import components, drop_unreferenced, face_normals, unique_edges
 from ..geometry.tsdf import SIDE, extract, fill_grid
-from ..geometry.voxels import Lattice, distinct, moved, spread
+from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
 
 _AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
@@ -26,12 +26,19 @@ _AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
 class BackgroundOptions:
     """How frames become one background."""
 
-    frames: int = 16  # fused, at most, spread over the sequence
+    frames: int = 10  # fused, at most, spread over the sequence
     reach: int = 2  # voxels on both sides of a surface that know their distance to it
     seen: float = 0.12  # share of the frames that must have surface somewhere
     fragment: float = 0.02  # m^2: connected pieces with less area are dropped
+    coarse: float = 0.5  # RMS distance from the fused surface that decimation may cost, in RMS noise of a frame
+    lattice: float = 1.0  # spacing of the lattice, in the same
+    refresh: float | None = None  # s from one copy of the background in the file to the next; None: one for all
 
     def __post_init__(self) -> None:
+        if not (self.coarse > 0 and self.lattice > 0 and (self.refresh is None or self.refresh > 0)):
+            raise InputError(
+                f"background: coarse {self.coarse:g}, lattice {self.lattice:g}, refresh {self.refresh} s: give above 0"
+            )
         if self.frames < 1 or self.reach < 1 or not 0 <= self.seen < 1 or not 0 <= self.fragment < np.inf:
             raise InputError(
                 f"background of {self.frames} frames, reach {self.reach}, seen {self.seen:g}, fragment "
@@ -93,11 +100,7 @@ class _Sums:
 
     def _around(self, mesh: Mesh) -> Int64[np.ndarray, " N"]:
         """The voxels within reach of a surface, about."""
-        keys = distinct(self._lattice.keys(spread(mesh, self._lattice.size)[0]))
-        steps = range(-self._reach, self._reach + 1)
-        for axis in np.eye(3, dtype=np.int64):
-            keys = distinct(np.concatenate([moved(keys, axis * step) for step in steps]))
-        return keys
+        return around(distinct(self._lattice.keys(spread(mesh, self._lattice.size)[0])), self._reach)
 
 
 def _signed(

@@ -28,6 +28,7 @@ class Survey:
     high: Float64[np.ndarray, "3"]  # the opposite corner, m
     diagonals: tuple[float, ...]  # of each frame's bounding box, m; 0 for a frame without surface
     flattened: tuple[int, ...] = ()  # frames that have faces, all without area: they count as empty
+    scale: float | None = None  # m, the unit of normalised coordinates where it is not the bounding box's diagonal
     dropped: int = 0  # faces without area, or the same three vertices as another, in all frames: they are not kept
 
     @property
@@ -37,13 +38,18 @@ class Survey:
 
     @property
     def diagonal(self) -> float:
-        """Length of the bounding box's diagonal, m: the unit of normalised coordinates."""
+        """Length of the bounding box's diagonal, m."""
         return float(np.linalg.norm(self.high - self.low)) or 1.0
 
+    @property
+    def unit(self) -> float:
+        """The unit of normalised coordinates, m."""
+        return self.diagonal if self.scale is None else self.scale
+
     def normalise(self, mesh: Mesh) -> Mesh:
-        """The mesh in normalised coordinates, cleaned: centered, the sequence's diagonal as the unit."""
+        """The mesh in normalised coordinates, cleaned and centered."""
         mesh = clean(mesh)
-        return Mesh.of((mesh.vertices - self.center) / self.diagonal, mesh.faces)
+        return Mesh.of((mesh.vertices - self.center) / self.unit, mesh.faces)
 
     def windows(self, size: int) -> list[range]:
         """Runs of at most `size` frames, each all empty or all of about one scale, of even lengths."""
@@ -71,15 +77,18 @@ class Counter(Protocol):
     def add(self, stage: str, count: int) -> None: ...
 
 
-def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
-    """The survey of a sequence, one frame in memory at a time. Raises InputError where there are no frames."""
+def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool = True) -> Survey:
+    """The survey of a sequence, one frame in memory at a time. Raises InputError where there are no frames.
+
+    Where it is not `cleaned`, faces without area count as any others: scenes have too many to look for them.
+    """
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped = list[float](), list[int](), 0
     for number, mesh in enumerate(sequence):
         _check(mesh, f"frame {number}")
-        had_faces, before, mesh = not mesh.is_empty, len(mesh.faces), clean(mesh)
+        had_faces, before, mesh = not mesh.is_empty, len(mesh.faces), clean(mesh) if cleaned else mesh
         dropped += before - len(mesh.faces)
         diagonals.append(0.0 if mesh.is_empty else mesh.diagonal)
         flattened += [number] if had_faces and mesh.is_empty else []
@@ -89,7 +98,7 @@ def survey(sequence: MeshSequence, stages: Counter | None = None) -> Survey:
             stages.add("survey", 1)
     if not np.isfinite(low).all():
         low, high = np.zeros(3), np.zeros(3)
-    return Survey(low, high, tuple(diagonals), tuple(flattened), dropped)
+    return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped)
 
 
 def _check(mesh: Mesh, where: str) -> None:

@@ -50,6 +50,14 @@ def distinct(keys: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " P"]:
     return ordered[np.concatenate([[True], ordered[1:] != ordered[:-1]])] if len(ordered) else ordered
 
 
+def around(keys: Int64[np.ndarray, " P"], reach: int = 1) -> Int64[np.ndarray, " Q"]:
+    """The cells no farther than so many cells along any axis from some cells, these among them."""
+    steps = range(-reach, reach + 1)
+    for axis in np.eye(3, dtype=np.int64):
+        keys = distinct(np.concatenate([moved(keys, axis * step) for step in steps]))
+    return keys
+
+
 def neighbours(keys: Int64[np.ndarray, " P"]) -> Int32[np.ndarray, "P 26"]:
     """For each of some sorted cells the numbers, among them, of the cells around it; its own where there is none."""
     table = np.empty((len(keys), len(_AROUND)), np.int32)

@@ -59,19 +59,6 @@ class Places:
         """The middles of the cells."""
         return self.lattice.centers(self.keys)
 
-    @staticmethod
-    def nowhere() -> Places:
-        """Of a scene without surface."""
-        none, table = np.zeros(0, np.int64), np.zeros((0, 26), np.int32)
-        never = np.zeros((0, 0), bool)
-        return Places(Lattice(np.zeros(3), 1.0), none, table, never, never, np.zeros((0, 3)))
-
-    def of(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
-        """The number of the cell that each point lies in; -1 where no frame that was looked at has surface."""
-        asked = self.lattice.keys(points)
-        at = np.minimum(np.searchsorted(self.keys, asked), len(self.keys) - 1)
-        return np.where(self.keys[at] == asked, at, -1)
-
 
 def find_places(
     frames: Iterable[Mesh], views: Sequence[PinholeCamera], lattice: Lattice, options: PlacesOptions = PlacesOptions()

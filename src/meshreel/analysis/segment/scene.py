@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Float64, Int64
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
@@ -23,7 +23,7 @@ from ...geometry.voxels import Lattice, spread
 from ...types import Frames, Mesh
 from .cut import CutOptions, moving_places
 from .masks import Masker
-from .places import Places, PlacesOptions, find_places
+from .places import PlacesOptions, find_places
 from .views import ViewsOptions, place_views
 from .votes import Votes
 
@@ -57,15 +57,17 @@ class Segmentation(Protocol):
 class ByPlace:
     """What is at a moving place moves, whenever it is there."""
 
-    places: Places
+    lattice: Lattice
+    keys: Int64[np.ndarray, " P"]  # of the places, sorted
     chosen: Bool[np.ndarray, " P"]
     island: float  # m^2
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """By where the faces are; the frame's number does not matter."""
+        """By where the faces are, whatever the frame's number."""
+        del frame
         if mesh.is_empty or not self.chosen.any():
             return np.zeros(len(mesh.faces), bool)
-        points, faces = spread(mesh, 1.5 * self.places.lattice.size)
+        points, faces = spread(mesh, 1.5 * self.lattice.size)
         moves = np.bincount(faces, self._at(points), len(mesh.faces))
         return without_islands(mesh, moves >= 0.5 * np.bincount(faces, minlength=len(mesh.faces)), self.island)
 
@@ -73,10 +75,11 @@ class ByPlace:
         """Whether each point is at a moving place; at one that was not looked at, as at the nearest that was."""
         from scipy.spatial import cKDTree
 
-        number = self.places.of(points)
-        unknown = np.flatnonzero(number < 0)
+        asked = self.lattice.keys(points)
+        number = np.minimum(np.searchsorted(self.keys, asked), len(self.keys) - 1)
+        unknown = np.flatnonzero(self.keys[number] != asked)
         if len(unknown):
-            number[unknown] = cKDTree(self.places.middles).query(points[unknown])[1]
+            number[unknown] = cKDTree(self.lattice.centers(self.keys)).query(points[unknown])[1]
         return self.chosen[number]
 
 
@@ -104,11 +107,11 @@ def segment(frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByPla
     chosen = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(most, len(frames)))})
     chosen = [number for number in chosen if not frames[number].is_empty]
     if not chosen:
-        return ByPlace(Places.nowhere(), np.zeros(0, bool), options.island)
+        return ByPlace(Lattice(np.zeros(3), 1.0), np.zeros(0, np.int64), np.zeros(0, bool), options.island)
     views = place_views(_Some(frames, chosen[:: max(1, len(chosen) // _PROBES)]), options.views)
     lattice = _lattice(frames, chosen)
     places = find_places((frames[number] for number in chosen), views, lattice, options.places)
-    return ByPlace(places, moving_places(places, options.cut), options.island)
+    return ByPlace(lattice, places.keys, moving_places(places, options.cut), options.island)
 
 
 def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
@@ -133,9 +136,7 @@ def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) ->
     return chosen | (small & ~alone)
 
 
-def _pieces(
-    mesh: Mesh, chosen: Bool[np.ndarray, " F"], areas: Float64[np.ndarray, " F"]
-) -> Float64[np.ndarray, " F"]:
+def _pieces(mesh: Mesh, chosen: Bool[np.ndarray, " F"], areas: Float64[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
     """The area of the connected chosen faces that each chosen face belongs to; infinite for the others."""
     found = np.full(len(mesh.faces), np.inf)
     label = components(mesh.faces[chosen], len(mesh.vertices))[mesh.faces[chosen][:, 0]]

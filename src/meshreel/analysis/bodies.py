@@ -1,0 +1,152 @@
+"""The bodies in a run of frames: connected pieces of what moves, followed over time (paper, section 3.3).
+
+In: the moving part of each frame. Out: bodies, each with a mesh in every frame, empty where it is not there. Pieces
+that touch in any frame are one body for the whole run; bits beside a body are its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from ..errors import InputError
+from ..geometry.topology import components, concatenate, drop_unreferenced, face_normals
+from ..geometry.voxels import Lattice, around, distinct, spread
+from ..types import Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class BodyOptions:
+    """What counts as one body."""
+
+    cell: float = 3.0  # cells of the scene: pieces of neighbour frames that come as near as this are one
+    least: float = 0.1  # m^2: pieces that never have as much surface are bits
+    beside: float = 0.5  # m: a bit no farther from a body belongs to it
+    lasts: int = 5  # frames; a bit on its own that is there for fewer is dropped
+
+    def __post_init__(self) -> None:
+        if not self.cell >= 1 or not min(self.least, self.beside) >= 0 or self.lasts < 1:
+            raise InputError(
+                f"bodies: cell {self.cell:g}, least {self.least:g} m^2, beside {self.beside:g} m, lasts {self.lasts}: "
+                "give >= 1, >= 0, >= 0, >= 1"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """The bodies of a run of frames, and what belongs to none."""
+
+    meshes: list[list[Mesh]]  # of each body, of each frame
+    dropped: int  # faces of bits that were only there for a moment
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """A connected piece of one frame."""
+
+    frame: int
+    mesh: Mesh
+    area: float  # m^2
+    cells: Int64[np.ndarray, " C"]  # keys of the coarse cells it lies in
+
+
+def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:
+    """The bodies in what moves of consecutive frames; `size` is that of the scene's cells, m."""
+    lattice = Lattice(np.zeros(3), options.cell * size)
+    pieces = [piece for frame, mesh in enumerate(moving) for piece in _pieces(frame, mesh, lattice)]
+    label = _linked(pieces)
+    clusters = [np.flatnonzero(label == number) for number in range(label.max(initial=-1) + 1)]
+    large = [c for c in clusters if max(pieces[k].area for k in c) >= options.least]
+    bodies: list[list[list[Mesh]]] = [[[] for _ in moving] for _ in large]
+    for body, cluster in zip(bodies, large, strict=True):
+        for k in cluster:
+            body[pieces[k].frame].append(pieces[k].mesh)
+    dropped = 0
+    for cluster in (c for c in clusters if max(pieces[k].area for k in c) < options.least):
+        dropped += _given(bodies, [pieces[k] for k in cluster], len(moving), options)
+    return Bodies([[concatenate(meshes) for meshes in body] for body in bodies], dropped)
+
+
+def same_bodies(before: Sequence[Mesh], now: Sequence[Mesh], size: float, options: BodyOptions) -> list[int]:
+    """For each mesh of a frame the number, among those of the frame before, of the one it continues; -1 for none.
+
+    Each is continued by one at most: by that which shares most cells with it.
+    """
+    lattice = Lattice(np.zeros(3), options.cell * size)
+    cells = [[around(_cells(mesh, lattice)) for mesh in meshes] for meshes in (before, now)]
+    shared = np.array([[len(np.intersect1d(a, b, assume_unique=True)) for a in cells[0]] for b in cells[1]])
+    found = [-1] * len(now)
+    while shared.size and shared.max() > 0:
+        new, old = np.unravel_index(int(shared.argmax()), shared.shape)
+        found[int(new)] = int(old)
+        shared[new, :] = shared[:, old] = 0
+    return found
+
+
+def _pieces(frame: int, mesh: Mesh, lattice: Lattice) -> list[_Piece]:
+    if mesh.is_empty:
+        return []
+    label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
+    areas = np.bincount(label, face_normals(mesh)[1])
+    found = []
+    for number in np.flatnonzero(np.bincount(label)):
+        part = drop_unreferenced(Mesh(mesh.vertices, mesh.faces[label == number]))
+        found.append(_Piece(frame, part, float(areas[number]), _cells(part, lattice)))
+    return found
+
+
+def _cells(mesh: Mesh, lattice: Lattice) -> Int64[np.ndarray, " C"]:
+    return distinct(lattice.keys(spread(mesh, lattice.size)[0]))
+
+
+def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
+    """A number for each piece: the same for those that come near each other in frames one behind the other."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    rows, columns = [], []
+    start = 0
+    while start < len(pieces):
+        frame = pieces[start].frame
+        here = [k for k in range(start, len(pieces)) if pieces[k].frame == frame]
+        later = [k for k in range(start, len(pieces)) if pieces[k].frame == frame + 1]
+        keys = np.concatenate([pieces[k].cells for k in later] or [np.zeros(0, np.int64)])
+        owner = np.repeat(later, [len(pieces[k].cells) for k in later])
+        for k in here:
+            near = np.isin(keys, around(pieces[k].cells))
+            for other in np.unique(owner[near]):
+                rows.append(k)
+                columns.append(int(other))
+        start = here[-1] + 1
+    graph = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(len(pieces), len(pieces)))
+    return connected_components(graph, directed=False)[1]
+
+
+def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, options: BodyOptions) -> int:
+    """Gives each bit to the nearest body of its frame; far from all, bits that last become a body. Faces dropped."""
+    alone = []
+    for bit in bits:
+        near = [(_gap(bit.mesh, body[bit.frame]), number) for number, body in enumerate(bodies) if body[bit.frame]]
+        gap, number = min(near, default=(np.inf, -1))
+        if gap <= options.beside:
+            bodies[number][bit.frame].append(bit.mesh)
+        else:
+            alone.append(bit)
+    if len({bit.frame for bit in alone}) < options.lasts:
+        return sum(len(bit.mesh.faces) for bit in alone)
+    body: list[list[Mesh]] = [[] for _ in range(frames)]
+    for bit in alone:
+        body[bit.frame].append(bit.mesh)
+    bodies.append(body)
+    return 0
+
+
+def _gap(mesh: Mesh, others: list[Mesh]) -> float:
+    """The distance of a bit's nearest vertex to the nearest vertex of others, m."""
+    from scipy.spatial import cKDTree
+
+    points: Float64[np.ndarray, "N 3"] = np.concatenate([other.vertices for other in others])
+    return float(cKDTree(points).query(mesh.vertices)[0].min())

@@ -1,0 +1,42 @@
+"""Whether a sequence is a scene: most of what is seen in one frame is in the same place in the others, and it is open.
+
+A body on its own moves, or is closed: where one stands as still as a room does, there is nothing to be won by taking it
+apart.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.topology import unique_edges
+from ...geometry.voxels import Lattice, around, distinct, spread
+from ...types import Frames, Mesh
+
+PROBES = 6  # frames, spread over the sequence
+SHARE = 0.6  # of a frame's surface that stands still in a scene
+_FINEST = 400  # cells along a frame's diagonal
+
+
+def is_scene(frames: Frames) -> bool:
+    """True where there is a background worth the name; False for empty and single frames."""
+    numbers = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(PROBES, len(frames)))})
+    meshes = [mesh for number in numbers if not (mesh := frames[number]).is_empty]
+    if len(meshes) < 2 or not all(_is_open(mesh) for mesh in meshes):
+        return False
+    lattice = Lattice(np.zeros(3), _cell(meshes[0]))
+    cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
+    wide = [around(own) for own in cells]
+    still = [np.mean([np.isin(own, other).mean() for other in wide]) for own in cells]
+    return float(np.median(still)) >= SHARE
+
+
+def _is_open(mesh: Mesh) -> bool:
+    edges, face_edges = unique_edges(mesh.faces)
+    return bool((np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1).any())
+
+
+def _cell(mesh: Mesh) -> float:
+    """About the length of an edge, m."""
+    pairs = mesh.vertices[unique_edges(mesh.faces)[0]]
+    edge = float(np.median(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)))
+    return max(edge, mesh.diagonal / _FINEST)
