@@ -146,5 +146,5 @@ def test_points_are_told_apart_by_their_keys():
 
 
 def test_an_unknown_experiment_is_told():
-    with pytest.raises(InputError, match="known: ablation, layers, targets"):
+    with pytest.raises(InputError, match="known: ablation, layers, scenes, targets"):
         experiment("all")

@@ -26,6 +26,7 @@ METRICS = (
 FIRST = "targets"  # the experiment of rows that do not name theirs
 REFERENCED = ("d2_psnr_paper",)  # what reference curves have
 
+WIDEST = 5  # panels in a row
 RATES = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20)  # Mbps, where the plots have ticks
 
 
@@ -62,10 +63,14 @@ def plot_curves(measured: Sequence[Row], sequence: str, chosen: ModuleType, path
     floors = chosen.floors([r for r in measured if r["sequence"] == sequence]) if hasattr(chosen, "floors") else {}
     metrics = getattr(chosen, "METRICS", METRICS)
     metrics = [(key, label) for key, label in metrics if any(value(row, key) is not None for row in rows)]
-    figure = Figure(figsize=(5 * len(metrics), 4.6), layout="constrained")
+    across = len(metrics) if len(metrics) <= WIDEST else -(-len(metrics) // 2)
+    down = -(-len(metrics) // across)
+    figure = Figure(figsize=(5 * across, 4.6 * down), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(1, len(metrics), squeeze=False)[0]
-    for panel, (key, label) in zip(panels, metrics, strict=True):
+    panels = figure.subplots(down, across, squeeze=False).reshape(-1)
+    for panel in panels[len(metrics) :]:
+        panel.set_axis_off()
+    for panel, (key, label) in zip(panels, metrics, strict=False):
         for codec in dict.fromkeys(map(curve_of, rows)):
             own = [(row["mbps"], value(row, key)) for row in rows if curve_of(row) == codec]
             points = sorted(point for point in own if point[1] is not None)

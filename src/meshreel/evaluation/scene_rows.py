@@ -22,7 +22,6 @@ from ..types import Mesh
 from .codec import Codec
 from .codecs import make_codec
 from .codecs.scenes import BackgroundDracoCodec
-from .fresh import peak_rss_mb
 from .peers import run_fresh
 from .rows import Point, Row
 from .scenes import SceneData, SceneFrames, open_scene
@@ -57,13 +56,11 @@ def measure_scene(point: Point, data: Path, cache: Path | None) -> Row:
 
 
 def _intra(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
-    """An anchor's row: the frames that are measured are those that are coded."""
-    start = time.process_time()
+    """An anchor's row: the frames that are measured are those that are coded. No times: what it decimates is kept."""
     data = codec.encode(SceneFrames(scene, numbers))
-    seconds = (time.process_time() - start) / len(numbers)
     once = codec.background_bytes(data) if isinstance(codec, BackgroundDracoCodec) else 0
     rate = _rate(len(data), once, len(numbers), scene.meshes.frame_rate)
-    return rate | {"encode_s": seconds} | _metrics(scene, numbers, codec.decode(data))
+    return rate | _metrics(scene, numbers, codec.decode(data))
 
 
 def _stream(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
@@ -74,7 +71,7 @@ def _stream(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
     video = open_video(data)
     once = sum(chunk.size for chunk in video.reader.chunks if chunk.kind == ChunkKind.STATIC)
     row = _rate(len(data), once, len(scene.meshes), scene.meshes.frame_rate)
-    row |= {"encode_s": seconds, "encode_peak_rss_mb": peak_rss_mb(), "decode": _decoding(data)}
+    row |= {"encode_s": seconds, "decode": _decoding(data)}
     return row | _metrics(scene, numbers, [video[number] for number in numbers])
 
 

@@ -16,7 +16,7 @@ from ..capture.simulate import SceneFrame
 from ..errors import InputError
 from ..types import Mesh
 
-Labels = Bool[np.ndarray, " F"]  # True: the face moves
+Labels = Bool[np.ndarray, " _"]  # True: the face moves; as many as the frame has faces
 
 
 @dataclass(frozen=True, slots=True)
