@@ -20,7 +20,6 @@ import numpy as np
 from .analysis.segment.probe import is_scene
 from .analysis.survey import Survey, survey
 from .choice import Quality
-from .coding.background import decode_background
 from .container.writer import ReelWriter
 from .decoder import open as open_video
 from .format.layout import Form, Header
@@ -52,8 +51,7 @@ class GroupSummary:
 class SceneSummary:
     """What is left of a scene's parts."""
 
-    background: int  # bytes, of all its copies
-    faces: int  # of the background, as decoded
+    background: int  # bytes, of all its states
     noise: float  # m, RMS distance of a frame's still surface from the background
     psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
     tracks: int
@@ -120,22 +118,20 @@ def _encode_scene(
     seen = survey(sequence, stages, cleaned=False)
     parts = take_apart(sequence, seen, options, stages)
     seen = replace(seen, scale=parts.unit)
-    static = b"" if parts.background.is_empty else encode_static(parts, seen, options.background)
-    refresh = options.background.refresh
-    copies = range(0, len(sequence), len(sequence) if refresh is None else max(1, round(refresh * sequence.frame_rate)))
+    states = encode_static(parts, seen, len(sequence), sequence.frame_rate, options.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
         found = list(encode_bodies(sequence, seen, parts, options, executor, stages))
-        groups, shown = list[GroupSummary](), list[int]()
+        groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
         for each in sorted(found, key=lambda each: (each.first_frame, each.track)):
-            if static and each.track == 0 and len(shown) < len(copies) and each.first_frame >= copies[len(shown)]:
-                shown.append(writer.add_static(static))
-            groups.append(_added(writer, each, shown[-1:], parts.unit))
+            while waiting and waiting[0].frame <= each.first_frame:
+                state = waiting.popleft()
+                static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
+            groups.append(_added(writer, each, static, parts.unit))
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
         writer.header = make_header(sequence.frame_rate, seen, metadata)
-    faces = len(decode_background(static).faces) if static else 0
     psnr = _measured(sequence, path, seen.diagonal)
-    scene = SceneSummary(len(static) * len(shown), faces, parts.noise, psnr, max(group.track for group in groups) + 1)
-    return Summary(path.stat().st_size, tuple(groups), _warnings(seen), scene)
+    size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
+    return Summary(path.stat().st_size, tuple(groups), _warnings(seen), SceneSummary(size, parts.noise, psnr, tracks))
 
 
 def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:

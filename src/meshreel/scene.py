@@ -10,7 +10,7 @@ quality means the same for a person in a room as for one alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -23,7 +23,7 @@ from .analysis.bodies import find_bodies, same_bodies
 from .analysis.segment.scene import ByMasks, ByPlace, segment
 from .analysis.survey import Survey
 from .choice import NO_ERROR
-from .coding.background import decode_background, encode_background
+from .coding.background import decode_background, decode_change, encode_background, encode_change
 from .coding.intra import encode_empty
 from .format.layout import Form
 from .geometry.decimate import decimate
@@ -35,7 +35,17 @@ from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_wi
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 PROBES = 8  # frames, at most, that what moves is measured in
+FINEST = 1e-4  # spacing of the background's lattice at least, normalised
 OUTLIER = 3.0  # cells: a static face farther from the background is no noise
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """From a frame on, the room is another."""
+
+    frame: int
+    gone: Bool[np.ndarray, " P"]  # places of the segmentation where something is no more
+    came: Mesh  # m, what has come to stand
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +53,20 @@ class Parts:
     """What does not change over a scene's segments."""
 
     segmentation: ByPlace | ByMasks
-    background: Mesh  # m; empty where nothing stands still
+    background: Mesh  # m, as in the first frame; empty where nothing stands still
+    changes: list[Change]
     cell: float  # m, of the scene's mesh
     noise: float  # m, RMS distance of a frame's still surface from the background
     unit: float  # m, diagonal of the largest body that moves; of the scene where nothing does
+
+
+@dataclass(frozen=True, slots=True)
+class Static:
+    """A state of the background from a frame on: whole, or a patch of the one before."""
+
+    frame: int
+    payload: bytes
+    is_patch: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,26 +83,76 @@ def take_apart(sequence: MeshSequence, seen: Survey, options: EncoderOptions, st
     segmentation = segment(sequence, options.segment)
     stages.add("segment", len(sequence))
     cell = segmentation.lattice.size
-    still = _Still(sequence, segmentation, _spread(len(sequence), options.background.frames))
+    numbers = _spread(len(sequence), options.background.frames)
+    still = _Some(sequence, numbers, lambda number, mesh: _first_state(segmentation, number, mesh))
     background = fuse_background(still, cell, options.background)
+    changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
     stages.add("background", len(sequence))
     noise, sizes = _measured(sequence, segmentation, background, OUTLIER * cell)
-    return Parts(segmentation, background, cell, noise, float(np.median(sizes)) if sizes else seen.diagonal)
+    unit = float(np.median(sizes)) if sizes else seen.diagonal
+    return Parts(segmentation, background, changes, cell, noise, unit)
 
 
-def encode_static(parts: Parts, seen: Survey, options: BackgroundOptions) -> bytes:
-    """The background's payload: as few faces as leave it about as far from the fused surface as noise does."""
-    place = Placement(parts.unit, tuple(seen.center))
-    step = max(options.lattice * parts.noise / parts.unit, 1e-4)
-    normalised = Mesh((parts.background.vertices - seen.center) / parts.unit, parts.background.faces)
-    payload = b""
+def encode_static(
+    parts: Parts, seen: Survey, count: int, frame_rate: float, options: BackgroundOptions
+) -> list[Static]:
+    """The states of the background in `count` frames: as few faces as are about as near to it as noise is.
+
+    A whole one at the start and, where it is to be refreshed, again; and a patch for each change of the room.
+    """
+    if parts.background.is_empty:
+        return []
+    step = max(options.lattice * parts.noise / parts.unit, FINEST)
+    most = options.coarse * parts.noise / parts.unit + FINEST / 10
+    payload, state = _coded(_normalised(parts.background, parts, seen), most, step)
+    changes = {change.frame: change for change in parts.changes}
+    found = [Static(0, payload, False)]
+    for frame in sorted({*changes, *refreshes(count, frame_rate, options)} - {0}):
+        if change := changes.get(frame):
+            assert isinstance(parts.segmentation, ByPlace)  # masks know of no changes
+            before, place = state, Placement(parts.unit, tuple(seen.center))
+            gone = parts.segmentation.faces_at(place.of(before), change.gone)
+            came = _coded(_normalised(change.came, parts, seen), most, step)[1]
+            payload = encode_change(before, gone, came, step)
+            state = decode_change(payload, before)
+            found.append(Static(frame, payload, True))
+        else:
+            found.append(Static(frame, encode_background(state, step), False))
+    return found
+
+
+def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> range:
+    """The frames at which the background is sent, whole, the first among them."""
+    return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
+
+
+def _first_state(segmentation: ByPlace, number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+    """The faces of a frame that are part of the room as it is in the first frame."""
+    return segmentation.faces_at(mesh, ~segmentation.chosen | (segmentation.rest.until > number))
+
+
+def _change(sequence: MeshSequence, segmentation: ByPlace, frame: int, options: EncoderOptions) -> Change:
+    came = segmentation.rest.since == frame
+    numbers = [frame + number for number in _spread(len(sequence) - frame, options.background.frames)]
+    later = _Some(sequence, numbers, lambda _, mesh: segmentation.faces_at(mesh, came))
+    mesh = fuse_background(later, segmentation.lattice.size, options.background) if came.any() else Mesh.empty()
+    return Change(frame, segmentation.rest.until == frame, mesh)
+
+
+def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
+    """The payload of a mesh with as few vertices as leave it within an RMS distance, and that as decoded."""
+    if mesh.is_empty:
+        return b"", mesh
     for fraction in (*FRACTIONS, 1.0):
-        small = decimate(normalised, max(4, round(fraction * len(normalised.vertices))))
-        payload = encode_background(small, step)
-        decoded = decode_background(payload, place)
-        if not decoded.is_empty and _apart(parts.background, decoded) <= options.coarse * parts.noise + 1e-6:
+        payload = encode_background(decimate(mesh, max(4, round(fraction * len(mesh.vertices)))), step)
+        decoded = decode_background(payload)
+        if not decoded.is_empty and _apart(mesh, decoded) <= most:
             break
-    return payload
+    return payload, decoded
+
+
+def _normalised(mesh: Mesh, parts: Parts, seen: Survey) -> Mesh:
+    return Mesh((mesh.vertices - seen.center) / parts.unit, mesh.faces)
 
 
 def encode_bodies(
@@ -98,7 +168,7 @@ def encode_bodies(
     options = replace(options, noise=noise)
     normalised = Survey(seen.low, seen.high, (), scale=parts.unit)
     tracks = _Tracks(parts.cell, options)
-    for frames in _segments(len(sequence), sequence.frame_rate, options):
+    for frames in _segments(len(sequence), sequence.frame_rate, parts, options):
         moving = [_moving(sequence[number], parts.segmentation, number) for number in frames]
         jobs = []
         for track, meshes in tracks.of(moving):
@@ -118,16 +188,13 @@ def _encoded(job: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
     return list((encode_segment if options.form == Form.LAYERS else encode_window)(frames, options))
 
 
-def _segments(count: int, frame_rate: float, options: EncoderOptions) -> Iterator[range]:
-    """Runs of frames that are coded on their own, of even lengths, cut also where the background is sent again."""
+def _segments(count: int, frame_rate: float, parts: Parts, options: EncoderOptions) -> Iterator[range]:
+    """Runs of frames that are coded on their own, of even lengths, cut also where the background is another."""
     longest = max(1, round(options.key_interval * frame_rate))
-    refresh = options.background.refresh
-    every = count if refresh is None else max(1, round(refresh * frame_rate))
-    for start in range(0, count, every):
-        stop = min(start + every, count)
-        parts = -(-(stop - start) // longest)
-        cuts = [start + (stop - start) * k // parts for k in range(parts + 1)]
-        yield from (range(a, b) for a, b in pairwise(cuts))
+    others = {change.frame for change in parts.changes} | set(refreshes(count, frame_rate, options.background))
+    for start, stop in pairwise(sorted({0, count} | others)):
+        pieces = -(-(stop - start) // longest)
+        yield from (range(a, b) for a, b in pairwise(start + (stop - start) * k // pieces for k in range(pieces + 1)))
 
 
 def _runs(meshes: Sequence[Mesh], normalised: Survey, options: EncoderOptions) -> list[range]:
@@ -168,11 +235,13 @@ class _Tracks:
                 yield TrackGroup(track, start, EncodedGroup(Form.EMPTY, count, encode_empty(), (), NO_ERROR))
 
 
-class _Still(Frames):
-    """What stands still of some frames."""
+class _Some(Frames):
+    """Chosen faces of some frames."""
 
-    def __init__(self, sequence: Frames, segmentation: ByPlace | ByMasks, numbers: Sequence[int]) -> None:
-        self._sequence, self._segmentation, self._numbers = sequence, segmentation, numbers
+    def __init__(
+        self, sequence: Frames, numbers: Sequence[int], choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]]
+    ) -> None:
+        self._sequence, self._numbers, self._choose = sequence, numbers, choose
 
     def __len__(self) -> int:
         return len(self._numbers)
@@ -180,7 +249,7 @@ class _Still(Frames):
     def __getitem__(self, index: int) -> Mesh:
         number = self._numbers[index]
         mesh = self._sequence[number]
-        return _part(mesh, ~self._segmentation.moving(number, mesh))
+        return _part(mesh, self._choose(number, mesh))
 
 
 def _moving(mesh: Mesh, segmentation: ByPlace | ByMasks, number: int) -> Mesh:

@@ -14,6 +14,7 @@ from ..types import Mesh
 
 _SIDE = 1 << 20  # cells along an axis that a key has room for, half of them on either side of the origin
 _HALF = _SIDE // 2
+_STRIDES = np.array([_SIDE * _SIDE, _SIDE, 1])
 _MOST_PARTS = 512  # of a face's side: more is beyond what a scene of one scale has
 _AROUND = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)])
 
@@ -41,7 +42,7 @@ class Lattice:
 
 def moved(keys: Int64[np.ndarray, " P"], offset: Int64[np.ndarray, " 3"]) -> Int64[np.ndarray, " P"]:
     """The cells so many cells farther along each axis."""
-    return keys + _key(offset)
+    return keys + int(_STRIDES @ offset)
 
 
 def distinct(keys: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " P"]:
@@ -96,5 +97,5 @@ def _middles(count: int) -> Float64[np.ndarray, "M 3"]:
     return np.column_stack([1 - first - second, first, second])
 
 
-def _key(cells: Int64[np.ndarray, "... 3"]) -> Int64[np.ndarray, "..."]:
-    return (cells[..., 0] * _SIDE + cells[..., 1]) * _SIDE + cells[..., 2]
+def _key(cells: Int64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
+    return cells @ _STRIDES

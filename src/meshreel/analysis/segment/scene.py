@@ -20,10 +20,11 @@ from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays, Seen
 from ...geometry.topology import components, face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
-from ...types import Frames, Mesh
+from ...types import Frames, Mesh, MeshSequence
 from .cut import CutOptions, moving_places
 from .masks import Masker
 from .places import PlacesOptions, find_places
+from .settle import Rest, SettleOptions, find_rest
 from .views import ViewsOptions, place_views
 from .votes import Votes
 
@@ -37,6 +38,7 @@ class SegmentOptions:
     views: ViewsOptions = field(default_factory=ViewsOptions)
     places: PlacesOptions = field(default_factory=PlacesOptions)
     cut: CutOptions = field(default_factory=CutOptions)
+    settle: SettleOptions = field(default_factory=SettleOptions)
     threshold: float = 0.3  # the paper's tau: a low one, and clean-up, miss less than a high one
     island: float = 0.01  # m^2: connected faces with less area take the label of what is around them
 
@@ -60,19 +62,24 @@ class ByPlace:
     lattice: Lattice
     keys: Int64[np.ndarray, " P"]  # of the places, sorted
     chosen: Bool[np.ndarray, " P"]
+    rest: Rest  # when what is there belongs to the room after all
     island: float  # m^2
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """By where the faces are, whatever the frame's number."""
-        del frame
-        if mesh.is_empty or not self.chosen.any():
+        """By where the faces are; the frame's number matters where the room changes."""
+        chosen = self.chosen & (frame >= self.rest.until) & (frame < self.rest.since)
+        return without_islands(mesh, self.faces_at(mesh, chosen), self.island)
+
+    def faces_at(self, mesh: Mesh, chosen: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " F"]:
+        """The faces most of whose surface is at chosen places; where nobody looked, the nearest place counts."""
+        if mesh.is_empty or not chosen.any():
             return np.zeros(len(mesh.faces), bool)
         points, faces = spread(mesh, 1.5 * self.lattice.size)
-        moves = np.bincount(faces, self._at(points), len(mesh.faces))
-        return without_islands(mesh, moves >= 0.5 * np.bincount(faces, minlength=len(mesh.faces)), self.island)
+        there = np.bincount(faces, chosen[self._place(points)], len(mesh.faces))
+        return there >= 0.5 * np.bincount(faces, minlength=len(mesh.faces))
 
-    def _at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Whether each point is at a moving place; at one that was not looked at, as at the nearest that was."""
+    def _place(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
+        """The number of the place that each point is at, or of the nearest."""
         from scipy.spatial import cKDTree
 
         asked = self.lattice.keys(points)
@@ -80,7 +87,7 @@ class ByPlace:
         unknown = np.flatnonzero(self.keys[number] != asked)
         if len(unknown):
             number[unknown] = cKDTree(self.lattice.centers(self.keys)).query(points[unknown])[1]
-        return self.chosen[number]
+        return number
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,17 +108,21 @@ class ByMasks:
         return without_islands(mesh, moves, self.options.island)
 
 
-def segment(frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByPlace:
+def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByPlace:
     """What moves in a scene, by geometric change over the whole of it; at most so many frames are looked at."""
     most = options.places.frames
     chosen = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(most, len(frames)))})
     chosen = [number for number in chosen if not frames[number].is_empty]
     if not chosen:
-        return ByPlace(Lattice(np.zeros(3), 1.0), np.zeros(0, np.int64), np.zeros(0, bool), options.island)
+        return ByPlace(
+            Lattice(np.zeros(3), 1.0), np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), options.island
+        )
     views = place_views(_Some(frames, chosen[:: max(1, len(chosen) // _PROBES)]), options.views)
     lattice = _lattice(frames, chosen)
     places = find_places((frames[number] for number in chosen), views, lattice, options.places)
-    return ByPlace(lattice, places.keys, moving_places(places, options.cut), options.island)
+    moving = moving_places(places, options.cut)
+    rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
+    return ByPlace(lattice, places.keys, moving, rest, options.island)
 
 
 def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
