@@ -32,7 +32,7 @@ class FusedOptions:
     noise: float = 1.0  # RMS distances that a cell is wide at least: less resolves noise
     spacing: float = 0.5  # median edge lengths of the frames that it is wide at least: less resolves nothing
     reach: float = 1.5  # cells to a frame's surface within which the frame agrees
-    agree: float = 0.25  # share of the frames that must agree, and two of them at least
+    agree: float = 0.18  # share of the frames that must agree, and two of them at least
     smallest: float = 0.02  # connected bits with less than this share of the largest one's faces are dropped
 
     def __post_init__(self) -> None:
