@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...geometry.topology import unique_edges
+from ...geometry.topology import drop_unreferenced, unique_edges
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Frames, Mesh
+from ..survey import check
 
 PROBES = 6  # frames, spread over the sequence
 SHARE = 0.6  # of a frame's surface that stands still in a scene
@@ -18,12 +19,20 @@ _FINEST = 400  # cells along a frame's diagonal
 
 
 def is_scene(frames: Frames) -> bool:
-    """True where there is a background worth the name; False for empty and single frames."""
+    """True where there is a background worth the name; False for empty and single frames.
+
+    Raises InputError for frames that cannot be used, as far as they are looked at.
+    """
     numbers = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(PROBES, len(frames)))})
-    meshes = [mesh for number in numbers if not (mesh := frames[number]).is_empty]
+    meshes = []
+    for number in numbers:
+        check(mesh := frames[number], f"frame {number}")
+        meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
     if len(meshes) < 2 or not all(_is_open(mesh) for mesh in meshes):
         return False
-    lattice = Lattice(np.zeros(3), _cell(meshes[0]))
+    lattice = Lattice.near(meshes[0], _cell(meshes[0]))
+    if lattice.size == 0:
+        return False
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(own) for own in cells]
     still = [np.mean([np.isin(own, other).mean() for other in wide]) for own in cells]
