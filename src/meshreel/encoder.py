@@ -11,7 +11,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,8 @@ from .choice import Quality
 from .container.writer import ReelWriter
 from .decoder import open as open_video
 from .format.layout import Form, Header
-from .geometry.nearest import Surface
+from .geometry.nearest import distances
+from .geometry.topology import drop_unreferenced
 from .layered import encode_segment
 from .metrics.distance import PSNR_CEILING
 from .presets import preset_options
@@ -115,31 +116,31 @@ def _encode_scene(
     sequence: MeshSequence, path: Path, options: EncoderOptions, executor: Executor | None, stages: Stages
 ) -> Summary:
     """As `encode`, for a scene with a background."""
-    seen = survey(sequence, stages, cleaned=False)
-    parts = take_apart(sequence, seen, options, stages)
-    seen = replace(seen, scale=parts.unit)
-    states = encode_static(parts, seen, len(sequence), sequence.frame_rate, options.background)
+    parts = take_apart(sequence, survey(sequence, stages, cleaned=False), options, stages)
+    seen = parts.seen
+    states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        found = list(encode_bodies(sequence, seen, parts, options, executor, stages))
+        coded = encode_bodies(sequence, parts, options, executor, stages)
         groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
-        for each in sorted(found, key=lambda each: (each.first_frame, each.track)):
+        for each in coded.groups:
             while waiting and waiting[0].frame <= each.first_frame:
                 state = waiting.popleft()
                 static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
-            groups.append(_added(writer, each, static, parts.unit))
+            with_static = each.track == 0 and not seen.is_bare(each.first_frame)
+            groups.append(_added(writer, each, static if with_static else [], seen.unit))
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     psnr = _measured(sequence, path, seen.diagonal)
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
-    return Summary(path.stat().st_size, tuple(groups), _warnings(seen), SceneSummary(size, parts.noise, psnr, tracks))
+    scene = SceneSummary(size, parts.noise, psnr, tracks)
+    return Summary(path.stat().st_size, tuple(groups), (*_warnings(seen), *_lost(coded.dropped)), scene)
 
 
 def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
-    """Writes a group of a track; that of the first names the background of its frames."""
+    """Writes a group of a track, which names the background of its frames where it is given."""
     group, track, last = each.group, each.track, writer.last_of(each.track)
     before = [last] if group.predicted and last is not None else []
-    shown = static if track == 0 else []
-    writer.add_group(each.first_frame, group.frame_count, group.payload, group.layers, (*shown, *before), track)
+    writer.add_group(each.first_frame, group.frame_count, group.payload, group.layers, (*static, *before), track)
     key = None if group.key is None else each.first_frame + group.key
     quality = group.quality.scaled(unit)
     return GroupSummary(group.form, group.frame_count, len(group.payload), quality, group.predicted, key, track)
@@ -151,12 +152,12 @@ def _measured(sequence: MeshSequence, path: Path, diagonal: float) -> float:
         numbers = sorted({round(k) for k in np.linspace(0, len(sequence) - 1, min(MEASURED, len(sequence)))})
         found = []
         for number in numbers:
-            points, shown = sequence[number].vertices, video[number]
+            points, shown = drop_unreferenced(sequence[number]).vertices, video[number]
             if not len(points) or shown.is_empty:
                 found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
                 continue
-            gaps = Surface(shown).closest(points).points - points
-            found.append(10 * math.log10(diagonal**2 / max(float((gaps**2).sum(axis=1).mean()), 1e-30)))
+            gap = float((distances(points, shown) ** 2).mean())
+            found.append(10 * math.log10(diagonal**2 / max(gap, 1e-30)))
     return min(float(np.mean(found)), PSNR_CEILING)
 
 
@@ -169,6 +170,13 @@ def _warnings(seen: Survey) -> tuple[str, ...]:
         text = f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)"
         found.append(text)
     return tuple(found)
+
+
+def _lost(faces: int) -> tuple[str, ...]:
+    """What a user must know of bits of a scene that belong to no body."""
+    if not faces:
+        return ()
+    return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:

@@ -51,7 +51,7 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
     if not seeds.any():
         return moving
     middles = places.middles
-    near = np.flatnonzero(_distance(middles, middles[seeds]) <= options.reach)
+    near = np.flatnonzero(_within(middles, middles[seeds], options.reach))
     moves = np.where(share >= options.share / 2, options.evidence * share, 0.0)[near]
     always, around = options.still
     rests = always + around * _around(middles[near], middles[seeds], share[seeds])
@@ -96,10 +96,13 @@ def _links(places: Places, chosen: Int64[np.ndarray, " C"]) -> tuple[Int64[np.nd
     return first[once], second[once]
 
 
-def _distance(points: Float64[np.ndarray, "N 3"], others: Float64[np.ndarray, "M 3"]) -> Float64[np.ndarray, " N"]:
+def _within(
+    points: Float64[np.ndarray, "N 3"], others: Float64[np.ndarray, "M 3"], reach: float
+) -> Bool[np.ndarray, " N"]:
+    """Which points have one of the others within reach; not looking beyond is ten times as fast."""
     from scipy.spatial import cKDTree
 
-    return cKDTree(others).query(points)[0]
+    return cKDTree(others).query(points, distance_upper_bound=np.nextafter(reach, np.inf))[0] <= reach
 
 
 def _around(

@@ -17,8 +17,9 @@ from jaxtyping import Bool, Float64, Int64
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
+from ...geometry.connected import connected_faces
 from ...geometry.raycast import Rays, Seen
-from ...geometry.topology import components, face_normals, unique_edges
+from ...geometry.topology import face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
 from ...types import Frames, Mesh, MeshSequence
 from .cut import CutOptions, moving_places
@@ -139,26 +140,25 @@ def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) ->
 
     A connected piece of the mesh that has one label keeps it if it rests: there is nothing around it.
     """
-    areas = face_normals(mesh)[1]
-    small = _pieces(mesh, chosen, areas) < least
-    chosen = chosen & ~small
-    alone = _whole(mesh, ~chosen)
-    small = _pieces(mesh, ~chosen, areas) < least
-    return chosen | (small & ~alone)
+    moving = chosen.copy()
+    moving[chosen] = _areas(mesh, chosen)[0] >= least
+    if not moving.any():
+        return moving
+    touched = np.zeros(len(mesh.vertices), bool)
+    touched[mesh.faces[moving].reshape(-1)] = True
+    rests = ~moving
+    area, label = _areas(mesh, rests)
+    beside = np.zeros(len(mesh.vertices), bool)  # whether a piece has something that moves around it
+    beside[label[touched[mesh.faces[rests]].any(axis=1)]] = True
+    moving[rests] = (area < least) & beside[label]
+    return moving
 
 
-def _pieces(mesh: Mesh, chosen: Bool[np.ndarray, " F"], areas: Float64[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
-    """The area of the connected chosen faces that each chosen face belongs to; infinite for the others."""
-    found = np.full(len(mesh.faces), np.inf)
-    label = components(mesh.faces[chosen], len(mesh.vertices))[mesh.faces[chosen][:, 0]]
-    found[chosen] = np.bincount(label, areas[chosen])[label] if len(label) else 0.0
-    return found
-
-
-def _whole(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
-    """The faces of connected pieces of the mesh of which every face is chosen."""
-    label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
-    return (np.bincount(label, ~chosen) == 0)[label] if len(label) else np.zeros(0, bool)
+def _areas(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> tuple[Float64[np.ndarray, " C"], Int64[np.ndarray, " C"]]:
+    """The area of the connected chosen faces that each chosen face belongs to, and their label, less than V."""
+    some = Mesh(mesh.vertices, mesh.faces[chosen])
+    label = connected_faces(some.faces, len(some.vertices))
+    return np.bincount(label, face_normals(some)[1])[label], label
 
 
 def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], known: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
@@ -185,13 +185,17 @@ def _probes(count: int) -> list[int]:
 
 
 def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
-    """Cells as large as the frames' edges are long, which is about a voxel of what they were fused on."""
+    """Cells as large as the frames' edges are long, which is about a voxel of what they were fused on.
+
+    Edges without length say nothing; 1 m where there are no others.
+    """
     edges = []
     for number in (chosen[0], chosen[len(chosen) // 2], chosen[-1]):
         mesh = frames[number]
         pairs = mesh.vertices[unique_edges(mesh.faces)[0]]
-        edges.append(np.median(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)))
-    return Lattice(np.zeros(3), float(np.median(edges)))
+        lengths = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)
+        edges += [np.median(lengths[lengths > 0])] if lengths.any() else []
+    return Lattice.near(frames[chosen[0]], float(np.median(edges)) if edges else 1.0)
 
 
 class _Some(Frames):
