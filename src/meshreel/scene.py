@@ -20,7 +20,8 @@ from jaxtyping import Bool, Float64
 
 from .analysis.background import BackgroundOptions, fuse_background
 from .analysis.bodies import find_bodies, same_bodies
-from .analysis.segment.scene import ByMasks, ByPlace, segment
+from .analysis.segment.masks import Masker
+from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
 from .analysis.survey import Survey
 from .choice import NO_ERROR
 from .coding.background import decode_background, encode_background
@@ -58,9 +59,12 @@ class TrackGroup:
     group: EncodedGroup
 
 
-def take_apart(sequence: MeshSequence, seen: Survey, options: EncoderOptions, stages: Stages) -> Parts:
-    """What stands still in a scene, and what is known of what moves."""
-    segmentation = segment(sequence, options.segment)
+def take_apart(
+    sequence: MeshSequence, seen: Survey, options: EncoderOptions, stages: Stages, masker: Masker | None = None
+) -> Parts:
+    """What stands still in a scene, and what is known of what moves; by somebody's masks where there are any."""
+    found = segment(sequence, options.segment) if masker is None else segment_by(masker, sequence, options.segment)
+    segmentation: ByPlace | ByMasks = found
     stages.add("segment", len(sequence))
     cell = segmentation.lattice.size
     still = _Still(sequence, segmentation, _spread(len(sequence), options.background.frames))
@@ -97,8 +101,8 @@ def encode_bodies(
     noise = min(parts.noise / parts.unit, MOST_NOISE) if options.form == Form.LAYERS else 0.0
     options = replace(options, noise=noise)
     normalised = Survey(seen.low, seen.high, (), scale=parts.unit)
-    tracks = _Tracks(parts.cell, options)
-    for frames in _segments(len(sequence), sequence.frame_rate, options):
+    tracks = Tracks(parts.cell, options)
+    for frames in segments(len(sequence), sequence.frame_rate, options):
         moving = [_moving(sequence[number], parts.segmentation, number) for number in frames]
         jobs = []
         for track, meshes in tracks.of(moving):
@@ -118,7 +122,7 @@ def _encoded(job: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
     return list((encode_segment if options.form == Form.LAYERS else encode_window)(frames, options))
 
 
-def _segments(count: int, frame_rate: float, options: EncoderOptions) -> Iterator[range]:
+def segments(count: int, frame_rate: float, options: EncoderOptions) -> Iterator[range]:
     """Runs of frames that are coded on their own, of even lengths, cut also where the background is sent again."""
     longest = max(1, round(options.key_interval * frame_rate))
     refresh = options.background.refresh
@@ -136,7 +140,7 @@ def _runs(meshes: Sequence[Mesh], normalised: Survey, options: EncoderOptions) -
     return sizes.windows(len(meshes) if options.form == Form.LAYERS else options.group_size)
 
 
-class _Tracks:
+class Tracks:
     """Which track each body of a segment is coded in: its own from before, or one that is free."""
 
     def __init__(self, cell: float, options: EncoderOptions) -> None:
