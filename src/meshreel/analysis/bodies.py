@@ -122,7 +122,7 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
                 columns.append(int(other))
         start = here[-1] + 1
     graph = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(len(pieces), len(pieces)))
-    return connected_components(graph, directed=False)[1]
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, options: BodyOptions) -> int:

@@ -81,8 +81,8 @@ def command(
     dynamic_only
         No background is looked for: all may move, and is coded in every frame.
     background_refresh
-        Seconds from one copy of a scene's background in the file to the next, for who joins late; one for all where it is
-        not given.
+        Seconds from one copy of a scene's background in the file to the next, for who joins late. One copy for all
+        frames where it is not given.
     jobs
         Runs of frames that need no other to encode side by side (groups, or what `keyint` cuts); the file is the same.
     """
@@ -94,12 +94,13 @@ def command(
     if dynamic_only and (background_refresh is not None or masking.wanted):
         raise InputError("--dynamic-only looks for no background: leave out --background-refresh, masks and views")
 
+    look = masking.options(preset_options().segment)
+
     def options_at(quality: float) -> EncoderOptions:
         options = preset_options(preset, quality, basis_size, group_size, centers, keyint)
         background = replace(options.background, refresh=background_refresh)
         return replace(options, background=background, segment=look, dynamic_only=dynamic_only)
 
-    look = masking.options(preset_options().segment)
     goal = None if target_psnr is None and target_mbps is None else Goal(target_psnr, target_mbps)
     if goal is not None and quality is not None:
         raise InputError(f"--quality {quality:g} and a target: the target chooses the quality, give one of both")

@@ -62,8 +62,8 @@ class Masking:
     sam3: Path | None = None
     """Masks by SAM3 (extra `sam3`): a folder with its weights, as of facebook/sam3."""
     prompts: tuple[str, ...] = ()
-    """What SAM3 looks for, in words, as --prompts person --prompts dog; of it counts what moves. Common words where none
-    is given."""
+    """What SAM3 looks for, in words, as --prompts person --prompts dog; of it counts what moves. Common words where
+    none is given."""
     device: str = "cpu"
     """Where SAM3 runs, as torch names it: cpu, cuda, cuda:1."""
     views: Path | None = None

@@ -44,14 +44,14 @@ def command(
     """Tell which faces of a scene move, and with which body.
 
     Writes labels/frame_00000.npz and so on: `np.load(file)["moving"]` is True for each face that moves,
-    `np.load(file)["bodies"]` the number of its body from 1 on, 0 for none; faces are the triangles of the frame as it was
-    read and welded. Beside them cameras.json, the views; sheet.png, some frames from some of them, a color a body; and
-    colored/, the same frames as PLY with colors.
+    `np.load(file)["bodies"]` the number of its body from 1 on, 0 for none; faces are the triangles of the frame as it
+    was read and welded. Beside them cameras.json, the views; sheet.png, some frames from some of them, a color a body;
+    and colored/, the same frames as PLY with colors.
 
     Parameters
     ----------
     inputs
-        A directory, a glob, mesh files or an .npz, as `encode` takes them; or the folder of a rig, as `capture` takes it.
+        A directory, a glob, mesh files or an .npz, as `encode` takes them; or a rig's folder, as `capture` takes it.
     output
         The directory to write into; made if needed.
     views_only
@@ -143,24 +143,19 @@ class _Tally:
         shares = [moving / max(faces, 1) for moving, faces in zip(self._moving, self._faces, strict=True)]
         share = sum(self._moving) / max(sum(self._faces), 1)
         told = {"moving_share": share, "moving_share_least": min(shares), "moving_share_most": max(shares)}
-        return {
-            "frames": len(self._faces),
-            "faces": sum(self._faces),
-            "moving": sum(self._moving),
-            **told,
-            "bodies": bodies,
-        }
+        counted = {"frames": len(self._faces), "faces": sum(self._faces), "moving": sum(self._moving)}
+        return counted | told | {"bodies": bodies}
 
 
 class _Preview:
-    """Pictures of some frames; the sheet has those views that see most of what moves."""
+    """Pictures of some frames; the sheet has those views that see most faces that move."""
 
     def __init__(self) -> None:
         self._rows = list[list[UInt8[np.ndarray, "H W 3"]]]()
         self._counts = list[list[int]]()
 
     def add(self, pictures: list[UInt8[np.ndarray, "H W 3"]], moving: list[int]) -> None:
-        """Takes in a frame: a picture a view, and how many of its pixels move."""
+        """Takes in a frame: a picture a view, and how many moving faces it sees."""
         self._rows.append(pictures)
         self._counts.append(moving)
 

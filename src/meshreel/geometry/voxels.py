@@ -41,7 +41,7 @@ class Lattice:
 
 def moved(keys: Int64[np.ndarray, " P"], offset: Int64[np.ndarray, " 3"]) -> Int64[np.ndarray, " P"]:
     """The cells so many cells farther along each axis."""
-    return keys + _key(offset)
+    return keys + _key(offset[None])
 
 
 def distinct(keys: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " P"]:

@@ -84,12 +84,9 @@ def _pack_ply(mesh: Mesh, colors: UInt8[np.ndarray, "V 3"] | None = None) -> byt
     )
     rows = np.empty(len(mesh.faces), dtype=[("size", "u1"), ("corners", "<i4", (3,))])
     rows["size"], rows["corners"] = 3, mesh.faces
-    points = np.empty(
-        len(mesh.vertices), dtype=[("place", dtype, (3,)), ("color", "u1", (0 if colors is None else 3,))]
-    )
-    points["place"] = mesh.vertices
-    if colors is not None:
-        points["color"] = colors
+    shown = np.zeros((len(mesh.vertices), 0), np.uint8) if colors is None else colors
+    points = np.empty(len(mesh.vertices), dtype=[("place", dtype, (3,)), ("color", "u1", shown.shape[1:])])
+    points["place"], points["color"] = mesh.vertices, shown
     return header.encode() + points.tobytes() + rows.tobytes()
 
 

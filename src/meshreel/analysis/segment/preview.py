@@ -23,7 +23,6 @@ _BODIES = (
     (255, 127, 14),
     (148, 103, 189),
     (23, 190, 207),
-    (188, 189, 34),
 )
 _LIGHT = np.array([0.36, 0.80, 0.48])
 _AMBIENT = 0.45  # what no light reaches has this much of its color
@@ -31,7 +30,7 @@ _GAP = 4  # pixels
 
 
 def label_colors(moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"]) -> UInt8[np.ndarray, "F 3"]:
-    """A color a face: light gray where it rests, one of seven by the number of its body, dark gray for bits of none."""
+    """A color a face: light gray where it rests, one of six by the number of its body, dark gray for bits of none."""
     own = np.array(_BODIES, np.uint8)[(bodies.astype(np.int64) - 1) % len(_BODIES)]
     known = np.where((bodies > 0)[:, None], own, np.array(_NO_BODY, np.uint8))
     return np.where(moving[:, None], known, np.array(_RESTS, np.uint8))
@@ -50,11 +49,11 @@ def colored_picture(seen: Seen, view: PinholeCamera, colors: UInt8[np.ndarray, "
 def look_at_labels(
     mesh: Mesh, moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"], views: Sequence[PinholeCamera]
 ) -> tuple[list[UInt8[np.ndarray, "H W 3"]], list[int]]:
-    """A picture a view, and how many of its pixels see what moves."""
+    """A picture a view, and how many faces that move it sees."""
     rays, colors = Rays(mesh), label_colors(moving, bodies)
     looks = [rays.look(view) for view in views]
     pictures = [colored_picture(seen, view, colors) for seen, view in zip(looks, views, strict=True)]
-    return pictures, [int(moving[seen.faces[seen.faces >= 0]].sum()) for seen in looks]
+    return pictures, [int(moving[np.unique(seen.faces[seen.faces >= 0])].sum()) for seen in looks]
 
 
 def sheet(rows: Sequence[Sequence[UInt8[np.ndarray, "H W 3"]]]) -> UInt8[np.ndarray, "Y X 3"]:

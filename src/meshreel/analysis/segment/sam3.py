@@ -54,8 +54,8 @@ class Sam3Masks:
         self._known: dict[int, UInt8[np.ndarray, " B"]] = {}
 
     def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
-        """Takes note of a frame; frames come in order from 0 on, all before the first masks. Later ones are known."""
-        if self._moving is not None:
+        """Takes note of a frame, once; frames come in order from 0 on, all before the first masks."""
+        if self._moving is not None or frame < len(self._pictures):
             return
         assert frame == len(self._pictures), "frames are observed in order, before masks"
         number = self._reference(views)
@@ -97,8 +97,8 @@ class _Tracker:
     """SAM3's video model: what some words name, found in every picture of a video and followed through it."""
 
     def __init__(self, path: Path, prompts: tuple[str, ...], device: str) -> None:
-        torch, transformers = _libraries()
         _check_files(path)
+        torch, transformers = _libraries()
         try:
             self._device = torch.device(device)
             model, told = transformers.Sam3VideoModel.from_pretrained(
