@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 from meshreel.analysis.embedded import EmbeddedOptions, Stage
+from meshreel.analysis.segment.views import ViewsOptions
 from meshreel.choice import IntraOptions, Quality
 from meshreel.presets import preset_options
 from meshreel.windows import EncoderOptions
 
+VIEWS = ViewsOptions(count=6, width=120, height=90, places=4, samples=500)
 TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,))
 
 
@@ -23,6 +25,7 @@ def quick(
     """The preset's options made small; takes what `preset_options` takes."""
     options = preset_options(preset, quality, basis_size, group_size, centers, key_interval)
     options = replace(options, intra=TRIALS)
+    options = replace(options, segment=replace(options.segment, views=VIEWS))
     return _quick_best(options) if preset == "best" else _quick_paper(options)
 
 

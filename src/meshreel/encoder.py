@@ -17,11 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from .analysis.segment.masks import Masker
 from .analysis.segment.probe import is_scene
 from .analysis.survey import Survey, survey
 from .choice import Quality
 from .container.writer import ReelWriter
 from .decoder import open as open_video
+from .errors import InputError
 from .format.layout import Form, Header
 from .geometry.nearest import distances
 from .geometry.topology import drop_unreferenced
@@ -86,17 +88,22 @@ def encode(
     options: EncoderOptions | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
+    masker: Masker | None = None,
 ) -> Summary:
     """Writes `sequence` to a .reel file at `path`, which appears only when it is complete; None: preset `best` at 50.
+
+    A scene with a background is taken apart; who has masks of what moves gives a `masker`, and it is a scene then.
 
     With an executor, runs of frames are encoded side by side; the bytes are the same. In memory are then as many runs
     as it has workers and one more, each of a key interval (preset `best`) or a group. Raises InputError for frames
     that cannot be used, before anything is coded.
     """
     options = options or preset_options()
+    if options.dynamic_only and masker is not None:
+        raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
     stages = Stages(progress, len(sequence))
-    if not options.dynamic_only and len(sequence) and is_scene(sequence):
-        return _encode_scene(sequence, Path(path), options, executor, stages)
+    if not options.dynamic_only and len(sequence) and (masker is not None or is_scene(sequence)):
+        return _encode_scene(sequence, Path(path), options, executor, stages, masker)
     seen = survey(sequence, stages)
     groups: list[GroupSummary] = []
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
@@ -113,10 +120,16 @@ def encode(
 
 
 def _encode_scene(
-    sequence: MeshSequence, path: Path, options: EncoderOptions, executor: Executor | None, stages: Stages
+    sequence: MeshSequence,
+    path: Path,
+    options: EncoderOptions,
+    executor: Executor | None,
+    stages: Stages,
+    masker: Masker | None,
 ) -> Summary:
     """As `encode`, for a scene with a background."""
-    parts = take_apart(sequence, survey(sequence, stages, cleaned=False), options, stages)
+    seen = survey(sequence, stages, cleaned=False)
+    parts = take_apart(sequence, seen, options, stages, masker)
     seen = parts.seen
     states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:

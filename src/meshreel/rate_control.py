@@ -13,6 +13,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
+from .analysis.segment.masks import Masker
 from .encoder import Summary, encode
 from .errors import InputError
 from .types import MeshSequence
@@ -58,6 +59,17 @@ class Goal:
             return summary.psnr
         return math.log(summary.size * 8 * frame_rate / summary.frame_count / 1e6)
 
+    def exceeded_by_background(self, summary: Summary, frame_rate: float) -> str:
+        """What is wrong where a scene's background, whose size no quality changes, leaves nothing of the rate."""
+        if self.mbps is None or summary.scene is None:
+            return ""
+        seconds = summary.frame_count / frame_rate
+        rate = summary.scene.background * 8 / seconds / 1e6
+        if rate <= math.exp(self.wanted + self.tolerance):
+            return ""
+        text = f"the background alone takes {summary.scene.background} bytes, {rate:.4g} Mbps over {seconds:.4g} s"
+        return f"{text}, and the target is {self.mbps:g} Mbps; give more, more frames, or fewer copies of it"
+
     def told(self, value: float) -> str:
         """A measured value for people."""
         return f"{value:.2f} dB" if self.mbps is None else f"{math.exp(value):.4g} Mbps"
@@ -70,11 +82,12 @@ def encode_to(
     options_at: Callable[[float], EncoderOptions],
     executor: Executor | None = None,
     progress: Progress | None = None,
+    masker: Masker | None = None,
 ) -> tuple[Summary, float]:
     """Writes a file that meets the goal; gives its summary and the quality it took.
 
-    `options_at` makes the options of a quality from 0 to 100. Raises InputError, and leaves no file, where no quality
-    meets the goal.
+    `options_at` makes the options of a quality from 0 to 100; `masker` is that of `encode`. Raises InputError, and
+    leaves no file, where no quality meets the goal: at once where a scene's background alone is more than the rate.
     """
     search, path = Search(goal), Path(path)
     if path.is_dir() or not path.parent.is_dir():
@@ -85,11 +98,13 @@ def encode_to(
             quality = search.next()
             if quality is None:
                 break
-            summary = encode(sequence, partial, options_at(quality), executor, progress)
+            summary = encode(sequence, partial, options_at(quality), executor, progress, masker)
             value = goal.measured(summary, sequence.frame_rate)
             if abs(value - goal.wanted) <= goal.tolerance:
                 partial.replace(path)
                 return summary, quality
+            if over := goal.exceeded_by_background(summary, sequence.frame_rate):
+                raise InputError(f"{path}: {over}")
             search.learn(quality, value)
     finally:
         partial.unlink(missing_ok=True)

@@ -20,7 +20,8 @@ from jaxtyping import Bool
 
 from .analysis.background import BackgroundOptions, fuse_background
 from .analysis.bodies import find_bodies, same_bodies
-from .analysis.segment.scene import ByMasks, ByPlace, segment
+from .analysis.segment.masks import Masker
+from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
 from .analysis.survey import Survey
 from .choice import NO_ERROR
 from .coding.background import decode_background, decode_change, encode_background, encode_change
@@ -87,13 +88,16 @@ class CodedBodies:
     dropped: int  # faces of bits that were only there for a moment, and are in none of the groups
 
 
-def take_apart(sequence: MeshSequence, seen: Survey, options: EncoderOptions, stages: Stages) -> Parts:
-    """What stands still in a scene, and what is known of what moves."""
-    segmentation = segment(sequence, options.segment)
+def take_apart(
+    sequence: MeshSequence, seen: Survey, options: EncoderOptions, stages: Stages, masker: Masker | None = None
+) -> Parts:
+    """What stands still in a scene, and what is known of what moves; by somebody's masks where there are any."""
+    found = segment(sequence, options.segment) if masker is None else segment_by(masker, sequence, options.segment)
+    segmentation: ByPlace | ByMasks = found
     stages.add("segment", len(sequence))
     cell = segmentation.lattice.size
     numbers = _spread(len(sequence), options.background.frames)
-    still = _Some(sequence, numbers, lambda number, mesh: _first_state(segmentation, number, mesh))
+    still = _Some(sequence, numbers, segmentation.still_at_first)
     background = fuse_background(still, cell, options.background)
     changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
     stages.add("background", len(sequence))
@@ -132,12 +136,8 @@ def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> rang
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
 
 
-def _first_state(segmentation: ByPlace, number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-    """The faces of a frame that are part of the room as it is in the first frame."""
-    return segmentation.faces_at(mesh, ~segmentation.chosen | (segmentation.rest.until > number))
-
-
-def _change(sequence: MeshSequence, segmentation: ByPlace, frame: int, options: EncoderOptions) -> Change:
+def _change(sequence: MeshSequence, segmentation: ByPlace | ByMasks, frame: int, options: EncoderOptions) -> Change:
+    assert isinstance(segmentation, ByPlace)  # masks know of no changes
     came = segmentation.rest.since == frame
     numbers = [frame + number for number in _spread(len(sequence) - frame, options.background.frames)]
     later = _Some(sequence, numbers, lambda _, mesh: segmentation.faces_at(mesh, came))
@@ -147,7 +147,7 @@ def _change(sequence: MeshSequence, segmentation: ByPlace, frame: int, options: 
 
 def _gone(parts: Parts, state: Mesh, change: Change) -> Bool[np.ndarray, " F"]:
     """The faces of a state of the background, normalised, that a change takes away."""
-    assert isinstance(parts.segmentation, ByPlace)  # masks know of no changes
+    assert isinstance(parts.segmentation, ByPlace)
     place = Placement(parts.seen.unit, tuple(parts.seen.center))
     return parts.segmentation.faces_at(place.of(state), change.gone)
 
@@ -174,8 +174,8 @@ def encode_bodies(
     """The groups of all tracks; each track has all frames, and no group has frames with surface and without."""
     noise = min(parts.noise / parts.seen.unit, MOST_NOISE) if options.form == Form.LAYERS else 0.0
     options = replace(options, noise=noise)
-    tracks, found = _Tracks(parts.cell, options), list[TrackGroup]()
-    for frames in _segments(len(sequence), sequence.frame_rate, parts, options):
+    tracks, found = Tracks(parts.cell, options), list[TrackGroup]()
+    for frames in segments(sequence, parts.segmentation, options):
         moving = [_moving(sequence[number], parts.segmentation, number) for number in frames]
         jobs = []
         for track, meshes in tracks.of(moving):
@@ -197,10 +197,11 @@ def _encoded(job: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
     return list((encode_segment if options.form == Form.LAYERS else encode_window)(frames, options))
 
 
-def _segments(count: int, frame_rate: float, parts: Parts, options: EncoderOptions) -> Iterator[range]:
+def segments(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: EncoderOptions) -> Iterator[range]:
     """Runs of frames that are coded on their own, of even lengths, cut also where the background is another."""
+    count, frame_rate = len(sequence), sequence.frame_rate
     longest = max(1, round(options.key_interval * frame_rate))
-    others = {change.frame for change in parts.changes} | set(refreshes(count, frame_rate, options.background))
+    others = set(segmentation.rest.changes) | set(refreshes(count, frame_rate, options.background))
     for start, stop in pairwise(sorted({0, count} | others)):
         pieces = -(-(stop - start) // longest)
         yield from (range(a, b) for a, b in pairwise(start + (stop - start) * k // pieces for k in range(pieces + 1)))
@@ -219,7 +220,7 @@ def _runs(meshes: Sequence[Mesh], frames: range, seen: Survey, options: EncoderO
     return runs
 
 
-class _Tracks:
+class Tracks:
     """Which track each body of a segment is coded in: its own from before, or one that is free."""
 
     def __init__(self, cell: float, options: EncoderOptions) -> None:

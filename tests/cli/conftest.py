@@ -10,11 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from meshreel.analysis.segment.pictures import write_views
+from meshreel.analysis.segment.views import place_views
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.cli import main
+from meshreel.geometry.raycast import Rays
+from meshreel.io.masks import write_picture
 from meshreel.io.write import write_mesh
+from tests.capture.depth_scenes import camera, record
 from tests.golden import GOLDEN
-from tests.small_options import quick
+from tests.small_options import VIEWS, quick
+from tests.small_scene import ROOM_FACES, scene
 
 FILE = GOLDEN / "mixed.reel"
 SCENE = GOLDEN / "scene.reel"
@@ -53,6 +59,7 @@ def quick_presets(monkeypatch):
     """`encode` and `demo` with options that suit tests."""
     monkeypatch.setattr("meshreel.cli.encode.preset_options", quick)
     monkeypatch.setattr("meshreel.cli.demo.preset_options", quick)
+    monkeypatch.setattr("meshreel.cli.segment.preset_options", quick)
 
 
 @pytest.fixture(scope="session")
@@ -71,6 +78,37 @@ def archive(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("archive") / "balls.npz"
     np.savez(path, vertices=np.stack([mesh.vertices for mesh in balls]), faces=balls[0].faces)
     return path
+
+
+@pytest.fixture(scope="session")
+def scan(tmp_path_factory) -> Path:
+    """A folder of four PLY files of a room in which two balls move."""
+    folder = tmp_path_factory.mktemp("scan")
+    for number, mesh in enumerate(scene(4)):
+        write_mesh(mesh, folder / f"frame_{number:05}.ply")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def painted(tmp_path_factory) -> Path:
+    """Masks of these frames, and the cameras they are for: white where a ball is seen."""
+    folder, frames = tmp_path_factory.mktemp("painted"), scene(4)
+    views = place_views(frames, VIEWS)
+    write_views(folder, frames, views)
+    for number, mesh in enumerate(frames):
+        rays = Rays(mesh)
+        for view, own in enumerate(views):
+            mask = np.where(rays.look(own).faces >= ROOM_FACES, 255, 0).astype(np.uint8)
+            write_picture(mask, folder / f"view{view:02}" / f"frame_{number:05}.png")
+    return folder
+
+
+@pytest.fixture
+def rig(tmp_path) -> Path:
+    """The recording of a ball before a wall by two still cameras: three frames, 15 a second."""
+    near = {"focal": (150.0, 150.0)}
+    cameras = [camera("front", **near), camera("left", 20, **near)]
+    return record(tmp_path / "rig", cameras, [(x, 0, 0) for x in (-0.3, 0, 0.3)])
 
 
 def failed(said: Said, *words: str) -> bool:

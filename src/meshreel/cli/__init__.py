@@ -1,4 +1,4 @@
-"""The command line: `meshreel capture|encode|decode|info|compare|bench|demo`.
+"""The command line: `meshreel capture|segment|encode|decode|info|compare|bench|demo`.
 
 Errors take one line on standard error and exit code 2; `--debug` shows the traceback. A command's module is imported
 when it is called: `decode` and `info` work where the extra `encode` is not installed.
@@ -29,6 +29,7 @@ PIPE_CLOSED = 141  # 128 + SIGPIPE
 
 COMMANDS = {
     "capture": "Fuse recordings of depth cameras into a mesh per frame.",
+    "segment": "Tell which faces of a scene move, and with which body.",
     "encode": "Encode a sequence of meshes into one .reel file.",
     "decode": "Decode a .reel file into a directory of meshes.",
     "info": "Show rate by part, objects over time, groups, forms and the quality recorded when the file was encoded.",

@@ -8,19 +8,20 @@ import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..encoder import Summary, encode
+from ..encoder import SceneSummary, Summary, encode
 from ..errors import InputError
-from ..io.sequence import open_sequence
 from ..presets import preset_options
 from ..rate_control import Goal, encode_to
 from ..windows import EncoderOptions
 from .console import Common
 from .reading import Reading
+from .scenes import Masking, open_source
 
 DEFAULT_QUALITY = preset_options().quality
 
@@ -39,16 +40,23 @@ def command(
     centers: int | None = None,
     group_size: int | None = None,
     keyint: float | None = None,
+    dynamic_only: Annotated[bool, Parameter(negative="")] = False,
+    background_refresh: float | None = None,
+    masking: Masking = Masking(),
     jobs: int = 1,
     common: Common = Common(),
 ) -> None:
     """Encode a sequence of meshes into one .reel file.
 
+    A scene, most of which stands still, is taken apart: its background is in the file once, and each moving body has
+    a track of its own.
+
     Parameters
     ----------
     inputs
         A directory, a glob, mesh files (OBJ, PLY, GLB, STL, OFF) or an .npz of vertices (T x V x 3) and faces (F x 3).
-        Vertices that repeat a position are welded.
+        Vertices that repeat a position are welded. Or the folder of a rig, as `capture` takes it, with its defaults:
+        each frame is fused whenever it is asked for, some three times; `capture` first where time counts.
     output
         The .reel file to write; it appears only when it is complete.
     preset
@@ -59,7 +67,8 @@ def command(
         Instead of a quality: the D2-PSNR (one way, mean over the frames, as `compare` prints it) to meet within 0.3 dB.
         Takes some encodes, 8 at most.
     target_mbps
-        Instead of a quality: the rate of the file to meet within 5 %, Mbit/s. Takes some encodes, 8 at most.
+        Instead of a quality: the rate of the file to meet within 5 %, Mbit/s. Takes some encodes, 8 at most. No quality
+        changes the size of a scene's background.
     basis_size
         Exactly this many KLT components per group, and no per-frame Draco where that is cheaper; both by
         rate-distortion where it is not given. Preset `paper` only.
@@ -69,6 +78,11 @@ def command(
         Most frames in a group, the paper's GoF (16; `paper`: 10).
     keyint
         Seconds, at most, from one frame that decodes on its own to the next (4). Preset `best` only.
+    dynamic_only
+        No background is looked for: all may move, and is coded in every frame.
+    background_refresh
+        Seconds from one copy of a scene's background in the file to the next, for who joins late. One copy for all
+        frames where it is not given.
     jobs
         Runs of frames that need no other to encode side by side (groups, or what `keyint` cuts); the file is the same.
     """
@@ -77,22 +91,32 @@ def command(
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
 
+    if dynamic_only and (background_refresh is not None or masking.wanted):
+        raise InputError("--dynamic-only looks for no background: leave out --background-refresh, masks and views")
+
+    look = masking.options(preset_options().segment)
+
     def options_at(quality: float) -> EncoderOptions:
-        return preset_options(preset, quality, basis_size, group_size, centers, keyint)
+        options = preset_options(preset, quality, basis_size, group_size, centers, keyint)
+        background = replace(options.background, refresh=background_refresh)
+        return replace(options, background=background, segment=look, dynamic_only=dynamic_only)
 
     goal = None if target_psnr is None and target_mbps is None else Goal(target_psnr, target_mbps)
     if goal is not None and quality is not None:
         raise InputError(f"--quality {quality:g} and a target: the target chooses the quality, give one of both")
     quality = DEFAULT_QUALITY if quality is None else quality
     options = options_at(quality)
-    source = inputs[0] if len(inputs) == 1 else inputs
-    sequence = open_sequence(source, reading.options())
+    source = open_source(inputs, reading)
+    sequence = source.sequence
+    masker = masking.masker(len(sequence))
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
         if goal is None:
-            summary = encode(sequence, output, options, executor, progress)
+            summary = encode(sequence, output, options, executor, progress, masker)
         else:
-            summary, quality = encode_to(sequence, output, goal, options_at, executor, progress)
-    warnings = (*sequence.warnings, *summary.warnings)
+            summary, quality = encode_to(sequence, output, goal, options_at, executor, progress, masker)
+    warnings = (*source.warnings, *summary.warnings)
+    if summary.scene is None and background_refresh is not None:
+        warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
     common.warn(warnings)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
     reached = "" if row["d2_psnr_paper"] is None else f", {row['d2_psnr_paper']:.2f} dB"
@@ -102,14 +126,15 @@ def command(
 
 def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
     """Rate, quality and forms of an encode, ready for JSON."""
-    seconds = summary.frame_count / frame_rate
     return {
         "bytes": summary.size,
         "frames": summary.frame_count,
-        "mbps": summary.size * 8 / seconds / 1e6,
+        "mbps": _mbps(summary.size, summary, frame_rate),
         "d2_psnr_paper": summary.psnr if math.isfinite(summary.psnr) else None,
+        "scene": None if summary.scene is None else _scene_row(summary, summary.scene, frame_rate),
         "groups": [
             {
+                "track": group.track,
                 "form": group.form.name.lower(),
                 "frames": group.frame_count,
                 "bytes": group.size,
@@ -123,11 +148,40 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
     }
 
 
+def _scene_row(summary: Summary, scene: SceneSummary, frame_rate: float) -> dict[str, Any]:
+    """What a scene's parts take; `other` is header and index."""
+    parts = {"background": scene.background}
+    for track in range(scene.tracks):
+        parts[f"track {track}"] = sum(group.size for group in summary.groups if group.track == track)
+    parts["other"] = summary.size - sum(parts.values())
+    return {
+        "tracks": scene.tracks,
+        "background_bytes": scene.background,
+        "background_faces": scene.faces,
+        "noise_m": scene.noise,
+        "parts_bytes": parts,
+        "parts_mbps": {name: _mbps(size, summary, frame_rate) for name, size in parts.items()},
+    }
+
+
+def _mbps(size: int, summary: Summary, frame_rate: float) -> float:
+    return size * 8 * frame_rate / summary.frame_count / 1e6
+
+
+def _describe_scene(row: dict[str, Any]) -> str:
+    """What stands still and what moves, as a part of a line."""
+    rates = row["parts_mbps"]
+    moving = sum(rate for name, rate in rates.items() if name.startswith("track"))
+    background = f"background {row['background_bytes']} bytes ({rates['background']:.3f} Mbps)"
+    return f"{background}, {row['tracks']} tracks ({moving:.3f} Mbps), noise {1000 * row['noise_m']:.2g} mm, "
+
+
 def describe(row: dict[str, Any]) -> str:
     """One line: frames, bytes, rate and forms."""
     forms = [group["form"] for group in row["groups"]]
     counted = ", ".join(f"{forms.count(form)} {form}" for form in sorted(set(forms)))
-    return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, groups: {counted}"
+    scene = "" if row["scene"] is None else _describe_scene(row["scene"])
+    return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}groups: {counted}"
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
+from jaxtyping import UInt8
 
 from ..errors import InputError
 from ..types import Mesh
@@ -43,6 +44,20 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
         file.write(pack(mesh))
 
 
+def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> None:
+    """Write the mesh to a .ply file whose faces have these colors (red, green, blue).
+
+    Colors are those of vertices, which most viewers show; vertices between faces of different colors are there twice.
+    """
+    code = colors.astype(np.int64) @ (65536, 256, 1)
+    corners = np.stack([mesh.faces.reshape(-1), np.repeat(code, 3)], axis=1)
+    split, number = np.unique(corners, axis=0, return_inverse=True)
+    shown = np.stack([split[:, 1] >> 16, split[:, 1] >> 8 & 255, split[:, 1] & 255], axis=1).astype(np.uint8)
+    whole = Mesh.of(mesh.vertices[split[:, 0]], number.reshape(-1, 3))
+    with replacing(path) as file:
+        file.write(_pack_ply(whole, shown))
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """A file that takes its final name at the end of the block; on any failure nothing is left behind."""
@@ -59,16 +74,20 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
             temporary.unlink()
 
 
-def _pack_ply(mesh: Mesh) -> bytes:
+def _pack_ply(mesh: Mesh, colors: UInt8[np.ndarray, "V 3"] | None = None) -> bytes:
     kind, dtype = ("float", "<f4") if _fits_float32(mesh) else ("double", "<f8")
+    colored = "" if colors is None else "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\n"
-        f"property {kind} x\nproperty {kind} y\nproperty {kind} z\n"
+        f"property {kind} x\nproperty {kind} y\nproperty {kind} z\n{colored}"
         f"element face {len(mesh.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
     )
     rows = np.empty(len(mesh.faces), dtype=[("size", "u1"), ("corners", "<i4", (3,))])
     rows["size"], rows["corners"] = 3, mesh.faces
-    return header.encode() + mesh.vertices.astype(dtype).tobytes() + rows.tobytes()
+    shown = np.zeros((len(mesh.vertices), 0), np.uint8) if colors is None else colors
+    points = np.empty(len(mesh.vertices), dtype=[("place", dtype, (3,)), ("color", "u1", shown.shape[1:])])
+    points["place"], points["color"] = mesh.vertices, shown
+    return header.encode() + points.tobytes() + rows.tobytes()
 
 
 def _pack_obj(mesh: Mesh) -> bytes:

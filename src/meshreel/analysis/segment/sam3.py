@@ -9,6 +9,7 @@ Differs from the paper: it does not say what SAM3 is asked for; ours are words, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,7 +40,10 @@ class Sam3Options:
 
 
 class Sam3Masks:
-    """A Masker that must first have observed the reference view in every frame: two passes over the frames."""
+    """A Masker that must first have observed the reference view in every frame: two passes over the frames.
+
+    What it has observed and answered it keeps, a bit a pixel: who encodes again, for a target, pays once.
+    """
 
     def __init__(self, path: Path, prompts: Sequence[str] | None = None, options: Sam3Options = Sam3Options()) -> None:
         """Loads the weights in the folder `path`. Raises InputError where they or the extra are not there."""
@@ -47,16 +51,22 @@ class Sam3Masks:
         self._options = options
         self._pictures: list[UInt8[np.ndarray, "H W 3"]] = []
         self._moving: Hypotheses | None = None
+        self._known: dict[int, UInt8[np.ndarray, " B"]] = {}
 
     def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
-        """Takes note of a frame; frames come in order from 0 on, all before the first masks."""
-        assert frame == len(self._pictures) and self._moving is None, "frames are observed in order, before masks"
+        """Takes note of a frame, once; frames come in order from 0 on, all before the first masks."""
+        if self._moving is not None or frame < len(self._pictures):
+            return
+        assert frame == len(self._pictures), "frames are observed in order, before masks"
         number = self._reference(views)
         self._pictures.append(normal_picture(seen[number], views[number]))
 
     def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Bool[np.ndarray, "X H W"]:
         """The masks of a frame that was observed; True: dynamic."""
-        return self.objects(frame, seen, views) > 0
+        shape = (len(views), views[0].height, views[0].width)
+        if frame not in self._known:
+            self._known[frame] = np.packbits(self.objects(frame, seen, views) > 0)
+        return np.unpackbits(self._known[frame], count=math.prod(shape)).astype(bool).reshape(shape)
 
     def objects(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Int32[np.ndarray, "X H W"]:
         """The moving object that each pixel sees, by one number in all frames; 0: none."""
@@ -87,8 +97,8 @@ class _Tracker:
     """SAM3's video model: what some words name, found in every picture of a video and followed through it."""
 
     def __init__(self, path: Path, prompts: tuple[str, ...], device: str) -> None:
-        torch, transformers = _libraries()
         _check_files(path)
+        torch, transformers = _libraries()
         try:
             self._device = torch.device(device)
             model, told = transformers.Sam3VideoModel.from_pretrained(

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float64, Int64, UInt8
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
@@ -42,6 +42,7 @@ class SegmentOptions:
     settle: SettleOptions = field(default_factory=SettleOptions)
     threshold: float = 0.3  # the paper's tau: a low one, and clean-up, miss less than a high one
     island: float = 0.01  # m^2: connected faces with less area take the label of what is around them
+    cameras: tuple[PinholeCamera, ...] = ()  # what to look from, of one size; none: placed as `views` says
 
     def __post_init__(self) -> None:
         if not 0 < self.threshold <= 1 or not 0 <= self.island < np.inf:
@@ -71,6 +72,10 @@ class ByPlace:
         chosen = self.chosen & (frame >= self.rest.until) & (frame < self.rest.since)
         return without_islands(mesh, self.faces_at(mesh, chosen), self.island)
 
+    def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """The faces of frame `frame` that belong to the room as it is in the first frame."""
+        return self.faces_at(mesh, ~self.chosen | (self.rest.until > frame))
+
     def faces_at(self, mesh: Mesh, chosen: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " F"]:
         """The faces most of whose surface is at chosen places; where nobody looked, the nearest place counts."""
         if mesh.is_empty or not chosen.any():
@@ -97,10 +102,28 @@ class ByMasks:
 
     masker: Masker
     views: Sequence[PinholeCamera]
+    lattice: Lattice
     options: SegmentOptions
+    _known: dict[int, UInt8[np.ndarray, " B"]] = field(default_factory=dict, repr=False)  # a bit a face, by frame
+
+    @property
+    def rest(self) -> Rest:
+        """Masks know of no changes of the room."""
+        return Rest.none(0)
+
+    def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """The faces of frame `frame` that do not move."""
+        return ~self.moving(frame, mesh)
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """By the votes of the pixels; faces that no view sees take their neighbours' label."""
+        """By the votes of the pixels; faces that no view sees take their neighbours' label. A frame is asked once."""
+        if frame not in self._known:
+            self._known[frame] = np.packbits(self._voted(frame, mesh))
+        return np.unpackbits(self._known[frame], count=len(mesh.faces)).astype(bool)
+
+    def _voted(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        if mesh.is_empty:
+            return np.zeros(0, bool)
         seen = _looks(mesh, self.views)
         masks = self.masker.masks(frame, seen, self.views)
         votes = Votes.of(np.stack([s.faces for s in seen]), masks, len(mesh.faces))
@@ -111,15 +134,11 @@ class ByMasks:
 
 def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByPlace:
     """What moves in a scene, by geometric change over the whole of it; at most so many frames are looked at."""
-    most = options.places.frames
-    chosen = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(most, len(frames)))})
-    chosen = [number for number in chosen if not frames[number].is_empty]
-    if not chosen:
-        return ByPlace(
-            Lattice(np.zeros(3), 1.0), np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), options.island
-        )
-    views = place_views(_Some(frames, chosen[:: max(1, len(chosen) // _PROBES)]), options.views)
+    chosen = _with_surface(frames, options.places.frames)
     lattice = _lattice(frames, chosen)
+    if not chosen:
+        return ByPlace(lattice, np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), options.island)
+    views = _views(frames, chosen, options)
     places = find_places((frames[number] for number in chosen), views, lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
@@ -128,11 +147,17 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) ->
 
 def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
     """What moves by somebody's masks. Who must see all frames before the first mask has a method `observe`."""
-    views = getattr(masker, "views", None) or place_views(_Some(frames, _probes(len(frames))), options.views)
+    chosen = _with_surface(frames, _PROBES) or _with_surface(frames, len(frames))
+    views = getattr(masker, "views", None) or _views(frames, chosen, options)
     if observe := getattr(masker, "observe", None):
         for number in range(len(frames)):
             observe(number, _looks(frames[number], views), views)
-    return ByMasks(masker, views, options)
+    return ByMasks(masker, views, _lattice(frames, chosen), options)
+
+
+def scene_views(frames: Frames, options: SegmentOptions = SegmentOptions()) -> tuple[PinholeCamera, ...]:
+    """What a scene is looked at from. Raises InputError where no frame has a surface to place views by."""
+    return _views(frames, _with_surface(frames, _PROBES) or _with_surface(frames, len(frames)), options)
 
 
 def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) -> Bool[np.ndarray, " F"]:
@@ -180,8 +205,16 @@ def _looks(mesh: Mesh, views: Sequence[PinholeCamera]) -> list[Seen]:
     return [rays.look(view) for view in views]
 
 
-def _probes(count: int) -> list[int]:
-    return sorted({round(k) for k in np.linspace(0, count - 1, _PROBES)})
+def _with_surface(frames: Frames, most: int) -> list[int]:
+    """Some frames, evenly spread; of at most so many, those that have a surface."""
+    numbers = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(most, len(frames)))})
+    return [number for number in numbers if not frames[number].is_empty]
+
+
+def _views(frames: Frames, chosen: Sequence[int], options: SegmentOptions) -> tuple[PinholeCamera, ...]:
+    """The cameras that are given, or placed ones that see some of the chosen frames well."""
+    some = _Some(frames, chosen[:: max(1, len(chosen) // _PROBES)])
+    return options.cameras or place_views(some, options.views)
 
 
 def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
@@ -189,6 +222,8 @@ def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
 
     Edges without length say nothing; 1 m where there are no others.
     """
+    if not chosen:
+        return Lattice(np.zeros(3), 1.0)
     edges = []
     for number in (chosen[0], chosen[len(chosen) // 2], chosen[-1]):
         mesh = frames[number]

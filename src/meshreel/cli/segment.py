@@ -1,0 +1,173 @@
+"""`meshreel segment`: which faces of a scene move, and with which body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+from jaxtyping import UInt8
+
+from ..analysis.segment.masks import CAMERAS, Masker
+from ..analysis.segment.pictures import write_views
+from ..analysis.segment.preview import label_colors, look_at_labels, sheet
+from ..analysis.segment.scene import ByMasks, ByPlace, scene_views, segment, segment_by
+from ..errors import InputError
+from ..geometry.cameras import pack_cameras
+from ..io.masks import write_picture
+from ..io.write import frame_names, make_folder, replacing, write_colored
+from ..labels import FrameLabels, label_frames
+from ..presets import preset_options
+from ..windows import EncoderOptions
+from .console import Common
+from .reading import Reading
+from .scenes import Masking, Source, open_source
+
+COLUMNS = 4  # views in the sheet
+MOST_PREVIEWS = 16  # frames whose pictures are in memory together
+LABELS, COLORED, SHEET = "labels", "colored", "sheet.png"
+
+
+def command(
+    inputs: list[str],
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    reading: Reading = Reading(),
+    masking: Masking = Masking(),
+    views_only: Annotated[bool, Parameter(negative="")] = False,
+    previews: int = 4,
+    common: Common = Common(),
+) -> None:
+    """Tell which faces of a scene move, and with which body.
+
+    Writes labels/frame_00000.npz and so on: `np.load(file)["moving"]` is True for each face that moves,
+    `np.load(file)["bodies"]` the number of its body from 1 on, 0 for none; faces are the triangles of the frame as it
+    was read and welded. Beside them cameras.json, the views; sheet.png, some frames from some of them, a color a body;
+    and colored/, the same frames as PLY with colors.
+
+    Parameters
+    ----------
+    inputs
+        A directory, a glob, mesh files or an .npz, as `encode` takes them; or a rig's folder, as `capture` takes it.
+    output
+        The directory to write into; made if needed.
+    views_only
+        Write only what the views see, view00/frame_00000.png and so on (normals as colors), and cameras.json. A
+        tool that makes masks of the pictures under the same names makes the folder that --masks takes.
+    previews
+        Frames in the sheet and in colored/, evenly spread; 0 for neither.
+    """
+    if not 0 <= previews <= MOST_PREVIEWS:
+        raise InputError(f"--previews {previews}: give 0 to {MOST_PREVIEWS}")
+    if views_only and (masking.masks or masking.sam3):
+        raise InputError("--views-only needs no masks; leave out --masks and --sam3")
+    options = preset_options()
+    options = replace(options, segment=masking.options(options.segment))
+    source = open_source(inputs, reading)
+    if views_only:
+        row = _write_views(source, output, options, common)
+        text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
+    else:
+        row = _write_labels(source, masking.masker(len(source.sequence)), output, options, previews, common)
+        text = f"{output}: {_told(row)}"
+    common.warn(source.warnings)
+    common.result({"output": str(output), "warnings": source.warnings} | row, text)
+
+
+def _write_views(source: Source, output: Path, options: EncoderOptions, common: Common) -> dict[str, Any]:
+    frames = source.sequence
+    views = scene_views(frames, options.segment)
+    with common.stages(len(frames)) as progress:
+        write_views(output, frames, views, lambda done: progress("look", done, len(frames)))
+    return {"frames": len(frames), "views": len(views)}
+
+
+def _write_labels(
+    source: Source, masker: Masker | None, output: Path, options: EncoderOptions, previews: int, common: Common
+) -> dict[str, Any]:
+    frames, count = source.sequence, len(source.sequence)
+    chosen = {round(k) for k in np.linspace(0, count - 1, min(previews, count))}
+    names = [Path(name).stem for name in frame_names(count, "npz")]
+    tally, preview = _Tally(), _Preview()
+    with common.stages(count) as progress:
+        by: ByPlace | ByMasks
+        if masker is None:
+            views, by = scene_views(frames, options.segment), segment(frames, options.segment)
+        else:
+            by = segment_by(masker, frames, options.segment)
+            views = tuple(by.views)
+        progress("segment", count, count)
+        for folder in (LABELS, *([COLORED] if chosen else [])):
+            make_folder(output / folder)
+        for number, labels in enumerate(label_frames(frames, by, options)):
+            with replacing(output / LABELS / f"{names[number]}.npz") as file:
+                np.savez_compressed(file, moving=labels.moving, bodies=labels.bodies)
+            tally.add(labels)
+            if number in chosen:
+                mesh = frames[number]
+                colors = label_colors(labels.moving, labels.bodies)
+                write_colored(mesh, colors, output / COLORED / f"{names[number]}.ply")
+                preview.add(*look_at_labels(mesh, labels.moving, labels.bodies, views))
+            progress("label", number + 1, count)
+    with replacing(output / CAMERAS) as file:
+        file.write(pack_cameras(views))
+    if chosen:
+        write_picture(preview.picture(), output / SHEET)
+    return tally.row() | {"views": len(views)}
+
+
+class _Tally:
+    """Counts faces."""
+
+    def __init__(self) -> None:
+        self._faces, self._moving = list[int](), list[int]()
+        self._bodies: dict[int, list[int]] = {}  # of each, its faces in each frame where it is there
+
+    def add(self, labels: FrameLabels) -> None:
+        """Takes in a frame."""
+        self._faces.append(len(labels.moving))
+        self._moving.append(int(labels.moving.sum()))
+        for number, faces in enumerate(np.bincount(labels.bodies).tolist()):
+            if number and faces:
+                self._bodies.setdefault(number, []).append(faces)
+
+    def row(self) -> dict[str, Any]:
+        """For JSON."""
+        bodies = [
+            {"body": number, "frames": len(faces), "faces": sum(faces) // len(faces)}
+            for number, faces in sorted(self._bodies.items())
+        ]
+        shares = [moving / max(faces, 1) for moving, faces in zip(self._moving, self._faces, strict=True)]
+        share = sum(self._moving) / max(sum(self._faces), 1)
+        told = {"moving_share": share, "moving_share_least": min(shares), "moving_share_most": max(shares)}
+        counted = {"frames": len(self._faces), "faces": sum(self._faces), "moving": sum(self._moving)}
+        return counted | told | {"bodies": bodies}
+
+
+class _Preview:
+    """Pictures of some frames; the sheet has those views that see most faces that move."""
+
+    def __init__(self) -> None:
+        self._rows = list[list[UInt8[np.ndarray, "H W 3"]]]()
+        self._counts = list[list[int]]()
+
+    def add(self, pictures: list[UInt8[np.ndarray, "H W 3"]], moving: list[int]) -> None:
+        """Takes in a frame: a picture a view, and how many moving faces it sees."""
+        self._rows.append(pictures)
+        self._counts.append(moving)
+
+    def picture(self) -> UInt8[np.ndarray, "Y X 3"]:
+        """A row a frame."""
+        best = np.argsort(-np.sum(self._counts, axis=0), kind="stable")[:COLUMNS]
+        return sheet([[row[view] for view in sorted(best.tolist())] for row in self._rows])
+
+
+def _told(row: dict[str, Any]) -> str:
+    share = f"{100 * row['moving_share']:.1f} % of the faces move"
+    spread = f"{100 * row['moving_share_least']:.1f} to {100 * row['moving_share_most']:.1f} % in a frame"
+    bodies = [f"{body['body']} in {body['frames']} frames, {body['faces']} faces" for body in row["bodies"]]
+    found = f"{len(bodies)} bodies ({'; '.join(bodies)})" if bodies else "no bodies"
+    return f"{row['frames']} frames, {share} ({spread}), {found}"

@@ -1,0 +1,57 @@
+"""Which faces of a scene move, and with which body: what `scene.py` codes, as labels of faces (section 3.2).
+
+In: frames of a scene, and who says what moves in them. Out: labels, frame by frame; a segment of frames is in memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, UInt16
+
+from .analysis.segment.scene import ByMasks, ByPlace
+from .geometry.topology import drop_unreferenced
+from .scene import Tracks, segments
+from .types import Mesh, MeshSequence
+from .windows import EncoderOptions
+
+
+@dataclass(frozen=True, slots=True)
+class FrameLabels:
+    """Of the faces of one frame."""
+
+    moving: Bool[np.ndarray, " F"]
+    bodies: UInt16[np.ndarray, " F"]  # the track that codes the face, and one; 0: it rests, or is of no body
+
+
+def label_frames(
+    sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: EncoderOptions
+) -> Iterator[FrameLabels]:
+    """The labels of each frame; a body has the same number in all frames."""
+    tracks = Tracks(segmentation.lattice.size, options)
+    for frames in segments(sequence, segmentation, options):
+        moving = list[Bool[np.ndarray, " F"]]()
+        parts = list[Mesh]()
+        for number in frames:
+            mesh = sequence[number]
+            moving.append(segmentation.moving(number, mesh))
+            parts.append(drop_unreferenced(Mesh(mesh.vertices, mesh.faces[moving[-1]])))
+        bodies = tracks.of(parts)
+        for place, (chosen, part) in enumerate(zip(moving, parts, strict=True)):
+            labels = np.zeros(len(chosen), np.uint16)
+            labels[chosen] = _numbers(part, [(track + 1, meshes[place]) for track, meshes in bodies])
+            yield FrameLabels(chosen, labels)
+
+
+def _numbers(part: Mesh, bodies: list[tuple[int, Mesh]]) -> UInt16[np.ndarray, " F"]:
+    """The number of the body that has each face of what moves; bodies have connected pieces of it, whole."""
+    from scipy.spatial import cKDTree
+
+    found = np.zeros(len(part.faces), np.uint16)
+    corners = part.vertices[part.faces[:, 0]]
+    for number, body in bodies:
+        if not body.is_empty and len(corners):
+            found[cKDTree(body.vertices).query(corners)[0] == 0] = number  # its vertices are those of the frame
+    return found

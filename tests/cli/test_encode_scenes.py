@@ -1,0 +1,157 @@
+"""`meshreel encode` of scenes: what is told of their parts, who says what moves, rigs as inputs, and what is refused."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import meshreel
+from meshreel.cli.encode import describe
+from meshreel.io.depth import write_depth
+from meshreel.io.write import write_mesh
+from tests.capture.depth_scenes import camera, measured, record
+from tests.cli.conftest import failed
+from tests.small_scene import scene
+
+pytestmark = pytest.mark.usefixtures("quick_presets")
+FRAMES = ("--fps", "10")
+
+
+def test_a_scene_is_told_by_its_parts_and_info_agrees(run, scan, tmp_path):
+    out = tmp_path / "a.reel"
+    row = run("encode", scan, "-o", out, *FRAMES, "--background-refresh", "0.2", "--json").row
+    parts = row["scene"]["parts_bytes"]
+    assert sum(parts.values()) == row["bytes"] and list(parts) == ["background", "track 0", "track 1", "other"]
+    assert sum(row["scene"]["parts_mbps"].values()) == pytest.approx(row["mbps"])
+    info = run("info", out, "--json").row
+    assert [state["spans"] for state in info["background"]] == [[[0, 1]], [[2, 3]]]  # two copies
+    assert parts["background"] == row["scene"]["background_bytes"] == info["parts"]["background"]
+    assert [track["bytes"] for track in info["tracks"]] == [parts["track 0"], parts["track 1"]]
+    assert info["metadata"]["noise_m"] == pytest.approx(row["scene"]["noise_m"], rel=1e-3)
+    assert {group["track"] for group in row["groups"]} == {0, 1}
+    told = describe(row)
+    assert f"background {parts['background']} bytes (" in told and "2 tracks (" in told and " mm, groups: " in told
+    with meshreel.open(out) as video:
+        assert len(video.tracks) == 2 and not video.background(0).is_empty
+
+
+def test_masks_say_what_moves_and_a_target_is_met_with_them(run, scan, painted, tmp_path):
+    out = tmp_path / "a.reel"
+    first = run(
+        "encode", scan, "-o", out, *FRAMES, "--frames", ":2", "--masks", painted, "--quality", "45", "--json"
+    ).row
+    assert first["scene"]["tracks"] == 2 and first["scene"]["background_bytes"] > 0
+    goal = ("--target-mbps", first["mbps"])
+    assert run("encode", scan, "-o", out, *FRAMES, "--frames", ":2", "--masks", painted, *goal, "--quiet").code == 0
+
+
+def test_where_all_moves_there_is_no_background(run, scan, painted, tmp_path):
+    shutil.copytree(painted, tmp_path / "white")
+    for picture in (tmp_path / "white").glob("view*/*.png"):
+        Image.fromarray(np.full((90, 120), 1, np.uint8)).save(picture)
+    out = tmp_path / "a.reel"
+    said = run("encode", scan, "-o", out, "--frames", ":1", "--masks", tmp_path / "white", "--json")
+    assert said.code == 0 and said.row["scene"]["background_bytes"] == 0
+    with meshreel.open(out) as video:
+        assert video.background(0).is_empty and not video.moving(0).is_empty
+
+
+def test_where_nothing_moves_there_is_a_background_alone(run, tmp_path):
+    for number, mesh in enumerate(scene(3, moving=False)):
+        write_mesh(mesh, tmp_path / f"frame_{number}.ply")
+    out = tmp_path / "a.reel"
+    said = run("encode", tmp_path, "-o", out, *FRAMES, "--json")
+    assert said.code == 0 and [group["form"] for group in said.row["groups"]] == ["empty"]
+    with meshreel.open(out) as video:
+        assert video.moving(2).is_empty and not video.background(2).is_empty
+        assert np.array_equal(video[0].vertices, video[2].vertices)
+    assert run("segment", tmp_path, "-o", tmp_path / "out", "--json").row["moving"] == 0
+
+
+def test_a_scene_of_which_nothing_is_to_be_taken_apart_has_one_part(run, scan, tmp_path):
+    row = run("encode", scan, "-o", tmp_path / "a.reel", "--frames", ":2", "--dynamic-only", "--json").row
+    assert row["scene"] is None and "background" not in describe(row)
+    assert run("info", tmp_path / "a.reel", "--json").row["background"] == []
+
+
+def test_a_background_that_leaves_nothing_of_the_rate_is_told_at_once(run, scan, tmp_path, monkeypatch):
+    out = tmp_path / "a.reel"
+    said = run("encode", scan, "-o", out, *FRAMES, "--target-mbps", "0.0001")
+    assert failed(said, "a.reel: the background alone takes", "the target is 0.0001 Mbps", "over 0.4 s")
+    assert not out.exists()
+
+
+def test_a_refresh_of_what_is_not_there_is_told(run, balls, tmp_path):
+    said = run("encode", balls, "-o", tmp_path / "a.reel", "--frames", ":1", "--background-refresh", "1")
+    assert said.code == 0 and "--background-refresh does nothing" in said.err
+
+
+def test_a_rig_is_fused_on_the_fly_at_its_own_rate(run, rig, tmp_path):
+    (rig / "left" / "depth" / "depth_00001.png").unlink()
+    out = tmp_path / "a.reel"
+    said = run("encode", rig, "-o", out, "--frames", ":1", "--quality", "0")
+    assert said.code == 0 and "camera left lacks 1 of 3 frames" in said.err
+    with meshreel.open(out) as video:
+        assert (len(video), video.frame_rate) == (1, 15)
+        assert not video[0].is_empty
+    assert failed(run("encode", rig, "-o", out, "--fps", "24"), "--fps 24", "a rig of 15 frames")
+    assert failed(run("encode", rig, "-o", out, "--scale", "0.001"), "--scale 0.001", "metres")
+    assert failed(run("encode", rig, "-o", out, "--frames", "3:"), "leave 0")
+
+
+def test_a_camera_that_moves_is_refused(run, tmp_path):
+    still = camera("front")
+    folder = record(tmp_path / "rig", [still, camera("moved", 10)], [(0, 0, 0)] * 6)
+    for number in range(6):
+        elsewhere = camera("moved", 10 + 8 * number)
+        write_depth(measured(elsewhere), folder / "moved" / "depth" / f"depth_{number:05}.png")
+    for command in (("encode", folder, "-o", tmp_path / "a.reel"), ("segment", folder, "-o", tmp_path / "out")):
+        assert failed(run(*command), "camera moved seems to move")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["rig"]
+
+
+def test_depth_that_is_all_zero_is_told_and_gives_empty_frames(run, rig, tmp_path):
+    for picture in rig.glob("*/depth/*.png"):
+        write_depth(np.zeros((96, 96), np.uint16), picture)
+    said = run("encode", rig, "-o", tmp_path / "a.reel")
+    assert said.code == 0 and "1 empty" in said.out
+    assert said.err.count("measures nothing in 3 of 3 frames looked at") == 2
+    assert failed(run("segment", rig, "-o", tmp_path / "out"), "has a surface; views need one")
+
+
+def test_depth_of_eight_bits_is_refused(run, rig, tmp_path):
+    Image.fromarray(np.full((96, 96), 200, np.uint8)).save(rig / "left" / "depth" / "depth_00002.png")
+    for command in (("encode", rig, "-o", tmp_path / "a.reel"), ("segment", rig, "-o", tmp_path / "out")):
+        assert failed(run(*command), "depth_00002.png", "8 bits a pixel", "16-bit")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--background-refresh", "0"], ["refresh 0 s"]),
+        (["--background-refresh", "1", "--dynamic-only"], ["--dynamic-only", "leave out --background-refresh"]),
+        (["--masks", "masks", "--dynamic-only"], ["--dynamic-only", "masks"]),
+        (["--views", "none.json"], ["none.json", "cannot be read"]),
+        (["--masks", "masks"], ["cameras.json", "cannot be read"]),
+        (["--sam3", "masks"], ["masks: holds no weights of SAM3", "model.safetensors"]),
+        (["--sam3", "none"], ["none: holds no weights of SAM3"]),
+        (["--sam3", "none", "--masks", "masks"], ["--masks masks", "one of both"]),
+    ],
+)
+def test_what_cannot_be_is_told_before_anything_is_written(run, scan, tmp_path, arguments, words, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "masks").mkdir()
+    assert failed(run("encode", scan, "-o", "a.reel", *arguments), *words)
+    assert [path.name for path in tmp_path.iterdir()] == ["masks"]
+
+
+def test_masks_of_another_size_stop_an_encode_before_it_begins(run, scan, painted, tmp_path):
+    shutil.copytree(painted, tmp_path / "masks")
+    Image.fromarray(np.zeros((60, 80), np.uint8)).save(tmp_path / "masks" / "view01" / "frame_00003.png")
+    said = run("encode", scan, "-o", tmp_path / "a.reel", "--masks", tmp_path / "masks")
+    assert failed(said, "frame_00003.png (frame 3): 80 x 60 pixels")
+    said = run("encode", scan, "-o", tmp_path / "a.reel", "--masks", tmp_path / "masks", "--frames", ":1")
+    assert said.code == 0  # frames that are not encoded need no masks

@@ -1,0 +1,136 @@
+"""`meshreel segment`: labels that numpy reads in a line, pictures to look at, and what other tools make masks of."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from meshreel.io.sequence import open_sequence
+from tests.cli.conftest import failed
+from tests.small_scene import ROOM_FACES
+
+pytestmark = pytest.mark.usefixtures("quick_presets")
+
+
+def labels(folder, number):
+    with np.load(folder / "labels" / f"frame_{number:05}.npz") as archive:
+        return archive["moving"], archive["bodies"]
+
+
+def test_each_frame_has_labels_and_bodies_keep_their_numbers(run, scan, tmp_path):
+    said = run("segment", scan, "-o", tmp_path / "out", "--json")
+    assert said.code == 0
+    frames = open_sequence(scan)
+    for number, mesh in enumerate(frames):
+        moving, bodies = labels(tmp_path / "out", number)
+        assert moving.shape == bodies.shape == (len(mesh.faces),)
+        assert moving[ROOM_FACES:].all() and not moving[:ROOM_FACES].any()
+        assert np.array_equal(moving, bodies > 0)
+        half = (len(mesh.faces) - ROOM_FACES) // 2
+        first, second = np.unique(bodies[ROOM_FACES : ROOM_FACES + half]), np.unique(bodies[ROOM_FACES + half :])
+        assert {first.item(), second.item()} == {1, 2}
+        assert first.item() == labels(tmp_path / "out", 0)[1][ROOM_FACES]
+    assert said.row["moving_share"] == pytest.approx(256 / (ROOM_FACES + 256))
+    assert said.row["bodies"] == [{"body": number, "frames": 4, "faces": 128} for number in (1, 2)]
+
+
+def test_the_sheet_the_cameras_and_the_colored_frames_are_beside_them(run, scan, tmp_path):
+    out = tmp_path / "out"
+    said = run("segment", scan, "-o", out, "--previews", "2")
+    assert said.code == 0 and "2 bodies (1 in 4 frames, 128 faces; 2 in 4 frames, 128 faces)" in said.out
+    assert sorted(path.name for path in (out / "colored").iterdir()) == ["frame_00000.ply", "frame_00003.ply"]
+    shown = open_sequence(out / "colored")[1]
+    assert len(shown.faces) == ROOM_FACES + 256
+    with Image.open(out / "sheet.png") as sheet:
+        assert sheet.size == (4 * 124 - 4, 2 * 94 - 4)
+        colors = np.array(sheet).reshape(-1, 3).astype(int)
+    assert (colors[:, 0] > 2 * colors[:, 2]).any() and (colors[:, 2] > 2 * colors[:, 0]).any()  # red and blue balls
+    assert len(json.loads((out / "cameras.json").read_text())["parameters"]) == 6
+    assert run("segment", scan, "-o", tmp_path / "bare", "--previews", "0", "--quiet").code == 0
+    assert sorted(path.name for path in (tmp_path / "bare").iterdir()) == ["cameras.json", "labels"]
+
+
+def test_pictures_for_other_tools_are_laid_out_as_masks_are_read(run, scan, tmp_path):
+    out = tmp_path / "out"
+    said = run("segment", scan, "-o", out, "--views-only", "--frames", "1:3")
+    assert said.code == 0 and "pictures of 2 frames from 6 views" in said.out
+    assert sorted(path.name for path in out.iterdir()) == ["cameras.json", *(f"view{k:02}" for k in range(6))]
+    for picture in out.glob("view*/*.png"):
+        Image.fromarray(np.zeros((90, 120), np.uint8)).save(picture)  # a tool that sees nothing move
+    said = run("segment", scan, "-o", tmp_path / "labels", "--frames", "1:3", "--masks", out, "--json")
+    assert said.row["moving"] == 0 and said.row["bodies"] == []
+
+
+def test_masks_move_the_faces_that_they_show(run, scan, painted, tmp_path):
+    assert run("segment", scan, "-o", tmp_path / "out", "--masks", painted, "--quiet").code == 0
+    for number in range(4):
+        moving, _ = labels(tmp_path / "out", number)
+        assert moving[ROOM_FACES:].mean() > 0.95 and moving[:ROOM_FACES].mean() < 0.01
+
+
+def test_given_cameras_are_looked_from(run, scan, painted, tmp_path):
+    record = json.loads((painted / "cameras.json").read_text())
+    record["parameters"] = record["parameters"][:2]
+    (tmp_path / "two.json").write_text(json.dumps(record))
+    said = run("segment", scan, "-o", tmp_path / "out", "--views-only", "--views", tmp_path / "two.json", "--json")
+    assert said.row["views"] == 2
+    assert json.loads((tmp_path / "out" / "cameras.json").read_text()) == record
+
+
+def test_a_rig_is_an_input(run, rig, tmp_path):
+    said = run("segment", rig, "-o", tmp_path / "out", "--json", "--previews", "1")
+    assert said.code == 0 and said.row["frames"] == 3 and said.row["faces"] > 10_000
+    (rig / "left" / "depth" / "depth_00001.png").unlink()
+    said = run("segment", rig, "-o", tmp_path / "pictures", "--views-only", "--frames", "1:2")
+    assert said.code == 0 and "camera left lacks 1 of 3 frames" in said.err
+
+
+def test_masks_that_are_missing_or_of_another_size_are_told_before_anything_is_written(run, scan, painted, tmp_path):
+    masks, out = tmp_path / "masks", tmp_path / "out"
+    shutil.copytree(painted, masks)
+    lost = masks / "view03" / "frame_00002.png"
+    Image.fromarray(np.zeros((45, 60), np.uint8)).save(lost)
+    said = run("segment", scan, "-o", out, "--masks", masks)
+    assert failed(said, "frame_00002.png (frame 2): 60 x 45 pixels where its camera has 120 x 90")
+    lost.unlink()
+    assert failed(
+        run("segment", scan, "-o", out, "--masks", masks), "view03: has no mask of frame 2 (1 of 4 are missing)"
+    )
+    shutil.rmtree(masks / "view02")
+    assert failed(run("segment", scan, "-o", out, "--masks", masks), "no folder of view 2 of 6")
+    assert failed(run("segment", scan, "-o", out, "--masks", tmp_path / "none"), "cameras.json", "cannot be read")
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--previews", "-1"], ["--previews -1", "0 to 16"]),
+        (["--previews", "17"], ["--previews 17"]),
+        (["--views-only", "--masks", "masks"], ["--views-only", "leave out"]),
+        (["--masks", "masks", "--sam3", "weights"], ["--masks masks", "--sam3 weights", "one of both"]),
+        (["--masks", "masks", "--views", "c.json"], ["--views c.json", "cameras of their own"]),
+        (["--prompts", "person"], ["--prompts", "give --sam3"]),
+        (["--device", "cuda"], ["--device", "give --sam3"]),
+        (["--sam3", "weights"], ["weights: holds no weights of SAM3", "config.json"]),
+        (["--views", "none.json"], ["none.json", "cannot be read"]),
+        (["--views", "bad.json"], ["bad.json", "pinhole camera JSON"]),
+        (["--up", "x"], ["x"]),
+    ],
+)
+def test_flags_that_cannot_be_are_told(run, scan, tmp_path, arguments, words, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bad.json").write_text("{}")
+    (tmp_path / "weights").mkdir()
+    assert failed(run("segment", scan, "-o", "out", *arguments), *words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_frames_without_a_surface_have_no_views_and_are_told(run, tmp_path):
+    for number in range(2):
+        (tmp_path / f"frame_{number}.obj").write_text("v 0 0 0\n")
+    assert failed(run("segment", tmp_path, "-o", tmp_path / "out"), "has a surface; views need one")
