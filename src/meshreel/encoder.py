@@ -21,6 +21,7 @@ from .analysis.segment.masks import Masker
 from .analysis.segment.probe import is_scene
 from .analysis.survey import Survey, survey
 from .choice import Quality
+from .coding.background import decode_background
 from .container.writer import ReelWriter
 from .decoder import open as open_video
 from .errors import InputError
@@ -55,6 +56,7 @@ class SceneSummary:
     """What is left of a scene's parts."""
 
     background: int  # bytes, of all its states
+    faces: int  # of the first of them, as decoded
     noise: float  # m, RMS distance of a frame's still surface from the background
     psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
     tracks: int
@@ -145,7 +147,8 @@ def _encode_scene(
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     psnr = _measured(sequence, path, seen.diagonal)
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
-    scene = SceneSummary(size, parts.noise, psnr, tracks)
+    faces = len(decode_background(states[0].payload).faces) if states else 0
+    scene = SceneSummary(size, faces, parts.noise, psnr, tracks)
     return Summary(path.stat().st_size, tuple(groups), (*_warnings(seen), *_lost(coded.dropped)), scene)
 
 
