@@ -107,6 +107,8 @@ def test_a_folder_without_weights_is_told_what_it_must_hold(tmp_path: Path, file
 
 
 def test_without_the_extra_an_error_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for name in ("config.json", "model.safetensors", "tokenizer.json"):  # a folder that is none is told first
+        (tmp_path / name).write_text("{}")
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(InputError, match=r"pip install 'meshreel\[sam3\]'"):
         sam3.Sam3Masks(tmp_path)
