@@ -11,7 +11,7 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,8 @@ from .container.writer import ReelWriter
 from .decoder import open as open_video
 from .errors import InputError
 from .format.layout import Form, Header
-from .geometry.nearest import Surface
+from .geometry.nearest import distances
+from .geometry.topology import drop_unreferenced
 from .layered import encode_segment
 from .metrics.distance import PSNR_CEILING
 from .presets import preset_options
@@ -54,8 +55,8 @@ class GroupSummary:
 class SceneSummary:
     """What is left of a scene's parts."""
 
-    background: int  # bytes, of all its copies
-    faces: int  # of the background, as decoded
+    background: int  # bytes, of all its states
+    faces: int  # of the first of them, as decoded
     noise: float  # m, RMS distance of a frame's still surface from the background
     psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
     tracks: int
@@ -131,31 +132,31 @@ def _encode_scene(
     """As `encode`, for a scene with a background."""
     seen = survey(sequence, stages, cleaned=False)
     parts = take_apart(sequence, seen, options, stages, masker)
-    seen = replace(seen, scale=parts.unit)
-    static = b"" if parts.background.is_empty else encode_static(parts, seen, options.background)
-    refresh = options.background.refresh
-    copies = range(0, len(sequence), len(sequence) if refresh is None else max(1, round(refresh * sequence.frame_rate)))
+    seen = parts.seen
+    states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        found = list(encode_bodies(sequence, seen, parts, options, executor, stages))
-        groups, shown = list[GroupSummary](), list[int]()
-        for each in sorted(found, key=lambda each: (each.first_frame, each.track)):
-            if static and each.track == 0 and len(shown) < len(copies) and each.first_frame >= copies[len(shown)]:
-                shown.append(writer.add_static(static))
-            groups.append(_added(writer, each, shown[-1:], parts.unit))
+        coded = encode_bodies(sequence, parts, options, executor, stages)
+        groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
+        for each in coded.groups:
+            while waiting and waiting[0].frame <= each.first_frame:
+                state = waiting.popleft()
+                static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
+            with_static = each.track == 0 and not seen.is_bare(each.first_frame)
+            groups.append(_added(writer, each, static if with_static else [], seen.unit))
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
         writer.header = make_header(sequence.frame_rate, seen, metadata)
-    faces = len(decode_background(static).faces) if static else 0
     psnr = _measured(sequence, path, seen.diagonal)
-    scene = SceneSummary(len(static) * len(shown), faces, parts.noise, psnr, max(group.track for group in groups) + 1)
-    return Summary(path.stat().st_size, tuple(groups), _warnings(seen), scene)
+    size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
+    faces = len(decode_background(states[0].payload).faces) if states else 0
+    scene = SceneSummary(size, faces, parts.noise, psnr, tracks)
+    return Summary(path.stat().st_size, tuple(groups), (*_warnings(seen), *_lost(coded.dropped)), scene)
 
 
 def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
-    """Writes a group of a track; that of the first names the background of its frames."""
+    """Writes a group of a track, which names the background of its frames where it is given."""
     group, track, last = each.group, each.track, writer.last_of(each.track)
     before = [last] if group.predicted and last is not None else []
-    shown = static if track == 0 else []
-    writer.add_group(each.first_frame, group.frame_count, group.payload, group.layers, (*shown, *before), track)
+    writer.add_group(each.first_frame, group.frame_count, group.payload, group.layers, (*static, *before), track)
     key = None if group.key is None else each.first_frame + group.key
     quality = group.quality.scaled(unit)
     return GroupSummary(group.form, group.frame_count, len(group.payload), quality, group.predicted, key, track)
@@ -167,12 +168,12 @@ def _measured(sequence: MeshSequence, path: Path, diagonal: float) -> float:
         numbers = sorted({round(k) for k in np.linspace(0, len(sequence) - 1, min(MEASURED, len(sequence)))})
         found = []
         for number in numbers:
-            points, shown = sequence[number].vertices, video[number]
+            points, shown = drop_unreferenced(sequence[number]).vertices, video[number]
             if not len(points) or shown.is_empty:
                 found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
                 continue
-            gaps = Surface(shown).closest(points).points - points
-            found.append(10 * math.log10(diagonal**2 / max(float((gaps**2).sum(axis=1).mean()), 1e-30)))
+            gap = float((distances(points, shown) ** 2).mean())
+            found.append(10 * math.log10(diagonal**2 / max(gap, 1e-30)))
     return min(float(np.mean(found)), PSNR_CEILING)
 
 
@@ -185,6 +186,13 @@ def _warnings(seen: Survey) -> tuple[str, ...]:
         text = f"{count} frames have faces, but none with an area: they count as empty (first frame {first} of these)"
         found.append(text)
     return tuple(found)
+
+
+def _lost(faces: int) -> tuple[str, ...]:
+    """What a user must know of bits of a scene that belong to no body."""
+    if not faces:
+        return ()
+    return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:

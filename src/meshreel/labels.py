@@ -31,7 +31,7 @@ def label_frames(
 ) -> Iterator[FrameLabels]:
     """The labels of each frame; a body has the same number in all frames."""
     tracks = Tracks(segmentation.lattice.size, options)
-    for frames in segments(len(sequence), sequence.frame_rate, options):
+    for frames in segments(sequence, segmentation, options):
         moving = list[Bool[np.ndarray, " F"]]()
         parts = list[Mesh]()
         for number in frames:

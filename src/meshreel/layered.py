@@ -146,20 +146,19 @@ def _course(targets: list[Target], options: EncoderOptions) -> Course:
 def _keyed(frames: Sequence[Mesh], targets: list[Target], course: Course, options: EncoderOptions) -> Keyed | None:
     """The template of the course's key and its fit to the frames; None where nothing is left of its base mesh.
 
-    It is the key frame's own surface, or that fused from all frames: the latter first where there is noise, the other
-    only where the first does not fit.
+    That fused from all frames where there is noise; else the key frame's own, or the fused one where only that fits.
     """
-    found = list[Keyed]()
-    for fuse in (options.noise > 0, options.noise == 0):
-        keyed = _laid(targets, course, fuse, options)
-        if keyed is not None:
-            found.append(keyed)
-            if len(frames) == 1 or _fitted(frames, keyed, options) == len(frames):
-                return keyed
-    return min(found, key=lambda one: float(np.mean(_residuals(one.fit, options) ** 2)), default=None)
+    if options.noise > 0:
+        return _laid(targets, course, True, options) or _laid(targets, course, False, options)
+    own = _laid(targets, course, False, options)
+    if own is None or len(frames) == 1 or _fitted(frames, own, options) == len(frames):
+        return own
+    fused = _laid(targets, course, True, options)
+    return own if fused is None else min(own, fused, key=lambda one: float(np.mean(one.fit.by_area**2)))
 
 
 def _laid(targets: list[Target], course: Course, fuse: bool, options: EncoderOptions) -> Keyed | None:
+    """A base mesh of the key frame's surface, or of the fused one, laid onto the frames; None where nothing is left."""
     key = targets[course.key].mesh
     surface = fused_mesh(course.motion, targets, options.noise, options.fused) if fuse else key
     if surface.is_empty:

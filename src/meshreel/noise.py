@@ -8,10 +8,17 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from .analysis.embedded import EmbeddedOptions
+from .analysis.fit import FitOptions
 from .windows import EncoderOptions
 
-FOLLOWED = 6e-4  # RMS noise from which the second fit believes the coherent positions more than the frames
 LOST = 2.0  # RMS distances of the noise that a residual may have besides what it may have without
+KEYS = 2  # tried at most: what one of them lacks, the fused template has from the other frames
+FOLLOWED = 6e-4  # RMS noise from which the second fit believes the coherent positions more than the frames
+ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds lay the template onto it
+GATE = 6.0  # RMS distances that a pair of closest points may be apart at least: three standard deviations
+BASE = 0.5  # RMS distances of the noise that a base mesh may miss besides
+STEP = 0.8  # RMS distances of the noise that a step of the base's motion is wide besides
 
 
 def above_noise(options: EncoderOptions) -> EncoderOptions:
@@ -19,17 +26,36 @@ def above_noise(options: EncoderOptions) -> EncoderOptions:
     noise = options.noise
     if noise == 0:
         return options
-    known = options.embedded
-    embedded = replace(
-        known,
-        doubt=math.hypot(known.doubt, noise),
-        settled=math.hypot(known.settled, noise),
-        rekeyed=math.hypot(known.rekeyed, LOST * noise),
-        lost=math.hypot(known.lost, LOST * noise),
+    template, layers, tails = options.template, options.layers, options.tails
+    return replace(
+        options,
+        embedded=_tracking(options.embedded, noise),
+        fit=_fit(options.fit, noise),
+        template=replace(template, error=math.hypot(template.error, BASE * noise)),
+        layers=replace(layers, step=math.hypot(layers.step, STEP * noise)),
+        tails=tails and replace(tails, noise=noise),
+        keys=min(options.keys, KEYS),
     )
+
+
+def _tracking(options: EmbeddedOptions, noise: float) -> EmbeddedOptions:
+    return replace(
+        options,
+        doubt=math.hypot(options.doubt, noise),
+        settled=math.hypot(options.settled, noise),
+        rekeyed=math.hypot(options.rekeyed, LOST * noise),
+        lost=math.hypot(options.lost, LOST * noise),
+    )
+
+
+def _fit(options: FitOptions, noise: float) -> FitOptions:
+    rounds = ROUNDS if len(options.gates) >= ROUNDS.stop else slice(None)
     stiffer = math.hypot(1.0, noise / FOLLOWED)
-    fit, tails = options.fit, options.tails
-    second = fit.smoothing[-1] if fit.second_smoothing is None else fit.second_smoothing
-    fit = replace(fit, pull=stiffer * fit.pull, second_smoothing=stiffer * second)
-    tails = tails and replace(tails, noise=noise)
-    return replace(options, embedded=embedded, fit=fit, tails=tails)
+    second = options.smoothing[-1] if options.second_smoothing is None else options.second_smoothing
+    return replace(
+        options,
+        gates=tuple(max(gate, GATE * noise) for gate in options.gates[rounds]),
+        smoothing=options.smoothing[rounds],
+        pull=stiffer * options.pull,
+        second_smoothing=stiffer * second,
+    )

@@ -13,8 +13,9 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ..errors import InputError
+from ..geometry.connected import connected_faces
 from ..geometry.nearest import Surface
-from ..geometry.topology import components, drop_unreferenced, face_normals, unique_edges
+from ..geometry.topology import drop_unreferenced, face_normals, unique_edges
 from ..geometry.tsdf import SIDE, extract, fill_grid
 from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
@@ -56,16 +57,20 @@ def fuse_background(frames: Iterable[Mesh], voxel: float, options: BackgroundOpt
     mesh = sums.surface(max(1, int(options.seen * count)))
     if mesh.is_empty:
         return mesh
-    label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
+    label = connected_faces(mesh.faces, len(mesh.vertices))
     areas = np.bincount(label, face_normals(mesh)[1])
     return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[areas[label] >= options.fragment]))
 
 
 class _Sums:
-    """Distances of voxels near any surface so far: their sum, and of how many frames."""
+    """Distances of voxels near any surface so far: their sum, and of how many frames.
+
+    Inside, coordinates are about an origin near the first surface: distances are float32, and scenes may be far away.
+    """
 
     def __init__(self, voxel: float, reach: int) -> None:
         self._lattice, self._reach = Lattice(np.full(3, -voxel / 2), voxel), reach  # cells' middles are voxels
+        self._origin: Float64[np.ndarray, " 3"] | None = None
         self._keys = np.zeros(0, np.int64)
         self._sums, self._counts = np.zeros(0), np.zeros(0, np.int32)
 
@@ -73,6 +78,9 @@ class _Sums:
         """Takes in a frame."""
         if mesh.is_empty:
             return
+        if self._origin is None:
+            self._origin = Lattice.near(mesh, self._lattice.size).origin
+        mesh = Mesh(mesh.vertices - self._origin, mesh.faces)
         keys = self._around(mesh)
         keys, distances = _signed(mesh, keys, self._lattice, self._reach * self._lattice.size)
         union = distinct(np.concatenate([self._keys, keys]))
@@ -85,18 +93,19 @@ class _Sums:
 
     def surface(self, least: int) -> Mesh:
         """Where the mean distance is zero, among voxels that at least so many frames know."""
-        if not len(self._keys):
+        if self._origin is None or not len(self._keys):
             return Mesh.empty()
         cells = self._lattice.cells(self._keys)
-        block, inside = np.divmod(cells, SIDE)
-        blocks, which = np.unique(block, axis=0, return_inverse=True)
-        which = which.reshape(-1)
+        inside, shared = cells % SIDE, Lattice(np.zeros(3), 1.0)
+        keys, which = np.unique(shared.keys(cells // SIDE + 0.5), return_inverse=True)
+        blocks, which = shared.cells(keys), which.reshape(-1)
         distances = np.zeros((len(blocks), SIDE, SIDE, SIDE), np.float32)
         weights = np.zeros_like(distances)
         at = (which, inside[:, 2], inside[:, 1], inside[:, 0])
         distances[at] = self._sums / self._counts / (self._reach * self._lattice.size)
         weights[at] = self._counts
-        return extract(fill_grid(self._lattice.size, blocks.astype(np.int32), distances, weights), least - 0.5)
+        mesh = extract(fill_grid(self._lattice.size, blocks.astype(np.int32), distances, weights), least - 0.5)
+        return Mesh(mesh.vertices + self._origin, mesh.faces)
 
     def _around(self, mesh: Mesh) -> Int64[np.ndarray, " N"]:
         """The voxels within reach of a surface, about."""

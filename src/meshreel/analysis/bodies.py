@@ -13,7 +13,8 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from ..errors import InputError
-from ..geometry.topology import components, concatenate, drop_unreferenced, face_normals
+from ..geometry.connected import connected_faces
+from ..geometry.topology import concatenate, drop_unreferenced, face_normals
 from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
 
@@ -55,7 +56,7 @@ class _Piece:
 
 def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:
     """The bodies in what moves of consecutive frames; `size` is that of the scene's cells, m."""
-    lattice = Lattice(np.zeros(3), options.cell * size)
+    lattice = _lattice(moving, options.cell * size)
     pieces = [piece for frame, mesh in enumerate(moving) for piece in _pieces(frame, mesh, lattice)]
     label = _linked(pieces)
     clusters = [np.flatnonzero(label == number) for number in range(label.max(initial=-1) + 1)]
@@ -75,7 +76,7 @@ def same_bodies(before: Sequence[Mesh], now: Sequence[Mesh], size: float, option
 
     Each is continued by one at most: by that which shares most cells with it.
     """
-    lattice = Lattice(np.zeros(3), options.cell * size)
+    lattice = _lattice([*before, *now], options.cell * size)
     cells = [[around(_cells(mesh, lattice)) for mesh in meshes] for meshes in (before, now)]
     shared = np.array([[len(np.intersect1d(a, b, assume_unique=True)) for a in cells[0]] for b in cells[1]])
     found = [-1] * len(now)
@@ -86,10 +87,14 @@ def same_bodies(before: Sequence[Mesh], now: Sequence[Mesh], size: float, option
     return found
 
 
+def _lattice(meshes: Sequence[Mesh], size: float) -> Lattice:
+    return Lattice.near(next((mesh for mesh in meshes if not mesh.is_empty), Mesh.empty()), size)
+
+
 def _pieces(frame: int, mesh: Mesh, lattice: Lattice) -> list[_Piece]:
     if mesh.is_empty:
         return []
-    label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
+    label = connected_faces(mesh.faces, len(mesh.vertices))
     areas = np.bincount(label, face_normals(mesh)[1])
     found = []
     for number in np.flatnonzero(np.bincount(label)):
@@ -121,7 +126,10 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
                 rows.append(k)
                 columns.append(int(other))
         start = here[-1] + 1
-    graph = coo_array((np.ones(len(rows), bool), (rows, columns)), shape=(len(pieces), len(pieces)))
+    if not pieces:
+        return np.zeros(0, np.int64)
+    links = (np.array(rows, np.int32), np.array(columns, np.int32))
+    graph = coo_array((np.ones(len(rows), bool), links), shape=(len(pieces), len(pieces)))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Int64
 
 from ..errors import InputError
-from ..geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
+from ..geometry.poisson import PoissonOptions, drop_small, reconstruct
 from ..geometry.topology import clean, unique_edges, vertex_normals
 from ..types import Mesh
 from .embedded import Motion
@@ -28,10 +28,10 @@ ROOM = 1.1  # Poisson's octree is so much wider than the points
 class FusedOptions:
     """How frames become one surface; lengths are in cells of the reconstruction."""
 
-    noise: float = 1.5  # RMS distances that a cell is wide at least: less resolves noise
+    noise: float = 1.0  # RMS distances that a cell is wide at least: less resolves noise
     spacing: float = 0.5  # median edge lengths of the frames that it is wide at least: less resolves nothing
     reach: float = 1.5  # cells to a frame's surface within which the frame agrees
-    agree: float = 0.25  # share of the frames that must agree, and two of them at least
+    agree: float = 0.18  # share of the frames that must agree, and two of them at least
     smallest: float = 0.02  # connected bits with less than this share of the largest one's faces are dropped
 
     def __post_init__(self) -> None:
@@ -60,7 +60,7 @@ def fused_mesh(motion: Motion, targets: Sequence[Target], noise: float, options:
     fewest = max(min(2, len(targets)), int(np.ceil(options.agree * len(targets))))
     most = max(len(target.mesh.vertices) for target in targets)
     poisson = PoissonOptions(depth=depth, reach=reach, vertices=max(most, 4), smallest=options.smallest)
-    surface = reconstruct(*thin_out(points, np.concatenate([one.normals for one in carried]), cell), poisson)
+    surface = reconstruct(points, np.concatenate([one.normals for one in carried]), poisson)  # all: each has one vote
     if surface.is_empty:
         return surface
     sure = _agreeing(surface, carried, reach) >= fewest

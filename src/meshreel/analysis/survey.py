@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
-from ..geometry.topology import clean
+from ..geometry.topology import clean, drop_unreferenced
 from ..types import Mesh, MeshSequence
 
 LARGEST_RATIO = 10.0  # of the diagonals of two frames in one window
@@ -45,6 +45,10 @@ class Survey:
     def unit(self) -> float:
         """The unit of normalised coordinates, m."""
         return self.diagonal if self.scale is None else self.scale
+
+    def is_bare(self, frame: int) -> bool:
+        """True for a frame without surface."""
+        return self.diagonals[frame] == 0
 
     def normalise(self, mesh: Mesh) -> Mesh:
         """The mesh in normalised coordinates, cleaned and centered."""
@@ -87,8 +91,9 @@ def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool 
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped = list[float](), list[int](), 0
     for number, mesh in enumerate(sequence):
-        _check(mesh, f"frame {number}")
-        had_faces, before, mesh = not mesh.is_empty, len(mesh.faces), clean(mesh) if cleaned else mesh
+        check(mesh, f"frame {number}")
+        had_faces, before = not mesh.is_empty, len(mesh.faces)
+        mesh = clean(mesh) if cleaned else drop_unreferenced(mesh)
         dropped += before - len(mesh.faces)
         diagonals.append(0.0 if mesh.is_empty else mesh.diagonal)
         flattened += [number] if had_faces and mesh.is_empty else []
@@ -101,7 +106,7 @@ def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool 
     return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped)
 
 
-def _check(mesh: Mesh, where: str) -> None:
+def check(mesh: Mesh, where: str) -> None:
     """Raises InputError for what files cannot have either (io checks those), but a mesh made in memory may."""
     if not np.isfinite(mesh.vertices).all():
         vertex = int(np.argmin(np.isfinite(mesh.vertices).all(axis=1)))

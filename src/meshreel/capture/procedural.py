@@ -67,7 +67,8 @@ class SoftBodies(MeshSequence):
         number = range(len(self))[operator.index(index)]
         seconds = self.options.begin + number / self.options.frame_rate
         moment = seconds / self.options.story % 1.0
-        return polygonize(cast(moment, self.options), _TOUCH, _grid(number, self.options))
+        grid = grid_of_frame(number, self.options.spacing, self.options.seed)
+        return polygonize(cast(moment, self.options), _TOUCH, grid)
 
 
 def soft_bodies(options: SoftBodiesOptions | None = None) -> SoftBodies:
@@ -96,6 +97,15 @@ def cast(moment: float, options: SoftBodiesOptions) -> tuple[Body, ...]:
     thinnest = 0.7 * options.spacing
     poses = (_host(moment), _guest(moment), _child(moment))
     return tuple(figure(pose, thinnest) for pose in poses[: options.people])
+
+
+def grid_of_frame(number: int, spacing: float, seed: int) -> Grid:
+    """A lattice of its own for each frame, so that no two frames share connectivity."""
+    random = np.random.default_rng((seed, number))
+    a, b, c = random.uniform(-0.15, 0.15, 3)
+    skew = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
+    turn = np.linalg.solve(np.eye(3) - skew, np.eye(3) + skew)  # Cayley: a rotation of up to 30 degrees
+    return Grid(turn, random.uniform(0, 1, 3), spacing)
 
 
 def _host(moment: float) -> Pose:
@@ -161,15 +171,6 @@ def _during(moment: float, rise: float, full: float, fade: float, end: float) ->
 def _mixed(*targets: tuple[np.ndarray, float]) -> tuple[np.ndarray, float]:
     """The target that counts most and how much."""
     return max(targets, key=lambda target: target[1])
-
-
-def _grid(number: int, options: SoftBodiesOptions) -> Grid:
-    """A lattice of its own for each frame, so that no two frames share connectivity."""
-    random = np.random.default_rng((options.seed, number))
-    a, b, c = random.uniform(-0.15, 0.15, 3)
-    skew = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
-    turn = np.linalg.solve(np.eye(3) - skew, np.eye(3) + skew)  # Cayley: a rotation of up to 30 degrees
-    return Grid(turn, random.uniform(0, 1, 3), options.spacing)
 
 
 def _sphere(levels: int) -> Mesh:

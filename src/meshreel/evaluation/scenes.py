@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, UInt16
 
+from ..analysis.segment.scene import segment
 from ..capture.fusion import FusionOptions, fuse_depths
 from ..capture.record import open_recording
 from ..capture.rig import RIG, DepthCamera
@@ -33,6 +34,7 @@ from .truth import pinhole
 
 SCENES = tuple(SPEEDS)
 TRUE = "truth"  # labels: those of the nearest clean faces
+FOUND = "found"  # labels: those that the encoder finds
 FUSED_EVERY = 2  # frames of which a background is fused
 JUDGES, LEAST_VOTES, AGREED = 5, 2, 0.01  # frames; so many must have a face of the background within so many m
 
@@ -47,7 +49,7 @@ class SceneData:
     truth: Truth
 
     def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
-        """Which faces of a frame move: `truth`, or what the file `labels/SOURCE.npz` says (a bit a face, by frame).
+        """Which faces of a frame move: `truth`, `found`, or what `labels/SOURCE.npz` says (a bit a face, by frame).
 
         Raises InputError where that file is missing or does not fit.
         """
@@ -55,6 +57,8 @@ class SceneData:
             path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
             return _kept_array(path, lambda: self.truth[number].labels_for(self.meshes[number]))
         path, frame = self.folder / "labels" / f"{source}.npz", f"frame_{number:05}"
+        if source == FOUND and not path.exists():
+            _find_labels(self.meshes, path)
         faces = len(self.meshes[number].faces)
         try:
             with np.load(path, allow_pickle=False) as archive:
@@ -127,6 +131,15 @@ def _capture(rig: Path, meshes: Path) -> None:
     for number, name in enumerate(frame_names(len(recording), "ply")):
         if not (meshes / name).exists():
             write_mesh(recording[number], meshes / name)
+
+
+def _find_labels(meshes: MeshSequence, path: Path) -> None:
+    """Writes what the encoder finds to move, a bit a face, by frame."""
+    found = segment(meshes)
+    labels = {f"frame_{k:05}": np.packbits(found.moving(k, meshes[k])) for k in range(len(meshes))}
+    make_folder(path.parent)
+    with replacing(path) as file:
+        np.savez_compressed(file, allow_pickle=False, **labels)
 
 
 def _still(rays: Rays, moves: Bool[np.ndarray, " F"], camera: DepthCamera) -> UInt16[np.ndarray, "H W"]:

@@ -51,6 +51,13 @@ class Surface:
         return Hits(np.einsum("nk,nkd->nd", barycentric, corners), faces, barycentric)
 
 
+def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndarray, " N"]:
+    """How far points are from a mesh that has faces, wherever in the world both are."""
+    origin = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    local = points - origin
+    return np.linalg.norm(Surface(Mesh(mesh.vertices - origin, mesh.faces)).closest(local).points - local, axis=1)
+
+
 def carried_labels(surface: Surface, labels: Bool[np.ndarray, " F"], mesh: Mesh) -> Bool[np.ndarray, " G"]:
     """The labels of a surface's faces on another mesh: each face takes that of the face nearest to its middle."""
     if mesh.is_empty:

@@ -5,6 +5,7 @@ Inside, coordinates are float32 about an origin of the mesh's own, so that far-a
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,28 +57,31 @@ class Rays:
 
     def look(self, camera: PinholeCamera) -> Seen:
         """What a camera sees."""
-        columns, rows = np.arange(camera.width) + 0.5, np.arange(camera.height)[:, None] + 0.5
-        turned = np.linalg.inv(camera.extrinsic[:3, :3]) @ np.linalg.inv(camera.intrinsic)
         rays = np.empty((camera.height, camera.width, 6), np.float32)
         rays[..., :3] = camera.eye - self._origin
-        for axis, (right, down, ahead) in enumerate(turned):  # one metre along the axis: distances are depths
-            rays[..., 3 + axis] = right * columns + (down * rows + ahead)
+        for axis, ways in enumerate(_ways(camera)):
+            rays[..., 3 + axis] = ways
         answer = self._scene.cast_rays(self._tensor(rays))
         return Seen(_faces(answer), answer["t_hit"].numpy())
 
     def backs(self, camera: PinholeCamera, seen: Seen) -> Bool[np.ndarray, "H W"]:
         """Where a camera sees the back of a face; `seen` is what it sees."""
-        hit = seen.faces >= 0
-        rows, columns = np.nonzero(hit)
-        _, directions = camera.rays(np.column_stack([columns, rows]) + 0.5)
-        normals = self._normals[seen.faces[hit]] @ camera.extrinsic[:3, :3].T
-        found = np.zeros(seen.faces.shape, bool)
-        found[hit] = (normals * directions).sum(axis=1) > 0
-        return found
+        if not len(self._normals):
+            return np.zeros(seen.faces.shape, bool)
+        normals = self._normals[seen.faces]  # of some face where none is seen
+        along = sum(normals[..., axis] * ways for axis, ways in enumerate(_ways(camera)))
+        return (along > 0) & (seen.faces >= 0)
 
     def _cast(self, origins: np.ndarray, directions: np.ndarray) -> dict:
         rays = np.concatenate([origins - self._origin, directions], axis=1).astype(np.float32)
         return self._scene.cast_rays(self._tensor(rays))
+
+
+def _ways(camera: PinholeCamera) -> Iterator[Float64[np.ndarray, "H W"]]:
+    """Where the ray of each pixel goes, axis by axis of the world; one metre along the optical axis."""
+    columns, rows = np.arange(camera.width) + 0.5, np.arange(camera.height)[:, None] + 0.5
+    for right, down, ahead in np.linalg.inv(camera.extrinsic[:3, :3]) @ np.linalg.inv(camera.intrinsic):
+        yield right * columns + (down * rows + ahead)
 
 
 def _faces(answer: dict) -> Int32[np.ndarray, "..."]:

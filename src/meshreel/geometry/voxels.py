@@ -14,6 +14,8 @@ from ..types import Mesh
 
 _SIDE = 1 << 20  # cells along an axis that a key has room for, half of them on either side of the origin
 _HALF = _SIDE // 2
+_STRIDES = np.array([_SIDE * _SIDE, _SIDE, 1])
+_STRIDE = 1 << 12  # cells between the places that a lattice may have its origin at: float32 holds them finely
 _MOST_PARTS = 512  # of a face's side: more is beyond what a scene of one scale has
 _AROUND = np.array([d for d in itertools.product((-1, 0, 1), repeat=3) if any(d)])
 
@@ -24,6 +26,14 @@ class Lattice:
 
     origin: Float64[np.ndarray, " 3"]  # m, a corner of a cell
     size: float  # m
+
+    @staticmethod
+    def near(mesh: Mesh, size: float) -> Lattice:
+        """The lattice for a scene that a mesh is of: its origin is (0, 0, 0), unless that is far away."""
+        if mesh.is_empty:
+            return Lattice(np.zeros(3), size)
+        place, stride = mesh.vertices[mesh.faces[0, 0]], _STRIDE * size
+        return Lattice(stride * np.round(place / stride), size)
 
     def keys(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
         """The key of the cell that each point lies in; points outside of what keys have room for are at its border."""
@@ -41,12 +51,15 @@ class Lattice:
 
 def moved(keys: Int64[np.ndarray, " P"], offset: Int64[np.ndarray, " 3"]) -> Int64[np.ndarray, " P"]:
     """The cells so many cells farther along each axis."""
-    return keys + _key(offset[None])
+    return keys + int(_STRIDES @ offset)
 
 
 def distinct(keys: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " P"]:
-    """The different keys, sorted; as np.unique, whose hashing takes three times as long on millions."""
-    ordered = np.sort(keys)
+    """The different keys, sorted; as np.unique, whose hashing takes three times as long on millions.
+
+    A stable sort merges runs that are sorted already, which keys mostly come in, and is several times as fast then.
+    """
+    ordered = np.sort(keys, kind="stable")
     return ordered[np.concatenate([[True], ordered[1:] != ordered[:-1]])] if len(ordered) else ordered
 
 
@@ -72,19 +85,16 @@ def neighbours(keys: Int64[np.ndarray, " P"]) -> Int32[np.ndarray, "P 26"]:
 def spread(mesh: Mesh, spacing: float) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]:
     """Points on a mesh no farther apart than about `spacing`, and the face of each, rising; each face has one."""
     corners = mesh.vertices[mesh.faces]
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    parts = np.clip(np.ceil(sides.max(axis=1, initial=0) / spacing), 1, _MOST_PARTS).astype(np.int64)
-    points, owners = [], []
-    for count in np.unique(parts):
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    longest = np.sqrt(np.max([(x * x + y * y) + z * z for x, y, z in ((b - a).T, (c - b).T, (a - c).T)], axis=0))
+    parts = np.clip(np.ceil(longest / spacing), 1, _MOST_PARTS).astype(np.int64)
+    start = np.cumsum(parts * parts) - parts * parts
+    points = np.empty((int((parts * parts).sum()), 3))
+    for count in np.flatnonzero(np.bincount(parts)):
         faces = np.flatnonzero(parts == count)
         weights = _middles(int(count))
-        points.append(np.einsum("mk,nkd->nmd", weights, corners[faces]).reshape(-1, 3))
-        owners.append(np.repeat(faces, len(weights)))
-    if not points:
-        return np.zeros((0, 3)), np.zeros(0, np.int64)
-    owner = np.concatenate(owners)
-    order = np.argsort(owner, kind="stable")
-    return np.concatenate(points)[order], owner[order]
+        points[start[faces][:, None] + np.arange(len(weights))] = np.einsum("mk,nkd->nmd", weights, corners[faces])
+    return points, np.repeat(np.arange(len(parts)), parts * parts)
 
 
 def _middles(count: int) -> Float64[np.ndarray, "M 3"]:
@@ -96,5 +106,5 @@ def _middles(count: int) -> Float64[np.ndarray, "M 3"]:
     return np.column_stack([1 - first - second, first, second])
 
 
-def _key(cells: Int64[np.ndarray, "... 3"]) -> Int64[np.ndarray, "..."]:
-    return (cells[..., 0] * _SIDE + cells[..., 1]) * _SIDE + cells[..., 2]
+def _key(cells: Int64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
+    return cells @ _STRIDES

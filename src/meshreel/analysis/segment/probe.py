@@ -10,8 +10,10 @@ import numpy as np
 from jaxtyping import Int64
 
 from ...geometry.decimate import has_boundary
+from ...geometry.topology import drop_unreferenced
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Frames
+from ..survey import check
 
 PROBES = 4  # frames, spread over the sequence
 SHARE = 0.6  # of a frame's surface that stands still in a scene
@@ -20,12 +22,20 @@ TINY = 1e-12  # m, of a cell
 
 
 def is_scene(frames: Frames) -> bool:
-    """True where there is a background worth the name; False for empty and single frames."""
+    """True where there is a background worth the name; False for empty and single frames.
+
+    Raises InputError for frames that cannot be used, as far as they are looked at.
+    """
     numbers = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(PROBES, len(frames)))})
-    meshes = [mesh for number in numbers if not (mesh := frames[number]).is_empty]
+    meshes = []
+    for number in numbers:
+        check(mesh := frames[number], f"frame {number}")
+        meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
     if len(meshes) < 2 or not has_boundary(meshes[0]):
         return False
-    lattice = Lattice(np.zeros(3), max(meshes[0].diagonal / CELLS, TINY))
+    lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
+    if lattice.size == 0:
+        return False
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(own) for own in cells]
     still = [np.mean([_shared(own, other) for other in wide]) for own in cells]

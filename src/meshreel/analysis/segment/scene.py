@@ -17,13 +17,15 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
+from ...geometry.connected import connected_faces
 from ...geometry.raycast import Rays, Seen
-from ...geometry.topology import components, face_normals, unique_edges
+from ...geometry.topology import face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
-from ...types import Frames, Mesh
+from ...types import Frames, Mesh, MeshSequence
 from .cut import CutOptions, moving_places
 from .masks import Masker
 from .places import PlacesOptions, find_places
+from .settle import Rest, SettleOptions, find_rest
 from .views import ViewsOptions, place_views
 from .votes import Votes
 
@@ -37,6 +39,7 @@ class SegmentOptions:
     views: ViewsOptions = field(default_factory=ViewsOptions)
     places: PlacesOptions = field(default_factory=PlacesOptions)
     cut: CutOptions = field(default_factory=CutOptions)
+    settle: SettleOptions = field(default_factory=SettleOptions)
     threshold: float = 0.3  # the paper's tau: a low one, and clean-up, miss less than a high one
     island: float = 0.01  # m^2: connected faces with less area take the label of what is around them
     cameras: tuple[PinholeCamera, ...] = ()  # what to look from, of one size; none: placed as `views` says
@@ -61,19 +64,28 @@ class ByPlace:
     lattice: Lattice
     keys: Int64[np.ndarray, " P"]  # of the places, sorted
     chosen: Bool[np.ndarray, " P"]
+    rest: Rest  # when what is there belongs to the room after all
     island: float  # m^2
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """By where the faces are, whatever the frame's number."""
-        del frame
-        if mesh.is_empty or not self.chosen.any():
+        """By where the faces are; the frame's number matters where the room changes."""
+        chosen = self.chosen & (frame >= self.rest.until) & (frame < self.rest.since)
+        return without_islands(mesh, self.faces_at(mesh, chosen), self.island)
+
+    def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """The faces of frame `frame` that belong to the room as it is in the first frame."""
+        return self.faces_at(mesh, ~self.chosen | (self.rest.until > frame))
+
+    def faces_at(self, mesh: Mesh, chosen: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " F"]:
+        """The faces most of whose surface is at chosen places; where nobody looked, the nearest place counts."""
+        if mesh.is_empty or not chosen.any():
             return np.zeros(len(mesh.faces), bool)
         points, faces = spread(mesh, 1.5 * self.lattice.size)
-        moves = np.bincount(faces, self._at(points), len(mesh.faces))
-        return without_islands(mesh, moves >= 0.5 * np.bincount(faces, minlength=len(mesh.faces)), self.island)
+        there = np.bincount(faces, chosen[self._place(points)], len(mesh.faces))
+        return there >= 0.5 * np.bincount(faces, minlength=len(mesh.faces))
 
-    def _at(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Whether each point is at a moving place; at one that was not looked at, as at the nearest that was."""
+    def _place(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
+        """The number of the place that each point is at, or of the nearest."""
         from scipy.spatial import cKDTree
 
         asked = self.lattice.keys(points)
@@ -81,7 +93,7 @@ class ByPlace:
         unknown = np.flatnonzero(self.keys[number] != asked)
         if len(unknown):
             number[unknown] = cKDTree(self.lattice.centers(self.keys)).query(points[unknown])[1]
-        return self.chosen[number]
+        return number
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +105,15 @@ class ByMasks:
     lattice: Lattice
     options: SegmentOptions
     _known: dict[int, UInt8[np.ndarray, " B"]] = field(default_factory=dict, repr=False)  # a bit a face, by frame
+
+    @property
+    def rest(self) -> Rest:
+        """Masks know of no changes of the room."""
+        return Rest.none(0)
+
+    def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        """The faces of frame `frame` that do not move."""
+        return ~self.moving(frame, mesh)
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """By the votes of the pixels; faces that no view sees take their neighbours' label. A frame is asked once."""
@@ -111,15 +132,17 @@ class ByMasks:
         return without_islands(mesh, moves, self.options.island)
 
 
-def segment(frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByPlace:
+def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByPlace:
     """What moves in a scene, by geometric change over the whole of it; at most so many frames are looked at."""
     chosen = _with_surface(frames, options.places.frames)
     lattice = _lattice(frames, chosen)
     if not chosen:
-        return ByPlace(lattice, np.zeros(0, np.int64), np.zeros(0, bool), options.island)
+        return ByPlace(lattice, np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), options.island)
     views = _views(frames, chosen, options)
     places = find_places((frames[number] for number in chosen), views, lattice, options.places)
-    return ByPlace(lattice, places.keys, moving_places(places, options.cut), options.island)
+    moving = moving_places(places, options.cut)
+    rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
+    return ByPlace(lattice, places.keys, moving, rest, options.island)
 
 
 def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
@@ -142,26 +165,25 @@ def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) ->
 
     A connected piece of the mesh that has one label keeps it if it rests: there is nothing around it.
     """
-    areas = face_normals(mesh)[1]
-    small = _pieces(mesh, chosen, areas) < least
-    chosen = chosen & ~small
-    alone = _whole(mesh, ~chosen)
-    small = _pieces(mesh, ~chosen, areas) < least
-    return chosen | (small & ~alone)
+    moving = chosen.copy()
+    moving[chosen] = _areas(mesh, chosen)[0] >= least
+    if not moving.any():
+        return moving
+    touched = np.zeros(len(mesh.vertices), bool)
+    touched[mesh.faces[moving].reshape(-1)] = True
+    rests = ~moving
+    area, label = _areas(mesh, rests)
+    beside = np.zeros(len(mesh.vertices), bool)  # whether a piece has something that moves around it
+    beside[label[touched[mesh.faces[rests]].any(axis=1)]] = True
+    moving[rests] = (area < least) & beside[label]
+    return moving
 
 
-def _pieces(mesh: Mesh, chosen: Bool[np.ndarray, " F"], areas: Float64[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
-    """The area of the connected chosen faces that each chosen face belongs to; infinite for the others."""
-    found = np.full(len(mesh.faces), np.inf)
-    label = components(mesh.faces[chosen], len(mesh.vertices))[mesh.faces[chosen][:, 0]]
-    found[chosen] = np.bincount(label, areas[chosen])[label] if len(label) else 0.0
-    return found
-
-
-def _whole(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
-    """The faces of connected pieces of the mesh of which every face is chosen."""
-    label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
-    return (np.bincount(label, ~chosen) == 0)[label] if len(label) else np.zeros(0, bool)
+def _areas(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> tuple[Float64[np.ndarray, " C"], Int64[np.ndarray, " C"]]:
+    """The area of the connected chosen faces that each chosen face belongs to, and their label, less than V."""
+    some = Mesh(mesh.vertices, mesh.faces[chosen])
+    label = connected_faces(some.faces, len(some.vertices))
+    return np.bincount(label, face_normals(some)[1])[label], label
 
 
 def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], known: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
@@ -196,15 +218,19 @@ def _views(frames: Frames, chosen: Sequence[int], options: SegmentOptions) -> tu
 
 
 def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
-    """Cells as large as the frames' edges are long, which is about a voxel of what they were fused on."""
+    """Cells as large as the frames' edges are long, which is about a voxel of what they were fused on.
+
+    Edges without length say nothing; 1 m where there are no others.
+    """
     if not chosen:
         return Lattice(np.zeros(3), 1.0)
     edges = []
     for number in (chosen[0], chosen[len(chosen) // 2], chosen[-1]):
         mesh = frames[number]
         pairs = mesh.vertices[unique_edges(mesh.faces)[0]]
-        edges.append(np.median(np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)))
-    return Lattice(np.zeros(3), float(np.median(edges)))
+        lengths = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)
+        edges += [np.median(lengths[lengths > 0])] if lengths.any() else []
+    return Lattice.near(frames[chosen[0]], float(np.median(edges)) if edges else 1.0)
 
 
 class _Some(Frames):

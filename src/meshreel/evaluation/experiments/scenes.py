@@ -15,18 +15,17 @@ from ..curves import Measure, curve, value
 from ..promises import Promise
 from ..rows import Point, Row, curve_rows, select
 from ..scene_rows import BACKGROUND_S, FLOOR, MEASURED_EVERY, MEMORY, NOISE_FLOOR, SCENE, SEGMENTATION
-from ..scenes import SCENES
+from ..scenes import FOUND, SCENES
 from .scenes_goals import own_goals, segmentation_goal
 
 COMPARISON = ComparisonOptions(ssim=True)  # scenes are looked at from where their cameras stood
 ROOM, STANDING = SCENES
 SYSTEM = "meshreel best"
-GIVEN = "found"  # labels that the system has found: labels/found.npz in the folder of the scene
 WHOLE = ((0.2, 12), (0.1, 11), (0.05, 11), (0.02, 10))  # anchor a: share of the faces, bits
 WHOLE_SUBDIVIDED = ((0.05, 11), (0.02, 10))
 PEOPLE = ((0.5, 11), (0.25, 11), (0.1, 10), (0.05, 10), (0.02, 9))  # anchor b, of what moves
 PEOPLE_SUBDIVIDED = ((0.1, 10), (0.02, 9))
-PEOPLE_GIVEN = ((0.25, 11), (0.1, 10))
+PEOPLE_FOUND = ((0.25, 11), (0.1, 10))
 QUALITIES = (20.0, 35.0, 50.0, 65.0, 80.0)
 DEFAULT = 50.0
 LENGTHS = (60, 240)  # frames whose memory is compared
@@ -74,10 +73,10 @@ def points(small: bool) -> Iterator[Point]:
     yield from (_anchor("scene_draco", *point, None, levels=1) for point in WHOLE_SUBDIVIDED)
     yield from (_anchor("background_draco", *point) for point in PEOPLE)
     yield from (_anchor("background_draco", *point, None, levels=1) for point in PEOPLE_SUBDIVIDED)
-    yield from (_anchor("labelled_draco", *point, None, labels=GIVEN) for point in PEOPLE_GIVEN)
+    yield from (_anchor("labelled_draco", *point, None, labels=FOUND) for point in PEOPLE_FOUND)
     yield from (_system(quality) for quality in QUALITIES)
     yield Point(ROOM, "meshreel", {"preset": "paper", "centers": 2000, "group_size": 10}, None, SCENE)
-    yield from (Point(name, "segmentation", {"labels": GIVEN}, None, SEGMENTATION) for name in SCENES)
+    yield from (Point(name, "segmentation", {"labels": FOUND}, None, SEGMENTATION) for name in SCENES)
     yield from (Point(ROOM, "meshreel", {"quality": DEFAULT}, length, MEMORY) for length in LENGTHS)
 
 

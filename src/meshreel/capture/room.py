@@ -1,0 +1,160 @@
+"""A furnished room from nothing, in which two people move: the scene of the demo, for a simulated rig.
+
+In: options. Out: the clean mesh of each moment with the faces that move, made when asked for, and where the cameras
+stand. y is up, metres; the floor is at height 0 and the front, towards +z, has no wall.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import overload
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import InputError
+from ..geometry.topology import concatenate, weld
+from ..types import Mesh
+from .figure import Pose, figure
+from .implicit import polygonize
+from .procedural import grid_of_frame
+from .rig import DepthCamera
+from .simulate import SceneFrame, corner_cameras
+
+SIZE = (3.6, 2.4, 3.2)  # m, of the room; it stands on the middle of its floor
+_FACE = 0.1  # m, about the length of a side of the room's faces
+_MARGIN = 0.15  # m from walls and ceiling to the cameras
+_CIRCLE, _SPEED = 0.95, 0.9  # m and m/s, of the walk around the middle
+_CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step
+_TURN = 0.9  # rad/s of the child
+_TOUCH = 0.01  # m; each person is made alone
+
+Vector = Float64[np.ndarray, " 3"] | tuple[float, float, float]
+Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lowest and highest corner, m
+FURNITURE: tuple[Box, ...] = (
+    ((-1.75, 0.0, -1.55), (-0.85, 1.25, -1.15)),  # a cupboard at the back wall
+    ((0.35, 0.0, -1.55), (1.55, 0.42, -1.00)),  # a bench there,
+    ((0.35, 0.42, -1.55), (1.55, 0.85, -1.40)),  # and its back
+    ((1.25, 0.68, 0.35), (1.75, 0.72, 1.35)),  # a table at the right wall
+    ((1.28, 0.0, 0.38), (1.34, 0.68, 0.44)),  # on four legs
+    ((1.66, 0.0, 0.38), (1.72, 0.68, 0.44)),
+    ((1.28, 0.0, 1.26), (1.34, 0.68, 1.32)),
+    ((1.66, 0.0, 1.26), (1.72, 0.68, 1.32)),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RoomOptions:
+    """How long and how fine."""
+
+    frames: int = 24
+    frame_rate: float = 12.0  # 1/s
+    spacing: float = 0.035  # m between grid points of the people's surface
+    seed: int = 0  # of the grids
+
+    def __post_init__(self) -> None:
+        """Refuses what cannot be made."""
+        if self.frames < 1:
+            raise InputError(f"frames {self.frames} is below 1; ask for at least one")
+        if not 0.008 <= self.spacing <= 0.1:
+            raise InputError(f"spacing {self.spacing} m is outside 0.008 to 0.1; 0.035 suits a room")
+        if not (math.isfinite(self.frame_rate) and self.frame_rate > 0):
+            raise InputError(f"frame rate {self.frame_rate} is not a positive number; give one, as 12")
+
+
+@dataclass(frozen=True, slots=True)
+class Room(Sequence[SceneFrame]):
+    """The clean frames of `furnished_room`."""
+
+    options: RoomOptions
+    still: Mesh  # room and furniture
+
+    def __len__(self) -> int:
+        return self.options.frames
+
+    @overload
+    def __getitem__(self, index: int) -> SceneFrame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[SceneFrame]: ...
+    def __getitem__(self, index: int | slice) -> SceneFrame | list[SceneFrame]:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        number = range(len(self))[operator.index(index)]
+        return SceneFrame.of([self.still], self.people(number))
+
+    def people(self, number: int) -> list[Mesh]:
+        """Who moves in a frame: one who walks around the middle, and a child who jumps and turns there. Both closed."""
+        spacing = self.options.spacing
+        grid = grid_of_frame(number, spacing, self.options.seed)
+        poses = (_walker(number / self.options.frame_rate), _child(number / self.options.frame_rate))
+        return [polygonize((figure(pose, 0.7 * spacing),), _TOUCH, grid) for pose in poses]
+
+
+def furnished_room(options: RoomOptions | None = None) -> Room:
+    """The room and its people, for as long as asked; the same options give the same frames."""
+    x, y, z = SIZE[0] / 2, SIZE[1], SIZE[2] / 2
+    panels = [
+        _panel((-x, 0, z), (2 * x, 0, 0), (0, 0, -2 * z)),  # the floor
+        _panel((-x, 0, -z), (2 * x, 0, 0), (0, y, 0)),  # the wall at the back,
+        _panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # left
+        _panel((x, 0, -z), (0, 0, 2 * z), (0, y, 0)),  # and right
+    ]
+    return Room(options or RoomOptions(), concatenate([weld(concatenate(panels)), *map(_box, FURNITURE)]))
+
+
+def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:
+    """Depth cameras in the room's corners that look to its middle, with pictures of `width` x 0.9 `width` pixels."""
+    half = np.array([SIZE[0] / 2 - _MARGIN, SIZE[1], SIZE[2] / 2 - _MARGIN])
+    low, high = half * (-1.0, 0.0, -1.0), half
+    return tuple(_resized(camera, width) for camera in corner_cameras(low, high, count))
+
+
+def _walker(seconds: float) -> Pose:
+    """Walks in a circle around the middle, arms swinging."""
+    walked = _SPEED * seconds
+    angle = walked / _CIRCLE + 2.4  # begins at the left
+    place = _CIRCLE * np.array([np.cos(angle), 0.0, -np.sin(angle)])
+    wobble = math.sin(4 * math.pi * walked / _CYCLE)
+    # A heading h looks along (sin h, 0, cos h), and the way goes along (-sin angle, 0, -cos angle).
+    return Pose(place, angle + math.pi, walked / _CYCLE, _STRIDE, softness=wobble)
+
+
+def _child(seconds: float) -> Pose:
+    """Jumps on the spot, turns, and waves with both arms."""
+    place = np.array([0.0, 0.14 * max(math.sin(2 * math.pi * seconds), 0.0), 0.0])
+    heading, sway = _TURN * seconds, 0.07 * math.sin(4 * math.pi * seconds)
+    out = np.array([math.cos(heading), 0.0, -math.sin(heading)])  # to its left
+    wrists = tuple(place + side * (0.26 + sway) * out + [0.0, 1.1, 0.0] for side in (1.0, -1.0))
+    return Pose(place, heading, wrists=(wrists[0], wrists[1]), reach=(1.0, 1.0), size=0.68, girth=1.05)
+
+
+def _resized(camera: DepthCamera, width: int) -> DepthCamera:
+    """The camera with larger or smaller pixels; the middle of pixel i is at i."""
+    height = round(width * camera.height / camera.width)
+    ratios = (width / camera.width, height / camera.height)
+    focal = (camera.focal[0] * ratios[0], camera.focal[1] * ratios[1])
+    center = ((camera.center[0] + 0.5) * ratios[0] - 0.5, (camera.center[1] + 0.5) * ratios[1] - 0.5)
+    return replace(camera, width=width, height=height, focal=focal, center=center)
+
+
+def _box(box: Box) -> Mesh:
+    """A closed box that looks outwards."""
+    low, high = (np.array(corner) for corner in box)
+    a, b, c = np.diag(high - low)
+    lower = [_panel(low, b, a), _panel(low, c, b), _panel(low, a, c)]
+    upper = [_panel(high, -a, -b), _panel(high, -b, -c), _panel(high, -c, -a)]
+    return weld(concatenate(lower + upper))
+
+
+def _panel(corner: Vector, right: Vector, up: Vector) -> Mesh:
+    """A rectangle of small faces that looks along right x up."""
+    counts = [max(1, round(float(np.linalg.norm(side)) / _FACE)) for side in (right, up)]
+    i, j = np.meshgrid(*(np.arange(count + 1) for count in counts), indexing="ij")
+    shares = (i.reshape(-1, 1) / counts[0], j.reshape(-1, 1) / counts[1])
+    vertices = np.asarray(corner) + shares[0] * np.asarray(right) + shares[1] * np.asarray(up)
+    first = (i * (counts[1] + 1) + j)[:-1, :-1].reshape(-1)
+    a, b, c, d = first, first + counts[1] + 1, first + counts[1] + 2, first + 1
+    return Mesh.of(vertices, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]))
