@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.choice import Quality
-from meshreel.encoder import GroupSummary, Summary
+from meshreel.encoder import GroupSummary, SceneSummary, Summary
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
@@ -82,6 +82,15 @@ def test_a_file_is_measured_in_the_unit_of_the_goal() -> None:
     summary = Summary(1000, groups)
     assert Goal(psnr=60).measured(summary, 25.0) == 65.0
     assert math.exp(Goal(mbps=1).measured(summary, 25.0)) == pytest.approx(1000 * 8 * 25 / 4 / 1e6)
+
+
+def test_a_background_is_too_large_for_a_rate_by_itself_and_for_no_psnr() -> None:
+    groups = (GroupSummary(Form.EMPTY, 10, 4, Quality(0, 0, 0)),)
+    summary = Summary(6000, groups, scene=SceneSummary(5000, 100, 0.001, 60.0, 1))
+    assert "5000 bytes, 0.1 Mbps over 0.4 s" in Goal(mbps=0.09).exceeded_by_background(summary, 25.0)
+    assert Goal(mbps=0.1).exceeded_by_background(summary, 25.0) == ""
+    assert Goal(psnr=90.0).exceeded_by_background(summary, 25.0) == ""
+    assert Goal(mbps=0.01).exceeded_by_background(replace(summary, scene=None), 25.0) == ""
 
 
 BODY = MeshList(tuple(soft_bodies(SoftBodiesOptions(frames=2, people=1, spacing=0.06))))

@@ -59,6 +59,8 @@ def test_pictures_for_other_tools_are_laid_out_as_masks_are_read(run, scan, tmp_
     said = run("segment", scan, "-o", out, "--views-only", "--frames", "1:3")
     assert said.code == 0 and "pictures of 2 frames from 6 views" in said.out
     assert sorted(path.name for path in out.iterdir()) == ["cameras.json", *(f"view{k:02}" for k in range(6))]
+    said = run("segment", scan, "-o", tmp_path / "labels", "--frames", "1:3", "--masks", out)
+    assert failed(said, "frame_00000.png: a mask of mode RGB", "8-bit gray PNG")  # the pictures themselves
     for picture in out.glob("view*/*.png"):
         Image.fromarray(np.zeros((90, 120), np.uint8)).save(picture)  # a tool that sees nothing move
     said = run("segment", scan, "-o", tmp_path / "labels", "--frames", "1:3", "--masks", out, "--json")

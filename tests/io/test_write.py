@@ -11,7 +11,7 @@ import trimesh
 from meshreel.errors import InputError
 from meshreel.io import write
 from meshreel.io.sequence import open_sequence
-from meshreel.io.write import replacing, write_mesh
+from meshreel.io.write import replacing, write_colored, write_mesh
 from meshreel.types import Mesh
 
 EXTENSIONS = ("ply", "obj", "glb")
@@ -86,3 +86,15 @@ def test_a_folder_that_is_not_there_and_a_foreign_extension_are_refused(tmp_path
         write_mesh(body(), tmp_path / "gone" / "m.ply")
     with pytest.raises(InputError, match=rf"m.fbx: .fbx extension is not one of {', '.join(write._FORMATS)}; choose"):
         write_mesh(body(), tmp_path / "m.fbx")
+
+
+def test_each_face_has_its_color_and_shares_no_corner_with_one_of_another(tmp_path: Path) -> None:
+    square = Mesh.of([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3], [0, 1, 3]])
+    colors = np.array([[255, 0, 7], [0, 9, 255], [255, 0, 7]], np.uint8)
+    write_colored(square, colors, tmp_path / "a.ply")
+    shown = trimesh.load(tmp_path / "a.ply", process=False)
+    assert len(shown.vertices) == 4 + 3  # 0, 1, 2, 3 of one color; 0, 2, 3 of the other
+    assert np.array_equal(shown.triangles, square.vertices[square.faces])
+    assert np.array_equal(shown.visual.vertex_colors[shown.faces][..., :3], np.repeat(colors[:, None], 3, axis=1))
+    write_colored(Mesh.empty(), colors[:0], tmp_path / "none.ply")
+    assert open_sequence(tmp_path / "none.ply")[0].is_empty

@@ -91,6 +91,8 @@ def command(
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
 
+    if background_refresh is not None and not 0 < background_refresh < math.inf:
+        raise InputError(f"--background-refresh {background_refresh:g}: give seconds above 0")
     if dynamic_only and (background_refresh is not None or masking.wanted):
         raise InputError("--dynamic-only looks for no background: leave out --background-refresh, masks and views")
 

@@ -10,12 +10,14 @@ import pytest
 
 from meshreel.analysis.segment.masks import CAMERAS, ImageMasks, Masker, one_size, read_views
 from meshreel.analysis.segment.pictures import write_views
+from meshreel.analysis.segment.scene import SegmentOptions, scene_views, segment_by
 from meshreel.analysis.segment.views import ViewsOptions, place_views
 from meshreel.analysis.segment.votes import Votes
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import pack_cameras
 from meshreel.geometry.raycast import Rays
 from meshreel.io.masks import write_picture
+from meshreel.types import Mesh, MeshList
 from tests.analysis.segment.test_views import ROOM
 from tests.metrics.shapes import sphere
 
@@ -72,3 +74,27 @@ def test_a_folder_without_cameras_or_with_cameras_of_two_sizes_is_refused(masks:
         ImageMasks(masks, 2)
     with pytest.raises(InputError, match="nothing: has 0 cameras"):
         one_size([], "nothing")
+
+
+def test_a_frame_is_asked_for_its_masks_once_and_an_empty_one_never(masks: Path):
+    asked = []
+
+    class Counted(ImageMasks):
+        def masks(self, frame, seen, views):
+            asked.append(frame)
+            return super().masks(frame, seen, views)
+
+    frames = MeshList((ROOM, ROOM, Mesh.empty()))
+    by = segment_by(Counted(masks, 2), frames, SegmentOptions(island=0))
+    found = [by.moving(frame, frames[frame]) for frame in (0, 1, 0, 2)]
+    assert asked == [0, 1] and np.array_equal(found[0], found[2]) and found[0].any() and len(found[3]) == 0
+    assert 0 < by.lattice.size < ROOM.diagonal
+
+
+def test_views_are_placed_by_frames_that_have_a_surface_and_given_ones_are_taken():
+    frames = MeshList((Mesh.empty(), ROOM, *[Mesh.empty()] * 5))
+    options = SegmentOptions(views=ViewsOptions(count=2, width=80, height=60))
+    assert len(scene_views(frames, options)) == 2
+    assert scene_views(frames, replace(options, cameras=VIEWS)) == VIEWS
+    with pytest.raises(InputError, match="has a surface"):
+        scene_views(MeshList((Mesh.empty(),) * 2), options)

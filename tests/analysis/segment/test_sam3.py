@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.segment import sam3
-from meshreel.analysis.segment.hypotheses import HypothesisOptions
+from meshreel.analysis.segment.hypotheses import HypothesisOptions, Tracked
 from meshreel.analysis.segment.masks import Masker
 from meshreel.analysis.segment.views import ViewsOptions, place_views
 from meshreel.analysis.segment.votes import Votes
@@ -94,8 +94,36 @@ def test_weights_that_lack_a_part_are_refused(weights: Path, tmp_path: Path):
         sam3.Sam3Masks(tmp_path)
 
 
+class Followed:
+    """A tracker that sees the last faces of each frame in the view over time, and counts how often it is asked."""
+
+    def __init__(self, *_: object) -> None:
+        self.asked: list[str] = []
+
+    def over_time(self, _pictures: list[np.ndarray]) -> Tracked:
+        self.asked.append("time")
+        ball = np.stack([seen[EASILY.reference].faces >= len(WALLS.faces) for seen in SEEN])
+        return Tracked(ball.astype(np.int32), {1: "ball"})
+
+    def through_views(self, _pictures: list[np.ndarray]) -> Tracked:
+        self.asked.append("views")
+        return Tracked(np.ones((len(VIEWS), 60, 80), np.int32), {1: "ball"})
+
+
+def test_who_goes_through_the_frames_again_is_answered_from_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    tracker = Followed()
+    monkeypatch.setattr(sam3, "_Tracker", lambda *_: tracker)
+    masker = sam3.Sam3Masks(tmp_path, None, EASILY)
+    found = []
+    for _ in range(2):
+        for frame, seen in enumerate(SEEN):
+            masker.observe(frame, seen, VIEWS)
+        found.append([masker.masks(frame, seen, VIEWS) for frame, seen in enumerate(SEEN)])
+    assert np.array_equal(*found) and found[0][0].shape == (3, 60, 80) and np.any(found)
+    assert tracker.asked == ["time", *["views"] * len(FRAMES)]
+
+
 @pytest.mark.parametrize("files", [None, [], ["config.json"], ["config.json", "model.safetensors"]])
-@pytest.mark.usefixtures("weights")
 def test_a_folder_without_weights_is_told_what_it_must_hold(tmp_path: Path, files: list[str] | None):
     folder = tmp_path / "sam3"
     if files is not None:
@@ -107,6 +135,8 @@ def test_a_folder_without_weights_is_told_what_it_must_hold(tmp_path: Path, file
 
 
 def test_without_the_extra_an_error_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for name in ("config.json", "model.safetensors", "tokenizer.json"):  # a folder that is none is told first
+        (tmp_path / name).write_text("{}")
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(InputError, match=r"pip install 'meshreel\[sam3\]'"):
         sam3.Sam3Masks(tmp_path)
