@@ -29,6 +29,7 @@ _FACE = 0.1  # m, about the length of a side of the room's faces
 _LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)  # m, box of the cameras: before the walls, and outside where none is
 _CIRCLE, _SPEED = 0.8, 0.8  # m and m/s, of the walk around the middle
 _CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step
+_SOLE = 0.01  # m, by which the walker's feet would sink into the floor
 _TURN = 0.6  # rad/s of the child
 _TOUCH = 0.01  # m; each person is made alone
 
@@ -101,7 +102,7 @@ def furnished_room(options: RoomOptions | None = None) -> Room:
         _panel((-x, 0, -z), (2 * x, 0, 0), (0, y, 0)),  # the wall at the back
         _panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # and that on the left
     ]
-    return Room(options or RoomOptions(), concatenate([weld(concatenate(panels)), *map(_box, FURNITURE)]))
+    return Room(options or RoomOptions(), concatenate([_joined(panels), *map(_box, FURNITURE)]))
 
 
 def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:
@@ -113,7 +114,7 @@ def _walker(seconds: float) -> Pose:
     """Walks in a circle around the middle, arms swinging."""
     walked = _SPEED * seconds
     angle = walked / _CIRCLE + 2.4  # begins at the left
-    place = _CIRCLE * np.array([np.cos(angle), 0.0, -np.sin(angle)])
+    place = np.array([_CIRCLE * math.cos(angle), _SOLE, -_CIRCLE * math.sin(angle)])
     wobble = math.sin(4 * math.pi * walked / _CYCLE)
     # A heading h looks along (sin h, 0, cos h), and the way goes along (-sin angle, 0, -cos angle).
     return Pose(place, angle + math.pi, walked / _CYCLE, _STRIDE, softness=wobble)
@@ -143,7 +144,13 @@ def _box(box: Box) -> Mesh:
     a, b, c = np.diag(high - low)
     lower = [_panel(low, b, a), _panel(low, c, b), _panel(low, a, c)]
     upper = [_panel(high, -a, -b), _panel(high, -b, -c), _panel(high, -c, -a)]
-    return weld(concatenate(lower + upper))
+    return _joined(lower + upper)
+
+
+def _joined(panels: list[Mesh]) -> Mesh:
+    """Panels as one mesh; where two meet, they share vertices."""
+    mesh = concatenate(panels)
+    return weld(Mesh.of(mesh.vertices.round(9), mesh.faces))  # the two come to a vertex by different sums
 
 
 def _panel(corner: Vector, right: Vector, up: Vector) -> Mesh:
