@@ -66,7 +66,7 @@ class EncoderOptions:
     template: TemplateOptions = field(default_factory=TemplateOptions)
     layers: LayersOptions = field(default_factory=LayersOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches (form LAYERS)
-    noise: float = 0.0  # RMS distance of the frames' surface from the truth, normalised; 0: a clean capture (form LAYERS)
+    noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture (form LAYERS)
     fused: FusedOptions = field(default_factory=FusedOptions)
 
     def __post_init__(self) -> None:

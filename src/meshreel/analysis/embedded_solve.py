@@ -78,9 +78,7 @@ def unmoved(
     return np.linalg.solve(linear, offsets[:, :, None])[:, :, 0], known
 
 
-def _affine(
-    nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose
-) -> Float64[np.ndarray, "P 3 4"]:
+def _affine(nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 4"]:
     """The blend of the nodes' motions at each bound point."""
     offsets = pose.positions - np.einsum("nij,nj->ni", pose.rotations, nodes)
     affine = np.concatenate([pose.rotations, offsets[:, :, None]], axis=2).reshape(-1, 12)
