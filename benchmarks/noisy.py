@@ -2,8 +2,8 @@
 
 python benchmarks/noisy.py --rig build/room2 --meshes build/room2-meshes      # half an hour; `crane` for one body
 
-In: a rig's folder of benchmarks/rooms.py with its truth, and what `meshreel capture` made of it. Out: the rows `fused` of
-docs/decisions/measured.jsonl.
+In: a rig's folder of benchmarks/rooms.py with its truth, and what `meshreel capture` made of it. Out: the rows `fused`
+of docs/decisions/measured.jsonl.
 """
 
 from __future__ import annotations

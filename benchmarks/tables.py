@@ -126,6 +126,26 @@ def tails(rows: list[Row]) -> Table:
     ]
 
 
+def fused(rows: list[Row]) -> Table:
+    """A row a body and way; the rates that it needs beside the anchors last."""
+    heads = ["body", "way", "> Mbps", "> to the truth: median, mm", "> normals, degrees", "> SSIM", "> RMS, mm"]
+    heads += ["> from the truth: RMS, mm", "> to the input: d2, dB", "> SSIM", "> CPU s a frame"]
+    names = ("median_mm", "angle_deg", "ssim", "rms_mm", "coverage_mm", "d2_noisy", "ssim_noisy")
+    digits = dict.fromkeys(names, 2) | {"ssim": 3, "ssim_noisy": 3, "angle_deg": 1, "coverage_mm": 1}
+    told = [
+        [
+            r["body"],
+            r["way"],
+            "" if r["mbps"] is None else f"{r['mbps']:.3f}",
+            *("" if r["mbps"] is None and name.endswith("noisy") else f"{r[name]:.{digits[name]}f}" for name in names),
+            f"{r['cpu_s_per_frame']:.1f}" if r["way"].startswith("quality") else "",
+        ]
+        for r in rows
+        if "note" not in r
+    ]
+    return heads, told + [[r["body"], r["way"] + ": " + r["note"], *[""] * 9] for r in rows if "note" in r]
+
+
 TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "noise": noise,
     "anchors": anchors,
@@ -135,6 +155,7 @@ TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "correspondence": correspondence,
     "template": template,
     "tails": tails,
+    "fused": fused,
 }
 
 

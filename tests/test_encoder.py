@@ -5,6 +5,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -229,3 +230,12 @@ def test_a_deforming_ball_keeps_its_frame_rate(tmp_path):
     video, _ = decoded(sequence, tmp_path / "a.reel")
     assert video.frame_rate == 12.5
     assert video.timestamps == pytest.approx([0, 0.08])
+
+
+def test_a_path_that_cannot_be_written_is_refused_before_anything_is_read(tmp_path: Path) -> None:
+    class Unread(MeshList):
+        def __getitem__(self, index: int) -> Mesh:
+            raise AssertionError("read")
+
+    with pytest.raises(InputError, match="cannot be written"):
+        encode(Unread((Mesh.empty(),) * 3), tmp_path / "nowhere" / "x.reel")

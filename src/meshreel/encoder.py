@@ -22,7 +22,7 @@ from .analysis.segment.probe import is_scene
 from .analysis.survey import Survey, survey
 from .choice import Quality
 from .coding.background import decode_background
-from .container.writer import ReelWriter
+from .container.writer import ReelWriter, check_target
 from .decoder import open as open_video
 from .errors import InputError
 from .format.layout import Form, Header
@@ -103,6 +103,7 @@ def encode(
     options = options or preset_options()
     if options.dynamic_only and masker is not None:
         raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
+    check_target(Path(path))
     stages = Stages(progress, len(sequence))
     if not options.dynamic_only and len(sequence) and (masker is not None or is_scene(sequence)):
         return _encode_scene(sequence, Path(path), options, executor, stages, masker)

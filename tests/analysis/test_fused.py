@@ -139,14 +139,7 @@ def test_a_hole_in_a_frame_is_no_residual_in_common_but_what_the_template_lacks_
 
 @pytest.mark.parametrize(
     "wrong",
-    [
-        {"noise": -1.0},
-        {"noise": 0.0, "spacing": 0.0},
-        {"reach": 0.0},
-        {"agree": 0.0},
-        {"agree": 1.1},
-        {"smallest": 1.0},
-    ],
+    [{"noise": -1.0}, {"noise": 0.0, "spacing": 0.0}, {"reach": 0.0}, {"agree": 0.0}, {"agree": 1.1}, {"smallest": 1}],
 )
 def test_options_out_of_range_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="give"):

@@ -1,28 +1,65 @@
-"""`meshreel demo`: from nothing to a file, its numbers and a picture."""
+"""`meshreel demo`: from nothing to a file, its numbers against the truth, and a picture."""
 
 from __future__ import annotations
 
 import sys
 
+import numpy as np
 import pytest
 
 import meshreel
-from meshreel.capture.procedural import SoftBodiesOptions
+from meshreel.capture.record import open_recording
+from meshreel.capture.truth import read_truth
 from meshreel.cli.console import called_as
 from tests.cli.conftest import failed
 
 
-@pytest.mark.usefixtures("quick_presets")
-def test_the_demo_leaves_a_file_and_a_picture_and_tells_its_numbers(run, tmp_path, monkeypatch):
-    def small(frames, frame_rate, begin):
-        return SoftBodiesOptions(frames, frame_rate, 0.06, 1, begin=begin)
+@pytest.fixture
+def coarse(quick_presets, monkeypatch):
+    """A demo that takes seconds: large pixels, large voxels."""
+    monkeypatch.setattr("meshreel.cli.demo.WIDTH", 128)
+    monkeypatch.setattr("meshreel.cli.demo.VOXEL", 0.06)
 
-    monkeypatch.setattr("meshreel.cli.demo.SoftBodiesOptions", small)
-    said = run("demo", "-o", tmp_path / "demo", "--frames", "2", "--no-ssim", "--json")
-    assert said.code == 0
-    assert said.row["frames"] == 2 and said.row["d2_psnr_paper"] > 40
-    assert len(meshreel.open(tmp_path / "demo" / "demo.reel")) == 2
+
+@pytest.mark.usefixtures("coarse")
+def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_tells_its_numbers(run, tmp_path):
+    said = run("demo", "-o", tmp_path / "demo", "--frames", "6", "--json")
+    assert said.code == 0, said.err
+    row = said.row
+    assert row["frames"] == 6 and row["d2_psnr_paper"] > 45
+    assert row["scene"]["tracks"] == 2
+    assert sum(row["parts"].values()) == row["bytes"] == (tmp_path / "demo" / "demo.reel").stat().st_size
+    assert row["parts"]["background"] > 0
+    truth = row["truth"]
+    assert truth["frames"] == [0, 1, 3, 5]
+    assert truth["decoded"]["background_median_m"] < truth["noise_floor"]["background_median_m"]  # fused over time
+    assert truth["decoded"]["people_median_m"] < 0.02
+    with meshreel.open(tmp_path / "demo" / "demo.reel") as video:
+        assert len(video) == 6 and len(video.tracks) == 2
+        assert not video.background(0).is_empty and not video.moving(5).is_empty
     assert (tmp_path / "demo" / "demo.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_demo_again_leaves_nothing_of_the_one_before(run, tmp_path):
+    folder = tmp_path / "demo"
+    first = run("demo", "-o", folder, "--frames", "3", "--json").row
+    again = run("demo", "-o", folder, "--frames", "2", "--json").row
+    assert (first["frames"], again["frames"]) == (3, 2)
+    recording, warnings = open_recording(folder / "rig")
+    assert (len(recording), len(read_truth(folder / "rig" / "truth")), warnings) == (2, 2, [])
+
+
+@pytest.mark.usefixtures("coarse")
+def test_the_same_seed_gives_the_same_bytes_and_another_one_other_noise(run, tmp_path):
+    for name, seed in (("a", "0"), ("b", "0"), ("c", "1")):
+        assert run("demo", "-o", tmp_path / name, "--frames", "2", "--seed", seed, "--quiet").code == 0
+    picture = "rig/corner0/depth/depth_00001.png"
+    for file, same in (("demo.reel", "b"), (picture, "b")):
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / same / file).read_bytes()
+    assert (tmp_path / "a" / picture).read_bytes() != (tmp_path / "c" / picture).read_bytes()
+    still = [read_truth(tmp_path / name / "rig" / "truth")[0] for name in ("a", "c")]
+    assert np.array_equal(*(frame.mesh.faces[~frame.dynamic] for frame in still))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a program is found by its mode")
@@ -45,4 +82,5 @@ def test_values_that_cannot_be_are_told(run, tmp_path):
     assert failed(run("demo", "-o", tmp_path / "d", "--frames", "0"), "frames", "0")
     assert failed(run("demo", "-o", tmp_path / "d", "--quality", "-1"), "quality", "-1")
     assert failed(run("demo", "-o", tmp_path / "d", "--jobs", "0"), "jobs", "0")
+    assert failed(run("demo", "-o", tmp_path / "d", "--seed", "-1"), "seed", "-1")
     assert not (tmp_path / "d").exists()

@@ -1,7 +1,7 @@
 """One surface fused from all frames that a key frame is followed through (paper, section 3.3.2).
 
-In: the motion of the key frame's mesh, and the frames. Out: a mesh in the key's pose that has what any of them has
-often enough: noise averages out, holes that come and go are closed, borders that stay open stay where they usually are.
+In: the motion of the key frame's mesh, and the frames. Out: a mesh in the key's pose of what enough of them have: noise
+averages out, holes that come and go are closed, borders that stay open stay where they usually are.
 Every frame is carried back to the key by the inverse of the blended motion; screened Poisson goes through all points.
 """
 

@@ -1,7 +1,7 @@
 """A furnished room from nothing, in which two people move: the scene of the demo, for a simulated rig.
 
 In: options. Out: the clean mesh of each moment with the faces that move, made when asked for, and where the cameras
-stand. y is up, metres; the floor is at height 0 and the front, towards +z, has no wall.
+stand. y is up, metres; the floor is at height 0 and its front and right sides are open.
 """
 
 from __future__ import annotations
@@ -24,25 +24,26 @@ from .procedural import grid_of_frame
 from .rig import DepthCamera
 from .simulate import SceneFrame, corner_cameras
 
-SIZE = (3.6, 2.4, 3.2)  # m, of the room; it stands on the middle of its floor
+SIZE = (3.0, 1.7, 2.6)  # m, of the room; it stands on the middle of its floor
 _FACE = 0.1  # m, about the length of a side of the room's faces
-_MARGIN = 0.15  # m from walls and ceiling to the cameras
-_CIRCLE, _SPEED = 0.95, 0.9  # m and m/s, of the walk around the middle
+_LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)  # m, box of the cameras: before the walls, and outside where none is
+_CIRCLE, _SPEED = 0.8, 0.8  # m and m/s, of the walk around the middle
 _CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step
-_TURN = 0.9  # rad/s of the child
+_SOLE = 0.01  # m, by which the walker's feet would sink into the floor
+_TURN = 0.6  # rad/s of the child
 _TOUCH = 0.01  # m; each person is made alone
 
 Vector = Float64[np.ndarray, " 3"] | tuple[float, float, float]
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lowest and highest corner, m
 FURNITURE: tuple[Box, ...] = (
-    ((-1.75, 0.0, -1.55), (-0.85, 1.25, -1.15)),  # a cupboard at the back wall
-    ((0.35, 0.0, -1.55), (1.55, 0.42, -1.00)),  # a bench there,
-    ((0.35, 0.42, -1.55), (1.55, 0.85, -1.40)),  # and its back
-    ((1.25, 0.68, 0.35), (1.75, 0.72, 1.35)),  # a table at the right wall
-    ((1.28, 0.0, 0.38), (1.34, 0.68, 0.44)),  # on four legs
-    ((1.66, 0.0, 0.38), (1.72, 0.68, 0.44)),
-    ((1.28, 0.0, 1.26), (1.34, 0.68, 1.32)),
-    ((1.66, 0.0, 1.26), (1.72, 0.68, 1.32)),
+    ((-1.45, 0.0, -1.25), (-0.95, 1.0, -0.85)),  # a cupboard in the corner of the walls
+    ((0.55, 0.0, -1.25), (1.35, 0.42, -0.85)),  # a bench at the back wall,
+    ((0.55, 0.42, -1.25), (1.35, 0.8, -1.1)),  # and its back
+    ((1.0, 0.66, 0.5), (1.45, 0.72, 1.2)),  # a table
+    ((1.02, 0.0, 0.52), (1.1, 0.66, 0.6)),  # on four legs
+    ((1.35, 0.0, 0.52), (1.43, 0.66, 0.6)),
+    ((1.02, 0.0, 1.1), (1.1, 0.66, 1.18)),
+    ((1.35, 0.0, 1.1), (1.43, 0.66, 1.18)),
 )
 
 
@@ -50,9 +51,9 @@ FURNITURE: tuple[Box, ...] = (
 class RoomOptions:
     """How long and how fine."""
 
-    frames: int = 24
-    frame_rate: float = 12.0  # 1/s
-    spacing: float = 0.035  # m between grid points of the people's surface
+    frames: int = 20
+    frame_rate: float = 20.0  # 1/s
+    spacing: float = 0.03  # m between grid points of the people's surface
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
@@ -60,9 +61,9 @@ class RoomOptions:
         if self.frames < 1:
             raise InputError(f"frames {self.frames} is below 1; ask for at least one")
         if not 0.008 <= self.spacing <= 0.1:
-            raise InputError(f"spacing {self.spacing} m is outside 0.008 to 0.1; 0.035 suits a room")
+            raise InputError(f"spacing {self.spacing} m is outside 0.008 to 0.1; 0.03 suits a room")
         if not (math.isfinite(self.frame_rate) and self.frame_rate > 0):
-            raise InputError(f"frame rate {self.frame_rate} is not a positive number; give one, as 12")
+            raise InputError(f"frame rate {self.frame_rate} is not a positive number; give one, as 20")
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,25 +99,22 @@ def furnished_room(options: RoomOptions | None = None) -> Room:
     x, y, z = SIZE[0] / 2, SIZE[1], SIZE[2] / 2
     panels = [
         _panel((-x, 0, z), (2 * x, 0, 0), (0, 0, -2 * z)),  # the floor
-        _panel((-x, 0, -z), (2 * x, 0, 0), (0, y, 0)),  # the wall at the back,
-        _panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # left
-        _panel((x, 0, -z), (0, 0, 2 * z), (0, y, 0)),  # and right
+        _panel((-x, 0, -z), (2 * x, 0, 0), (0, y, 0)),  # the wall at the back
+        _panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # and that on the left
     ]
-    return Room(options or RoomOptions(), concatenate([weld(concatenate(panels)), *map(_box, FURNITURE)]))
+    return Room(options or RoomOptions(), concatenate([_joined(panels), *map(_box, FURNITURE)]))
 
 
 def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:
-    """Depth cameras in the room's corners that look to its middle, with pictures of `width` x 0.9 `width` pixels."""
-    half = np.array([SIZE[0] / 2 - _MARGIN, SIZE[1], SIZE[2] / 2 - _MARGIN])
-    low, high = half * (-1.0, 0.0, -1.0), half
-    return tuple(_resized(camera, width) for camera in corner_cameras(low, high, count))
+    """Depth cameras at the room's corners, that look down to its middle, with pictures of `width` x 0.9 `width` pixels."""
+    return tuple(_resized(camera, width) for camera in corner_cameras(np.array(_LOW), np.array(_HIGH), count))
 
 
 def _walker(seconds: float) -> Pose:
     """Walks in a circle around the middle, arms swinging."""
     walked = _SPEED * seconds
     angle = walked / _CIRCLE + 2.4  # begins at the left
-    place = _CIRCLE * np.array([np.cos(angle), 0.0, -np.sin(angle)])
+    place = np.array([_CIRCLE * math.cos(angle), _SOLE, -_CIRCLE * math.sin(angle)])
     wobble = math.sin(4 * math.pi * walked / _CYCLE)
     # A heading h looks along (sin h, 0, cos h), and the way goes along (-sin angle, 0, -cos angle).
     return Pose(place, angle + math.pi, walked / _CYCLE, _STRIDE, softness=wobble)
@@ -125,9 +123,9 @@ def _walker(seconds: float) -> Pose:
 def _child(seconds: float) -> Pose:
     """Jumps on the spot, turns, and waves with both arms."""
     place = np.array([0.0, 0.14 * max(math.sin(2 * math.pi * seconds), 0.0), 0.0])
-    heading, sway = _TURN * seconds, 0.07 * math.sin(4 * math.pi * seconds)
+    heading, sway = _TURN * seconds, 0.05 * math.sin(4 * math.pi * seconds)
     out = np.array([math.cos(heading), 0.0, -math.sin(heading)])  # to its left
-    wrists = tuple(place + side * (0.26 + sway) * out + [0.0, 1.1, 0.0] for side in (1.0, -1.0))
+    wrists = tuple(place + side * (0.2 + sway) * out + [0.0, 1.2, 0.0] for side in (1.0, -1.0))
     return Pose(place, heading, wrists=(wrists[0], wrists[1]), reach=(1.0, 1.0), size=0.68, girth=1.05)
 
 
@@ -146,7 +144,13 @@ def _box(box: Box) -> Mesh:
     a, b, c = np.diag(high - low)
     lower = [_panel(low, b, a), _panel(low, c, b), _panel(low, a, c)]
     upper = [_panel(high, -a, -b), _panel(high, -b, -c), _panel(high, -c, -a)]
-    return weld(concatenate(lower + upper))
+    return _joined(lower + upper)
+
+
+def _joined(panels: list[Mesh]) -> Mesh:
+    """Panels as one mesh; where two meet, they share vertices."""
+    mesh = concatenate(panels)
+    return weld(Mesh.of(mesh.vertices.round(9), mesh.faces))  # the two come to a vertex by different sums
 
 
 def _panel(corner: Vector, right: Vector, up: Vector) -> Mesh:

@@ -31,7 +31,7 @@ def command(file: Path, /, *, common: Common = Common()) -> None:
         size = f"{row['bytes'] - missing} of {size} ({missing} are missing: the file is truncated)"
     head = f"{file}: {row['frames']} frames at {row['frame_rate']:g}/s, {size}, {row['mbps']:.4g} Mbps"
     recorded = ", ".join(f"{name} {value}" for name, value in row["metadata"].items())
-    tables = [_rates(row), *([_tracks(row), _states(row)] if row["background"] or len(row["tracks"]) > 1 else [])]
+    tables = [rate_table(row), *([_tracks(row), _states(row)] if row["background"] or len(row["tracks"]) > 1 else [])]
     common.result(row, head, f"recorded at encode: {recorded or 'nothing'}", *tables, _groups(row))
     common.warn(f"background: {state['error']}" for state in row["background"] if "error" in state)
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
@@ -147,7 +147,7 @@ def _spans(ranges: Iterable[tuple[int, int]]) -> list[list[int]]:
     return spans
 
 
-def _rates(row: dict[str, Any]) -> Table:
+def rate_table(row: dict[str, Any]) -> Table:
     table = Table("part", "bytes", "Mbps", "share")
     for name, size in ((name, size) for name, size in row["parts"].items() if size):
         table.add_row(name, str(size), f"{row['parts_mbps'][name]:.4f}", f"{100 * size / row['bytes']:.1f} %")

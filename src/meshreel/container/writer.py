@@ -146,6 +146,12 @@ class ReelWriter:
             partial.unlink(missing_ok=True)
 
 
+def check_target(path: Path) -> None:
+    """Raises InputError where no file can be written at a path: before minutes are spent on what goes into it."""
+    with _as_input_error(path):
+        _open_spool(path).close()
+
+
 def pack_head(header: Header, index: Index) -> bytes:
     """Everything before the chunks."""
     body = pack(header) + pack(index)

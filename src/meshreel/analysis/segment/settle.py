@@ -26,7 +26,7 @@ class SettleOptions:
     """What counts as a change of the room."""
 
     rest: float = 10.0  # s that it is as it is before, or after, without a break: people do not stand so still
-    share: float = 0.9  # of the frames that know a place in that time which have surface in it
+    share: float = 0.8  # of the frames that know a place in that time which have surface in it
     least: float = 0.15  # m^2 that change together
 
     def __post_init__(self) -> None:

@@ -1,0 +1,81 @@
+"""The picture of docs/tutorial.md: the procedural room as it is captured, taken apart, coded and decoded.
+
+In: nothing; the room is simulated. Called by pictures.py.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from drawing import Sheet, shaded
+from jaxtyping import Float64
+
+from meshreel.analysis.segment.scene import segment
+from meshreel.capture.fusion import FusionOptions
+from meshreel.capture.record import open_recording
+from meshreel.capture.room import RoomOptions, furnished_room, room_cameras
+from meshreel.capture.simulate import SensorOptions, simulate_rig
+from meshreel.decoder import open as open_video
+from meshreel.encoder import encode
+from meshreel.geometry.topology import components, concatenate, drop_unreferenced
+from meshreel.metrics.cameras import Box, OrthographicCamera
+from meshreel.presets import preset_options
+from meshreel.types import Mesh, MeshList
+
+FRAMES, SHOWN = 8, 4
+WIDTH, NOISE, VOXEL = 256, 0.3, 0.03  # as `meshreel demo` has them
+PANEL = 300  # pixels
+GREY = np.full(3, 0.82)
+BODIES = np.array([[0.87, 0.45, 0.20], [0.20, 0.45, 0.70], [0.35, 0.65, 0.35]])
+FROM = np.array([0.42, 0.42, 1.0])  # where the picture is seen from
+
+
+def draw(path: Path) -> None:
+    """A fused frame, the faces that move, the background alone, the frame decoded."""
+    capture = captured()
+    frame, moves = capture[SHOWN], segment(capture).moving(SHOWN, capture[SHOWN])
+    with tempfile.TemporaryDirectory() as folder:
+        encode(capture, Path(folder) / "room.reel", preset_options())
+        with open_video(Path(folder) / "room.reel") as video:
+            background, decoded = video.background(SHOWN), video[SHOWN]
+    sheet, camera = Sheet(4, PANEL), _oblique(background)
+    colored, colors = _colored(frame, moves)
+    sheet.image(0, f"fused: {len(frame.faces)} faces", shaded(frame, camera))
+    sheet.image(1, f"moving: {100 * moves.mean():.0f} % of the faces", shaded(colored, camera, colors))
+    sheet.image(2, f"background, once: {len(background.faces)} faces", shaded(background, camera))
+    sheet.image(3, f"decoded: {len(decoded.faces)} faces", shaded(decoded, camera))
+    sheet.write(path)
+
+
+def captured() -> MeshList:
+    """The frames as they are fused."""
+    room = furnished_room(RoomOptions(frames=FRAMES))
+    with tempfile.TemporaryDirectory() as folder:
+        simulate_rig(Path(folder), room, room_cameras(WIDTH), room.options.frame_rate, SensorOptions(noise=NOISE))
+        recording, _ = open_recording(Path(folder), FusionOptions(VOXEL))
+        return MeshList(tuple(recording), recording.frame_rate)
+
+
+def _colored(mesh: Mesh, moves: np.ndarray) -> tuple[Mesh, Float64[np.ndarray, "V 3"]]:
+    """The mesh with what moves split off, and a color for each of its vertices: one a body, the largest first."""
+    still, moving = (drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen])) for chosen in (~moves, moves))
+    label = components(moving.faces, len(moving.vertices))
+    rank = np.argsort(np.argsort(-np.bincount(label), kind="stable"), kind="stable")[label]
+    colors = np.concatenate([np.tile(GREY, (len(still.vertices), 1)), BODIES[rank % len(BODIES)]])
+    return concatenate([still, moving]), colors
+
+
+def _oblique(mesh: Mesh) -> OrthographicCamera:
+    """A parallel view from above the open sides."""
+    box = Box.of([mesh])
+    ahead = -FROM / np.linalg.norm(FROM)
+    right = np.cross(ahead, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3] = np.stack([right, np.cross(ahead, right), ahead])
+    extrinsic[:3, 3] = -extrinsic[:3, :3] @ box.center
+    placed = mesh.vertices @ extrinsic[:3, :3].T + extrinsic[:3, 3]
+    reach = float(np.abs(placed[:, :2]).max())
+    return OrthographicCamera(PANEL, PANEL, 2.06 * reach / PANEL, extrinsic, back=2 * mesh.diagonal)
