@@ -132,6 +132,11 @@ def test_flags_that_cannot_be_are_told(run, scan, tmp_path, arguments, words, mo
     assert not (tmp_path / "out").exists()
 
 
+def test_the_help_says_how_labels_are_read(run):
+    told = " ".join(run("segment", "--help").out.replace("│", " ").split())
+    assert 'np.load(file)["moving"]' in told and "--masks" in told and "--empty-prompts" not in told
+
+
 def test_frames_without_a_surface_have_no_views_and_are_told(run, tmp_path):
     for number in range(2):
         (tmp_path / f"frame_{number}.obj").write_text("v 0 0 0\n")

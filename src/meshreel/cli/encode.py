@@ -48,15 +48,13 @@ def command(
 ) -> None:
     """Encode a sequence of meshes into one .reel file.
 
-    A scene, most of which stands still, is taken apart: its background is in the file once, and each moving body has
-    a track of its own.
-
     Parameters
     ----------
     inputs
         A directory, a glob, mesh files (OBJ, PLY, GLB, STL, OFF) or an .npz of vertices (T x V x 3) and faces (F x 3).
         Vertices that repeat a position are welded. Or the folder of a rig, as `capture` takes it, with its defaults:
-        each frame is fused whenever it is asked for, some three times; `capture` first where time counts.
+        each frame is fused whenever it is asked for, some three times; `capture` first where time counts. A scene, of
+        which most stands still, is taken apart: its background is in the file once, each moving body has its own track.
     output
         The .reel file to write; it appears only when it is complete.
     preset

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -61,7 +61,7 @@ class Masking:
     PNG of object numbers, 0 for what stands still. `segment --views-only` makes pictures and cameras for it."""
     sam3: Path | None = None
     """Masks by SAM3 (extra `sam3`): a folder with its weights, as of facebook/sam3."""
-    prompts: tuple[str, ...] = ()
+    prompts: Annotated[tuple[str, ...], Parameter(negative="")] = ()
     """What SAM3 looks for, in words, as --prompts person --prompts dog; of it counts what moves. Common words where
     none is given."""
     device: str = "cpu"

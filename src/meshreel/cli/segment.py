@@ -43,17 +43,15 @@ def command(
 ) -> None:
     """Tell which faces of a scene move, and with which body.
 
-    Writes labels/frame_00000.npz and so on: `np.load(file)["moving"]` is True for each face that moves,
-    `np.load(file)["bodies"]` the number of its body from 1 on, 0 for none; faces are the triangles of the frame as it
-    was read and welded. Beside them cameras.json, the views; sheet.png, some frames from some of them, a color a body;
-    and colored/, the same frames as PLY with colors.
-
     Parameters
     ----------
     inputs
         A directory, a glob, mesh files or an .npz, as `encode` takes them; or a rig's folder, as `capture` takes it.
     output
-        The directory to write into; made if needed.
+        The directory to write into; made if needed. In labels/frame_00000.npz and so on, `np.load(file)["moving"]` is
+        True for each face that moves, `np.load(file)["bodies"]` the number of its body from 1 on, 0 for none; faces are
+        the triangles of the frame as it was read and welded. Beside them cameras.json, the views; sheet.png, some
+        frames from some of the views, a color a body; and colored/, the same frames as PLY with colors.
     views_only
         Write only what the views see, view00/frame_00000.png and so on (normals as colors), and cameras.json. A
         tool that makes masks of the pictures under the same names makes the folder that --masks takes.
