@@ -26,7 +26,7 @@ def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_tells_its_numbers(run, t
     said = run("demo", "-o", tmp_path / "demo", "--frames", "6", "--json")
     assert said.code == 0, said.err
     row = said.row
-    assert row["frames"] == 6 and row["d2_psnr_paper"] > 45
+    assert row["frames"] == 6 and row["d2_psnr_paper"] > 40
     assert row["scene"]["tracks"] == 2
     assert sum(row["parts"].values()) == row["bytes"] == (tmp_path / "demo" / "demo.reel").stat().st_size
     assert row["parts"]["background"] > 0
@@ -53,7 +53,7 @@ def test_a_demo_again_leaves_nothing_of_the_one_before(run, tmp_path):
 @pytest.mark.usefixtures("coarse")
 def test_the_same_seed_gives_the_same_bytes_and_another_one_other_noise(run, tmp_path):
     for name, seed in (("a", "0"), ("b", "0"), ("c", "1")):
-        assert run("demo", "-o", tmp_path / name, "--frames", "2", "--seed", seed, "--debug").code == 0
+        assert run("demo", "-o", tmp_path / name, "--frames", "2", "--seed", seed, "--quiet").code == 0
     picture = "rig/corner0/depth/depth_00001.png"
     for file, same in (("demo.reel", "b"), (picture, "b")):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / same / file).read_bytes()
