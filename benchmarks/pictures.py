@@ -1,6 +1,7 @@
-"""The pictures of docs/pipeline.md, one a stage, from procedural data only.
+"""The pictures of docs/pipeline.md, one a stage, and that of docs/tutorial.md, from procedural data only.
 
-python benchmarks/pictures.py            # all, into docs/pictures (about a minute)
+python benchmarks/pictures.py            # all, into docs/pictures (about two minutes)
+python benchmarks/pictures.py --room     # that of the tutorial alone
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from meshreel.presets import preset_options
 from meshreel.types import Mesh, MeshList
 
 sys.path.insert(0, str(Path(__file__).parent))
+import pictures_room
 from drawing import (
     DPI,
     Sheet,
@@ -47,15 +49,20 @@ def main(arguments: list[str]) -> int:
     """Draws everything."""
     parser = argparse.ArgumentParser(description="Draw the pictures of docs/pipeline.md.")
     parser.add_argument("-o", "--output", type=Path, default=OUTPUT)
-    output = parser.parse_args(arguments).output
+    parser.add_argument("--room", action="store_true", help="only the room of docs/tutorial.md")
+    chosen = parser.parse_args(arguments)
+    output: Path = chosen.output
     output.mkdir(parents=True, exist_ok=True)
+    matplotlib.rcParams["font.family"] = "DejaVu Sans"  # comes with matplotlib: the same letters everywhere
+    pictures_room.draw(output / "room.png")
+    if chosen.room:
+        return 0
     draw_all(compute(story(), preset_options("paper")), output)
     return 0
 
 
 def draw_all(stages: Stages, output: Path) -> None:
     """One file for each stage."""
-    matplotlib.rcParams["font.family"] = "DejaVu Sans"  # comes with matplotlib: the same letters everywhere
     for name, draw in PICTURES.items():
         draw(stages, output / f"{name}.png")
         print(f"{output / name}.png")

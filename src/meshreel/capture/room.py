@@ -29,7 +29,7 @@ _FACE = 0.1  # m, about the length of a side of the room's faces
 _LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)  # m, box of the cameras: before the walls, and outside where none is
 _CIRCLE, _SPEED = 0.8, 0.8  # m and m/s, of the walk around the middle
 _CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step
-_SOLE = 0.01  # m, by which the walker's feet would sink into the floor
+_SOLE = 0.01  # m, by which feet would sink into the floor
 _TURN = 0.6  # rad/s of the child
 _TOUCH = 0.01  # m; each person is made alone
 
@@ -52,7 +52,7 @@ class RoomOptions:
     """How long and how fine."""
 
     frames: int = 20
-    frame_rate: float = 20.0  # 1/s
+    frame_rate: float = 30.0  # 1/s
     spacing: float = 0.03  # m between grid points of the people's surface
     seed: int = 0  # of the grids
 
@@ -63,7 +63,7 @@ class RoomOptions:
         if not 0.008 <= self.spacing <= 0.1:
             raise InputError(f"spacing {self.spacing} m is outside 0.008 to 0.1; 0.03 suits a room")
         if not (math.isfinite(self.frame_rate) and self.frame_rate > 0):
-            raise InputError(f"frame rate {self.frame_rate} is not a positive number; give one, as 20")
+            raise InputError(f"frame rate {self.frame_rate} is not a positive number; give one, as 30")
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ def _walker(seconds: float) -> Pose:
 
 def _child(seconds: float) -> Pose:
     """Jumps on the spot, turns, and waves with both arms."""
-    place = np.array([0.0, 0.14 * max(math.sin(2 * math.pi * seconds), 0.0), 0.0])
+    place = np.array([0.0, _SOLE + 0.14 * max(math.sin(2 * math.pi * seconds), 0.0), 0.0])
     heading, sway = _TURN * seconds, 0.05 * math.sin(4 * math.pi * seconds)
     out = np.array([math.cos(heading), 0.0, -math.sin(heading)])  # to its left
     wrists = tuple(place + side * (0.2 + sway) * out + [0.0, 1.2, 0.0] for side in (1.0, -1.0))
