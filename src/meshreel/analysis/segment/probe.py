@@ -30,9 +30,10 @@ def is_scene(frames: Frames) -> bool:
         meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
     if len(meshes) < 2 or not all(_is_open(mesh) for mesh in meshes):
         return False
-    lattice = Lattice.near(meshes[0], _cell(meshes[0]))
-    if lattice.size == 0:
+    size = _cell(meshes[0])
+    if size == 0:
         return False
+    lattice = Lattice.near(meshes[0], size)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(own) for own in cells]
     still = [np.mean([np.isin(own, other).mean() for other in wide]) for own in cells]
