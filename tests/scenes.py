@@ -12,7 +12,7 @@ from meshreel.analysis.background import BackgroundOptions
 from meshreel.analysis.segment.places import PlacesOptions
 from meshreel.analysis.segment.scene import SegmentOptions
 from meshreel.analysis.segment.views import ViewsOptions
-from meshreel.geometry.topology import concatenate
+from meshreel.geometry.topology import concatenate, weld
 from meshreel.types import Mesh
 from meshreel.windows import EncoderOptions
 
@@ -30,15 +30,15 @@ SEGMENT = SegmentOptions(
 
 
 def room() -> Mesh:
-    """The floor z = 0 and two walls, which face inwards."""
+    """The floor z = 0 and two walls, which face inwards; one surface."""
     floor = plane(SIDE, PARTS)
     walls = [Mesh.of(floor.vertices[:, axes], floor.faces) for axes in ([2, 0, 1], [1, 2, 0])]
-    return concatenate([floor, *walls])
+    return weld(concatenate([floor, *walls]))
 
 
 def ball(x: float, y: float = 1.2, radius: float = RADIUS) -> Mesh:
     """A ball that lies on the floor, almost."""
-    return moved(sphere(radius, 4), (x, y, radius + 0.5 * CELL))
+    return moved(sphere(radius, 3), (x, y, radius + 0.5 * CELL))
 
 
 def figure(turn: float) -> Mesh:

@@ -82,7 +82,7 @@ def test_far_away_scenes_are_taken_apart_as_well():
     assert min(overlaps(far, segment(far, SEGMENT))) > 0.9
 
 
-def test_empty_frames_are_passed_over_and_nothing_moves_where_there_is_nothing(rolling):
+def test_empty_frames_are_passed_over_and_nothing_moves_where_there_is_nothing():
     frames = [ROLLING[0], NONE, *ROLLING[1:]]
     found = segment(frames, SEGMENT)
     assert overlap(found.moving(0, ROLLING[0]), of_body(ROLLING[0])) > 0.9
@@ -153,6 +153,7 @@ class Right:
         assert len(seen) == len(views)
 
     def masks(self, frame, seen, views):
+        del views
         middle = ROLLING[frame].vertices[ROLLING[frame].faces].mean(axis=1)
         return np.stack([(one.faces >= 0) & (middle[one.faces][..., 0] > 1.2) for one in seen])
 
