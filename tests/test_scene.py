@@ -85,7 +85,7 @@ def test_a_scene_comes_back_as_it_was_without_its_noise(rolling):
     _, video, summary = rolling
     assert_rolls(video)
     assert summary.scene is not None and summary.scene.tracks == 1 and summary.warnings == ()
-    assert summary.scene.noise == pytest.approx(NOISE, rel=0.5)  # of a surface, across it
+    assert 0.5 * NOISE < summary.scene.noise < 3 * NOISE  # borders and the floor under the ball count, too
     assert summary.psnr > 20 * np.log10(4 / NOISE) - 8
 
 
@@ -132,8 +132,8 @@ def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeyp
 def test_where_nothing_moves_the_file_is_a_background(tmp_path):
     video, summary = encoded(with_room([ball(1.2)] * 4), tmp_path / "a.reel")
     assert [group.form for group in summary.groups] == [Form.EMPTY] and summary.scene.tracks == 1
-    assert rms(concatenate([room(), ball(1.2)]).vertices, video[3]) < 2 * NOISE
-    assert summary.scene.background > 0.8 * summary.size
+    assert rms(concatenate([room(), ball(1.2)]).vertices, video[3]) < 2.5 * NOISE
+    assert summary.scene.background > 0.7 * summary.size
 
 
 def test_where_all_moves_there_is_no_scene(tmp_path):
@@ -316,6 +316,6 @@ def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
     sequence = MeshList(tuple(ROLLING))
     parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS, Stages(None, 4))
     assert rms(parts.background.vertices, room()) < NOISE
-    assert parts.noise == pytest.approx(NOISE, rel=0.5) and parts.cell == pytest.approx(CELL, rel=0.2)
+    assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.cell == pytest.approx(CELL, rel=0.2)
     number = 2
     assert (parts.segmentation.moving(number, ROLLING[number]) == of_body(ROLLING[number])).mean() > 0.98

@@ -8,7 +8,7 @@ import pytest
 from meshreel.analysis.segment.probe import is_scene
 from meshreel.errors import InputError
 from meshreel.types import Mesh
-from tests.metrics.shapes import moved, sphere
+from tests.metrics.shapes import moved, plane, sphere
 from tests.scenes import ball, figure, room, with_room
 
 ROLLING = with_room([ball(0.5 + 0.25 * t) for t in range(5)])
@@ -31,8 +31,14 @@ def test_a_room_that_moves_is_none():
 
 @pytest.mark.parametrize("offset", [0.0, 0.5])
 def test_an_open_sheet_is_one_where_it_stands_still(offset):
-    half = Mesh(sphere().vertices, sphere().faces[: len(sphere().faces) // 2])
+    fine = sphere(levels=5)
+    half = Mesh(fine.vertices, fine.faces[: len(fine.faces) // 2])
     assert is_scene([moved(half, (offset * t, offset * t, 0)) for t in range(4)]) == (offset == 0)
+
+
+def test_what_has_few_cells_is_none_for_steps_of_one_do_not_show():
+    assert not is_scene([moved(plane(1.0, 8), (0.05 * t, 0, 0)) for t in range(3)])
+    assert is_scene([plane(1.0, 30)] * 3)
 
 
 def test_empty_and_single_frames_are_none_and_empty_ones_between_do_no_harm():

@@ -16,6 +16,7 @@ from ..survey import check
 PROBES = 6  # frames, spread over the sequence
 SHARE = 0.6  # of a frame's surface that stands still in a scene
 _FINEST = 400  # cells along a frame's diagonal
+_COARSEST = 32  # likewise: of fewer, what has moved by one is in the same place still
 
 
 def is_scene(frames: Frames) -> bool:
@@ -31,7 +32,7 @@ def is_scene(frames: Frames) -> bool:
     if len(meshes) < 2 or not all(_is_open(mesh) for mesh in meshes):
         return False
     size = _cell(meshes[0])
-    if size == 0:
+    if size * _COARSEST > meshes[0].diagonal or size == 0:
         return False
     lattice = Lattice.near(meshes[0], size)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
