@@ -14,7 +14,7 @@ def connected(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, 
     if count == 0:
         return np.zeros(0, np.int64)
     ends = np.concatenate([faces[:, 1], faces[:, 2]])
-    graph = csr_array((np.ones(len(ends), np.int8), (np.tile(faces[:, 0], 2), ends)), shape=(count, count))
+    graph = csr_array((np.ones(len(ends), bool), (np.tile(faces[:, 0], 2), ends)), shape=(count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
 
 

@@ -39,6 +39,8 @@ def fill_grid(
     import open3d as o3d
 
     grid = new_grid(voxel, max(len(blocks), 1))
+    if not len(blocks):
+        return grid
     tensor = o3d.core.Tensor.from_numpy
     places, _ = grid.hashmap().activate(tensor(np.ascontiguousarray(blocks)))
     places = places.to(o3d.core.int64)
@@ -49,7 +51,14 @@ def fill_grid(
 
 def extract(grid: Any, least: float) -> Mesh:
     """The zero level between voxels whose weight is above `least`; the empty mesh where there is none."""
-    found = grid.extract_triangle_mesh(weight_threshold=least)
+    if grid.hashmap().size() == 0:
+        return Mesh.empty()
+    try:
+        found = grid.extract_triangle_mesh(weight_threshold=least)
+    except RuntimeError as error:
+        if "shape {0}" not in str(error):  # it has made no vertices, and fails to color them
+            raise
+        return Mesh.empty()
     if "indices" not in found.triangle or len(found.triangle["indices"]) == 0:
         return Mesh.empty()
     vertices = found.vertex["positions"].numpy().astype(np.float64)

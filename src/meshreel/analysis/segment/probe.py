@@ -18,7 +18,6 @@ from ..survey import check
 PROBES = 4  # frames, spread over the sequence
 SHARE = 0.6  # of a frame's surface that stands still in a scene
 CELLS = 200  # along a frame's diagonal: 4 cm in a room
-TINY = 1e-12  # m, of a cell
 
 
 def is_scene(frames: Frames) -> bool:

@@ -183,8 +183,7 @@ def _areas(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> tuple[Float64[np.ndarr
     """The area of the connected chosen faces that each chosen face belongs to, and their label, less than V."""
     some = Mesh(mesh.vertices, mesh.faces[chosen])
     label = connected_faces(some.faces, len(some.vertices))
-    areas = np.bincount(label, face_normals(some)[1])
-    return areas[label].astype(np.float64), label  # of no faces, bincount makes integers
+    return np.bincount(label, face_normals(some)[1], len(some.vertices))[label].astype(np.float64), label
 
 
 def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], known: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:

@@ -1,0 +1,174 @@
+"""What moves in a scene is found, and nothing else; labels are clean."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from meshreel.analysis.segment.places import PlacesOptions
+from meshreel.analysis.segment.scene import ByPlace, SegmentOptions, segment, segment_by, without_islands
+from meshreel.errors import InputError
+from meshreel.geometry.topology import components, concatenate, face_normals
+from meshreel.geometry.voxels import Lattice
+from meshreel.types import Mesh
+from tests.metrics.shapes import moved, plane
+from tests.scenes import SEGMENT, ball, figure, of_body, overlap, room, with_room
+
+NONE = Mesh.empty()
+ROLLING = with_room([ball(0.5 + 0.25 * t) for t in range(6)])
+
+
+def overlaps(frames: list[Mesh], found: ByPlace) -> list[float]:
+    return [overlap(found.moving(number, mesh), of_body(mesh)) for number, mesh in enumerate(frames)]
+
+
+@pytest.fixture(scope="module")
+def rolling() -> ByPlace:
+    return segment(ROLLING, SEGMENT)
+
+
+def test_a_ball_that_rolls_is_found_and_the_room_rests(rolling):
+    assert min(overlaps(ROLLING, rolling)) > 0.9
+    for number, mesh in enumerate(ROLLING):
+        on_wall = ~of_body(mesh) & (mesh.vertices[mesh.faces].mean(axis=1)[:, 2] > 0.2)
+        assert not rolling.moving(number, mesh)[on_wall].any()
+
+
+def test_frames_that_were_not_looked_at_are_labelled_as_well():
+    few = segment(ROLLING, replace(SEGMENT, places=PlacesOptions(frames=3)))
+    assert overlaps(ROLLING, few)[2] > 0.9  # where it was looked at; between, it is where nobody has looked
+    assert min(overlaps(ROLLING, few)) > 0.3
+
+
+@pytest.mark.parametrize("body", [NONE, ball(1.2)], ids=["alone", "with a ball that lies"])
+def test_a_still_room_with_noise_has_no_moving_places(body):
+    frames = with_room([body] * 6)
+    found = segment(frames, SEGMENT)
+    assert not found.chosen.any() and not found.moving(0, frames[0]).any()
+
+
+def test_somebody_who_stands_and_swings_the_arms_is_found_whole():
+    frames = with_room([figure(0.5 * t) for t in range(6)])
+    assert min(overlaps(frames, segment(frames, SEGMENT))) > 0.9
+
+
+def test_what_is_smaller_than_the_least_area_is_not_found():
+    frames = with_room([ball(0.5 + 0.25 * t, radius=0.06) for t in range(6)])
+    assert not segment(frames, SEGMENT).chosen.any()
+
+
+def test_a_ball_that_rests_for_half_of_the_time_is_found_there_too():
+    frames = with_room([ball(0.5)] * 3 + [ball(0.5 + 0.3 * t) for t in range(1, 4)])
+    assert min(overlaps(frames, segment(frames, SEGMENT))) > 0.9
+
+
+def test_the_order_of_time_does_not_matter(rolling):
+    back = segment(ROLLING[::-1], SEGMENT)  # other views, for other frames are first
+    for number, mesh in enumerate(ROLLING):
+        assert overlap(back.moving(number, mesh), rolling.moving(number, mesh)) > 0.9
+
+
+def test_the_same_frames_give_the_same_segmentation(rolling):
+    again = segment(list(ROLLING), SEGMENT)
+    assert again.keys.tobytes() == rolling.keys.tobytes() and again.chosen.tobytes() == rolling.chosen.tobytes()
+
+
+def test_far_away_scenes_are_taken_apart_as_well():
+    far = [moved(mesh, (1e6, -1e6, 2e6)) for mesh in ROLLING]
+    assert min(overlaps(far, segment(far, SEGMENT))) > 0.9
+
+
+def test_empty_frames_are_passed_over_and_nothing_moves_where_there_is_nothing():
+    frames = [ROLLING[0], NONE, *ROLLING[1:]]
+    found = segment(frames, SEGMENT)
+    assert overlap(found.moving(0, ROLLING[0]), of_body(ROLLING[0])) > 0.9
+    assert found.moving(1, NONE).shape == (0,)
+    for empty in ([NONE], [NONE] * 3):
+        assert not segment(empty, SEGMENT).moving(0, ROLLING[0]).any()
+    assert not segment([ROLLING[0]], SEGMENT).chosen.any()  # one frame: nothing can be said to move
+
+
+def test_edges_without_length_do_not_say_how_large_cells_are():
+    flat = Mesh.of(np.zeros((3, 3)), [[0, 1, 2]])
+    many = concatenate([*[flat] * 8000, room()])
+    assert 0.05 < segment([many] * 3, SEGMENT).lattice.size < 0.1
+    assert not segment([flat] * 3, SEGMENT).chosen.any()
+
+
+# a square of 8 x 8 cells of 1 cm, as two faces each
+SHEET = plane(0.08, 8)
+COLUMN = np.floor(SHEET.vertices[SHEET.faces].mean(axis=1) / 0.01).astype(int)
+
+
+def area(mesh: Mesh, chosen: np.ndarray) -> dict[int, float]:
+    """Area of the connected chosen pieces by their label."""
+    label = components(mesh.faces[chosen], len(mesh.vertices))[mesh.faces[chosen][:, 0]]
+    return {int(n): float(face_normals(mesh)[1][chosen][label == n].sum()) for n in np.unique(label)}
+
+
+def test_an_island_takes_the_label_of_what_is_around_it():
+    spot = (COLUMN[:, 0] == 4) & (COLUMN[:, 1] == 4)
+    assert not without_islands(SHEET, spot, 2e-4).any() and without_islands(SHEET, ~spot, 2e-4).all()
+    assert np.array_equal(without_islands(SHEET, spot, 0.5e-4), spot)
+    assert np.array_equal(without_islands(SHEET, ~spot, 0.5e-4), ~spot)
+
+
+def test_a_piece_that_rests_alone_keeps_its_label_and_one_that_moves_alone_does_not():
+    both = concatenate([SHEET, moved(SHEET, (1, 0, 0), 0.1)])
+    large = np.arange(len(both.faces)) < len(SHEET.faces)
+    assert np.array_equal(without_islands(both, large, 1e-3), large)
+    assert not without_islands(both, ~large, 1e-3).any()
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.lists(st.booleans(), min_size=128, max_size=128), st.floats(0, 1e-3))
+def test_no_island_that_something_else_surrounds_is_left_of_those_that_move(bits, least):
+    chosen = np.array(bits)
+    clean = without_islands(SHEET, chosen, least)
+    assert all(size >= least * (1 - 1e-9) for size in area(SHEET, clean).values())
+    if clean.any():
+        assert all(size >= least * (1 - 1e-9) for size in area(SHEET, ~clean).values())
+    assert np.array_equal(without_islands(SHEET, clean, least), clean)  # and once is enough
+
+
+def test_no_faces_have_no_labels():
+    assert without_islands(NONE, np.zeros(0, bool), 1.0).shape == (0,)
+    assert ByPlace(Lattice(np.zeros(3), 1.0), np.zeros(1, np.int64), np.ones(1, bool), 0.01).moving(0, NONE).shape == (
+        0,
+    )
+
+
+class Right:
+    """A masker that calls what is at x > 1.2 m moving; it must see all frames first."""
+
+    def __init__(self) -> None:
+        self.observed: list[int] = []
+
+    def observe(self, frame, seen, views):
+        self.observed.append(frame)
+        assert len(seen) == len(views)
+
+    def masks(self, frame, seen, views):
+        del views
+        middle = ROLLING[frame].vertices[ROLLING[frame].faces].mean(axis=1)
+        return np.stack([(one.faces >= 0) & (middle[one.faces][..., 0] > 1.2) for one in seen])
+
+
+def test_masks_from_elsewhere_become_labels_and_what_is_not_seen_takes_its_neighbours():
+    masker = Right()
+    found = segment_by(masker, ROLLING[:2], SEGMENT)
+    assert masker.observed == [0, 1]
+    wanted = ROLLING[1].vertices[ROLLING[1].faces].mean(axis=1)[:, 0] > 1.2
+    assert (found.moving(1, ROLLING[1]) == wanted).mean() > 0.97
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"threshold": 0.0}, {"threshold": 1.1}, {"island": -1.0}, {"island": np.inf}], ids=str
+)
+def test_options_that_cannot_be_are_refused(wrong):
+    with pytest.raises(InputError, match="give"):
+        SegmentOptions(**wrong)

@@ -1,0 +1,120 @@
+"""What stands still, fused: noise averages out, borders stay open, and hiding in one frame hides nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from meshreel.analysis.background import BackgroundOptions, fuse_background
+from meshreel.errors import InputError
+from meshreel.geometry.nearest import distances
+from meshreel.geometry.topology import concatenate, face_normals
+from meshreel.types import Mesh
+from tests.metrics.shapes import moved, noisy, plane, sphere
+
+VOXEL = 0.05
+SIGMA = 0.01  # m
+FLOOR = moved(plane(1.6, 32), (0.0, 0.0, 0.013))
+
+
+def height_error(mesh: Mesh) -> float:
+    """RMS of the heights over the floor, m, away from its border."""
+    inside = (np.abs(mesh.vertices[:, :2] - 0.8) < 0.61).all(axis=1)
+    assert inside.sum() > 100
+    return float(np.sqrt(((mesh.vertices[inside, 2] - 0.013) ** 2).mean()))
+
+
+def floors(count: int) -> list[Mesh]:
+    return [noisy(FLOOR, SIGMA, seed) for seed in range(count)]
+
+
+def test_a_plane_comes_back_as_it_is_and_faces_the_same_way():
+    mesh = fuse_background([FLOOR], VOXEL)
+    assert height_error(mesh) < 1e-5 and (face_normals(mesh)[0][:, 2] > 0.99).all()
+
+
+def test_the_error_falls_with_the_frames():
+    errors = [height_error(fuse_background(floors(count), VOXEL)) for count in (1, 4, 16)]
+    assert errors[1] < 0.65 * errors[0] and errors[2] < 0.65 * errors[1] and errors[2] < 0.4 * SIGMA
+
+
+def test_nothing_is_beyond_a_border():
+    for frames in ([FLOOR], floors(6)):
+        mesh = fuse_background(frames, VOXEL)
+        low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        assert (low[:2] > -3 * SIGMA).all() and (high[:2] < 1.6 + 3 * SIGMA).all()
+        assert (low[:2] < VOXEL + 3 * SIGMA).all() and (high[:2] > 1.6 - VOXEL - 3 * SIGMA).all()  # and it goes so far
+
+
+def test_a_hole_stays_a_hole():
+    middle = FLOOR.vertices[FLOOR.faces].mean(axis=1)[:, :2] - 0.8
+    holed = Mesh(FLOOR.vertices, FLOOR.faces[np.linalg.norm(middle, axis=1) > 0.4])
+    mesh = fuse_background([holed, holed], VOXEL)
+    assert np.linalg.norm(mesh.vertices[:, :2] - 0.8, axis=1).min() > 0.33
+
+
+def test_what_is_hidden_in_one_frame_is_there_in_others():
+    halves = [Mesh(FLOOR.vertices, FLOOR.faces[FLOOR.vertices[FLOOR.faces[:, 0], 0] < 1.0]) for _ in range(1)]
+    mesh = fuse_background([*halves, FLOOR], VOXEL)
+    assert mesh.vertices[:, 0].max() > 1.5
+
+
+def test_what_few_frames_have_is_left_out():
+    table = moved(plane(0.8, 16), (0.4, 0.4, 0.7))
+    frames = [concatenate([FLOOR, table]), *[FLOOR] * 9]
+    assert fuse_background(frames, VOXEL).vertices[:, 2].max() > 0.6
+    least = fuse_background(frames, VOXEL, BackgroundOptions(seen=0.25))
+    assert least.vertices[:, 2].max() < 0.1 and not least.is_empty
+
+
+def test_small_pieces_are_dropped():
+    both = concatenate([FLOOR, moved(sphere(0.1, 3), (0.8, 0.8, 0.6))])  # 0.13 m^2
+    assert fuse_background([both], VOXEL, BackgroundOptions(fragment=0.2)).vertices[:, 2].max() < 0.1
+    assert fuse_background([both], VOXEL, BackgroundOptions(fragment=0.05)).vertices[:, 2].max() > 0.6
+    assert fuse_background([both], VOXEL, BackgroundOptions(fragment=50.0)).is_empty
+
+
+def test_the_order_of_frames_does_not_matter_and_the_same_frames_give_the_same_mesh():
+    frames = floors(4)
+    one, same, other = (fuse_background(some, VOXEL) for some in (frames, list(frames), frames[::-1]))
+    assert np.array_equal(one.vertices, same.vertices) and np.array_equal(one.faces, same.faces)
+    assert abs(height_error(one) - height_error(other)) < 1e-4 and abs(len(one.faces) - len(other.faces)) < 20
+
+
+@pytest.mark.parametrize("place", [(1e6, -2e6, 3e6), (300.0, 0.0, -500.0)])
+def test_far_away_scenes_keep_their_millimetres(place):
+    origin = VOXEL * np.round(np.array(place) / VOXEL)  # the voxels lie in them as they do here
+    near, far = fuse_background(floors(2), VOXEL), fuse_background([moved(m, origin) for m in floors(2)], VOXEL)
+    assert abs(len(far.faces) - len(near.faces)) < 20
+    back = moved(far, -origin)
+    inside = (np.abs(back.vertices[:, :2] - 0.8) < 0.61).all(axis=1)  # at its border, last digits say what is known
+    assert distances(back.vertices[inside], near).max() < 1e-4
+    assert height_error(back) == pytest.approx(height_error(near), abs=1e-5)
+
+
+def test_of_nothing_there_is_nothing():
+    assert fuse_background([], VOXEL).is_empty and fuse_background([Mesh.empty()] * 3, VOXEL).is_empty
+    assert not fuse_background([Mesh.empty(), FLOOR, Mesh.empty()], VOXEL).is_empty
+    assert fuse_background([Mesh.of(np.ones((3, 3)), [[0, 1, 2]])], VOXEL).is_empty
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"frames": 0},
+        {"reach": 0},
+        {"seen": 1.0},
+        {"seen": -0.1},
+        {"fragment": -1.0},
+        {"fragment": np.inf},
+        {"coarse": 0.0},
+        {"lattice": 0.0},
+        {"refresh": 0.0},
+        {"refresh": float("nan")},
+        {"coarse": float("nan")},
+    ],
+    ids=str,
+)
+def test_options_that_cannot_be_are_refused(wrong):
+    with pytest.raises(InputError, match="give"):
+        BackgroundOptions(**wrong)

@@ -1,0 +1,132 @@
+"""Bodies are connected pieces, followed over time; bits are somebody's, or counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from meshreel.analysis.bodies import BodyOptions, find_bodies, same_bodies
+from meshreel.errors import InputError
+from meshreel.geometry.topology import concatenate
+from meshreel.types import Mesh
+from tests.metrics.shapes import moved, sphere
+
+CELL = 0.05
+BALL = sphere(0.3, 3)  # 1.1 m^2
+BIT = sphere(0.03, 1)  # 0.01 m^2
+NONE = Mesh.empty()
+
+
+def at(x: float, y: float = 0.0, z: float = 0.0, mesh: Mesh = BALL) -> Mesh:
+    return moved(mesh, (x, y, z))
+
+
+def walls(meshes) -> list[list[float]]:
+    """For each body, of each frame, its middle along x; NaN where it is not there."""
+    return [[np.nan if m.is_empty else round(float(m.vertices[:, 0].mean()), 2) for m in body] for body in meshes]
+
+
+def test_two_apart_are_two_and_each_is_itself_in_every_frame():
+    frames = [concatenate([at(0.1 * t), at(3 - 0.1 * t)]) for t in range(4)]
+    found = find_bodies(frames, CELL)
+    assert walls(found.meshes) == [[0.0, 0.1, 0.2, 0.3], [3.0, 2.9, 2.8, 2.7]] and found.dropped == 0
+    assert sum(len(body[0].faces) for body in found.meshes) == len(frames[0].faces)
+
+
+def test_two_that_touch_are_one_for_the_whole_run():
+    frames = [concatenate([at(0), at(x)]) for x in (2.0, 1.4, 0.8, 0.62, 0.8, 1.4, 2.0)]
+    assert len(find_bodies(frames, CELL).meshes) == 1
+    assert len(find_bodies(frames[:2], CELL).meshes) == 2
+
+
+def test_one_that_leaves_and_another_that_comes_are_two():
+    frames = [at(0), at(0.1), NONE, at(5), at(5.1)]
+    assert str(walls(find_bodies(frames, CELL).meshes)) == str([[0.0, 0.1, *[np.nan] * 3], [*[np.nan] * 3, 5.0, 5.1]])
+
+
+def test_one_that_jumps_is_two():
+    assert len(find_bodies([at(0), at(3)], CELL).meshes) == 2
+
+
+@pytest.mark.parametrize("where", [0.0, 4.0])
+def test_bits_go_to_the_nearest_body(where):
+    side = 0.4 if where == 0 else -0.4
+    frames = [concatenate([at(0), at(4), at(where + side, mesh=BIT)])] * 2
+    found = find_bodies(frames, CELL)
+    sizes = [len(body[0].faces) - len(BALL.faces) for body in found.meshes]
+    assert sizes == ([len(BIT.faces), 0] if where == 0 else [0, len(BIT.faces)]) and found.dropped == 0
+
+
+def test_bits_far_from_all_are_dropped_and_counted():
+    frames = [concatenate([at(0), at(4, mesh=BIT)]), at(0), at(0), concatenate([at(0), at(0, 4, mesh=BIT)])]
+    found = find_bodies(frames, CELL)
+    assert len(found.meshes) == 1 and found.dropped == 2 * len(BIT.faces)
+    assert [len(mesh.faces) for mesh in found.meshes[0]] == [len(BALL.faces)] * 4
+
+
+def test_bits_that_last_are_a_body_of_their_own():
+    frames = [concatenate([at(0), at(4 + 0.01 * t, mesh=BIT)]) for t in range(5)]
+    found = find_bodies(frames, CELL)
+    assert len(found.meshes) == 2 and found.dropped == 0
+    assert len(find_bodies(frames, CELL, BodyOptions(lasts=6)).meshes) == 1
+
+
+def test_bits_alone_without_any_body_are_kept_where_they_last():
+    assert find_bodies([at(0, mesh=BIT)] * 4, CELL).dropped == 4 * len(BIT.faces)
+    assert find_bodies([at(0, mesh=BIT)] * 5, CELL).dropped == 0
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.lists(
+        st.lists(
+            st.tuples(st.sampled_from([BALL, BIT]), st.floats(-3, 3), st.floats(-3, 3)),
+            max_size=4,
+        ),
+        min_size=1,
+        max_size=5,
+    )
+)
+def test_no_face_is_lost_without_being_counted(frames):
+    meshes = [concatenate([at(x, y, mesh=mesh) for mesh, x, y in frame]) if frame else NONE for frame in frames]
+    found = find_bodies(meshes, CELL)
+    assert all(len(body) == len(frames) for body in found.meshes)
+    kept = sum(len(mesh.faces) for body in found.meshes for mesh in body)
+    assert kept + found.dropped == sum(len(mesh.faces) for mesh in meshes)
+
+
+@pytest.mark.parametrize("frames", [[], [NONE], [NONE] * 3])
+def test_where_nothing_moves_there_are_no_bodies(frames):
+    found = find_bodies(frames, CELL)
+    assert found.meshes == [] and found.dropped == 0
+
+
+def test_one_frame_has_its_pieces_as_bodies():
+    assert len(find_bodies([concatenate([at(0), at(3)])], CELL).meshes) == 2
+
+
+def test_far_away_bodies_are_told_apart_as_well():
+    far = (1e6, -1e6, 2e6)
+    frames = [moved(concatenate([at(0.1 * t), at(3 - 0.1 * t)]), far) for t in range(3)]
+    bodies = find_bodies(frames, CELL).meshes
+    assert len(bodies) == 2
+    last, now = [body[-1] for body in bodies], [bodies[1][-1], bodies[0][-1]]
+    assert same_bodies(last, now, CELL, BodyOptions()) == [1, 0]
+
+
+def test_a_body_is_continued_by_that_which_shares_most_with_it():
+    before = [at(0), NONE, at(3)]
+    assert same_bodies(before, [at(3.1), at(0.05), at(8)], CELL, BodyOptions()) == [2, 0, -1]
+    both = [at(0.2), at(0.05)]
+    assert same_bodies([at(0)], both, CELL, BodyOptions()) == [-1, 0]
+    assert same_bodies([], [at(0)], CELL, BodyOptions()) == [-1]
+    assert same_bodies([at(0)], [], CELL, BodyOptions()) == []
+    assert same_bodies([NONE], [NONE], CELL, BodyOptions()) == [-1]
+
+
+@pytest.mark.parametrize("wrong", [{"cell": 0.5}, {"least": -1.0}, {"beside": -0.1}, {"lasts": 0}], ids=str)
+def test_options_that_cannot_be_are_refused(wrong):
+    with pytest.raises(InputError, match="give"):
+        BodyOptions(**wrong)

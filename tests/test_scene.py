@@ -1,0 +1,321 @@
+"""A scene in a file: what goes in comes out, part by part; tracks over segments; what is lost is said."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.analysis.background import BackgroundOptions
+from meshreel.analysis.segment.scene import ByPlace
+from meshreel.analysis.survey import survey
+from meshreel.choice import NO_ERROR
+from meshreel.coding.background import decode_background
+from meshreel.coding.intra import encode_empty, encode_intra
+from meshreel.encoder import encode
+from meshreel.format.layout import Form
+from meshreel.geometry.nearest import distances
+from meshreel.geometry.topology import concatenate
+from meshreel.geometry.voxels import Lattice
+from meshreel.scene import Parts, TrackGroup, encode_bodies, encode_static, take_apart
+from meshreel.types import Mesh, MeshList, Placement
+from meshreel.windows import EncodedGroup, Stages
+from tests.metrics.shapes import moved, plane, sphere
+from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, of_body, quick_scene, room, with_room
+
+NONE = Mesh.empty()
+BODIES = [ball(0.5 + 0.35 * t) for t in range(4)]
+ROLLING = with_room(BODIES)
+OPTIONS = quick_scene(group_size=3)
+FAR = np.array([1e6, -1e6, 2e6])
+
+
+def encoded(frames, path, options=OPTIONS, rate=30.0, **more):
+    """The frames that come back and the summary."""
+    sequence = MeshList(tuple(frames), rate)
+    summary = encode(sequence, path, options, **more)
+    video = meshreel.open(path)
+    assert len(video) == len(frames) == summary.frame_count and path.stat().st_size == summary.size
+    return video, summary
+
+
+def statics(video) -> set[int]:
+    """Numbers of the chunks that frames are shown with."""
+    found = (video.reader.static_of_frame(frame) for frame in range(len(video)))
+    return {chunk.offset for chunk in found if chunk is not None}
+
+
+def rms(points, mesh) -> float:
+    return float(np.sqrt((distances(points, mesh) ** 2).mean()))
+
+
+def assert_rolls(video, offset=(0.0, 0.0, 0.0)):
+    """Each frame is the room and the ball where it is, within the noise or so."""
+    for number, body in enumerate(BODIES[: len(video)]):
+        found, clean = video[number], moved(concatenate([room(), body]), offset)
+        assert rms(clean.vertices, found) < 2.5 * NOISE
+        high = found.vertices[(found.vertices - offset > 0.15).all(axis=1)]  # what is not at the floor or the walls
+        assert len(high) > 100 and rms(high, clean) < 2.5 * NOISE
+
+
+@pytest.fixture
+def plainly(monkeypatch):
+    """Bodies coded frame by frame, where it does not matter how: a fraction of the time."""
+
+    def coded(frames, options, stages=None):
+        del options, stages
+        if frames[0].is_empty:
+            return [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
+        assert not any(mesh.is_empty for mesh in frames)
+        return [EncodedGroup(Form.DRACO, len(frames), encode_intra(list(frames), 1e-3, 0), (), NO_ERROR)]
+
+    monkeypatch.setattr("meshreel.scene.encode_segment", coded)
+
+
+@pytest.fixture(scope="module")
+def rolling(tmp_path_factory):
+    path = tmp_path_factory.mktemp("rolling") / "a.reel"
+    return path, *encoded(ROLLING, path)
+
+
+def test_a_scene_comes_back_as_it_was_without_its_noise(rolling):
+    _, video, summary = rolling
+    assert_rolls(video)
+    assert summary.scene is not None and summary.scene.tracks == 1 and summary.warnings == ()
+    assert 0.5 * NOISE < summary.scene.noise < 3 * NOISE  # borders and the floor under the ball count, too
+    assert summary.psnr > 20 * np.log10(4 / NOISE) - 8
+
+
+def test_the_background_is_in_the_file_once_and_shared_by_all_frames(rolling):
+    _, video, summary = rolling
+    faces = summary.scene.faces
+    assert 0 < summary.scene.background < summary.size and len(statics(video)) == 1
+    first = video[0]
+    for mesh in video:
+        assert np.array_equal(mesh.vertices[mesh.faces[:faces]], first.vertices[first.faces[:faces]])
+
+
+def test_the_unit_is_the_size_of_what_moves(rolling):
+    _, video, _ = rolling
+    assert video.reader.header.scale == pytest.approx(2 * np.sqrt(3) * RADIUS, rel=0.1)
+
+
+@pytest.mark.usefixtures("plainly")
+def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
+    stages: dict[str, int] = {}
+    encoded(ROLLING, tmp_path / "a.reel")
+    with ThreadPoolExecutor(2) as executor:
+        encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=lambda s, done, _: stages.update({s: done}))
+    assert (tmp_path / "b.reel").read_bytes() == (tmp_path / "a.reel").read_bytes()
+    assert stages == dict.fromkeys(("survey", "segment", "background", "code"), 4)
+
+
+def test_preset_paper_has_scenes_too(tmp_path):
+    options = quick_scene("paper", group_size=1)
+    video, summary = encoded(ROLLING, tmp_path / "a.reel", options)
+    assert summary.scene is not None and len(statics(video)) == 1
+    assert_rolls(video)
+
+
+def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr("meshreel.encoder.is_scene", None)
+    small = [Mesh.of(plane(1.0, 6).vertices, plane(1.0, 6).faces)] * 2
+    options = replace(quick_scene("paper", group_size=1), dynamic_only=True)
+    video, summary = encoded(small, tmp_path / "a.reel", options)
+    assert summary.scene is None and not statics(video) and rms(small[1].vertices, video[1]) < 0.01
+
+
+@pytest.mark.usefixtures("plainly")
+def test_where_nothing_moves_the_file_is_a_background(tmp_path):
+    video, summary = encoded(with_room([ball(1.2)] * 4), tmp_path / "a.reel")
+    assert [group.form for group in summary.groups] == [Form.EMPTY] and summary.scene.tracks == 1
+    assert rms(concatenate([room(), ball(1.2)]).vertices, video[3]) < 2.5 * NOISE
+    assert summary.scene.background > 0.7 * summary.size
+
+
+def test_where_all_moves_there_is_no_scene(tmp_path):
+    frames = [moved(plane(1.0, 6), (0.4 * t, 0.3 * t, 0.5 * t)) for t in range(2)]
+    video, summary = encoded(frames, tmp_path / "a.reel", quick_scene("paper", group_size=1))
+    assert summary.scene is None and rms(frames[1].vertices, video[1]) < 0.01
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_clean_scene_needs_few_faces_for_its_flat_walls(tmp_path):
+    video, summary = encoded(with_room([NONE] * 3, sigma=0.0), tmp_path / "a.reel")
+    assert summary.scene.faces < 0.3 * len(room().faces)
+    inner = room().vertices[room().vertices.max(axis=1) < SIDE - 1.5 * CELL]  # at a border, up to a cell is missing
+    assert rms(inner, video[0]) < 0.1 * CELL
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_frame_without_surface_stays_without(tmp_path):
+    frames = [*ROLLING[:2], NONE, *ROLLING[2:]]
+    video, summary = encoded(frames, tmp_path / "a.reel")
+    assert [mesh.is_empty for mesh in video] == [False, False, True, False, False]
+    assert summary.scene is not None and len(statics(video)) == 1
+    assert rms(ROLLING[2].vertices, video[3]) < 3 * NOISE and summary.psnr > 30
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_first_frame_without_surface_is_legal(tmp_path):
+    video, _ = encoded([NONE, NONE, *ROLLING[:3]], tmp_path / "a.reel")
+    assert [mesh.is_empty for mesh in video] == [True, True, False, False, False]
+    assert rms(ROLLING[0].vertices, video[2]) < 3 * NOISE
+
+
+def test_one_frame_is_no_scene(tmp_path):
+    video, summary = encoded([plane(1.0, 6)], tmp_path / "a.reel")
+    assert summary.scene is None and rms(plane(1.0, 6).vertices, video[0]) < 0.01
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_scene_far_from_the_origin_keeps_its_millimetres(tmp_path, rolling):
+    video, summary = encoded([moved(mesh, FAR) for mesh in ROLLING], tmp_path / "a.reel")
+    assert_rolls(video, FAR)
+    assert summary.scene.noise == pytest.approx(rolling[2].scene.noise, rel=0.5)  # its cells are in other places
+    assert summary.psnr == pytest.approx(rolling[2].psnr, abs=1.0)
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_vertex_that_no_face_has_does_not_make_the_scene_larger(tmp_path):
+    stray = [Mesh.of([*mesh.vertices, [1e7, 0, 0]], mesh.faces) for mesh in ROLLING[:3]]
+    video, summary = encoded(stray, tmp_path / "a.reel")
+    assert max(video.reader.header.maximum) < 10 and summary.psnr > 30
+
+
+@pytest.mark.usefixtures("plainly")
+def test_the_background_may_be_sent_again(tmp_path):
+    options = replace(OPTIONS, background=BackgroundOptions(frames=4, refresh=0.2))
+    video, summary = encoded(ROLLING, tmp_path / "a.reel", options, rate=10.0)
+    assert len(statics(video)) == 2
+    assert_rolls(video)
+    firsts = [group for group in summary.groups if not group.predicted]
+    assert len(firsts) >= 2  # who joins at the second needs nothing before
+
+
+@pytest.mark.usefixtures("plainly")
+def test_bits_that_are_dropped_are_counted_for_the_user(tmp_path):
+    """Where the ball was, a bit is left in one frame, far from where it is now."""
+    bit = moved(sphere(0.05, 2), (0.5, 1.2, 2 * RADIUS + 0.5 * CELL))
+    frames = with_room([*BODIES[:3], concatenate([BODIES[3], bit])])
+    _, summary = encoded(frames, tmp_path / "a.reel")
+    assert summary.warnings == (
+        f"{len(bit.faces)} faces of bits that move, far from all bodies and there only for a moment, are not kept",
+    )
+
+
+# tracks over segments, with a segmentation that is known
+
+
+class AllMoves(ByPlace):
+    """Everything moves, whatever it is."""
+
+    def moving(self, frame, mesh):
+        del frame
+        return np.ones(len(mesh.faces), bool)
+
+
+ALL = AllMoves(Lattice(np.zeros(3), CELL), np.zeros(0, np.int64), np.zeros(0, bool), 0.0)
+
+
+def tracks(frames: list[Mesh], segment: int = 2) -> list[str]:
+    """Of each track, which frames it has a body in; segments of so many frames."""
+    sequence = MeshList(tuple(frames), 1.0)
+    seen = replace(survey(sequence), scale=1.0)
+    parts = Parts(seen, ALL, NONE, CELL, 0.0)
+    options = replace(OPTIONS, key_interval=float(segment))
+    coded = encode_bodies(sequence, parts, options, None, Stages(None, len(frames)))
+    assert coded.dropped == 0
+    assert coded.groups == sorted(coded.groups, key=lambda each: (each.first_frame, each.track))
+    count = max(each.track for each in coded.groups) + 1
+    return [shown(coded.groups, track, len(frames)) for track in range(count)]
+
+
+def shown(groups: list[TrackGroup], track: int, frames: int) -> str:
+    """Of each frame of a track, whether it has a group with surface (x) or one without (.); each exactly one."""
+    found = [""] * frames
+    for each in groups:
+        if each.track == track:
+            for frame in range(each.first_frame, each.first_frame + each.group.frame_count):
+                found[frame] += "." if each.group.form == Form.EMPTY else "x"
+    return "".join(found)
+
+
+SMALL = sphere(0.3, 2)
+
+
+def at(*places: float) -> Mesh:
+    return concatenate([moved(SMALL, (x, 0, 0)) for x in places]) if places else NONE
+
+
+@pytest.mark.usefixtures("plainly")
+def test_one_body_has_one_track():
+    assert tracks([at(0.1 * t) for t in range(4)]) == ["xxxx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_who_enters_late_has_a_track_that_was_empty_before():
+    assert tracks([at(0), at(0), at(0), at(0), at(0, 3), at(0, 3)]) == ["xxxxxx", "....xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_who_enters_within_a_segment_is_empty_in_its_first_frames():
+    assert tracks([at(0), at(0, 3), at(0, 3), at(0, 3)]) == ["xxxx", ".xxx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_who_leaves_is_empty_from_then_on_and_the_track_is_free_for_another():
+    assert tracks([at(0, 3), at(0, 3), at(0), at(0), at(0), at(0)]) == ["xxxxxx", "xx...."]
+    assert tracks([at(0, 3), at(0, 3), at(0), at(0), at(0, 6), at(0, 6)]) == ["xxxxxx", "xx..xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_frames_with_nobody_are_one_track_without_surface():
+    assert tracks([at()] * 4) == ["...."]
+    assert tracks([at(0), at(0), at(), at(), at(0), at(0)]) == ["xx..xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_two_that_meet_go_on_in_one_track_and_two_that_part_get_another():
+    meeting = [at(0, 1.5), at(0.3, 1.2), at(0.46, 1.04), at(0.5, 1.0)]
+    assert sorted(tracks(meeting)) == ["xx..", "xxxx"]
+    assert tracks([at(1.3, 1.7), at(1.3, 1.7), at(1.0, 2.0), at(1.0, 2.0)]) == ["xxxx", "..xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_body_keeps_its_track_whatever_the_order_of_faces():
+    frames = [at(0, 3), at(0, 3), at(3, 0), at(3, 0)]
+    assert tracks(frames) == ["xxxx", "xxxx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_body_with_a_frame_of_faces_without_area_is_coded_as_not_there():
+    flat = Mesh.of(np.zeros((3, 3)), [[0, 1, 2]])
+    assert tracks([at(0), flat, at(0), at(0)], segment=4) == ["x.xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_background_is_no_finer_than_its_noise_asks_for():
+    seen = replace(survey(MeshList((room(),))), scale=1.0)
+    sizes = []
+    for noise in (0.0, 0.002, 0.01):
+        parts = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], CELL, noise)
+        payload = encode_static(parts, BackgroundOptions())
+        place = Placement(1.0, tuple(seen.center))
+        away = rms(parts.background.vertices, decode_background(payload, place))
+        assert away <= max(0.5 * noise, 1e-4)
+        sizes.append(len(payload))
+    assert sizes[0] > sizes[1] > sizes[2]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
+    sequence = MeshList(tuple(ROLLING))
+    parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS, Stages(None, 4))
+    assert rms(parts.background.vertices, room()) < NOISE
+    assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.cell == pytest.approx(CELL, rel=0.2)
+    number = 2
+    assert (parts.segmentation.moving(number, ROLLING[number]) == of_body(ROLLING[number])).mean() > 0.98
