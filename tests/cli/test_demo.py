@@ -15,7 +15,7 @@ from tests.cli.conftest import failed
 
 
 @pytest.fixture
-def coarse(quick_presets, monkeypatch):
+def coarse(quick_presets, monkeypatch):  # noqa: ARG001
     """A demo that takes seconds: large pixels, large voxels."""
     monkeypatch.setattr("meshreel.cli.demo.WIDTH", 128)
     monkeypatch.setattr("meshreel.cli.demo.VOXEL", 0.06)

@@ -12,12 +12,13 @@ from jaxtyping import Int64
 from ...geometry.decimate import has_boundary
 from ...geometry.topology import drop_unreferenced
 from ...geometry.voxels import Lattice, around, distinct, spread
-from ...types import Frames
+from ...types import Frames, Mesh
 from ..survey import check
 
 PROBES = 4  # frames, spread over the sequence
 SHARE = 0.6  # of a frame's surface that stands still in a scene
 CELLS = 200  # along a frame's diagonal: 4 cm in a room
+COARSEST = 32  # edges along it: a mesh of fewer is no capture of a room
 
 
 def is_scene(frames: Frames) -> bool:
@@ -30,15 +31,21 @@ def is_scene(frames: Frames) -> bool:
     for number in numbers:
         check(mesh := frames[number], f"frame {number}")
         meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
-    if len(meshes) < 2 or not has_boundary(meshes[0]):
+    if len(meshes) < 2 or not has_boundary(meshes[0]) or _edge(meshes[0]) * COARSEST > meshes[0].diagonal:
+        return False
+    if meshes[0].diagonal == 0:
         return False
     lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
-    if lattice.size == 0:
-        return False
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(own) for own in cells]
     still = [np.mean([_shared(own, other) for other in wide]) for own in cells]
     return float(np.median(still)) >= SHARE
+
+
+def _edge(mesh: Mesh) -> float:
+    """The usual length of a side of a face, m."""
+    corners = mesh.vertices[mesh.faces]
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
 
 def _shared(own: Int64[np.ndarray, " C"], other: Int64[np.ndarray, " D"]) -> float:
