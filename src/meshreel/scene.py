@@ -9,7 +9,6 @@ quality means the same for a person in a room as for one alone.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -38,7 +37,7 @@ from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_wi
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 PROBES = 8  # frames, at most, that what moves is measured in
 LEAST_NOISE = 1e-4  # of the unit: a background is no finer than with that much
-OUTLIER = 3.0  # cells: a static face farther from the background is no noise
+NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +58,7 @@ class Parts:
     background: Mesh  # m, as in the first frame; empty where nothing stands still
     changes: list[Change]
     cell: float  # m, of the scene's mesh
-    noise: float  # m, RMS distance of a frame's still surface from the background
+    noise: float  # m, standard deviation of a frame's still surface from the background
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +100,7 @@ def take_apart(
     background = fuse_background(still, cell, options.background)
     changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
     stages.add("background", len(sequence))
-    noise, sizes = _measured(sequence, segmentation, background, OUTLIER * cell)
+    noise, sizes = _measured(sequence, segmentation, background)
     unit = float(np.median(sizes)) if sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
     return Parts(seen, segmentation, background, changes, cell, noise)
@@ -283,11 +282,12 @@ def _spread(count: int, most: int) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
 
 
-def _measured(
-    sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh, far: float
-) -> tuple[float, list[float]]:
-    """RMS distance of still faces' corners from the background, m; the diagonal of the largest body a frame, m."""
-    squares, sizes = [], []
+def _measured(sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh) -> tuple[float, list[float]]:
+    """Standard deviation of still surface from the background, m; the diagonal of the largest body a frame, m.
+
+    By the median: what is past a border of the background, or has flown, is no noise.
+    """
+    deviations, sizes = [], []
     for number in _spread(len(sequence), PROBES):
         mesh = sequence[number]
         moves = segmentation.moving(number, mesh)
@@ -295,9 +295,8 @@ def _measured(
             sizes.append(_largest(_part(mesh, moves)))
         still = _part(mesh, ~moves)
         if not still.is_empty and not background.is_empty:
-            gaps = distances(still.vertices, background)
-            squares.append(float((gaps[gaps < far] ** 2).mean()) if (gaps < far).any() else 0.0)
-    return math.sqrt(float(np.mean(squares))) if squares else 0.0, sizes
+            deviations.append(float(np.median(distances(still.vertices, background))) / NORMAL_MEDIAN)
+    return float(np.mean(deviations)) if deviations else 0.0, sizes
 
 
 def _largest(mesh: Mesh) -> float:
