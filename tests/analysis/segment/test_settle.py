@@ -10,13 +10,15 @@ from meshreel.analysis.segment.places import PlacesOptions
 from meshreel.analysis.segment.scene import ByPlace, SegmentOptions, segment
 from meshreel.analysis.segment.settle import NEVER, SettleOptions
 from meshreel.analysis.segment.views import ViewsOptions
-from meshreel.decoder import open as open_video
-from meshreel.encoder import encode
+from meshreel.analysis.survey import survey
+from meshreel.coding.background import decode_background, decode_change
 from meshreel.errors import InputError
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld
 from meshreel.presets import preset_options
-from meshreel.types import Mesh, MeshList
+from meshreel.scene import encode_static, take_apart
+from meshreel.types import Mesh, MeshList, Placement
+from meshreel.windows import Stages
 
 FRAMES, LIFTED, PUT = 28, 9, 18  # at 4 frames a second
 OPTIONS = SegmentOptions(
@@ -49,8 +51,8 @@ def box(middle: tuple[float, float, float], size: float = 0.4) -> Mesh:
 
 
 def frame(number: int) -> Mesh:
-    floor = sheet((0, 0, 0), (0, 0, 2), (2.4, 0, 0), 5)
-    wall = sheet((0, 0, 0), (2.4, 0, 0), (0, 1.4, 0), 5)
+    floor = sheet((0, 0, 0), (0, 0, 2), (2.4, 0, 0), 6)
+    wall = sheet((0, 0, 0), (2.4, 0, 0), (0, 1.4, 0), 6)
     share = np.clip((number - LIFTED) / (PUT - LIFTED), 0, 1)
     lifted = 0.4 * np.sin(np.pi * share)
     return concatenate([floor, wall, box((0.5 + 1.3 * share, 0.2 + lifted, 1.0))])
@@ -66,14 +68,14 @@ def found(scene: MeshList) -> ByPlace:
     return segment(scene, OPTIONS)
 
 
-ROOM = 2 * 2048  # faces of floor and wall, which come first
+ROOM = 2 * 8192  # faces of floor and wall, which come first
 
 
 def test_a_box_moves_only_while_it_is_carried(scene: MeshList, found: ByPlace) -> None:
     shares = [found.moving(number, scene[number])[ROOM:].mean() for number in range(FRAMES)]
     assert max(shares[: LIFTED - 1] + shares[PUT + 2 :]) < 0.08  # what touches the floor is never seen free
     assert min(shares[LIFTED + 2 : PUT - 1]) > 0.95
-    assert all(found.moving(number, scene[number])[:ROOM].mean() < 0.02 for number in range(0, FRAMES, 5))
+    assert all(found.moving(number, scene[number])[:ROOM].mean() < 0.05 for number in range(0, FRAMES, 5))
 
 
 def test_without_enough_rest_it_moves_always(scene: MeshList) -> None:
@@ -90,19 +92,24 @@ def test_changes_are_two_of_the_frames(found: ByPlace) -> None:
     assert (found.rest.since[~found.chosen] == NEVER).all()
 
 
-def test_the_file_has_a_patch_for_each_change(scene: MeshList, tmp_path) -> None:
+def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
     options = replace(preset_options(quality=30), segment=OPTIONS)
-    summary = encode(scene, tmp_path / "box.reel", options)
-    assert summary.scene is not None
-    with open_video(tmp_path / "box.reel") as video:
-        for number in (0, FRAMES - 1):
-            gaps = Surface(video.background(number)).closest(scene[number].vertices).points - scene[number].vertices
-            assert np.quantile(np.linalg.norm(gaps, axis=1), 0.99) < 0.03
-        moved = Surface(video.background(FRAMES - 1)).closest(box((0.5, 0.2, 1.0)).vertices).points
-        assert np.linalg.norm(moved - box((0.5, 0.2, 1.0)).vertices, axis=1).max() > 0.15  # nothing stands there now
-        for number in range(0, FRAMES, 3):
-            gaps = Surface(video[number]).closest(scene[number].vertices).points - scene[number].vertices
-            assert np.quantile(np.linalg.norm(gaps, axis=1), 0.97) < 0.04
+    parts = take_apart(scene, survey(scene), options, Stages(None, FRAMES))
+    states = encode_static(parts, FRAMES, 4.0, options.background)
+    assert [state.is_patch for state in states] == [False, True, True]
+    place, rooms = Placement(parts.seen.unit, tuple(parts.seen.center)), [decode_background(states[0].payload)]
+    for state in states[1:]:
+        rooms.append(decode_change(state.payload, rooms[-1]))
+    first, between, last = (place.of(room) for room in rooms)
+    here, there = (np.array([x, 0.4, 1.0]) for x in (0.5, 1.8))  # the middle of the box's lid
+    assert apart(first, here) < 0.03 < 0.15 < apart(first, there)
+    assert min(apart(between, here), apart(between, there)) > 0.15
+    assert apart(last, there) < 0.03 < 0.15 < apart(last, here)
+    assert max(apart(room, np.array([1.2, 0.0, 1.5])) for room in (first, between, last)) < 0.01
+
+
+def apart(mesh: Mesh, point: np.ndarray) -> float:
+    return float(np.linalg.norm(Surface(mesh).closest(point[None]).points - point))
 
 
 @pytest.mark.parametrize("wrong", [{"rest": 0.0}, {"share": 0.0}, {"least": -1.0}])
