@@ -12,17 +12,20 @@ from meshreel.capture.record import open_recording
 from meshreel.capture.truth import read_truth
 from meshreel.cli.console import called_as
 from tests.cli.conftest import failed
+from tests.small_options import quick
 
 
 @pytest.fixture
-def coarse(quick_presets, monkeypatch):  # noqa: ARG001
-    """A demo that takes seconds: large pixels, large voxels."""
+def coarse(monkeypatch):
+    """A demo that takes seconds: quick options, large pixels, large voxels."""
+    monkeypatch.setattr("meshreel.cli.demo.preset_options", quick)
     monkeypatch.setattr("meshreel.cli.demo.WIDTH", 128)
     monkeypatch.setattr("meshreel.cli.demo.VOXEL", 0.06)
 
 
 @pytest.mark.usefixtures("coarse")
-def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_tells_its_numbers(run, tmp_path):
+def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_tells_its_numbers(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("meshreel.cli.demo.VOXEL", 0.04)  # the two people are three voxels apart
     said = run("demo", "-o", tmp_path / "demo", "--frames", "6", "--json")
     assert said.code == 0, said.err
     row = said.row

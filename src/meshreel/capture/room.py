@@ -106,7 +106,7 @@ def furnished_room(options: RoomOptions | None = None) -> Room:
 
 
 def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:
-    """Depth cameras at the room's corners that look down to its middle; pictures of `width` x 0.9 `width` pixels."""
+    """Depth cameras at the corners that look down to the middle; pictures of `width` x 0.9 `width` pixels."""
     return tuple(_resized(camera, width) for camera in corner_cameras(np.array(_LOW), np.array(_HIGH), count))
 
 
