@@ -24,7 +24,7 @@ from meshreel.metrics.cameras import Box, OrthographicCamera
 from meshreel.presets import preset_options
 from meshreel.types import Mesh, MeshList
 
-FRAMES, SHOWN = 8, 4
+FRAMES, SHOWN = 20, 9
 WIDTH, NOISE, VOXEL = 256, 0.3, 0.03  # as `meshreel demo` has them
 PANEL = 300  # pixels
 GREY = np.full(3, 0.82)
