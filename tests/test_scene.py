@@ -11,6 +11,7 @@ import pytest
 import meshreel
 from meshreel.analysis.background import BackgroundOptions
 from meshreel.analysis.segment.scene import ByPlace
+from meshreel.analysis.segment.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.choice import NO_ERROR
 from meshreel.coding.background import decode_background
@@ -218,14 +219,14 @@ class AllMoves(ByPlace):
         return np.ones(len(mesh.faces), bool)
 
 
-ALL = AllMoves(Lattice(np.zeros(3), CELL), np.zeros(0, np.int64), np.zeros(0, bool), 0.0)
+ALL = AllMoves(Lattice(np.zeros(3), CELL), np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), 0.0)
 
 
 def tracks(frames: list[Mesh], segment: int = 2) -> list[str]:
     """Of each track, which frames it has a body in; segments of so many frames."""
     sequence = MeshList(tuple(frames), 1.0)
     seen = replace(survey(sequence), scale=1.0)
-    parts = Parts(seen, ALL, NONE, CELL, 0.0)
+    parts = Parts(seen, ALL, NONE, [], CELL, 0.0)
     options = replace(OPTIONS, key_interval=float(segment))
     coded = encode_bodies(sequence, parts, options, None, Stages(None, len(frames)))
     assert coded.dropped == 0
@@ -302,8 +303,8 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
     seen = replace(survey(MeshList((room(),))), scale=1.0)
     sizes = []
     for noise in (0.0, 0.002, 0.01):
-        parts = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], CELL, noise)
-        payload = encode_static(parts, BackgroundOptions())
+        parts = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise)
+        payload = encode_static(parts, 1, 30.0, BackgroundOptions())[0].payload
         place = Placement(1.0, tuple(seen.center))
         away = rms(parts.background.vertices, decode_background(payload, place))
         assert away <= max(0.5 * noise, 1e-4)

@@ -21,12 +21,12 @@ from tests.small_options import quick
 
 real = command.encode
 
-def slow(sequence, path, options, executor, progress):
+def slow(sequence, path, options, executor, progress, masker=None):
     def wait(stage, done, total):
         if stage == "code" and done == 1:
             print("coding", flush=True)
             time.sleep(120)
-    return real(sequence, path, options, executor, wait)
+    return real(sequence, path, options, executor, wait, masker)
 
 command.preset_options = quick
 if sys.argv.pop(1) == "wait":

@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 
 from meshreel.analysis.segment.places import PlacesOptions
 from meshreel.analysis.segment.scene import ByPlace, SegmentOptions, segment, segment_by, without_islands
+from meshreel.analysis.segment.settle import Rest
 from meshreel.errors import InputError
 from meshreel.geometry.topology import components, concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
-from meshreel.types import Mesh
+from meshreel.types import Mesh, MeshList
 from tests.metrics.shapes import moved, plane
 from tests.scenes import SEGMENT, ball, figure, of_body, overlap, room, with_room
 
@@ -28,7 +29,7 @@ def overlaps(frames: list[Mesh], found: ByPlace) -> list[float]:
 
 @pytest.fixture(scope="module")
 def rolling() -> ByPlace:
-    return segment(ROLLING, SEGMENT)
+    return segment(MeshList(tuple(ROLLING)), SEGMENT)
 
 
 def test_a_ball_that_rolls_is_found_and_the_room_rests(rolling):
@@ -39,7 +40,7 @@ def test_a_ball_that_rolls_is_found_and_the_room_rests(rolling):
 
 
 def test_frames_that_were_not_looked_at_are_labelled_as_well():
-    few = segment(ROLLING, replace(SEGMENT, places=PlacesOptions(frames=3)))
+    few = segment(MeshList(tuple(ROLLING)), replace(SEGMENT, places=PlacesOptions(frames=3)))
     assert overlaps(ROLLING, few)[2] > 0.9  # where it was looked at; between, it is where nobody has looked
     assert min(overlaps(ROLLING, few)) > 0.3
 
@@ -47,56 +48,56 @@ def test_frames_that_were_not_looked_at_are_labelled_as_well():
 @pytest.mark.parametrize("body", [NONE, ball(1.2)], ids=["alone", "with a ball that lies"])
 def test_a_still_room_with_noise_has_no_moving_places(body):
     frames = with_room([body] * 6)
-    found = segment(frames, SEGMENT)
+    found = segment(MeshList(tuple(frames)), SEGMENT)
     assert not found.chosen.any() and not found.moving(0, frames[0]).any()
 
 
 def test_somebody_who_stands_and_swings_the_arms_is_found_whole():
     frames = with_room([figure(0.5 * t) for t in range(6)])
-    assert min(overlaps(frames, segment(frames, SEGMENT))) > 0.9
+    assert min(overlaps(frames, segment(MeshList(tuple(frames)), SEGMENT))) > 0.9
 
 
 def test_what_is_smaller_than_the_least_area_is_not_found():
     frames = with_room([ball(0.5 + 0.25 * t, radius=0.06) for t in range(6)])
-    assert not segment(frames, SEGMENT).chosen.any()
+    assert not segment(MeshList(tuple(frames)), SEGMENT).chosen.any()
 
 
 def test_a_ball_that_rests_for_half_of_the_time_is_found_there_too():
     frames = with_room([ball(0.5)] * 3 + [ball(0.5 + 0.3 * t) for t in range(1, 4)])
-    assert min(overlaps(frames, segment(frames, SEGMENT))) > 0.9
+    assert min(overlaps(frames, segment(MeshList(tuple(frames)), SEGMENT))) > 0.9
 
 
 def test_the_order_of_time_does_not_matter(rolling):
-    back = segment(ROLLING[::-1], SEGMENT)  # other views, for other frames are first
+    back = segment(MeshList(tuple(ROLLING[::-1])), SEGMENT)  # other views, for other frames are first
     for number, mesh in enumerate(ROLLING):
         assert overlap(back.moving(number, mesh), rolling.moving(number, mesh)) > 0.9
 
 
 def test_the_same_frames_give_the_same_segmentation(rolling):
-    again = segment(list(ROLLING), SEGMENT)
+    again = segment(MeshList(tuple(ROLLING)), SEGMENT)
     assert again.keys.tobytes() == rolling.keys.tobytes() and again.chosen.tobytes() == rolling.chosen.tobytes()
 
 
 def test_far_away_scenes_are_taken_apart_as_well():
     far = [moved(mesh, (1e6, -1e6, 2e6)) for mesh in ROLLING]
-    assert min(overlaps(far, segment(far, SEGMENT))) > 0.9
+    assert min(overlaps(far, segment(MeshList(tuple(far)), SEGMENT))) > 0.9
 
 
 def test_empty_frames_are_passed_over_and_nothing_moves_where_there_is_nothing():
     frames = [ROLLING[0], NONE, *ROLLING[1:]]
-    found = segment(frames, SEGMENT)
+    found = segment(MeshList(tuple(frames)), SEGMENT)
     assert overlap(found.moving(0, ROLLING[0]), of_body(ROLLING[0])) > 0.9
     assert found.moving(1, NONE).shape == (0,)
     for empty in ([NONE], [NONE] * 3):
-        assert not segment(empty, SEGMENT).moving(0, ROLLING[0]).any()
-    assert not segment([ROLLING[0]], SEGMENT).chosen.any()  # one frame: nothing can be said to move
+        assert not segment(MeshList(tuple(empty)), SEGMENT).moving(0, ROLLING[0]).any()
+    assert not segment(MeshList((ROLLING[0],)), SEGMENT).chosen.any()  # one frame: nothing can be said to move
 
 
 def test_edges_without_length_do_not_say_how_large_cells_are():
     flat = Mesh.of(np.zeros((3, 3)), [[0, 1, 2]])
     many = concatenate([*[flat] * 8000, room()])
-    assert 0.05 < segment([many] * 3, SEGMENT).lattice.size < 0.1
-    assert not segment([flat] * 3, SEGMENT).chosen.any()
+    assert 0.05 < segment(MeshList((many,) * 3), SEGMENT).lattice.size < 0.1
+    assert not segment(MeshList((flat,) * 3), SEGMENT).chosen.any()
 
 
 # a square of 8 x 8 cells of 1 cm, as two faces each
@@ -137,9 +138,9 @@ def test_no_island_that_something_else_surrounds_is_left_of_those_that_move(bits
 
 def test_no_faces_have_no_labels():
     assert without_islands(NONE, np.zeros(0, bool), 1.0).shape == (0,)
-    assert ByPlace(Lattice(np.zeros(3), 1.0), np.zeros(1, np.int64), np.ones(1, bool), 0.01).moving(0, NONE).shape == (
-        0,
-    )
+    assert ByPlace(Lattice(np.zeros(3), 1.0), np.zeros(1, np.int64), np.ones(1, bool), Rest.none(1), 0.01).moving(
+        0, NONE
+    ).shape == (0,)
 
 
 class Right:
