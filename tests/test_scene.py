@@ -226,7 +226,7 @@ def tracks(frames: list[Mesh], segment: int = 2) -> list[str]:
     """Of each track, which frames it has a body in; segments of so many frames."""
     sequence = MeshList(tuple(frames), 1.0)
     seen = replace(survey(sequence), scale=1.0)
-    parts = Parts(seen, ALL, NONE, [], CELL, 0.0)
+    parts = Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0)
     options = replace(OPTIONS, key_interval=float(segment))
     coded = encode_bodies(sequence, parts, options, None, Stages(None, len(frames)))
     assert coded.dropped == 0
@@ -303,7 +303,7 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
     seen = replace(survey(MeshList((room(),))), scale=1.0)
     sizes = []
     for noise in (0.0, 0.002, 0.01):
-        parts = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise)
+        parts = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise)
         payload = encode_static(parts, 1, 30.0, BackgroundOptions())[0].payload
         place = Placement(1.0, tuple(seen.center))
         away = rms(parts.background.vertices, decode_background(payload, place))

@@ -57,7 +57,7 @@ class SceneSummary:
 
     background: int  # bytes, of all its states
     faces: int  # of the first of them, as decoded
-    noise: float  # m, standard deviation of a frame's still surface from the background
+    noise: float  # m, RMS distance of a frame's still surface from the background
     psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
     tracks: int
 

@@ -9,6 +9,7 @@ quality means the same for a person in a room as for one alone.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -37,6 +38,7 @@ from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_wi
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 PROBES = 8  # frames, at most, that what moves is measured in
 LEAST_NOISE = 1e-4  # of the unit: a background is no finer than with that much
+OUTLIER = 3.0  # cells: still surface farther from the background is no noise
 NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
 
 
@@ -58,7 +60,8 @@ class Parts:
     background: Mesh  # m, as in the first frame; empty where nothing stands still
     changes: list[Change]
     cell: float  # m, of the scene's mesh
-    noise: float  # m, standard deviation of a frame's still surface from the background
+    noise: float  # m, RMS distance of a frame's still surface from the background, tails and all: what bodies have
+    deviation: float  # m, the same by the median, as a standard deviation: without its tails
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,10 +103,10 @@ def take_apart(
     background = fuse_background(still, cell, options.background)
     changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
     stages.add("background", len(sequence))
-    noise, sizes = _measured(sequence, segmentation, background)
+    noise, deviation, sizes = _measured(sequence, segmentation, background, OUTLIER * cell)
     unit = float(np.median(sizes)) if sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
-    return Parts(seen, segmentation, background, changes, cell, noise)
+    return Parts(seen, segmentation, background, changes, cell, noise, deviation)
 
 
 def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:
@@ -113,7 +116,7 @@ def encode_static(parts: Parts, count: int, frame_rate: float, options: Backgrou
     """
     if parts.background.is_empty:
         return []
-    noise = max(parts.noise / parts.seen.unit, LEAST_NOISE)
+    noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
     step, most = options.lattice * noise, options.coarse * noise
     payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
     changes = {change.frame: change for change in parts.changes}
@@ -282,12 +285,14 @@ def _spread(count: int, most: int) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
 
 
-def _measured(sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh) -> tuple[float, list[float]]:
-    """Standard deviation of still surface from the background, m; the diagonal of the largest body a frame, m.
+def _measured(
+    sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh, far: float
+) -> tuple[float, float, list[float]]:
+    """RMS distance of still surface from the background, m, its deviation by the median, m; sizes of largest bodies.
 
-    By the median: what is past a border of the background, or has flown, is no noise.
+    What is farther than `far` is past a border of the background.
     """
-    deviations, sizes = [], []
+    squares, deviations, sizes = [], [], []
     for number in _spread(len(sequence), PROBES):
         mesh = sequence[number]
         moves = segmentation.moving(number, mesh)
@@ -295,8 +300,12 @@ def _measured(sequence: MeshSequence, segmentation: ByPlace | ByMasks, backgroun
             sizes.append(_largest(_part(mesh, moves)))
         still = _part(mesh, ~moves)
         if not still.is_empty and not background.is_empty:
-            deviations.append(float(np.median(distances(still.vertices, background))) / NORMAL_MEDIAN)
-    return float(np.mean(deviations)) if deviations else 0.0, sizes
+            gaps = distances(still.vertices, background)
+            deviations.append(float(np.median(gaps)) / NORMAL_MEDIAN)
+            squares.append(float((gaps[gaps < far] ** 2).mean()) if (gaps < far).any() else 0.0)
+    if not squares:
+        return 0.0, 0.0, sizes
+    return math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes
 
 
 def _largest(mesh: Mesh) -> float:
