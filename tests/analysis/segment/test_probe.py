@@ -23,6 +23,8 @@ def test_a_room_is_a_scene_whoever_is_in_it_and_wherever_it_is(offset):
 def test_a_body_alone_is_none_moving_or_still():
     assert not is_scene([ball(0.5 + 0.5 * t) for t in range(4)])
     assert not is_scene([figure(0.3)] * 4)  # closed
+    holed = sphere(levels=5)
+    assert not is_scene([Mesh(holed.vertices, holed.faces[40:])] * 4)
 
 
 def test_a_room_that_moves_is_none():

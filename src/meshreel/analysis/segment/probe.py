@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Int64
 
-from ...geometry.decimate import has_boundary
-from ...geometry.topology import drop_unreferenced
+from ...geometry.topology import drop_unreferenced, unique_edges
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Frames, Mesh
 from ..survey import check
@@ -18,6 +17,7 @@ from ..survey import check
 PROBES = 4  # frames, spread over the sequence
 SHARE = 0.6  # of a frame's surface that stands still in a scene
 CELLS = 200  # along a frame's diagonal: 4 cm in a room
+BORDER = 1.0  # diagonals: the length of the borders of what is open; of the holes of a captured body, less
 COARSEST = 32  # edges along it: a mesh of fewer is no capture of a room
 
 
@@ -31,15 +31,21 @@ def is_scene(frames: Frames) -> bool:
     for number in numbers:
         check(mesh := frames[number], f"frame {number}")
         meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
-    if len(meshes) < 2 or not has_boundary(meshes[0]) or _edge(meshes[0]) * COARSEST > meshes[0].diagonal:
-        return False
-    if meshes[0].diagonal == 0:
+    if len(meshes) < 2 or meshes[0].diagonal == 0 or not _is_open(meshes[0]) or _edge(meshes[0]) * COARSEST > meshes[0].diagonal:
         return False
     lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(own) for own in cells]
     still = [np.mean([_shared(own, other) for other in wide]) for own in cells]
     return float(np.median(still)) >= SHARE
+
+
+def _is_open(mesh: Mesh) -> bool:
+    """True where the borders are long; a few small holes do not open a body."""
+    edges, face_edges = unique_edges(mesh.faces)
+    border = edges[np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1]
+    length = np.linalg.norm(mesh.vertices[border[:, 0]] - mesh.vertices[border[:, 1]], axis=1).sum()
+    return bool(length > BORDER * mesh.diagonal)
 
 
 def _edge(mesh: Mesh) -> float:
