@@ -32,7 +32,7 @@ from .layered import encode_segment
 from .metrics.distance import PSNR_CEILING, psnr
 from .presets import preset_options
 from .scene import Static, TrackGroup, encode_bodies, encode_static, take_apart
-from .types import Frames, Mesh, MeshSequence
+from .types import Frames, Mesh, MeshSequence, evenly
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
 
 MEASURED = 4  # frames of a scene that are compared with what is decoded
@@ -180,9 +180,8 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
 def _measured(sequence: MeshSequence, path: Path, diagonal: float) -> float:
     """d2_psnr_paper, dB, mean over a few frames of a file."""
     with open_video(path) as video:
-        numbers = sorted({round(k) for k in np.linspace(0, len(sequence) - 1, min(MEASURED, len(sequence)))})
         found = []
-        for number in numbers:
+        for number in evenly(len(sequence), MEASURED):
             points, shown = drop_unreferenced(sequence[number]).vertices, video[number]
             if not len(points) or shown.is_empty:
                 found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
