@@ -210,8 +210,9 @@ def segments(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: E
 
 
 def _runs(meshes: Sequence[Mesh], frames: range, seen: Survey, options: EncoderOptions) -> list[range]:
-    """Frames of a body that can be coded together: with surface or without, and of one scale; and of frames that have
-    a surface or none: with those without, no background is shown.
+    """Frames of a body that can be coded together: with surface or without, and of one scale.
+
+    A run is cut, too, where the scene begins or ends to have a surface: frames without are shown without background.
     """
     size = len(meshes) if options.form == Form.LAYERS else options.group_size
     cuts = [k for k in range(1, len(frames)) if seen.is_bare(frames[k]) != seen.is_bare(frames[k - 1])]
