@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,12 +18,12 @@ from jaxtyping import Float64, UInt16
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..io.depth import picture_size, read_depth
+from ..io.names import last_number
 from ..io.write import make_folder, replacing
 
 RIG, SINGLE = "rig.json", "camera.json"
 MOST_PIXELS = 16_384  # of a picture's side
 RIGID = 1e-3  # that an entry of R R^T may be off
-_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,12 +227,12 @@ def _pictures(folder: Path, camera: DepthCamera) -> dict[int, Path]:
         raise InputError(f"{folder}: depth of camera {camera.name} cannot be read ({error.strerror})") from None
     found: dict[int, Path] = {}
     for path in paths:
-        number = _NUMBER.search(path.stem)
+        number = last_number(path.stem)
         if number is None:
             raise InputError(f"{path}: has no frame number in its name; name it as depth_00012.png")
-        if (key := int(number[1])) in found:
-            raise InputError(f"{path}: is frame {key}, as {found[key].name} is; keep one of them")
-        found[key] = path
+        if number in found:
+            raise InputError(f"{path}: is frame {number}, as {found[number].name} is; keep one of them")
+        found[number] = path
     if not found:
         raise InputError(f"{folder}: camera {camera.name} has no depth pictures (*.png); record some, or leave it out")
     return found
