@@ -12,7 +12,7 @@ from .analysis.embedded import EmbeddedOptions
 from .analysis.fit import FitOptions
 from .windows import EncoderOptions
 
-LOST = 2.0  # RMS distances of the noise that a residual may have besides what it may have without
+LOST = 3.0  # RMS distances of the noise that a residual may have besides: legs come and go in noisy frames
 KEYS = 2  # tried at most: what one of them lacks, the fused template has from the other frames
 FOLLOWED = 6e-4  # RMS noise from which the second fit believes the coherent positions more than the frames
 ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds lay the template onto it
@@ -40,12 +40,14 @@ def above_noise(options: EncoderOptions) -> EncoderOptions:
 
 
 def _tracking(options: EmbeddedOptions, noise: float) -> EmbeddedOptions:
+    lost = math.hypot(options.lost, LOST * noise)  # a key from which nothing is lost is in no doubt
     return replace(
         options,
         doubt=math.hypot(options.doubt, noise),
         settled=math.hypot(options.settled, noise),
-        rekeyed=math.hypot(options.rekeyed, LOST * noise),
-        lost=math.hypot(options.lost, LOST * noise),
+        rekeyed=lost,
+        uneven=math.inf,
+        lost=lost,
     )
 
 

@@ -15,7 +15,6 @@ from ..geometry.topology import vertex_areas, vertex_normals
 from ..types import Mesh
 from .fit_match import ON_BORDER, Target, interpolated, interpolated_scalar
 
-
 BITS = 0.01  # of a noisy frame's area, that may have flown
 
 
@@ -57,7 +56,9 @@ def residual_of(fitted: Mesh, target: Target) -> Residual:
     return Residual(_rms(to_fit), _rms(to_frame), quantile, angles, by_area, common)
 
 
-def _without_farthest(distances: Float64[np.ndarray, " N"], areas: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
+def _without_farthest(
+    distances: Float64[np.ndarray, " N"], areas: Float64[np.ndarray, " N"]
+) -> Float64[np.ndarray, " N"]:
     """The areas, zero for the farthest `BITS` of them."""
     order = np.argsort(-distances, kind="stable")
     kept = areas.copy()

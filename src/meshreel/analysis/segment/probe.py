@@ -31,7 +31,9 @@ def is_scene(frames: Frames) -> bool:
     for number in numbers:
         check(mesh := frames[number], f"frame {number}")
         meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
-    if len(meshes) < 2 or meshes[0].diagonal == 0 or not _is_open(meshes[0]) or _edge(meshes[0]) * COARSEST > meshes[0].diagonal:
+    if len(meshes) < 2 or meshes[0].diagonal == 0 or not _is_open(meshes[0]):
+        return False
+    if _edge(meshes[0]) * COARSEST > meshes[0].diagonal:
         return False
     lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
