@@ -20,6 +20,7 @@ from .rig import DepthCamera
 
 BLOCK = 8  # voxels, side of a block of the sparse grid
 BLOCKS = 20_000  # that there is room for at first; more is made when needed
+MOST_BLOCKS = 500_000  # 2 GB, and as much again while room is made
 SEEN = 0.5  # measurements of a voxel above which it counts: one is enough
 
 
@@ -45,6 +46,8 @@ def fuse_depths(
 ) -> Mesh:
     """The surface that these cameras see; empty where none has measured anything in its range.
 
+    Raises InputError where what they see takes more than `MOST_BLOCKS` blocks of voxels.
+
     Every camera is integrated into the blocks of all: where one sees through what another took for surface (flying
     pixels, noise), it carves it away.
     """
@@ -56,6 +59,9 @@ def fuse_depths(
         found = grid.compute_unique_block_coordinates(*_pinhole(view), *_depth(view, options))
         blocks.append(found.numpy())
     union = np.unique(np.concatenate(blocks), axis=0)
+    if len(union) > MOST_BLOCKS:
+        text = f"surface in {len(union)} blocks of {BLOCK * options.voxel:g} m, over {MOST_BLOCKS}"
+        raise InputError(f"{text}; are depth_unit_m and depth_max_m right? If so, give a larger voxel")
     for view in views:
         grid.integrate(_tensor(union), *_pinhole(view), *_depth(view, options))
     return without_fragments(_extracted(grid), options.fragment)
@@ -101,7 +107,12 @@ def _depth(view: tuple[DepthCamera, np.ndarray], options: FusionOptions) -> tupl
 
 def _extracted(grid: Any) -> Mesh:
     """The zero level as a mesh whose order of vertices and faces follows from their places alone."""
-    found = grid.extract_triangle_mesh(weight_threshold=SEEN)
+    try:
+        found = grid.extract_triangle_mesh(weight_threshold=SEEN)
+    except RuntimeError as error:
+        if "shape {0}" in str(error):  # no surface at all: Open3D makes colors of the wrong shape, and refuses them
+            return Mesh.empty()
+        raise
     if "indices" not in found.triangle or len(found.triangle["indices"]) == 0:
         return Mesh.empty()
     vertices = found.vertex["positions"].numpy().astype(np.float64)
