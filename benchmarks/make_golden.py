@@ -1,7 +1,7 @@
 """Makes the golden files of a format version: tiny .reel files and, beside each, what they must decode to, bit for bit.
 
-`python benchmarks/make_golden.py conformance/v1` writes those that are not there. The others stay as they are for ever,
-whatever today's encoder would make of them: a reader that no longer decodes them to these bits is wrong.
+`PYTHONPATH=. python benchmarks/make_golden.py conformance/v1` writes those that are not there. The others stay as they
+are for ever, whatever today's encoder would make of them: a reader that no longer decodes them to these bits is wrong.
 """
 
 from __future__ import annotations

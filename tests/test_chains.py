@@ -33,7 +33,7 @@ def made() -> bytes:
     file, reference, state = io.BytesIO(), ball(), None
     with ReelWriter(file, HEADER) as writer:
         for length, key in zip(LENGTHS, KEYS, strict=True):
-            before = () if key or writer.last_group is None else (writer.last_group,)
+            before = () if key or writer.last_of(0) is None else (writer.last_of(0),)
             wanted = moving(reference, length, writer.frame_count)
             coded = encode_layers(reference, wanted, previous=state if before else None)
             writer.add_group(writer.frame_count, length, coded.payload, coded.layers, before)

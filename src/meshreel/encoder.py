@@ -29,10 +29,10 @@ from .format.layout import Form, Header
 from .geometry.nearest import distances
 from .geometry.topology import drop_unreferenced
 from .layered import encode_segment
-from .metrics.distance import PSNR_CEILING
+from .metrics.distance import PSNR_CEILING, psnr
 from .presets import preset_options
-from .scene import TrackGroup, encode_bodies, encode_static, take_apart
-from .types import Frames, Mesh, MeshSequence
+from .scene import Static, TrackGroup, encode_bodies, encode_static, take_apart
+from .types import Frames, Mesh, MeshSequence, evenly
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
 
 MEASURED = 4  # frames of a scene that are compared with what is decoded
@@ -97,53 +97,53 @@ def encode(
     A scene with a background is taken apart; who has masks of what moves gives a `masker`, and it is a scene then.
 
     With an executor, runs of frames are encoded side by side; the bytes are the same. In memory are then as many runs
-    as it has workers and one more, each of a key interval (preset `best`) or a group. Raises InputError for frames
-    that cannot be used, before anything is coded.
+    as it has workers and one more, each of a key interval (preset `best`) or a group; of a scene, what moves in one
+    key interval. Raises InputError for frames that cannot be used, before anything is coded.
     """
     options = options or preset_options()
     if options.dynamic_only and masker is not None:
         raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
     check_target(Path(path))
-    stages = Stages(progress, len(sequence))
+    work = _Work(sequence, options, executor, Stages(progress, len(sequence)))
     if not options.dynamic_only and len(sequence) and (masker is not None or is_scene(sequence)):
-        return _encode_scene(sequence, Path(path), options, executor, stages, masker)
-    seen = survey(sequence, stages)
+        return _encode_scene(work, Path(path), masker)
+    return _encode_bodies(work, Path(path))
+
+
+@dataclass(frozen=True, slots=True)
+class _Work:
+    """What is to be encoded, and how."""
+
+    sequence: MeshSequence
+    options: EncoderOptions
+    executor: Executor | None
+    stages: Stages
+
+
+def _encode_bodies(work: _Work, path: Path) -> Summary:
+    """As `encode`, for a sequence in which everything may move."""
+    sequence, options = work.sequence, work.options
+    seen = survey(sequence, work.stages)
     groups: list[GroupSummary] = []
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        for encoded in _encoded_windows(sequence, seen, options, executor, stages):
+        for encoded in _encoded_windows(work, seen):
             for group in encoded:
-                before = () if writer.last_group is None or not group.predicted else (writer.last_group,)
-                writer.add_group(writer.frame_count, group.frame_count, group.payload, group.layers, before)
-                quality = group.quality.scaled(seen.diagonal)
-                key = None if group.key is None else writer.frame_count - group.frame_count + group.key
-                size = len(group.payload)
-                groups.append(GroupSummary(group.form, group.frame_count, size, quality, group.predicted, key))
+                each = TrackGroup(0, writer.frame_count, group)
+                groups.append(_added(writer, each, [], seen.diagonal))
         writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups))
-    return Summary(Path(path).stat().st_size, tuple(groups), _warnings(seen))
+    return Summary(path.stat().st_size, tuple(groups), _warnings(seen))
 
 
-def _encode_scene(
-    sequence: MeshSequence,
-    path: Path,
-    options: EncoderOptions,
-    executor: Executor | None,
-    stages: Stages,
-    masker: Masker | None,
-) -> Summary:
+def _encode_scene(work: _Work, path: Path, masker: Masker | None) -> Summary:
     """As `encode`, for a scene with a background."""
+    sequence, options, stages = work.sequence, work.options, work.stages
     seen = survey(sequence, stages, cleaned=False)
     parts = take_apart(sequence, seen, options, stages, masker)
     seen = parts.seen
     states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        coded = encode_bodies(sequence, parts, options, executor, stages)
-        groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
-        for each in coded.groups:
-            while waiting and waiting[0].frame <= each.first_frame:
-                state = waiting.popleft()
-                static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
-            with_static = each.track == 0 and not seen.is_bare(each.first_frame)
-            groups.append(_added(writer, each, static if with_static else [], seen.unit))
+        coded = encode_bodies(sequence, parts, options, work.executor, stages)
+        groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     psnr = _measured(sequence, path, seen.diagonal)
@@ -151,6 +151,20 @@ def _encode_scene(
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tracks)
     return Summary(path.stat().st_size, tuple(groups), (*_warnings(seen), *_lost(coded.dropped)), scene)
+
+
+def _added_in_order(
+    writer: ReelWriter, coded: Sequence[TrackGroup], states: Sequence[Static], seen: Survey
+) -> list[GroupSummary]:
+    """Writes all groups, and each state of the background before the first group that is shown with it."""
+    groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
+    for each in coded:
+        while waiting and waiting[0].frame <= each.first_frame:
+            state = waiting.popleft()
+            static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
+        with_static = each.track == 0 and not seen.is_bare(each.first_frame)
+        groups.append(_added(writer, each, static if with_static else [], seen.unit))
+    return groups
 
 
 def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
@@ -166,16 +180,15 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
 def _measured(sequence: MeshSequence, path: Path, diagonal: float) -> float:
     """d2_psnr_paper, dB, mean over a few frames of a file."""
     with open_video(path) as video:
-        numbers = sorted({round(k) for k in np.linspace(0, len(sequence) - 1, min(MEASURED, len(sequence)))})
         found = []
-        for number in numbers:
+        for number in evenly(len(sequence), MEASURED):
             points, shown = drop_unreferenced(sequence[number]).vertices, video[number]
             if not len(points) or shown.is_empty:
                 found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)
                 continue
             gap = float((distances(points, shown) ** 2).mean())
-            found.append(10 * math.log10(diagonal**2 / max(gap, 1e-30)))
-    return min(float(np.mean(found)), PSNR_CEILING)
+            found.append(min(psnr(gap, diagonal), PSNR_CEILING))
+    return float(np.mean(found))
 
 
 def _warnings(seen: Survey) -> tuple[str, ...]:
@@ -209,10 +222,9 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
     )
 
 
-def _encoded_windows(
-    sequence: MeshSequence, seen: Survey, options: EncoderOptions, executor: Executor | None, stages: Stages
-) -> Iterator[Iterable[EncodedGroup]]:
+def _encoded_windows(work: _Work, seen: Survey) -> Iterator[Iterable[EncodedGroup]]:
     """The groups of each run of frames that needs no other, in order; with an executor, a run a worker ahead."""
+    sequence, options, executor, stages = work.sequence, work.options, work.executor, work.stages
     layered = options.form == Form.LAYERS
     size = max(1, round(options.key_interval * sequence.frame_rate)) if layered else options.group_size
     windows = (_Normalised(sequence, seen, window) for window in seen.windows(size))

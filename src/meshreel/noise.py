@@ -18,6 +18,7 @@ FOLLOWED = 6e-4  # RMS noise from which the second fit believes the coherent pos
 ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds lay the template onto it
 GATE = 6.0  # RMS distances that a pair of closest points may be apart at least: three standard deviations
 BASE = 0.5  # RMS distances of the noise that a base mesh may miss besides
+BORDER = 100.0  # weight of open borders in the base mesh: a coarse one cuts their corners, and holes grow
 STEP = 0.8  # RMS distances of the noise that a step of the base's motion is wide besides
 
 
@@ -31,7 +32,7 @@ def above_noise(options: EncoderOptions) -> EncoderOptions:
         options,
         embedded=_tracking(options.embedded, noise),
         fit=_fit(options.fit, noise),
-        template=replace(template, error=math.hypot(template.error, BASE * noise)),
+        template=replace(template, error=math.hypot(template.error, BASE * noise), border=BORDER),
         layers=replace(layers, step=math.hypot(layers.step, STEP * noise)),
         tails=tails and replace(tails, noise=noise),
         keys=min(options.keys, KEYS),

@@ -33,7 +33,7 @@ from .geometry.decimate import decimate
 from .geometry.nearest import distances
 from .geometry.topology import drop_unreferenced
 from .layered import MOST_EMPTY, encode_segment
-from .types import Frames, Mesh, MeshSequence, Placement
+from .types import Frames, Mesh, MeshSequence, Placement, evenly
 from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_window
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
@@ -104,7 +104,7 @@ def take_apart(
     segmentation: ByPlace | ByMasks = found
     stages.add("segment", len(sequence))
     cell = segmentation.lattice.size
-    numbers = _spread(len(sequence), options.background.frames)
+    numbers = evenly(len(sequence), options.background.frames)
     still = _Some(sequence, numbers, segmentation.still_at_first)
     background = fuse_background(still, cell, options.background)
     if background.is_empty and len(numbers):
@@ -160,7 +160,7 @@ def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> rang
 def _change(sequence: MeshSequence, segmentation: ByPlace | ByMasks, frame: int, options: EncoderOptions) -> Change:
     assert isinstance(segmentation, ByPlace)  # masks know of no changes
     came = segmentation.rest.since == frame
-    numbers = [frame + number for number in _spread(len(sequence) - frame, options.background.frames)]
+    numbers = [frame + number for number in evenly(len(sequence) - frame, options.background.frames)]
     later = _Some(sequence, numbers, lambda _, mesh: segmentation.faces_at(mesh, came))
     mesh = fuse_background(later, segmentation.lattice.size, options.background) if came.any() else Mesh.empty()
     return Change(frame, segmentation.rest.until == frame, mesh)
@@ -229,8 +229,9 @@ def segments(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: E
 
 
 def _runs(meshes: Sequence[Mesh], frames: range, seen: Survey, options: EncoderOptions) -> list[range]:
-    """Frames of a body that can be coded together: with surface or without, and of one scale; and of frames that have
-    a surface or none: with those without, no background is shown.
+    """Frames of a body that can be coded together: with surface or without, and of one scale.
+
+    A run is cut, too, where the scene begins or ends to have a surface: frames without are shown without background.
     """
     size = len(meshes) if options.form == Form.LAYERS else options.group_size
     cuts = [k for k in range(1, len(frames)) if seen.is_bare(frames[k]) != seen.is_bare(frames[k - 1])]
@@ -300,10 +301,6 @@ def _part(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
     return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen]))
 
 
-def _spread(count: int, most: int) -> list[int]:
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
-
-
 def _measured(
     sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh, far: float
 ) -> tuple[float, float, list[float]]:
@@ -312,7 +309,7 @@ def _measured(
     What is farther than `far` is past a border of the background.
     """
     squares, deviations, sizes = [], [], []
-    for number in _spread(len(sequence), PROBES):
+    for number in evenly(len(sequence), PROBES):
         mesh = sequence[number]
         moves = segmentation.moving(number, mesh)
         if moves.any():

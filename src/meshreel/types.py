@@ -77,6 +77,11 @@ class Frames(Protocol):
         return (self[index] for index in range(len(self)))
 
 
+def evenly(count: int, most: int) -> list[int]:
+    """Numbers of some of `count` frames, rising: at most so many, evenly spread from the first to the last."""
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
+
+
 @runtime_checkable
 class MeshSequence(Frames, Protocol):
     """Frames read one at a time, with a frame rate; never all in memory."""

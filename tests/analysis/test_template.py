@@ -47,7 +47,7 @@ def test_a_mesh_of_one_face_is_its_own_base(error: float) -> None:
     np.testing.assert_allclose(np.sort(base.vertices, axis=0), np.sort(triangle.vertices, axis=0), atol=1e-9)
 
 
-@pytest.mark.parametrize("wrong", [{"error": 0.0}, {"error": -1.0}, {"levels": 5}, {"levels": -1}])
+@pytest.mark.parametrize("wrong", [{"error": 0.0}, {"error": -1.0}, {"levels": 5}, {"levels": -1}, {"border": 0.0}])
 def test_options_that_cannot_be_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(InputError, match="template error"):
         TemplateOptions(**wrong)

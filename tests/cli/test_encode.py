@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -106,9 +106,10 @@ def test_flags_default_to_the_defaults_of_the_options():
     defaults = {name: parameter.default for name, parameter in inspect.signature(command).parameters.items()}
     code = preset_options()
     assert replace(defaults["reading"].options(), weld=None) == SequenceOptions()
-    assert defaults["preset"] == code.preset == "best"
-    chosen_by_the_preset = ("quality", "basis_size", "centers", "group_size", "keyint", "target_psnr", "target_mbps")
-    assert [defaults[name] for name in chosen_by_the_preset] == [None] * len(chosen_by_the_preset)
+    coding = asdict(defaults["coding"])
+    assert coding.pop("preset") == code.preset == "best"
+    assert set(coding.values()) == {None}  # chosen by the preset
+    assert defaults["coding"].options(code.quality) == code
 
 
 @pytest.mark.usefixtures("quick_presets")

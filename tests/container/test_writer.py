@@ -190,14 +190,14 @@ def test_a_group_that_cannot_be_is_refused_and_the_file_goes_on(arguments, messa
 def test_a_group_may_depend_on_the_one_before_it_and_on_no_other():
     file = io.BytesIO()
     with ReelWriter(file, HEADER) as writer:
-        assert writer.last_group is None
+        assert writer.last_of(0) is None
         writer.add_group(0, 10, EMPTY)
         writer.add_static(STATIC)  # may lie between them
         writer.add_group(10, 5, EMPTY, depends_on=(0, 1))
-        assert writer.last_group == 2
+        assert writer.last_of(0) == 2
         with pytest.raises(InputError, match="last group of its track"):
             writer.add_group(15, 3, EMPTY, depends_on=(0,))
-        writer.add_group(15, 3, EMPTY, depends_on=(writer.last_group,))
+        writer.add_group(15, 3, EMPTY, depends_on=(writer.last_of(0),))
     groups = ReelReader(BytesSource(file.getvalue())).groups
     assert [group.depends_on for group in groups] == [(), (0, 1), (2,)]
 
@@ -215,7 +215,7 @@ def test_tracks_interleave_and_each_has_its_own_frames_and_last_group():
         with pytest.raises(InputError, match="chunk 5: track 2 from frame 0 behind track 1 from frame 4"):
             writer.add_group(0, 12, EMPTY, track=2)
         writer.add_group(10, 2, EMPTY, depends_on=(1, changed))
-        assert (writer.frame_count, writer.last_group) == (12, 5)
+        assert (writer.frame_count, writer.last_of(0)) == (12, 5)
     reader = ReelReader(BytesSource(file.getvalue()))
     assert [[group.number for group in groups] for groups in reader.tracks] == [[1, 5], [2, 4]]
     assert [chunk.depends_on for chunk in reader.chunks] == [(), (0,), (0,), (0,), (3, 2), (1, 3)]

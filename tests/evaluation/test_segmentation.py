@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.capture.simulate import SceneFrame
 from meshreel.errors import InputError
-from meshreel.evaluation.segmentation import score_labels, score_segmentation
-from meshreel.types import Mesh
-from tests.metrics.shapes import moved, noisy, plane, sphere
+from meshreel.evaluation.segmentation import score_labels
 
 
 def labels(*numbers):
@@ -38,11 +35,3 @@ def test_labels_that_do_not_fit_are_told():
         score_labels([labels(1)], [labels(1), labels(1)])
     with pytest.raises(InputError, match="0 frames"):
         score_labels([], [])
-
-
-def test_fused_meshes_are_judged_by_the_nearest_clean_faces():
-    clean = SceneFrame.of([moved(plane(4.0, 20), (-2, -2, -1))], [sphere(0.4, 3)])
-    fused = Mesh.of(noisy(clean.mesh, 0.01).vertices[:, :3], clean.mesh.faces)
-    score = score_segmentation([fused], [clean.dynamic], [clean])
-    assert score.iou == (1.0,) and score.static_called_dynamic == 0
-    assert score_segmentation([fused], [~clean.dynamic], [clean]).worst == 0

@@ -1,7 +1,8 @@
 """The bodies in a run of frames: connected pieces of what moves, followed over time (paper, section 3.3).
 
 In: the moving part of each frame. Out: bodies, each with a mesh in every frame, empty where it is not there. Pieces
-that touch in any frame are one body for the whole run; bits beside a body are its own.
+that touch in any frame are one body for the whole run. Bits that last are bodies, too: a template that follows a
+person does not follow what lies beside him. Others belong to the body that they are beside.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ class BodyOptions:
 
     cell: float = 3.0  # cells of the scene: pieces of neighbour frames that come as near as this are one
     least: float = 0.1  # m^2: pieces that never have as much surface are bits
-    beside: float = 0.5  # m: a bit no farther from a body belongs to it
-    lasts: int = 5  # frames; a bit on its own that is there for fewer is dropped
+    lasts: int = 5  # frames; bits that are there for as many are a body of their own
+    beside: float = 0.5  # m: bits that do not last, no farther from a body, belong to it; the others are dropped
 
     def __post_init__(self) -> None:
         if not self.cell >= 1 or not min(self.least, self.beside) >= 0 or self.lasts < 1:
             raise InputError(
-                f"bodies: cell {self.cell:g}, least {self.least:g} m^2, beside {self.beside:g} m, lasts {self.lasts}: "
-                "give >= 1, >= 0, >= 0, >= 1"
+                f"bodies: cell {self.cell:g}, least {self.least:g} m^2, lasts {self.lasts}, beside {self.beside:g} m: "
+                "give >= 1, >= 0, >= 1, >= 0"
             )
 
 
@@ -65,9 +66,8 @@ def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = Body
     for body, cluster in zip(bodies, large, strict=True):
         for k in cluster:
             body[pieces[k].frame].append(pieces[k].mesh)
-    dropped = 0
-    for cluster in (c for c in clusters if max(pieces[k].area for k in c) < options.least):
-        dropped += _given(bodies, [pieces[k] for k in cluster], len(moving), options)
+    small = [[pieces[k] for k in c] for c in clusters if max(pieces[k].area for k in c) < options.least]
+    dropped = sum(_given(bodies, bits, len(moving), options) for bits in small)
     return Bodies([[concatenate(meshes) for meshes in body] for body in bodies], dropped)
 
 
@@ -134,22 +134,22 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
 
 
 def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, options: BodyOptions) -> int:
-    """Gives each bit to the nearest body of its frame; far from all, bits that last become a body. Faces dropped."""
-    alone = []
+    """Makes bits that last a body, and gives each of the others to the nearest body of its frame. Faces dropped."""
+    if len({bit.frame for bit in bits}) >= options.lasts:
+        body: list[list[Mesh]] = [[] for _ in range(frames)]
+        for bit in bits:
+            body[bit.frame].append(bit.mesh)
+        bodies.append(body)
+        return 0
+    dropped = 0
     for bit in bits:
         near = [(_gap(bit.mesh, body[bit.frame]), number) for number, body in enumerate(bodies) if body[bit.frame]]
         gap, number = min(near, default=(np.inf, -1))
         if gap <= options.beside:
             bodies[number][bit.frame].append(bit.mesh)
         else:
-            alone.append(bit)
-    if len({bit.frame for bit in alone}) < options.lasts:
-        return sum(len(bit.mesh.faces) for bit in alone)
-    body: list[list[Mesh]] = [[] for _ in range(frames)]
-    for bit in alone:
-        body[bit.frame].append(bit.mesh)
-    bodies.append(body)
-    return 0
+            dropped += len(bit.mesh.faces)
+    return dropped
 
 
 def _gap(mesh: Mesh, others: list[Mesh]) -> float:

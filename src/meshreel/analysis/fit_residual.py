@@ -15,6 +15,8 @@ from ..geometry.topology import vertex_areas, vertex_normals
 from ..types import Mesh
 from .fit_match import ON_BORDER, Target, interpolated, interpolated_scalar
 
+BITS = 0.01  # of a noisy frame's area, that may have flown
+
 
 @dataclass(frozen=True, slots=True)
 class Residual:
@@ -25,7 +27,7 @@ class Residual:
     quantile: float  # 95 % of all these distances are less; the worse direction
     normals: float  # degrees, mean angle to the normal at the closest point; mean of both directions
     by_area: float  # RMS over the area, the worse direction: few vertices may span much of a surface that is left over
-    common: float  # the same, where the frame has surface: a hole in it says nothing about what should be there
+    common: float  # the same, where both have surface: without holes of the frame, and the farthest of it (`BITS`)
 
     @property
     def rms(self) -> float:
@@ -47,10 +49,21 @@ def residual_of(fitted: Mesh, target: Target) -> Residual:
         + _mean_angle(normals, target.normals_at(back))
     ) / 2
     quantile = max(float(np.quantile(to_fit, 0.95)), float(np.quantile(to_frame, 0.95)))
-    lost, areas = _rms(to_fit, vertex_areas(target.mesh)), vertex_areas(fitted)
+    own, areas = vertex_areas(target.mesh), vertex_areas(fitted)
     beside = interpolated_scalar(target.inside, target.mesh.faces, back) > ON_BORDER
-    by_area, common = max(lost, _rms(to_frame, areas)), max(lost, _rms(to_frame * beside, areas))
+    by_area = max(_rms(to_fit, own), _rms(to_frame, areas))
+    common = max(_rms(to_fit, _without_farthest(to_fit, own)), _rms(to_frame * beside, areas))
     return Residual(_rms(to_fit), _rms(to_frame), quantile, angles, by_area, common)
+
+
+def _without_farthest(
+    distances: Float64[np.ndarray, " N"], areas: Float64[np.ndarray, " N"]
+) -> Float64[np.ndarray, " N"]:
+    """The areas, zero for the farthest `BITS` of them."""
+    order = np.argsort(-distances, kind="stable")
+    kept = areas.copy()
+    kept[order[np.cumsum(areas[order]) <= BITS * areas.sum()]] = 0
+    return kept
 
 
 def _rms(distances: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"] | None = None) -> float:

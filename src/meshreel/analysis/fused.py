@@ -64,7 +64,8 @@ def fused_mesh(motion: Motion, targets: Sequence[Target], noise: float, options:
     if surface.is_empty:
         return surface
     sure = _agreeing(surface, carried, reach) >= fewest
-    return drop_small(clean(Mesh(surface.vertices, surface.faces[sure[surface.faces].all(axis=1)])), options.smallest)
+    believed = sure[surface.faces].sum(axis=1) >= 2  # neither all nor any: borders would recede or grow by half a face
+    return drop_small(clean(Mesh(surface.vertices, surface.faces[believed])), options.smallest)
 
 
 def _agreeing(surface: Mesh, frames: Sequence[Target], reach: float) -> Int64[np.ndarray, " V"]:

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float64, Int32
 
 from ..errors import InputError
-from ..geometry.decimate import decimate
+from ..geometry.decimate import BOUNDARY_WEIGHT, decimate
 from ..geometry.levels import heights, levels_of, refine
 from ..geometry.nearest import Surface
 from ..types import Mesh
@@ -29,10 +29,14 @@ class TemplateOptions:
 
     error: float = 1.1e-3  # RMS distance of the key frame's vertices to the base mesh to aim at, of the diagonal
     levels: int = 2  # midpoint subdivisions of the base
+    border: float = BOUNDARY_WEIGHT  # weight of open borders in the decimation
 
     def __post_init__(self) -> None:
-        if self.error <= 0 or not 0 <= self.levels <= 4:
-            raise InputError(f"template error {self.error:g}, {self.levels} levels: give > 0, and 0 to 4")
+        if self.error <= 0 or not 0 <= self.levels <= 4 or not 0 < self.border < np.inf:
+            raise InputError(
+                f"template error {self.error:g}, {self.levels} levels, border {self.border:g}: "
+                "give > 0, 0 to 4, and > 0"
+            )
 
 
 def base_mesh(key: Mesh, options: TemplateOptions) -> Mesh:
@@ -40,7 +44,7 @@ def base_mesh(key: Mesh, options: TemplateOptions) -> Mesh:
     most = len(key.vertices)
     count = min(max(most // 20, FEWEST), most)
     for left in reversed(range(ROUNDS + 1)):
-        base = decimate(key, max(count, 4))
+        base = decimate(key, max(count, 4), options.border)
         error = _rms(key, base)
         if left == 0 or error == 0.0 or abs(np.log(error / options.error)) < 0.05:
             break

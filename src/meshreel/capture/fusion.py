@@ -14,12 +14,12 @@ import numpy as np
 from jaxtyping import UInt16
 
 from ..errors import InputError
-from ..geometry.topology import clean, components, drop_unreferenced, face_normals, weld
+from ..geometry.connected import connected_faces
+from ..geometry.topology import drop_unreferenced, face_normals
+from ..geometry.tsdf import SIDE, extract, new_grid
 from ..types import Mesh
 from .rig import DepthCamera
 
-BLOCK = 8  # voxels, side of a block of the sparse grid
-BLOCKS = 20_000  # that there is room for at first; more is made when needed
 MOST_BLOCKS = 500_000  # 2 GB, and as much again while room is made
 SEEN = 0.5  # measurements of a voxel above which it counts: one is enough
 
@@ -54,33 +54,26 @@ def fuse_depths(
     views = [(camera, inside) for camera, depth in depths if (inside := camera.in_range(depth)).any()]
     if not views:
         return Mesh.empty()
-    grid, blocks = _grid(options), []
+    grid, blocks = new_grid(options.voxel), []
     for view in views:
         found = grid.compute_unique_block_coordinates(*_pinhole(view), *_depth(view, options))
         blocks.append(found.numpy())
     union = np.unique(np.concatenate(blocks), axis=0)
     if len(union) > MOST_BLOCKS:
-        text = f"surface in {len(union)} blocks of {BLOCK * options.voxel:g} m, over {MOST_BLOCKS}"
+        text = f"surface in {len(union)} blocks of {SIDE * options.voxel:g} m, over {MOST_BLOCKS}"
         raise InputError(f"{text}; are depth_unit_m and depth_max_m right? If so, give a larger voxel")
     for view in views:
         grid.integrate(_tensor(union), *_pinhole(view), *_depth(view, options))
-    return without_fragments(_extracted(grid), options.fragment)
+    return without_fragments(extract(grid, SEEN), options.fragment)
 
 
 def without_fragments(mesh: Mesh, least: float) -> Mesh:
     """The mesh without connected pieces of less area, m^2."""
     if mesh.is_empty:
         return mesh
-    labels = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
+    labels = connected_faces(mesh.faces, len(mesh.vertices))
     areas = np.bincount(labels, face_normals(mesh)[1])
     return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[areas[labels] >= least]))
-
-
-def _grid(options: FusionOptions) -> Any:
-    import open3d as o3d
-
-    kinds, one = (o3d.core.float32, o3d.core.float32), o3d.core.SizeVector([1])
-    return o3d.t.geometry.VoxelBlockGrid(("tsdf", "weight"), kinds, (one, one), options.voxel, BLOCK, BLOCKS)
 
 
 def _tensor(values: np.ndarray) -> Any:
@@ -94,37 +87,11 @@ def _pinhole(view: tuple[DepthCamera, np.ndarray]) -> tuple[Any, Any, Any]:
     import open3d as o3d
 
     camera, depth = view
-    intrinsic = camera.intrinsic.copy()
-    intrinsic[:2, 2] += 0.5  # a rig's pixels have their middles at whole numbers; integration cuts projections off
-    return o3d.t.geometry.Image(_tensor(depth)), _tensor(intrinsic), _tensor(camera.extrinsic)
+    looking = camera.view  # whose pixels have their middles at halves: integration cuts projections off
+    return o3d.t.geometry.Image(_tensor(depth)), _tensor(looking.intrinsic), _tensor(looking.extrinsic)
 
 
 def _depth(view: tuple[DepthCamera, np.ndarray], options: FusionOptions) -> tuple[float, float, float]:
     """Units in a metre, the farthest depth, m, and the truncation, voxels."""
     camera, _ = view
     return 1.0 / camera.depth_unit, float(camera.depth_range[1]), options.truncation
-
-
-def _extracted(grid: Any) -> Mesh:
-    """The zero level as a mesh whose order of vertices and faces follows from their places alone."""
-    try:
-        found = grid.extract_triangle_mesh(weight_threshold=SEEN)
-    except RuntimeError as error:
-        if "shape {0}" in str(error):  # no surface at all: Open3D makes colors of the wrong shape, and refuses them
-            return Mesh.empty()
-        raise
-    if "indices" not in found.triangle or len(found.triangle["indices"]) == 0:
-        return Mesh.empty()
-    vertices = found.vertex["positions"].numpy().astype(np.float64)
-    return _ordered(clean(weld(Mesh(vertices, found.triangle["indices"].numpy().astype(np.int32)))))
-
-
-def _ordered(mesh: Mesh) -> Mesh:
-    """No two vertices are in one place."""
-    order = np.lexsort(mesh.vertices.T[::-1])
-    rank = np.empty(len(order), np.int32)
-    rank[order] = np.arange(len(order), dtype=np.int32)
-    faces = rank[mesh.faces]
-    first = np.argmin(faces, axis=1)[:, None]
-    faces = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
-    return Mesh.of(mesh.vertices[order], faces[np.lexsort(faces.T[::-1])])

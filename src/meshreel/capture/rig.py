@@ -9,7 +9,6 @@ from __future__ import annotations
 import difflib
 import json
 import math
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,6 +21,7 @@ from jaxtyping import Float64, UInt16
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..io.depth import picture_size, read_depth
+from ..io.names import last_number
 from ..io.write import make_folder, replacing
 
 RIG, SINGLE = "rig.json", "camera.json"
@@ -34,7 +34,6 @@ RATES = (1e-9, 1e9)  # 1/s, as a sequence of meshes may have
 _TEXTS = ("name", "depth", "color")
 _NUMBERS = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m", "depth_min_m", "depth_max_m")
 _SEE = "see `meshreel capture --help`"
-_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -288,12 +287,12 @@ def _pictures(folder: Path, camera: DepthCamera) -> dict[int, Path]:
         raise InputError(f"{text}; name its folder as `depth` in {RIG}") from None
     found: dict[int, Path] = {}
     for path in paths:
-        number = _NUMBER.search(path.stem)
+        number = last_number(path.stem)
         if number is None:
             raise InputError(f"{path}: has no frame number in its name; name it as depth_00012.png")
-        if (key := int(number[1])) in found:
-            raise InputError(f"{path}: is frame {key}, as {found[key].name} is; keep one of them")
-        found[key] = path
+        if number in found:
+            raise InputError(f"{path}: is frame {number}, as {found[number].name} is; keep one of them")
+        found[number] = path
     if not found:
         raise InputError(f"{folder}: camera {camera.name} has no depth pictures (*.png); record some, or leave it out")
     return found

@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float64, UInt16
 from ..errors import InputError
 from ..geometry.nearest import Surface, carried_labels
 from ..geometry.raycast import Rays
-from ..geometry.topology import face_normals
+from ..geometry.topology import concatenate, face_normals
 from ..io.depth import write_depth
 from ..io.write import make_folder, replacing, write_mesh
 from ..types import Mesh
@@ -63,12 +63,8 @@ class SceneFrame:
     def of(still: Sequence[Mesh], moving: Sequence[Mesh]) -> SceneFrame:
         """All parts in one mesh."""
         parts = [*still, *moving]
-        starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-        vertices = np.concatenate([part.vertices for part in parts] or [np.zeros((0, 3))])
-        faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
-        labels = [np.full(len(part.faces), number >= len(still)) for number, part in enumerate(parts)]
-        joined = np.concatenate(faces or [np.zeros((0, 3))])
-        return SceneFrame(Mesh.of(vertices, joined), np.concatenate(labels or [np.zeros(0, bool)]).astype(bool))
+        faces = [len(part.faces) for part in parts]
+        return SceneFrame(concatenate(parts), np.repeat(np.arange(len(parts)) >= len(still), faces))
 
     def labels_for(self, fused: Mesh) -> Bool[np.ndarray, " F"]:
         """Which faces of a fused mesh move: as the clean face nearest to the middle of each."""

@@ -8,12 +8,13 @@ import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from ..analysis.segment.scene import SegmentOptions
 from ..encoder import SceneSummary, Summary, encode
 from ..errors import InputError
 from ..presets import preset_options
@@ -26,22 +27,82 @@ from .scenes import Masking, open_source
 DEFAULT_QUALITY = preset_options().quality
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Coding:
+    """How meshes are coded: what `preset_options` takes."""
+
+    preset: Literal["best", "paper"] = "best"
+    """How to code: `best` is what measures best, `paper` is section 3 of the TSMC paper."""
+    quality: float | None = None
+    """0 (small) to 100 (fine); 50 where neither it nor a target is given."""
+    target_psnr: float | None = None
+    """Instead of a quality: the D2-PSNR (one way, mean over the frames, as `compare` prints it) to meet within 0.3 dB.
+    Takes some encodes, 8 at most."""
+    target_mbps: float | None = None
+    """Instead of a quality: the rate of the file to meet within 5 %, Mbit/s. Takes some encodes, 8 at most. No quality
+    changes the size of a scene's background."""
+    basis_size: int | None = None
+    """Exactly this many KLT components per group, and no per-frame Draco where that is cheaper; both by
+    rate-distortion where it is not given. Preset `paper` only."""
+    centers: int | None = None
+    """Volume centers to track, the paper's K (2000). Preset `paper` only."""
+    group_size: int | None = None
+    """Most frames in a group, the paper's GoF (16; `paper`: 10)."""
+    keyint: float | None = None
+    """Seconds, at most, from one frame that decodes on its own to the next (4). Preset `best` only."""
+
+    def goal(self) -> Goal | None:
+        """What is to be met; None: a quality. Raises InputError where both are given, or a target cannot be."""
+        if self.target_psnr is None and self.target_mbps is None:
+            return None
+        goal = Goal(self.target_psnr, self.target_mbps)
+        if self.quality is not None:
+            text = f"--quality {self.quality:g} and a target: the target chooses the quality"
+            raise InputError(f"{text}, give one of both")
+        return goal
+
+    def options(self, quality: float) -> EncoderOptions:
+        """The encoder's options at a quality. Raises InputError where a value is out of range, or not of the preset."""
+        return preset_options(
+            self.preset, quality, self.basis_size, self.group_size, self.centers, key_interval=self.keyint
+        )
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Parting:
+    """What of a sequence is background."""
+
+    dynamic_only: Annotated[bool, Parameter(negative="")] = False
+    """No background is looked for: all may move, and is coded in every frame."""
+    background_refresh: float | None = None
+    """Seconds from one copy of a scene's background in the file to the next, for who joins late. One copy for all
+    frames where it is not given."""
+
+    def __post_init__(self) -> None:
+        if self.background_refresh is not None and not 0 < self.background_refresh < math.inf:
+            raise InputError(f"--background-refresh {self.background_refresh:g}: give seconds above 0")
+
+    def check(self, masking: Masking) -> None:
+        """Raises InputError where one flag excludes another."""
+        if self.dynamic_only and (self.background_refresh is not None or masking.wanted):
+            raise InputError("--dynamic-only looks for no background: leave out --background-refresh, masks and views")
+
+    def options(self, options: EncoderOptions, segment: SegmentOptions) -> EncoderOptions:
+        """The same for a sequence that is taken apart so."""
+        background = replace(options.background, refresh=self.background_refresh)
+        return replace(options, background=background, segment=segment, dynamic_only=self.dynamic_only)
+
+
 def command(
     inputs: list[str],
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    preset: Literal["best", "paper"] = "best",
-    quality: float | None = None,
-    target_psnr: float | None = None,
-    target_mbps: float | None = None,
+    coding: Coding = Coding(),
     reading: Reading = Reading(),
-    basis_size: int | None = None,
-    centers: int | None = None,
-    group_size: int | None = None,
-    keyint: float | None = None,
-    dynamic_only: Annotated[bool, Parameter(negative="")] = False,
-    background_refresh: float | None = None,
+    parting: Parting = Parting(),
     masking: Masking = Masking(),
     jobs: int = 1,
     common: Common = Common(),
@@ -57,30 +118,6 @@ def command(
         which most stands still, is taken apart: its background is in the file once, each moving body has its own track.
     output
         The .reel file to write; it appears only when it is complete.
-    preset
-        How to code: `best` is what measures best, `paper` is section 3 of the TSMC paper.
-    quality
-        0 (small) to 100 (fine); 50 where neither it nor a target is given.
-    target_psnr
-        Instead of a quality: the D2-PSNR (one way, mean over the frames, as `compare` prints it) to meet within 0.3 dB.
-        Takes some encodes, 8 at most.
-    target_mbps
-        Instead of a quality: the rate of the file to meet within 5 %, Mbit/s. Takes some encodes, 8 at most. No quality
-        changes the size of a scene's background.
-    basis_size
-        Exactly this many KLT components per group, and no per-frame Draco where that is cheaper; both by
-        rate-distortion where it is not given. Preset `paper` only.
-    centers
-        Volume centers to track, the paper's K (2000). Preset `paper` only.
-    group_size
-        Most frames in a group, the paper's GoF (16; `paper`: 10).
-    keyint
-        Seconds, at most, from one frame that decodes on its own to the next (4). Preset `best` only.
-    dynamic_only
-        No background is looked for: all may move, and is coded in every frame.
-    background_refresh
-        Seconds from one copy of a scene's background in the file to the next, for who joins late. One copy for all
-        frames where it is not given.
     jobs
         Runs of frames that need no other to encode side by side (groups, or what `keyint` cuts); the file is the same.
     """
@@ -88,40 +125,27 @@ def command(
         raise InputError(f"{output}: the output must end in .reel")
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
-
-    if background_refresh is not None and not 0 < background_refresh < math.inf:
-        raise InputError(f"--background-refresh {background_refresh:g}: give seconds above 0")
-    if dynamic_only and (background_refresh is not None or masking.wanted):
-        raise InputError("--dynamic-only looks for no background: leave out --background-refresh, masks and views")
-
-    look = masking.options(preset_options().segment)
+    parting.check(masking)
+    segment = masking.options(preset_options().segment)
 
     def options_at(quality: float) -> EncoderOptions:
-        options = preset_options(preset, quality, basis_size, group_size, centers, keyint)
-        background = replace(options.background, refresh=background_refresh)
-        return replace(options, background=background, segment=look, dynamic_only=dynamic_only)
+        return parting.options(coding.options(quality), segment)
 
-    goal = None if target_psnr is None and target_mbps is None else Goal(target_psnr, target_mbps)
-    if goal is not None and quality is not None:
-        raise InputError(f"--quality {quality:g} and a target: the target chooses the quality, give one of both")
-    quality = DEFAULT_QUALITY if quality is None else quality
+    goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
     source = open_source(inputs, reading)
-    sequence = source.sequence
-    masker = masking.masker(len(sequence))
+    sequence, masker = source.sequence, masking.masker(len(source.sequence))
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
         if goal is None:
             summary = encode(sequence, output, options, executor, progress, masker)
         else:
             summary, quality = encode_to(sequence, output, goal, options_at, executor, progress, masker)
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
-    if summary.scene is None and background_refresh is not None:
+    if summary.scene is None and parting.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
     common.warn(warnings)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
-    reached = "" if row["d2_psnr_paper"] is None else f", {row['d2_psnr_paper']:.2f} dB"
-    text = f"{output}: {describe(row)}; quality {quality:g}{reached}"
-    common.result({"output": str(output), "warnings": warnings} | row, text)
+    common.result({"output": str(output), "warnings": warnings} | row, f"{output}: {describe(row)}; {_reached(row)}")
 
 
 def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
@@ -182,6 +206,11 @@ def describe(row: dict[str, Any]) -> str:
     counted = ", ".join(f"{forms.count(form)} {form}" for form in sorted(set(forms)))
     scene = "" if row["scene"] is None else _describe_scene(row["scene"])
     return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}groups: {counted}"
+
+
+def _reached(row: dict[str, Any]) -> str:
+    psnr = row["d2_psnr_paper"]
+    return f"quality {row['quality']:g}" + ("" if psnr is None else f", {psnr:.2f} dB")
 
 
 @contextmanager

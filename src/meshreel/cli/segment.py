@@ -20,6 +20,7 @@ from ..io.masks import write_picture
 from ..io.write import frame_names, make_folder, replacing, write_colored
 from ..labels import FrameLabels, label_frames
 from ..presets import preset_options
+from ..types import evenly
 from ..windows import EncoderOptions
 from .console import Common
 from .reading import Reading
@@ -89,7 +90,7 @@ def _write_labels(
     source: Source, masker: Masker | None, output: Path, options: EncoderOptions, previews: int, common: Common
 ) -> dict[str, Any]:
     frames, count = source.sequence, len(source.sequence)
-    chosen = {round(k) for k in np.linspace(0, count - 1, min(previews, count))}
+    chosen = evenly(count, previews)
     names = [Path(name).stem for name in frame_names(count, "npz")]
     tally, preview = _Tally(), _Preview()
     with common.stages(count) as progress:

@@ -51,11 +51,6 @@ class ReelWriter:
         """Frames so far, of the first track."""
         return self.frames_of(0)
 
-    @property
-    def last_group(self) -> int | None:
-        """Number of the newest chunk of frames of the first track; None where there is none."""
-        return self.last_of(0)
-
     def frames_of(self, track: int) -> int:
         """Frames of a track so far; where its next group begins."""
         return self._checks.frames[track] if track < len(self._checks.frames) else 0

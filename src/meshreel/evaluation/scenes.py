@@ -30,7 +30,6 @@ from ..io.write import frame_names, make_folder, replacing, write_mesh
 from ..types import Mesh, MeshSequence
 from .derived import Chosen
 from .rooms import SPEEDS, RoomOptions, simulate_room
-from .truth import pinhole
 
 SCENES = tuple(SPEEDS)
 TRUE = "truth"  # labels: those of the nearest clean faces
@@ -144,7 +143,7 @@ def _find_labels(meshes: MeshSequence, path: Path) -> None:
 
 def _still(rays: Rays, moves: Bool[np.ndarray, " F"], camera: DepthCamera) -> UInt16[np.ndarray, "H W"]:
     """The depth picture of the faces that stand; 0 where one that moves is in front, or none."""
-    seen = rays.look(pinhole(camera))
+    seen = rays.look(camera.view)
     still = seen.faces >= 0
     still[still] = ~moves[seen.faces[still]]
     units = np.rint(np.where(still, seen.depth, 0) / camera.depth_unit)

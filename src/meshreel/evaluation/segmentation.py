@@ -12,9 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from ..capture.simulate import SceneFrame
 from ..errors import InputError
-from ..types import Mesh
 
 Labels = Bool[np.ndarray, " _"]  # True: the face moves; as many as the frame has faces
 
@@ -53,10 +51,3 @@ def score_labels(found: Iterable[Labels], true: Iterable[Labels]) -> Segmentatio
     if not overlaps:
         raise InputError("labels of 0 frames; give one frame at least")
     return SegmentationScore(tuple(overlaps), called / max(static, 1))
-
-
-def score_segmentation(
-    meshes: Iterable[Mesh], found: Iterable[Labels], truth: Iterable[SceneFrame]
-) -> SegmentationScore:
-    """The score of labels of fused meshes: their true labels are those of the nearest clean faces."""
-    return score_labels(found, (clean.labels_for(mesh) for clean, mesh in zip(truth, meshes, strict=True)))

@@ -12,7 +12,6 @@ from typing import Any, Protocol, runtime_checkable
 from ..capture.rig import DepthCamera
 from ..capture.simulate import SceneFrame
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera
 from ..metrics.truth import Scene, Sight, SightOptions, scene_means, scene_row
 from ..types import Frames
 
@@ -34,15 +33,8 @@ class TrueFrames(Protocol):
 
 
 def sights(cameras: Sequence[DepthCamera]) -> tuple[Sight, ...]:
-    """A rig's cameras as metrics have them: there a pixel's middle is half a pixel further."""
-    return tuple(Sight(pinhole(camera), *camera.depth_range) for camera in cameras)
-
-
-def pinhole(camera: DepthCamera) -> PinholeCamera:
-    """A rig's camera whose pixel (column i, row j) covers [i, i + 1) x [j, j + 1)."""
-    intrinsic = camera.intrinsic.copy()
-    intrinsic[:2, 2] += 0.5
-    return PinholeCamera(camera.width, camera.height, intrinsic, camera.extrinsic)
+    """A rig's cameras as metrics have them."""
+    return tuple(Sight(camera.view, *camera.depth_range) for camera in cameras)
 
 
 def true_scene(truth: TrueFrames, number: int, options: SightOptions = SightOptions()) -> Scene:

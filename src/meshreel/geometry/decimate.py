@@ -22,17 +22,20 @@ ROUNDS = 3  # collapses at a border take one face, inside two: the count of face
 _ONE_AT_A_TIME = threading.Lock()  # the library keeps its mesh in statics
 
 
-def decimate(mesh: Mesh, vertices: int) -> Mesh:
-    """The mesh with about `vertices` vertices (within 2 % where it can be), cleaned; itself where it has no more."""
+def decimate(mesh: Mesh, vertices: int, border: float = BOUNDARY_WEIGHT) -> Mesh:
+    """The mesh with about `vertices` vertices (within 2 % where it can be), cleaned; itself where it has no more.
+
+    `border` is the weight of planes that stand on open borders against those of the faces.
+    """
     if vertices < 4:
         raise InputError(f"vertices is {vertices}: give at least 4, the corners of the smallest solid")
     mesh = clean(mesh)
     if len(mesh.vertices) <= vertices or mesh.diagonal == 0:
         return mesh
-    collapse = _collapse_open if has_boundary(mesh) else _collapse_closed
+    is_open = has_boundary(mesh)
     faces = max(len(mesh.faces) - 2 * (len(mesh.vertices) - vertices), 4)
     for _ in range(ROUNDS):
-        small = clean(collapse(mesh, faces))
+        small = clean(_collapse_open(mesh, faces, border) if is_open else _collapse_closed(mesh, faces))
         excess = len(small.vertices) - vertices
         if abs(excess) <= 0.02 * vertices:
             break
@@ -70,12 +73,12 @@ def _collapse_closed(mesh: Mesh, faces: int) -> Mesh:
     return Mesh.of(small.astype(np.float64) / scale + middle, triangles)
 
 
-def _collapse_open(mesh: Mesh, faces: int) -> Mesh:
+def _collapse_open(mesh: Mesh, faces: int, border: float) -> Mesh:
     import open3d as o3d
 
     scale, middle = OPEN_DIAGONAL / mesh.diagonal, mesh.vertices.mean(axis=0)
     solid = o3d.geometry.TriangleMesh(
         o3d.utility.Vector3dVector((mesh.vertices - middle) * scale), o3d.utility.Vector3iVector(mesh.faces)
     )
-    small = solid.simplify_quadric_decimation(faces, boundary_weight=BOUNDARY_WEIGHT)
+    small = solid.simplify_quadric_decimation(faces, boundary_weight=border)
     return Mesh.of(np.asarray(small.vertices) / scale + middle, np.asarray(small.triangles))

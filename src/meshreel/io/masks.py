@@ -7,7 +7,6 @@ palette indices); a folder -> its files by view and by frame.
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -15,9 +14,9 @@ import numpy as np
 from jaxtyping import UInt8
 
 from ..errors import InputError
+from .names import last_number
 from .write import replacing
 
-_NUMBER = re.compile(r"(\d+)(?!.*\d)")
 _LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
 
 
@@ -77,10 +76,11 @@ def _listed(folder: Path) -> list[Path]:
 def _numbered(folder: Path, paths: Iterable[Path], what: str) -> dict[int, Path]:
     found: dict[int, Path] = {}
     for path in paths:
-        number = _NUMBER.search(path.stem if path.suffix.lower() == ".png" else path.name)
+        number = last_number(path.stem if path.suffix.lower() == ".png" else path.name)
         if number is None:
             continue
-        if (key := int(number[1])) in found:
-            raise InputError(f"{folder}: {found[key].name} and {path.name} are both {what} {key}; keep one of them")
-        found[key] = path
+        if number in found:
+            text = f"{found[number].name} and {path.name} are both {what} {number}"
+            raise InputError(f"{folder}: {text}; keep one of them")
+        found[number] = path
     return found

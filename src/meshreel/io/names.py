@@ -15,6 +15,7 @@ from ..errors import InputError
 from .meshes import EXTENSIONS
 
 _MAGIC = re.compile(r"[*?\[]")
+_LAST = re.compile(r"(\d+)(?!.*\d)")
 
 
 def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
@@ -36,6 +37,12 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, 
             raise InputError(f"{source}: no mesh file fits this pattern; check it, or name the folder")
         return _ordered(root, found)
     raise InputError(f"{source}: no such file or folder; check the path")
+
+
+def last_number(name: str) -> int | None:
+    """The last whole number in a name; None where there is none."""
+    found = _LAST.search(name)
+    return None if found is None else int(found[1])
 
 
 def _globbed(pattern: Path) -> tuple[Path, list[Path]]:

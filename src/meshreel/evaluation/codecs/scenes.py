@@ -20,7 +20,7 @@ from ...decoder import open as open_video
 from ...encoder import make_header
 from ...errors import InputError
 from ...geometry.decimate import decimate_faces
-from ...geometry.topology import drop_unreferenced
+from ...geometry.topology import concatenate, drop_unreferenced
 from ...types import Mesh, MeshSequence
 from ..codec import Progress
 from ..scenes import TRUE, SceneFrames
@@ -103,16 +103,11 @@ class BackgroundDracoCodec:
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, from the bytes alone."""
         still, *frames = open_video(data)
-        return [_together(still, moving) for moving in frames]
+        return [concatenate([still, moving]) for moving in frames]
 
     def background_bytes(self, data: bytes) -> int:
         """How much of the file is the background."""
         return open_video(data).reader.groups[0].size
-
-
-def _together(still: Mesh, moving: Mesh) -> Mesh:
-    faces = np.concatenate([still.faces, moving.faces + len(still.vertices)])
-    return Mesh.of(np.concatenate([still.vertices, moving.vertices]), faces)
 
 
 def _check_share(share: float) -> None:
