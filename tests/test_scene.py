@@ -17,6 +17,7 @@ from meshreel.choice import NO_ERROR
 from meshreel.coding.background import decode_background
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.encoder import encode
+from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate
@@ -24,6 +25,7 @@ from meshreel.geometry.voxels import Lattice
 from meshreel.scene import Parts, TrackGroup, encode_bodies, encode_static, take_apart
 from meshreel.types import Mesh, MeshList, Placement
 from meshreel.windows import EncodedGroup, Stages
+from tests import small_scene
 from tests.metrics.shapes import moved, plane, sphere
 from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, of_body, quick_scene, room, with_room
 
@@ -320,3 +322,18 @@ def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
     assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.cell == pytest.approx(CELL, rel=0.2)
     number = 2
     assert (parts.segmentation.moving(number, ROLLING[number]) == of_body(ROLLING[number])).mean() > 0.98
+
+
+def test_a_scene_that_is_not_in_metres_is_refused_with_its_size(tmp_path):
+    small = MeshList(tuple(Mesh(mesh.vertices * 1e-3, mesh.faces) for mesh in small_scene.scene(4)), 10.0)
+    with pytest.raises(InputError, match=r"frame 0: \d+ of \d+ faces stand still.*is 0\.00\d+ m large.*--scale"):
+        encode(small, tmp_path / "a.reel", quick_scene())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_frame_in_another_unit_is_refused_by_its_number(tmp_path):
+    frames = list(small_scene.scene(12))
+    frames[2] = Mesh(frames[2].vertices * 1000, frames[2].faces)
+    with pytest.raises(InputError, match=r"frame 2 is 3\.\d+e\+03 m large, half of the frames at most 3\.\d+ m; mend"):
+        encode(MeshList(tuple(frames), 10.0), tmp_path / "a.reel", quick_scene())
+    assert list(tmp_path.iterdir()) == []

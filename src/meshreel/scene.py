@@ -22,10 +22,11 @@ from .analysis.background import BackgroundOptions, fuse_background
 from .analysis.bodies import find_bodies, same_bodies
 from .analysis.segment.masks import Masker
 from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
-from .analysis.survey import Survey
+from .analysis.survey import Survey, check_one_unit
 from .choice import NO_ERROR
 from .coding.background import decode_background, decode_change, encode_background, encode_change
 from .coding.intra import encode_empty
+from .errors import InputError
 from .format.layout import Form
 from .geometry.connected import connected
 from .geometry.decimate import decimate
@@ -38,6 +39,7 @@ from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_wi
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 PROBES = 8  # frames, at most, that what moves is measured in
 LEAST_NOISE = 1e-4  # of the unit: a background is no finer than with that much
+LOST = 0.5  # of a frame's faces: as many stand still only where there is a background
 OUTLIER = 3.0  # cells: still surface farther from the background is no noise
 NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
 
@@ -93,7 +95,11 @@ class CodedBodies:
 def take_apart(
     sequence: MeshSequence, seen: Survey, options: EncoderOptions, stages: Stages, masker: Masker | None = None
 ) -> Parts:
-    """What stands still in a scene, and what is known of what moves; by somebody's masks where there are any."""
+    """What stands still in a scene, and what is known of what moves; by somebody's masks where there are any.
+
+    Raises InputError where frames are of different units, or of another than metres.
+    """
+    check_one_unit(seen)
     found = segment(sequence, options.segment) if masker is None else segment_by(masker, sequence, options.segment)
     segmentation: ByPlace | ByMasks = found
     stages.add("segment", len(sequence))
@@ -101,12 +107,25 @@ def take_apart(
     numbers = evenly(len(sequence), options.background.frames)
     still = _Some(sequence, numbers, segmentation.still_at_first)
     background = fuse_background(still, cell, options.background)
+    if background.is_empty and len(numbers):
+        _check_nothing_lost(sequence, numbers, segmentation)
     changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
     stages.add("background", len(sequence))
     noise, deviation, sizes = _measured(sequence, segmentation, background, OUTLIER * cell)
     unit = float(np.median(sizes)) if sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
     return Parts(seen, segmentation, background, changes, cell, noise, deviation)
+
+
+def _check_nothing_lost(sequence: MeshSequence, numbers: Sequence[int], segmentation: ByPlace | ByMasks) -> None:
+    """Where a background is empty, no frame may have much that stands still: it would be in no part of the file."""
+    for number in numbers:
+        mesh = sequence[number]
+        still = segmentation.still_at_first(number, mesh)
+        if still.sum() > LOST * len(mesh.faces):
+            text = f"frame {number}: {still.sum()} of {len(mesh.faces)} faces stand still, but are too small for a room"
+            size = f"the frame is {mesh.diagonal:.3g} m large; is it in metres? If not, give --scale"
+            raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
 
 
 def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:

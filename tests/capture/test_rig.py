@@ -75,16 +75,58 @@ def mirrored(rig):
         (lambda r: r["cameras"][0].update(width=4), "4 x 96"),
         (lambda r: r["cameras"][0].update(depth_unit_m=0), "depth unit 0"),
         (lambda r: r["cameras"][0].update(depth_min_m=9), "range 9 to 4"),
+        (lambda r: r["cameras"][0].pop("camera_to_world"), "camera number 0 .*it has no camera_to_world"),
+        (lambda r: r["cameras"][0].update(width="96"), "camera number 0 .*width is '96' and not a number"),
+        (lambda r: r["cameras"][0].update(width=96.5), "pictures of 96.5 x 96"),
+        (lambda r: r["cameras"][0].update(height=True), "height is True"),
+        (lambda r: r["cameras"][0].update(width=10**400), "pictures of inf x 96"),
+        (lambda r: r["cameras"][0].update(fx=0.6), r"camera front: focal \(0.6, 96.0\).* 96 x 96: give pixels"),
+        (lambda r: r["cameras"][0].update(fx=1e300), "camera front: focal"),
+        (lambda r: r["cameras"][0].update(cx=1e300), "camera front: focal .* center"),
+        (lambda r: r["cameras"][0].update(name=None), "name is None; give text"),
+        (lambda r: r["cameras"][0].update(depth=None), "depth is None; give text"),
+        (lambda r: r["cameras"][0].update(color=["a"]), r"color is \['a'\]; give text"),
+        (lambda r: r["cameras"][0].update(camera_to_world="x"), "camera_to_world is not 4 rows"),
+        (lambda r: r["cameras"][0].update(camera_to_world=[[1], [0, 1], [0], [1]]), "camera_to_world is not 4 rows"),
+        (lambda r: r["cameras"][0]["camera_to_world"][0].__setitem__(3, 1e6), r"front.*1e\+06 m from the world"),
+        (lambda r: r["cameras"].__setitem__(0, 5), "camera number 0 .*is 5 and not an object"),
         (lambda r: r["cameras"][1].update(name="front"), "two cameras"),
         (lambda r: r["cameras"][1].update(depth="nowhere"), "nowhere"),
         (lambda r: r.update(cameras=[]), "no list"),
         (lambda r: r.update(frames_per_second=0), "frames_per_second"),
+        (lambda r: r.update(frames_per_second=True), "frames_per_second is True"),
+        (lambda r: r.update(frames_per_second=1e300), r"frames_per_second is 1e\+300; give"),
     ],
 )
 def test_a_rig_that_is_wrong_is_refused_with_the_reason(folder, change, words):
     changed(folder, change)
     with pytest.raises(InputError, match=words):
         read_rig(folder)
+
+
+def test_keys_that_mean_nothing_are_told_with_what_may_be_meant(folder):
+    changed(folder, lambda rig: rig["cameras"][1].update(depth_unit=0.01, serial="x"))
+    _, warnings = open_recording(folder)
+    assert warnings == [
+        f"{folder}: cameras are described by keys that mean nothing here: depth_unit (is depth_unit_m meant?), serial"
+    ]
+
+
+def test_a_description_may_begin_with_a_byte_order_mark(folder):
+    path = folder / "rig.json"
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert len(read_rig(folder).cameras) == 2
+
+
+def test_frames_that_no_camera_has_are_told_where_the_row_is_uneven(folder):
+    for name in ("front", "side"):
+        for number in (3, 4, 6):
+            write_depth(measured(camera()), folder / name / "depth" / f"depth_{number:05}.png")
+    assert read_rig(folder).missing() == ["no camera has 1 of the frames 0 to 6, as 5: later ones come earlier"]
+    for name in ("front", "side"):
+        for number in (1, 3):
+            (folder / name / "depth" / f"depth_{number:05}.png").unlink()
+    assert read_rig(folder).missing() == []  # every second number: another way to count
 
 
 def test_a_folder_without_a_rig_or_with_none_that_can_be_read_is_told(tmp_path):

@@ -7,7 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from meshreel.capture import fusion
 from meshreel.cli import main
+from meshreel.io.depth import read_depth, write_depth
 from meshreel.io.sequence import open_sequence
 from tests.capture.depth_scenes import RADIUS, camera, record
 
@@ -54,7 +56,7 @@ def test_frames_of_other_options_are_not_mixed(rig, tmp_path, capsys):
     out = tmp_path / "frames"
     assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 0
     assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.04"]) == 2
-    assert "another rig or of other options" in capsys.readouterr().err
+    assert "another rig or of other options (fusion.voxel 0.05, now 0.04); choose" in capsys.readouterr().err
     (out / "capture.json").write_text("{")
     assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 2
     (out / "capture.json").unlink()
@@ -71,3 +73,28 @@ def test_what_is_missing_is_told_once_and_errors_take_one_line(rig, tmp_path, ca
     assert "neither rig.json nor camera.json" in error and error.count("\n") == 1
     assert main(["capture", str(rig), "-o", str(tmp_path / "other"), "--voxel", "9"]) == 2
     assert "voxel 9" in capsys.readouterr().err and not (tmp_path / "other").exists()
+
+
+def test_a_recording_that_was_made_again_is_not_mixed_with_the_one_before(rig, tmp_path, capsys):
+    command = ["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.05"]
+    assert main(command) == 0
+    path = rig / "side" / "depth" / "depth_00001.png"
+    write_depth(read_depth(path) // 2, path)
+    assert main(command) == 2
+    assert "(pictures[1] " in capsys.readouterr().err
+
+
+def test_pictures_of_noise_alone_give_frames_without_a_surface_which_are_told(rig, tmp_path, capsys):
+    random = np.random.default_rng(0)
+    for path in rig.rglob("depth_*.png"):
+        write_depth(random.integers(0, 65_535, (96, 96)).astype(np.uint16), path)
+    assert main(["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.1"]) == 0
+    assert "3 of 3 fused frames have no surface, as frame_00000.ply" in capsys.readouterr().err
+
+
+def test_surface_in_too_many_blocks_is_refused_with_the_frame(rig, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(fusion, "MOST_BLOCKS", 10)
+    assert main(["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.02"]) == 2
+    error = capsys.readouterr().err
+    assert "rig: frame 0: surface in " in error and "are depth_unit_m and depth_max_m right?" in error
+    assert not list((tmp_path / "frames").glob("frame_*"))

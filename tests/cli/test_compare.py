@@ -113,6 +113,12 @@ def test_lengths_that_differ_are_told_with_the_remedy(run, balls):
     assert failed(run("compare", balls, FILE), "3 frames", "10", "--frames")
 
 
+def test_a_damaged_file_is_told_by_its_name_and_the_frames(run, decoded, tmp_path):
+    (tmp_path / "a.reel").write_bytes(FILE.read_bytes()[:-1])
+    said = run("compare", decoded, tmp_path / "a.reel", "--no-ssim")
+    assert failed(said, f"{tmp_path / 'a.reel'}: chunk 3 (frames 9 to 9): truncated", "copy the file again")
+
+
 def test_missing_things_are_told(run, balls, tmp_path):
     assert failed(run("compare", tmp_path / "none", FILE), "none")
     assert failed(run("compare", balls, tmp_path / "none.reel"), "none.reel")

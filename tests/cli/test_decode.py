@@ -55,6 +55,13 @@ def test_a_damaged_group_costs_only_its_frames_and_the_exit_code(run, tmp_path):
     assert len(list((tmp_path / "out").iterdir())) == 6
 
 
+def test_a_frame_that_is_lost_has_no_file_of_a_run_before(run, tmp_path):
+    assert run("decode", FILE, "-o", tmp_path / "out").code == 0
+    (tmp_path / "a.reel").write_bytes(FILE.read_bytes()[:-1])
+    assert failed(run("decode", tmp_path / "a.reel", "-o", tmp_path / "out"), "1 of 10 frames", "copy the file again")
+    assert not (tmp_path / "out" / "frame_00009.ply").exists() and len(list((tmp_path / "out").iterdir())) == 9
+
+
 @pytest.mark.parametrize("only", ["all", "background", "moving"])
 def test_of_a_scene_all_or_what_moves_or_what_does_not(run, tmp_path, only):
     arguments = [] if only == "all" else ["--only", only]

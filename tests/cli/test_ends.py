@@ -81,7 +81,7 @@ def test_a_full_disk_leaves_nothing_and_says_so(balls, tmp_path):
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 2
     assert errors.startswith("meshreel: error: ") and errors.count("\n") == 1
-    assert "a.reel" in errors and "too large" in errors
+    assert "a.reel" in errors and "too large; free space, or choose another folder" in errors
     assert list((tmp_path / "out").iterdir()) == []
 
 

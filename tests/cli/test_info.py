@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import meshreel
 from meshreel.coding.intra import encode_empty
 from meshreel.container.writer import ReelWriter
@@ -146,3 +148,10 @@ def test_a_group_that_is_predicted_from_the_one_before_is_told(run):
         ("layers", 2, True),
     ]
     assert run("info", file).out.count("layers, predicted") == 2
+
+
+def test_what_was_recorded_cannot_steer_a_terminal(run, tmp_path):
+    with ReelWriter(tmp_path / "a.reel", replace(HEADER, metadata='{"tool": "a\\u001b[31m\\nb"}')) as writer:
+        writer.add_group(0, 1, encode_empty())
+    said = run("info", tmp_path / "a.reel")
+    assert said.code == 0 and "recorded at encode: tool a\\x1b[31m\\nb\n" in said.out

@@ -74,6 +74,11 @@ def test_masks_move_the_faces_that_they_show(run, scan, painted, tmp_path):
         assert moving[ROOM_FACES:].mean() > 0.95 and moving[:ROOM_FACES].mean() < 0.01
 
 
+def test_masks_of_more_frames_than_are_read_are_told(run, scan, painted, tmp_path):
+    said = run("segment", scan, "-o", tmp_path / "out", "--masks", painted, "--frames", "1:3", "--previews", "0")
+    assert said.code == 0 and "has masks of 2 more frames than the 2 there are" in said.err
+
+
 def test_given_cameras_are_looked_from(run, scan, painted, tmp_path):
     record = json.loads((painted / "cameras.json").read_text())
     record["parameters"] = record["parameters"][:2]

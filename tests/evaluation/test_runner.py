@@ -18,7 +18,7 @@ from meshreel.evaluation.datasets import open_dataset
 from meshreel.evaluation.derived import Backwards
 from meshreel.evaluation.fresh import peak_rss_mb
 from meshreel.evaluation.peers import equal_anchor, run_fresh
-from meshreel.evaluation.rows import Point, read_rows
+from meshreel.evaluation.rows import Point, append_row, read_rows
 from meshreel.evaluation.runner import Bench, run_point, run_points
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions
@@ -199,6 +199,22 @@ def test_a_line_that_is_no_row_is_told_by_its_number(tmp_path, text):
     (tmp_path / "rows.jsonl").write_text('{"point": "", "kind": "quality"}\n' + text)
     with pytest.raises(InputError, match="line 2"):
         read_rows(tmp_path / "rows.jsonl")
+
+
+def test_a_row_that_was_not_written_to_its_end_is_passed_over_and_replaced(tmp_path):
+    path = tmp_path / "rows.jsonl"
+    path.write_text('{"point": "a"}\n{"point": "b", "ki')  # as a process leaves it that is killed
+    assert read_rows(path) == [{"point": "a"}]
+    append_row(path, {"point": "c"})
+    assert path.read_text() == '{"point": "a"}\n{"point": "c"}\n'
+    path.write_text('{"point": "a"}')  # whole, as editors may leave it
+    append_row(path, {"point": "c"})
+    assert read_rows(path) == [{"point": "a"}, {"point": "c"}]
+
+
+def test_rows_that_cannot_be_written_are_told_with_the_file(tmp_path):
+    with pytest.raises(InputError, match=f"{tmp_path}: cannot be written .*choose another file"):
+        append_row(tmp_path, {})
 
 
 def two_balls(gap):

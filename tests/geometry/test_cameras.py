@@ -58,3 +58,33 @@ def test_an_intrinsic_matrix_that_does_not_end_in_0_0_1_is_refused():
     record["parameters"][0]["intrinsic"]["intrinsic_matrix"][8] = 2.0
     with pytest.raises(InputError, match=r"0\.0, 2\.0"):
         unpack_cameras(json.dumps(record).encode(), "these")
+
+
+def put(place: str, number: int, value: float):
+    """Changes a number of the second camera."""
+
+    def change(record: dict) -> None:
+        matrix = record["extrinsic"] if place == "extrinsic" else record["intrinsic"]["intrinsic_matrix"]
+        matrix[number] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (put("extrinsic", 0, 7.0), "no rotation"),
+        (put("extrinsic", 0, -1.0), "no rotation"),  # a mirror
+        (put("extrinsic", 3, 0.5), r"last row is \[0\.5, 0\.0, 0\.0, 1\.0\] and not 0 0 0 1"),
+        (put("extrinsic", 12, 1e12), r"over 1e\+09"),
+        (put("extrinsic", 12, float("nan")), "not finite"),
+        (put("intrinsic", 0, -1.0), "focal lengths -1 and 1, not above 0"),
+        (put("intrinsic", 4, 0.0), "focal lengths 1 and 0"),
+        (put("intrinsic", 0, 1e300), r"over 1e\+09"),
+    ],
+)
+def test_a_camera_that_none_can_have_is_refused_with_its_number(change, words):
+    record = json.loads(pack_cameras([PinholeCamera(64, 48, np.eye(3), np.eye(4))] * 2))
+    change(record["parameters"][1])
+    with pytest.raises(InputError, match=f"these: .*camera number 1: .*{words}.*mend it"):
+        unpack_cameras(json.dumps(record).encode(), "these")

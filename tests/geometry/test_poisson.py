@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
+from meshreel.geometry.poisson import PoissonOptions, _no_word_of_leaves, drop_small, reconstruct, thin_out
 from meshreel.geometry.topology import face_normals
 from meshreel.types import Mesh
 
@@ -24,6 +26,16 @@ def test_points_of_a_ball_give_the_ball_facing_outward() -> None:
     np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 0.3, atol=0.01)
     outward = np.sum(face_normals(mesh)[0] * mesh.vertices[mesh.faces[:, 0]], axis=1)
     assert (outward > 0).mean() > 0.999
+
+
+def test_a_coarse_tree_does_not_flood_the_terminal_and_what_else_is_said_is_heard(capfd, monkeypatch) -> None:
+    n = directions(300)
+    monkeypatch.setattr("meshreel.geometry.poisson.decimate", lambda mesh, _: (mesh, os.write(2, b"after\n"))[0])
+    reconstruct(0.3 * n, n, PoissonOptions(depth=4, reach=0.1))  # the library warns about its leaves
+    assert capfd.readouterr().err == "after\n"
+    with _no_word_of_leaves():
+        os.write(2, b"[WARNING] a (Line 1)\n    _getValues\n    getValue assumes leaf node\n[WARNING] another\n")
+    assert capfd.readouterr().err == "[WARNING] another\n"
 
 
 def test_no_surface_is_invented_where_there_are_no_points() -> None:

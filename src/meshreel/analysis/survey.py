@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..geometry.topology import clean, drop_unreferenced
 from ..types import Mesh, MeshSequence
 
+UNLIKE = 30.0  # times the usual size: a frame of a room that large is in another unit
 LARGEST_RATIO = 10.0  # of the diagonals of two frames in one window
 
 
@@ -104,6 +105,20 @@ def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool 
     if not np.isfinite(low).all():
         low, high = np.zeros(3), np.zeros(3)
     return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped)
+
+
+def check_one_unit(seen: Survey) -> None:
+    """Raises InputError where a frame is far larger than the others, which a room's are not.
+
+    It would be looked at in as many cells as the square of the ratio.
+    """
+    sizes = [size for size in seen.diagonals if size > 0]
+    usual, largest = float(np.median(sizes or [0.0])), max(sizes, default=0.0)
+    if largest > UNLIKE * usual:
+        text = (
+            f"frame {seen.diagonals.index(largest)} is {largest:.3g} m large, half of the frames at most {usual:.3g} m"
+        )
+        raise InputError(f"{text}; mend its unit, leave it out with --frames, or encode with --dynamic-only")
 
 
 def check(mesh: Mesh, where: str) -> None:

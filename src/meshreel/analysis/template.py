@@ -34,7 +34,8 @@ class TemplateOptions:
     def __post_init__(self) -> None:
         if self.error <= 0 or not 0 <= self.levels <= 4 or not 0 < self.border < np.inf:
             raise InputError(
-                f"template error {self.error:g}, {self.levels} levels, border {self.border:g}: give > 0, 0 to 4, and > 0"
+                f"template error {self.error:g}, {self.levels} levels, border {self.border:g}: "
+                "give > 0, 0 to 4, and > 0"
             )
 
 

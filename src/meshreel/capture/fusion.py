@@ -16,10 +16,11 @@ from jaxtyping import UInt16
 from ..errors import InputError
 from ..geometry.connected import connected_faces
 from ..geometry.topology import drop_unreferenced, face_normals
-from ..geometry.tsdf import extract, new_grid
+from ..geometry.tsdf import SIDE, extract, new_grid
 from ..types import Mesh
 from .rig import DepthCamera
 
+MOST_BLOCKS = 500_000  # 2 GB, and as much again while room is made
 SEEN = 0.5  # measurements of a voxel above which it counts: one is enough
 
 
@@ -45,6 +46,8 @@ def fuse_depths(
 ) -> Mesh:
     """The surface that these cameras see; empty where none has measured anything in its range.
 
+    Raises InputError where what they see takes more than `MOST_BLOCKS` blocks of voxels.
+
     Every camera is integrated into the blocks of all: where one sees through what another took for surface (flying
     pixels, noise), it carves it away.
     """
@@ -56,6 +59,9 @@ def fuse_depths(
         found = grid.compute_unique_block_coordinates(*_pinhole(view), *_depth(view, options))
         blocks.append(found.numpy())
     union = np.unique(np.concatenate(blocks), axis=0)
+    if len(union) > MOST_BLOCKS:
+        text = f"surface in {len(union)} blocks of {SIDE * options.voxel:g} m, over {MOST_BLOCKS}"
+        raise InputError(f"{text}; are depth_unit_m and depth_max_m right? If so, give a larger voxel")
     for view in views:
         grid.integrate(_tensor(union), *_pinhole(view), *_depth(view, options))
     return without_fragments(extract(grid, SEEN), options.fragment)

@@ -41,7 +41,12 @@ class Recording(MeshSequence):
         return len(self.numbers)
 
     def __getitem__(self, index: int) -> Mesh:
-        return fuse_depths(self.rig.depths(self.numbers[index]), self.options)
+        number = self.numbers[index]
+        depths = self.rig.depths(number)
+        try:
+            return fuse_depths(depths, self.options)
+        except InputError as error:
+            raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
 
 
 def open_recording(
@@ -53,7 +58,7 @@ def open_recording(
     its cameras moves.
     """
     rig = read_rig(folder)
-    warnings = rig.missing()
+    warnings = [*rig.remarks, *rig.missing()]
     for number, camera in enumerate(rig.cameras):
         seen = _looked_at(rig, number)
         blind = sum(not depth.any() for depth in seen)

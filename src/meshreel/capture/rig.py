@@ -6,9 +6,12 @@ In -> out: a folder with `rig.json` <-> cameras and, frame by frame, their depth
 
 from __future__ import annotations
 
+import difflib
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +27,13 @@ from ..io.write import make_folder, replacing
 RIG, SINGLE = "rig.json", "camera.json"
 MOST_PIXELS = 16_384  # of a picture's side
 RIGID = 1e-3  # that an entry of R R^T may be off
+FARTHEST = 1e4  # m from the world's origin: fusion has 32-bit coordinates, which are 1 mm apart there
+FOCAL = (0.05, 100.0)  # of a picture's side, outside of which no focal length is in pixels
+AWAY = 10.0  # sides that the optical axis may be beside the picture, of one that was cut out
+RATES = (1e-9, 1e9)  # 1/s, as a sequence of meshes may have
+_TEXTS = ("name", "depth", "color")
+_NUMBERS = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m", "depth_min_m", "depth_max_m")
+_SEE = "see `meshreel capture --help`"
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +52,12 @@ class DepthCamera:
     def __post_init__(self) -> None:
         if not (8 <= self.width <= MOST_PIXELS and 8 <= self.height <= MOST_PIXELS):
             raise InputError(f"camera {self.name}: pictures of {self.width} x {self.height}: give 8 to {MOST_PIXELS}")
-        if not all(math.isfinite(f) and f > 0 for f in self.focal) or not all(map(math.isfinite, self.center)):
-            raise InputError(
-                f"camera {self.name}: focal {self.focal}, center {self.center}: give pixels, focal above 0"
-            )
+        sides = (self.width, self.height)
+        if not all(FOCAL[0] * n <= f <= FOCAL[1] * n for f, n in zip(self.focal, sides, strict=True)) or not all(
+            -AWAY * n <= c <= (1 + AWAY) * n for c, n in zip(self.center, sides, strict=True)
+        ):
+            text = f"focal {self.focal}, center {self.center} for pictures of {self.width} x {self.height}"
+            raise InputError(f"camera {self.name}: {text}: give pixels, focal above 0; calibrate the camera again")
         near, far = self.depth_range
         if not (math.isfinite(self.depth_unit) and self.depth_unit > 0 and 0 <= near < far < math.inf):
             text = f"depth unit {self.depth_unit:g}, range {near:g} to {far:g}"
@@ -95,6 +107,7 @@ class Rig:
     cameras: tuple[DepthCamera, ...]
     files: tuple[dict[int, Path], ...]  # of each camera
     frame_rate: float  # 1/s
+    remarks: tuple[str, ...] = ()  # what a user must know of the description
 
     @property
     def frames(self) -> list[int]:
@@ -116,7 +129,7 @@ class Rig:
         return camera.in_range(depth)
 
     def missing(self) -> list[str]:
-        """For each camera that lacks some frames, a line that says so."""
+        """For each camera that lacks some frames, a line that says so; and one for frames that none has."""
         frames, told = set(self.frames), []
         for camera, files in zip(self.cameras, self.files, strict=True):
             lost = sorted(frames - set(files))
@@ -124,7 +137,7 @@ class Rig:
                 told.append(
                     f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, as {lost[0]}: fused without"
                 )
-        return told
+        return told + _gaps(self.frames)
 
 
 def read_rig(folder: Path) -> Rig:
@@ -135,7 +148,7 @@ def read_rig(folder: Path) -> Rig:
     for entry, camera in zip(entries, cameras, strict=True):
         if "color" in entry:
             _check_color(folder / str(entry["color"]), camera)
-    return Rig(folder, cameras, files, rate)
+    return Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)))
 
 
 def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:
@@ -157,10 +170,11 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float]
         record = _json(path)
         entries = [{"name": folder.resolve().name, "depth": "depth"} | record]
     else:
-        raise InputError(f"{folder}: has neither {RIG} nor {SINGLE}; describe its cameras in one of them")
+        text = f"{folder}: {'' if folder.is_dir() else 'is no folder and '}has neither {RIG} nor {SINGLE}"
+        raise InputError(f"{text}; describe its cameras in one of them")
     rate = record.get("frames_per_second")
-    if not isinstance(rate, (int, float)) or not (math.isfinite(rate) and rate > 0):
-        raise InputError(f"{path}: frames_per_second is {rate!r}; give a number above 0")
+    if isinstance(rate, bool) or not isinstance(rate, (int, float)) or not RATES[0] <= rate <= RATES[1]:
+        raise InputError(f"{path}: frames_per_second is {rate!r:.40}; give a number from {RATES[0]:g} to {RATES[1]:g}")
     cameras = tuple(_camera(path, number, entry) for number, entry in enumerate(entries))
     names = [camera.name for camera in cameras]
     if len(set(names)) < len(names):
@@ -185,26 +199,69 @@ def write_rig(folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float)
 
 def _camera(path: Path, number: int, entry: Any) -> DepthCamera:
     try:
-        name = str(entry.get("name", f"camera{number}"))
-        pose = np.array(entry["camera_to_world"], dtype=np.float64)
-        if pose.shape != (4, 4):
-            raise InputError(f"camera {name}: camera_to_world has the shape {pose.shape}; give 4 rows of 4 numbers")
-        return DepthCamera(
-            name,
-            int(entry["width"]),
-            int(entry["height"]),
-            (float(entry["fx"]), float(entry["fy"])),
-            (float(entry["cx"]), float(entry["cy"])),
-            pose,
-            float(entry.get("depth_unit_m", 0.001)),
-            (float(entry.get("depth_min_m", 0.1)), float(entry.get("depth_max_m", 10.0))),
-        )
+        if not isinstance(entry, dict):
+            raise InputError(f"is {entry!r:.40} and not an object")
+        for key in _TEXTS:
+            if not isinstance(entry.get(key, ""), str):
+                raise InputError(f"{key} is {entry[key]!r:.40}; give text")
+        given = {"depth_unit_m": 0.001, "depth_min_m": 0.1, "depth_max_m": 10.0} | entry
+        width, height, fx, fy, cx, cy, unit, near, far = (_number(given, key) for key in _NUMBERS)
+        if not (width.is_integer() and height.is_integer()):
+            raise InputError(f"pictures of {width:g} x {height:g}; give whole numbers of pixels")
+        pose = _pose(given)
+    except InputError as error:
+        raise InputError(f"{path}: camera number {number} is not described: {error}; {_SEE}") from None
+    try:
+        name = entry.get("name", f"camera{number}")
+        return DepthCamera(name, int(width), int(height), (fx, fy), (cx, cy), pose, unit, (near, far))
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise InputError(
-            f"{path}: camera number {number} is not described ({error!r}); see `meshreel capture --help`"
-        ) from None
+
+
+def _number(entry: dict[str, Any], key: str) -> float:
+    value = entry.get(key)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"{key} is {value!r:.40} and not a number" if key in entry else f"it has no {key}")
+    try:
+        return float(value)
+    except OverflowError:  # whole numbers in JSON may have any size
+        return math.inf
+
+
+def _pose(entry: dict[str, Any]) -> Float64[np.ndarray, "4 4"]:
+    """The matrix, whatever is wrong with its numbers."""
+    if "camera_to_world" not in entry:
+        raise InputError("it has no camera_to_world")
+    try:
+        pose = np.array(entry["camera_to_world"], dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError("camera_to_world is not 4 rows of 4 numbers") from None
+    if pose.shape != (4, 4):
+        name = entry.get("name", "")
+        raise InputError(f"camera {name}: camera_to_world has the shape {pose.shape}; give 4 rows of 4 numbers")
+    return pose
+
+
+def _unknown(folder: Path, entries: list[Any]) -> Iterator[str]:
+    """A line about keys of cameras that mean nothing: a misspelt one would leave a default in place, unseen."""
+    known = {*_TEXTS, *_NUMBERS, "camera_to_world", "frames_per_second"}
+    found = dict.fromkeys(key for entry in entries for key in entry if key not in known)
+    near = [(key, difflib.get_close_matches(key, known, 1)) for key in found]
+    if near:
+        told = ", ".join(key + (f" (is {other[0]} meant?)" if other else "") for key, other in near)
+        yield f"{folder}: cameras are described by keys that mean nothing here: {told}"
+
+
+def _gaps(frames: list[int]) -> list[str]:
+    """A line where numbers of frames are left out in an otherwise even row."""
+    pairs = list(pairwise(frames))
+    step = min((after - before for before, after in pairs), default=1)
+    lost = [(before + step, (after - before - 1) // step) for before, after in pairs if after - before > step]
+    if not lost:
+        return []
+    count = sum(many for _, many in lost)
+    told = f"no camera has {count} of the frames {frames[0]} to {frames[-1]}, as {lost[0][0]}"
+    return [f"{told}: later ones come earlier"]
 
 
 def _broken(pose: Float64[np.ndarray, "4 4"]) -> str:
@@ -216,6 +273,8 @@ def _broken(pose: Float64[np.ndarray, "4 4"]) -> str:
     turn = pose[:3, :3]
     if np.abs(turn @ turn.T - np.eye(3)).max() > RIGID or np.linalg.det(turn) < 0:
         return "is no rotation with a translation"
+    if (away := float(np.abs(pose[:3, 3]).max())) > FARTHEST:
+        return f"is {away:.3g} m from the world's origin, over {FARTHEST:g}: put the origin near the cameras, in metres"
     return ""
 
 
@@ -224,7 +283,8 @@ def _pictures(folder: Path, camera: DepthCamera) -> dict[int, Path]:
     try:
         paths = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and not p.name.startswith("."))
     except OSError as error:
-        raise InputError(f"{folder}: depth of camera {camera.name} cannot be read ({error.strerror})") from None
+        text = f"{folder}: depth of camera {camera.name} cannot be read ({error.strerror})"
+        raise InputError(f"{text}; name its folder as `depth` in {RIG}") from None
     found: dict[int, Path] = {}
     for path in paths:
         number = last_number(path.stem)
@@ -248,9 +308,9 @@ def _check_color(folder: Path, camera: DepthCamera) -> None:
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        record = json.loads(path.read_text())
+        record = json.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin with a mark
     except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read ({error}); give JSON") from None
     if not isinstance(record, dict):
-        raise InputError(f"{path}: is not a JSON object; see `meshreel capture --help`")
+        raise InputError(f"{path}: is not a JSON object; {_SEE}")
     return record

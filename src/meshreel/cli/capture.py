@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -61,11 +62,16 @@ def command(
     common.warn(warnings)
     names = frame_names(len(recording), format)
     missing = _started(output, _made(rig, recording), names)
+    bare = []
     with common.stages(len(recording)) as progress:
         for index, name in enumerate(names):
             if name in missing:
-                write_mesh(recording[index], output / name)
+                mesh = recording[index]
+                write_mesh(mesh, output / name)
+                bare += [name] if mesh.is_empty else []
             progress("fuse", index + 1, len(recording))
+    if bare:
+        common.warn([f"{output}: {len(bare)} of {len(missing)} fused frames have no surface, as {bare[0]}"])
     row = {"output": str(output), "frames": len(names), "fused": len(missing), "frame_rate": recording.frame_rate}
     kept = "" if len(missing) == len(names) else f", {len(names) - len(missing)} of them from before"
     told = f"{output}: {len(names)} {format} files{kept}, {recording.frame_rate:g} frames a second"
@@ -73,15 +79,25 @@ def command(
 
 
 def _made(rig: Path, recording: Recording) -> dict[str, Any]:
-    """What decides the frames, apart from the pictures."""
+    """What decides the frames; of the pictures their sizes, which are other ones where a recording is another."""
     cameras = [camera.record() for camera in recording.rig.cameras]
+    sizes = [[_size(files[n]) if n in files else -1 for n in recording.numbers] for files in recording.rig.files]
     return {
         "rig": str(rig.resolve()),
         "frames_per_second": recording.frame_rate,
         "frames": recording.numbers,
         "fusion": asdict(recording.options),
         "cameras": cameras,
+        "pictures": [zlib.crc32(json.dumps(each).encode()) for each in sizes],
     }
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file; those of one that cannot be read are told when it is."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
 
 
 def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
@@ -94,11 +110,24 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
             before = json.loads(path.read_text())
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: cannot be read ({error}); delete the folder, or choose another") from None
-        if before != json.loads(json.dumps(made)):
-            raise InputError(f"{output}: holds frames of another rig or of other options; choose another folder")
+        if before != (now := json.loads(json.dumps(made))):
+            text = f"{output}: holds frames of another rig or of other options"
+            raise InputError(f"{text} ({_difference(before, now)}); choose another folder")
     elif any(output.glob("frame_*")):
         raise InputError(f"{output}: holds frames that no {MADE} tells the making of; choose another folder")
     else:
         with replacing(path) as file:
             file.write((json.dumps(made, indent=1) + "\n").encode())
     return set(names) - there
+
+
+def _difference(before: Any, now: Any, name: str = "") -> str:
+    """The first thing that two records have differently, and both values where they are short."""
+    if isinstance(before, dict) and isinstance(now, dict):
+        key = next(key for key in {**now, **before} if key not in now or key not in before or before[key] != now[key])
+        return _difference(before.get(key), now.get(key), f"{name}.{key}" if name else key)
+    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        number = next(number for number, pair in enumerate(zip(before, now, strict=True)) if pair[0] != pair[1])
+        return _difference(before[number], now[number], f"{name}[{number}]")
+    told = [json.dumps(value) for value in (before, now)]
+    return f"{name} {told[0]:.60}, now {told[1]:.60}"

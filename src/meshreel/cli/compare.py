@@ -16,7 +16,7 @@ from ..capture.truth import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder import Video
 from ..decoder import open as open_video
-from ..errors import InputError
+from ..errors import FormatError, InputError
 from ..evaluation.truth import compare_with_truth
 from ..format.layout import MAGIC
 from ..geometry.topology import weld
@@ -66,12 +66,15 @@ def command(
     if isinstance(other, Video) and not options.keys:
         options = replace(options, keys=recorded_keys(other))
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
-    with common.stages(len(sequence)) as progress:
-        row = compare_sequences(sequence, counted(other, progress), options).to_row()
-        if truth is not None:
-            row |= {"truth": _against_truth(sequence, other, truth, knowing.truth_every, progress)}
-    if sheet is not None:
-        write_sheet(sequence, other, sheet, SheetOptions(up=looking.up))
+    try:
+        with common.stages(len(sequence)) as progress:
+            row = compare_sequences(sequence, counted(other, progress), options).to_row()
+            if truth is not None:
+                row |= {"truth": _against_truth(sequence, other, truth, knowing.truth_every, progress)}
+        if sheet is not None:
+            write_sheet(sequence, other, sheet, SheetOptions(up=looking.up))
+    except FormatError as error:  # a chunk that the decoder knows by its number only
+        raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
     if reel:
         described = describe_file(Path(decoded))
         row = {name: described[name] for name in ("bytes", "mbps", "parts", "parts_mbps")} | row
@@ -107,7 +110,8 @@ def open_truth(folder: Path, reading: Reading, count: int) -> ChosenTruth:
     numbers = reading.options().chosen(len(truth))
     if len(numbers) != count:
         chosen = "" if len(numbers) == len(truth) else f" of {len(truth)} that --frames {reading.frames} leaves"
-        raise InputError(f"{folder} is the truth of {len(numbers)} frames{chosen}, the originals have {count}")
+        text = f"{folder} is the truth of {len(numbers)} frames{chosen}, the originals have {count}"
+        raise InputError(f"{text}; give that of the same recording, or choose with --frames A:B")
     return ChosenTruth(truth, numbers)
 
 

@@ -60,11 +60,13 @@ def command(
                 mesh = look[only](i)
             except FormatError as error:
                 failed.append(error)
+                (output / name).unlink(missing_ok=True)  # one of a run before would pass for this frame
             else:
                 write_mesh(mesh, output / name)
             progress("decode", i + 1, len(video))
     if failed:
-        raise FormatError(f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written")
+        text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
+        raise FormatError(f"{text}; copy the file again")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")
 

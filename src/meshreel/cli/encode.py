@@ -140,7 +140,7 @@ def command(
             summary = encode(sequence, output, options, executor, progress, masker)
         else:
             summary, quality = encode_to(sequence, output, goal, options_at, executor, progress, masker)
-    warnings = (*source.warnings, *summary.warnings)
+    warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
     if summary.scene is None and parting.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
     common.warn(warnings)

@@ -30,11 +30,16 @@ def command(file: Path, /, *, common: Common = Common()) -> None:
     if missing := row["bytes_missing"]:
         size = f"{row['bytes'] - missing} of {size} ({missing} are missing: the file is truncated)"
     head = f"{file}: {row['frames']} frames at {row['frame_rate']:g}/s, {size}, {row['mbps']:.4g} Mbps"
-    recorded = ", ".join(f"{name} {value}" for name, value in row["metadata"].items())
+    recorded = _printable(", ".join(f"{name} {value}" for name, value in row["metadata"].items()))
     tables = [rate_table(row), *([_tracks(row), _states(row)] if row["background"] or len(row["tracks"]) > 1 else [])]
     common.result(row, head, f"recorded at encode: {recorded or 'nothing'}", *tables, _groups(row))
     common.warn(f"background: {state['error']}" for state in row["background"] if "error" in state)
     common.warn(f"group {i}: {group['error']}" for i, group in enumerate(row["groups"]) if "error" in group)
+
+
+def _printable(text: str) -> str:
+    """The text with what would steer a terminal as its code: a file may come from anyone."""
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
 def describe_file(file: Path) -> dict[str, Any]:

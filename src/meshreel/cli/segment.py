@@ -66,14 +66,16 @@ def command(
     options = preset_options()
     options = replace(options, segment=masking.options(options.segment))
     source = open_source(inputs, reading)
+    masker = masking.masker(len(source.sequence))
     if views_only:
         row = _write_views(source, output, options, common)
         text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
     else:
-        row = _write_labels(source, masking.masker(len(source.sequence)), output, options, previews, common)
+        row = _write_labels(source, masker, output, options, previews, common)
         text = f"{output}: {_told(row)}"
-    common.warn(source.warnings)
-    common.result({"output": str(output), "warnings": source.warnings} | row, text)
+    warnings = (*source.warnings, *getattr(masker, "remarks", ()))
+    common.warn(warnings)
+    common.result({"output": str(output), "warnings": warnings} | row, text)
 
 
 def _write_views(source: Source, output: Path, options: EncoderOptions, common: Common) -> dict[str, Any]:

@@ -6,6 +6,7 @@ flat, and a process that is killed leaves nothing under the final name.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
@@ -192,6 +193,7 @@ def _as_input_error(target: Path | Sink) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise InputError(f"{name}: cannot be written: {error.strerror or error}") from error
+        remedy = "; free space, or choose another folder" if error.errno in (errno.ENOSPC, errno.EFBIG) else ""
+        raise InputError(f"{name}: cannot be written: {error.strerror or error}{remedy}") from error
     except FormatError as error:
         raise InputError(f"{name}: cannot be stored: {error}") from error

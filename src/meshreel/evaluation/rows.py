@@ -34,11 +34,17 @@ class Point:
 
 
 def read_rows(path: Path) -> list[Row]:
-    """The rows of a JSON-lines file. Raises InputError where it is missing or a line is no JSON object."""
+    """The rows of a JSON-lines file, without one that was not written to its end.
+
+    Raises InputError where the file is missing or a line is no JSON object.
+    """
     try:
-        lines = path.read_text().splitlines()
+        data = path.read_bytes()
+        lines = data[: _whole(data)].decode().splitlines()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}; make it with `meshreel bench run`") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 ({error.reason}); make it with `meshreel bench run`") from error
     rows = []
     for number, line in enumerate(lines, 1):
         try:
@@ -58,10 +64,32 @@ def join_rows(files: Sequence[Sequence[Row]]) -> list[Row]:
 
 
 def append_row(path: Path, row: Row) -> None:
-    """The row as one more line of the file, made if needed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a") as file:
-        file.write(json.dumps(row, allow_nan=False) + "\n")
+    """The row as one more line of the file, made if needed, in the place of one that was not written to its end.
+
+    Raises InputError where it cannot be written.
+    """
+    line = (json.dumps(row, allow_nan=False) + "\n").encode()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("r+b" if path.exists() else "xb") as file:
+            data = file.read() if file.readable() else b""
+            end = _whole(data)
+            file.seek(end)
+            file.truncate()
+            file.write(b"\n" * (end > 0 and data[end - 1 : end] != b"\n") + line)
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: cannot be written ({reason}); free space, or choose another file") from None
+
+
+def _whole(data: bytes) -> int:
+    """Where the rows end: a process that is killed while it writes leaves a part of one behind them."""
+    start = data.rfind(b"\n") + 1
+    try:
+        json.loads(data[start:] or b"0")
+    except ValueError:
+        return start
+    return len(data)
 
 
 def curve_rows(rows: Sequence[Row], sequence: str, codec: str | None = None) -> list[Row]:

@@ -16,6 +16,9 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 
+_RIGID = 1e-3  # that an entry of R R^T may be off: some tools write few digits
+_LARGEST = 1e9  # of a matrix's numbers: keeps all that is computed from them finite
+
 
 @dataclass(frozen=True, slots=True)
 class PinholeCamera:
@@ -71,13 +74,17 @@ def pack_cameras(cameras: Sequence[PinholeCamera]) -> bytes:
 
 def unpack_cameras(data: bytes, name: str) -> list[PinholeCamera]:
     """The cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory; `name` is what an error calls it."""
+    found: list[PinholeCamera] = []
     try:
         record = json.loads(data)
-        return [_camera(entry) for entry in record.get("parameters", [record])]
+        for entry in record.get("parameters", [record]):
+            found.append(_camera(entry))
+        return found
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise InputError(f"{name}: cannot read cameras ({error}); give Open3D pinhole camera JSON") from error
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError, np.linalg.LinAlgError) as error:
-        raise InputError(f"{name}: not Open3D pinhole camera JSON ({error!r})") from error
+        text = f"{name}: not Open3D pinhole camera JSON (camera number {len(found)}: {error!r})"
+        raise InputError(f"{text}; mend it or leave it out") from error
 
 
 def _camera(entry: dict[str, Any]) -> PinholeCamera:
@@ -86,9 +93,18 @@ def _camera(entry: dict[str, Any]) -> PinholeCamera:
     width, height = int(entry["intrinsic"]["width"]), int(entry["intrinsic"]["height"])
     if not (np.isfinite(intrinsic).all() and np.isfinite(extrinsic).all()):
         raise ValueError("a matrix is not finite")
+    if np.abs(intrinsic).max() > _LARGEST or np.abs(extrinsic).max() > _LARGEST:
+        raise ValueError(f"a matrix with a number over {_LARGEST:g}")
     if not (8 <= width <= 16384 and 8 <= height <= 16384):
         raise ValueError(f"image size {width} x {height}")
     if not np.array_equal(intrinsic[2], (0, 0, 1)):
         raise ValueError(f"an intrinsic matrix whose last row is {intrinsic[2].tolist()} and not 0 0 1")
-    np.linalg.inv(intrinsic), np.linalg.inv(extrinsic)  # raises where singular
+    if not (intrinsic[0, 0] > 0 and intrinsic[1, 1] > 0):
+        raise ValueError(f"focal lengths {intrinsic[0, 0]:g} and {intrinsic[1, 1]:g}, not above 0")
+    turn = extrinsic[:3, :3]
+    if np.abs(turn @ turn.T - np.eye(3)).max() > _RIGID or np.linalg.det(turn) < 0:
+        raise ValueError("an extrinsic matrix that is no rotation with a translation, column by column")
+    if not np.allclose(extrinsic[3], (0, 0, 0, 1)):
+        raise ValueError(f"an extrinsic matrix whose last row is {extrinsic[3].tolist()} and not 0 0 0 1")
+    np.linalg.inv(intrinsic)  # raises where singular
     return PinholeCamera(width, height, intrinsic, extrinsic)

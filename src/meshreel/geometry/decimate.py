@@ -53,8 +53,9 @@ def decimate_faces(mesh: Mesh, faces: int) -> Mesh:
     mesh = clean(mesh)
     if len(mesh.faces) <= faces or mesh.diagonal == 0:
         return mesh
-    collapse = _collapse_open if has_boundary(mesh) else _collapse_closed
-    return clean(collapse(mesh, faces))
+    if has_boundary(mesh):
+        return clean(_collapse_open(mesh, faces, BOUNDARY_WEIGHT))
+    return clean(_collapse_closed(mesh, faces))
 
 
 def has_boundary(mesh: Mesh) -> bool:

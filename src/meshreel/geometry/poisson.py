@@ -5,7 +5,12 @@ Poisson closes whatever is open; what it invents far from the points is cut away
 
 from __future__ import annotations
 
+import os
+import re
+import tempfile
 import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +21,7 @@ from ..types import Mesh
 from .decimate import decimate
 from .topology import clean, components
 
+_LEAVES = re.compile(rb"\[WARNING\] [^\n]*\n[^\n]*_getValues\n[^\n]*getValue assumes leaf node\n")
 _ONE_AT_A_TIME = threading.Lock()  # the library keeps its state in statics: two threads would spoil each other's bits
 
 
@@ -55,7 +61,7 @@ def reconstruct(
         return Mesh.empty()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.normals = o3d.utility.Vector3dVector(normals)
-    with _ONE_AT_A_TIME:
+    with _ONE_AT_A_TIME, _no_word_of_leaves():
         build = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson
         solid, density = build(cloud, depth=options.depth, n_threads=1)
     whole = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
@@ -65,6 +71,30 @@ def reconstruct(
     kept = trusted[mesh.faces].all(axis=1)
     kept |= _holes(mesh, ~kept, options.hole) & (gaps <= 3 * options.reach)[mesh.faces].all(axis=1)
     return drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[kept])), options.smallest)
+
+
+@contextmanager
+def _no_word_of_leaves() -> Iterator[None]:
+    """Holds back what is written to standard error, and gives it on without the library's warnings about leaves.
+
+    There are thousands, whatever is asked of the library, about nothing that a user could mend; no setting ends them.
+    """
+    with ExitStack() as stack:
+        try:
+            kept = stack.enter_context(tempfile.TemporaryFile())
+            shown = os.dup(2)
+        except OSError:  # no room, or no standard error: then they are seen, or not
+            yield
+            return
+        os.dup2(kept.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(shown, 2)
+            os.close(shown)
+            kept.seek(0)
+            if said := _LEAVES.sub(b"", kept.read()):
+                os.write(2, said)
 
 
 def drop_small(mesh: Mesh, share: float) -> Mesh:

@@ -65,6 +65,32 @@ def test_a_mask_of_another_size_is_told_with_its_frame_and_size(masks: Path):
         ImageMasks(masks, 2)
 
 
+def test_damage_is_told_before_the_first_mask_is_asked_for(masks: Path):
+    last = masks / "view02" / "frame_00001.png"
+    last.write_bytes(last.read_bytes()[:60])
+    with pytest.raises(InputError, match=r"frame_00001\.png: cannot be read .*make the mask again"):
+        ImageMasks(masks, 2)
+    write_picture(np.zeros((60, 80, 3), np.uint8), last)
+    with pytest.raises(InputError, match=r"frame_00001\.png: a mask of mode RGB"):
+        ImageMasks(masks, 2)
+
+
+def test_masks_of_more_frames_are_remarked(masks: Path):
+    assert ImageMasks(masks, 2).remarks == ()
+    [line] = ImageMasks(masks, 1).remarks
+    assert "masks of 1 more frames than the 1 there are" in line and str(masks) in line
+
+
+def test_cameras_that_see_nothing_of_the_scene_are_refused(masks: Path):
+    away = tuple(replace(view, extrinsic=view.extrinsic + np.diag([0, 0, 1e4], 1)) for view in VIEWS)
+    (masks / CAMERAS).write_bytes(pack_cameras(away))
+    frames = MeshList((Mesh.empty(), ROOM))
+    with pytest.raises(InputError, match="the 3 cameras that are given see no face of 1 frames, as 1; give cameras of"):
+        segment_by(ImageMasks(masks, 2), frames)
+    with pytest.raises(InputError, match="the 3 cameras that are given see no face"):
+        scene_views(frames, SegmentOptions(cameras=away))
+
+
 def test_a_folder_without_cameras_or_with_cameras_of_two_sizes_is_refused(masks: Path):
     (masks / CAMERAS).write_bytes(pack_cameras([VIEWS[0], replace(VIEWS[1], width=100)]))
     with pytest.raises(InputError, match=r"cameras of 80 x 60 and 100 x 60 pixels; give cameras of one size"):

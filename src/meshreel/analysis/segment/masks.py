@@ -15,7 +15,6 @@ from jaxtyping import Bool, UInt8
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera, unpack_cameras
 from ...geometry.raycast import Seen
-from ...io.depth import picture_size
 from ...io.masks import find_masks, read_mask
 
 CAMERAS = "cameras.json"  # Open3D's pinhole camera JSON, beside the folders of the views
@@ -37,12 +36,16 @@ class ImageMasks:
     """
 
     def __init__(self, folder: Path, frames: int) -> None:
-        """Looks at every file of so many frames. Raises InputError where one is missing or of another size."""
+        """Reads every file of so many frames. Raises InputError where one is missing, damaged or of another size."""
         self.views = read_views(folder)
         self._files = find_masks(folder, len(self.views), frames)
         for view, files in zip(self.views, self._files, strict=True):
             for frame, path in enumerate(files):
-                _check_size(path, frame, picture_size(path), view)
+                height, width = read_mask(path).shape  # all of it: damage is told now, not when half is encoded
+                _check_size(path, frame, (width, height), view)
+        others = len([path for path in self._files[0][0].parent.iterdir() if path.suffix.lower() == ".png"]) - frames
+        text = f"{folder}: has masks of {others} more frames than the {frames} there are: the first ones are taken"
+        self.remarks = (f"{text}, frame 0 for the first",) if others > 0 else ()
 
     def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Bool[np.ndarray, "X H W"]:
         """The masks of one frame; the views must be this object's own."""

@@ -11,13 +11,14 @@ from jaxtyping import Int64
 
 from ...geometry.topology import drop_unreferenced, unique_edges
 from ...geometry.voxels import Lattice, around, distinct, spread
-from ...types import Frames, Mesh
+from ...types import Frames, Mesh, evenly
 from ..survey import check
 
 PROBES = 4  # frames, spread over the sequence
 SHARE = 0.6  # of a frame's surface that stands still in a scene
 CELLS = 200  # along a frame's diagonal: 4 cm in a room
 BORDER = 1.0  # diagonals: the length of the borders of what is open; of the holes of a captured body, less
+UNLIKE = 30.0  # of the sizes of two frames: no room is in both, and cells of one are no cells of the other
 COARSEST = 32  # edges along it: a mesh of fewer is no capture of a room
 
 
@@ -26,14 +27,15 @@ def is_scene(frames: Frames) -> bool:
 
     Raises InputError for frames that cannot be used, as far as they are looked at.
     """
-    numbers = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(PROBES, len(frames)))})
+    numbers = evenly(len(frames), PROBES)
     meshes = []
     for number in numbers:
         check(mesh := frames[number], f"frame {number}")
         meshes += [] if mesh.is_empty else [drop_unreferenced(mesh)]
-    if len(meshes) < 2 or meshes[0].diagonal == 0 or not _is_open(meshes[0]):
+    sizes = [mesh.diagonal for mesh in meshes]
+    if len(meshes) < 2 or sizes[0] == 0 or max(sizes) > UNLIKE * min(sizes):
         return False
-    if _edge(meshes[0]) * COARSEST > meshes[0].diagonal:
+    if not _is_open(meshes[0]) or _edge(meshes[0]) * COARSEST > sizes[0]:
         return False
     lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]

@@ -148,7 +148,7 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) ->
 def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
     """What moves by somebody's masks. Who must see all frames before the first mask has a method `observe`."""
     chosen = _with_surface(frames, _PROBES) or _with_surface(frames, len(frames))
-    views = getattr(masker, "views", None) or _views(frames, chosen, options)
+    views = _looking(getattr(masker, "views", None), frames, chosen) or _views(frames, chosen, options)
     if observe := getattr(masker, "observe", None):
         for number in range(len(frames)):
             observe(number, _looks(frames[number], views), views)
@@ -214,7 +214,17 @@ def _with_surface(frames: Frames, most: int) -> list[int]:
 def _views(frames: Frames, chosen: Sequence[int], options: SegmentOptions) -> tuple[PinholeCamera, ...]:
     """The cameras that are given, or placed ones that see some of the chosen frames well."""
     some = _Some(frames, chosen[:: max(1, len(chosen) // _PROBES)])
-    return options.cameras or place_views(some, options.views)
+    return _looking(options.cameras, frames, chosen) or place_views(some, options.views)
+
+
+def _looking(
+    views: tuple[PinholeCamera, ...] | None, frames: Frames, chosen: Sequence[int]
+) -> tuple[PinholeCamera, ...] | None:
+    """The views that are given. Raises InputError where they see nothing of the chosen frames."""
+    if views and chosen and not any((s.faces >= 0).any() for k in chosen for s in _looks(frames[k], views)):
+        text = f"the {len(views)} cameras that are given see no face of {len(chosen)} frames, as {chosen[0]}"
+        raise InputError(f"{text}; give cameras of this scene, in its unit and axes")
+    return views
 
 
 def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
