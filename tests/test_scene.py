@@ -179,7 +179,7 @@ def test_a_scene_far_from_the_origin_keeps_its_millimetres(tmp_path, rolling):
     video, summary = encoded([moved(mesh, FAR) for mesh in ROLLING], tmp_path / "a.reel")
     assert_rolls(video, FAR)
     assert summary.scene.noise == pytest.approx(rolling[2].scene.noise, rel=0.5)  # its cells are in other places
-    assert summary.psnr == pytest.approx(rolling[2].psnr, abs=1.0)
+    assert summary.psnr > rolling[2].psnr - 1.0
 
 
 @pytest.mark.usefixtures("plainly")
@@ -305,11 +305,14 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
     seen = replace(survey(MeshList((room(),))), scale=1.0)
     sizes = []
     for noise in (0.0, 0.002, 0.01):
-        parts = Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise)
-        payload = encode_static(parts, 1, 30.0, BackgroundOptions())[0].payload
+        parts, options = (
+            Parts(seen, ALL, with_room([NONE], sigma=0.002)[0], [], CELL, noise, noise),
+            BackgroundOptions(),
+        )
+        payload = encode_static(parts, 1, 30.0, options)[0].payload
         place = Placement(1.0, tuple(seen.center))
         away = rms(parts.background.vertices, decode_background(payload, place))
-        assert away <= max(0.5 * noise, 1e-4)
+        assert away <= max(options.coarse * noise, 1e-4)
         sizes.append(len(payload))
     assert sizes[0] > sizes[1] > sizes[2]
 

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from .analysis.background import BackgroundOptions, fuse_background
+from .analysis.background_depth import fuse_still_depth
 from .analysis.bodies import find_bodies, same_bodies
 from .analysis.segment.masks import Masker
 from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
@@ -29,7 +30,8 @@ from .coding.intra import encode_empty
 from .errors import InputError
 from .format.layout import Form
 from .geometry.connected import connected
-from .geometry.decimate import decimate
+from .geometry.decimate import decimate, decimate_faces
+from .geometry.depth import SeesDepth
 from .geometry.nearest import distances
 from .geometry.topology import drop_unreferenced
 from .layered import MOST_EMPTY, encode_segment
@@ -37,6 +39,7 @@ from .types import Frames, Mesh, MeshSequence, Placement, evenly
 from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_window
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
+HALFWAY = 0.3  # of the vertices: what has fewer than half as many is decimated from there, a third of the time
 PROBES = 8  # frames, at most, that what moves is measured in
 LEAST_NOISE = 1e-4  # of the unit: a background is no finer than with that much
 LOST = 0.5  # of a frame's faces: as many stand still only where there is a background
@@ -104,11 +107,9 @@ def take_apart(
     segmentation: ByPlace | ByMasks = found
     stages.add("segment", len(sequence))
     cell = segmentation.lattice.size
-    numbers = evenly(len(sequence), options.background.frames)
-    still = _Some(sequence, numbers, segmentation.still_at_first)
-    background = fuse_background(still, cell, options.background)
-    if background.is_empty and len(numbers):
-        _check_nothing_lost(sequence, numbers, segmentation)
+    background = _background(sequence, segmentation, cell, options.background)
+    if background.is_empty:
+        _check_nothing_lost(sequence, segmentation, options.background)
     changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
     stages.add("background", len(sequence))
     noise, deviation, sizes = _measured(sequence, segmentation, background, OUTLIER * cell)
@@ -117,9 +118,9 @@ def take_apart(
     return Parts(seen, segmentation, background, changes, cell, noise, deviation)
 
 
-def _check_nothing_lost(sequence: MeshSequence, numbers: Sequence[int], segmentation: ByPlace | ByMasks) -> None:
+def _check_nothing_lost(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: BackgroundOptions) -> None:
     """Where a background is empty, no frame may have much that stands still: it would be in no part of the file."""
-    for number in numbers:
+    for number in evenly(len(sequence), options.frames):
         mesh = sequence[number]
         still = segmentation.still_at_first(number, mesh)
         if still.sum() > LOST * len(mesh.faces):
@@ -157,6 +158,18 @@ def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> rang
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
 
 
+def _background(
+    sequence: MeshSequence, segmentation: ByPlace | ByMasks, cell: float, options: BackgroundOptions
+) -> Mesh:
+    """What stands still at first, from the cameras' depth where it is known; cells in m."""
+    numbers = evenly(len(sequence), options.frames)
+    if options.depth and isinstance(sequence, SeesDepth):
+        meshes = ((number, sequence[number]) for number in numbers)
+        moments = ((sequence.pictures(k), mesh, segmentation.still_at_first(k, mesh)) for k, mesh in meshes)
+        return fuse_still_depth(moments, cell, options)
+    return fuse_background(_Some(sequence, numbers, segmentation.still_at_first), cell, options)
+
+
 def _change(sequence: MeshSequence, segmentation: ByPlace | ByMasks, frame: int, options: EncoderOptions) -> Change:
     assert isinstance(segmentation, ByPlace)  # masks know of no changes
     came = segmentation.rest.since == frame
@@ -177,8 +190,10 @@ def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
     """The payload of a mesh with as few vertices as leave it within an RMS distance, and that as decoded."""
     if mesh.is_empty:
         return b"", mesh
+    smaller = decimate_faces(mesh, max(4, round(2 * HALFWAY * len(mesh.vertices))))
     for fraction in (*FRACTIONS, 1.0):
-        payload = encode_background(decimate(mesh, max(4, round(fraction * len(mesh.vertices)))), step)
+        source = smaller if 2 * fraction <= HALFWAY else mesh
+        payload = encode_background(decimate(source, max(4, round(fraction * len(mesh.vertices)))), step)
         decoded = decode_background(payload)
         if not decoded.is_empty and _apart(mesh, decoded) <= most:
             break

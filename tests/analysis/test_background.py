@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -62,7 +64,7 @@ def test_what_is_hidden_in_one_frame_is_there_in_others():
 def test_what_few_frames_have_is_left_out():
     table = moved(plane(0.8, 16), (0.4, 0.4, 0.7))
     frames = [concatenate([FLOOR, table]), *[FLOOR] * 9]
-    assert fuse_background(frames, VOXEL).vertices[:, 2].max() > 0.6
+    assert fuse_background(frames, VOXEL, BackgroundOptions(seen=0.1)).vertices[:, 2].max() > 0.6
     least = fuse_background(frames, VOXEL, BackgroundOptions(seen=0.25))
     assert least.vertices[:, 2].max() < 0.1 and not least.is_empty
 
@@ -99,11 +101,22 @@ def test_of_nothing_there_is_nothing():
     assert fuse_background([Mesh.of(np.ones((3, 3)), [[0, 1, 2]])], VOXEL).is_empty
 
 
+def test_what_is_elsewhere_in_each_frame_has_flown_and_is_left_out():
+    ribbons = [moved(plane(0.8, 16), (0.4, 0.4, 0.7 + 0.06 * math.sin(2.4 * k))) for k in range(10)]
+    frames = [concatenate([floor, ribbon]) for floor, ribbon in zip(floors(10), ribbons, strict=True)]
+    assert fuse_background(frames, VOXEL, BackgroundOptions(steady=9.0)).vertices[:, 2].max() > 0.6
+    mesh = fuse_background(frames, VOXEL)
+    assert mesh.vertices[:, 2].max() < 0.1 and height_error(mesh) < SIGMA
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
         {"frames": 0},
-        {"reach": 0},
+        {"steady": 0.0},
+        {"past": -0.1},
+        {"finer": 0.0},
+        {"facing": 1.0},
         {"seen": 1.0},
         {"seen": -0.1},
         {"fragment": -1.0},

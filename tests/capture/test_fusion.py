@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.capture.fusion import FusionOptions, fuse_depths, without_fragments
+from meshreel.capture.fusion import FusionOptions, fuse_depths
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
+from meshreel.geometry.connected import without_fragments
 from meshreel.geometry.topology import components, face_normals
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from meshreel.capture import fusion
 from meshreel.cli import main
+from meshreel.geometry import tsdf
 from meshreel.io.depth import read_depth, write_depth
 from meshreel.io.sequence import open_sequence
 from tests.capture.depth_scenes import RADIUS, camera, record
@@ -93,7 +93,7 @@ def test_pictures_of_noise_alone_give_frames_without_a_surface_which_are_told(ri
 
 
 def test_surface_in_too_many_blocks_is_refused_with_the_frame(rig, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(fusion, "MOST_BLOCKS", 10)
+    monkeypatch.setattr(tsdf, "MOST_BLOCKS", 10)
     assert main(["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.02"]) == 2
     error = capsys.readouterr().err
     assert "rig: frame 0: surface in " in error and "are depth_unit_m and depth_max_m right?" in error

@@ -8,19 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from jaxtyping import UInt16
 
 from ..errors import InputError
-from ..geometry.connected import connected_faces
-from ..geometry.topology import drop_unreferenced, face_normals
-from ..geometry.tsdf import SIDE, extract, new_grid
+from ..geometry.connected import without_fragments
+from ..geometry.tsdf import extract, integrate
 from ..types import Mesh
 from .rig import DepthCamera
 
-MOST_BLOCKS = 500_000  # 2 GB, and as much again while room is made
 SEEN = 0.5  # measurements of a voxel above which it counts: one is enough
 
 
@@ -46,52 +43,9 @@ def fuse_depths(
 ) -> Mesh:
     """The surface that these cameras see; empty where none has measured anything in its range.
 
-    Raises InputError where what they see takes more than `MOST_BLOCKS` blocks of voxels.
-
-    Every camera is integrated into the blocks of all: where one sees through what another took for surface (flying
-    pixels, noise), it carves it away.
+    Raises InputError where what they see takes more blocks of voxels than there is memory for.
     """
-    views = [(camera, inside) for camera, depth in depths if (inside := camera.in_range(depth)).any()]
-    if not views:
+    pictures = [camera.picture(inside) for camera, depth in depths if (inside := camera.in_range(depth)).any()]
+    if not pictures:
         return Mesh.empty()
-    grid, blocks = new_grid(options.voxel), []
-    for view in views:
-        found = grid.compute_unique_block_coordinates(*_pinhole(view), *_depth(view, options))
-        blocks.append(found.numpy())
-    union = np.unique(np.concatenate(blocks), axis=0)
-    if len(union) > MOST_BLOCKS:
-        text = f"surface in {len(union)} blocks of {SIDE * options.voxel:g} m, over {MOST_BLOCKS}"
-        raise InputError(f"{text}; are depth_unit_m and depth_max_m right? If so, give a larger voxel")
-    for view in views:
-        grid.integrate(_tensor(union), *_pinhole(view), *_depth(view, options))
-    return without_fragments(extract(grid, SEEN), options.fragment)
-
-
-def without_fragments(mesh: Mesh, least: float) -> Mesh:
-    """The mesh without connected pieces of less area, m^2."""
-    if mesh.is_empty:
-        return mesh
-    labels = connected_faces(mesh.faces, len(mesh.vertices))
-    areas = np.bincount(labels, face_normals(mesh)[1])
-    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[areas[labels] >= least]))
-
-
-def _tensor(values: np.ndarray) -> Any:
-    import open3d as o3d
-
-    return o3d.core.Tensor.from_numpy(np.ascontiguousarray(values))
-
-
-def _pinhole(view: tuple[DepthCamera, np.ndarray]) -> tuple[Any, Any, Any]:
-    """A view's picture, intrinsics and extrinsics as Open3D takes them."""
-    import open3d as o3d
-
-    camera, depth = view
-    looking = camera.view  # whose pixels have their middles at halves: integration cuts projections off
-    return o3d.t.geometry.Image(_tensor(depth)), _tensor(looking.intrinsic), _tensor(looking.extrinsic)
-
-
-def _depth(view: tuple[DepthCamera, np.ndarray], options: FusionOptions) -> tuple[float, float, float]:
-    """Units in a metre, the farthest depth, m, and the truncation, voxels."""
-    camera, _ = view
-    return 1.0 / camera.depth_unit, float(camera.depth_range[1]), options.truncation
+    return without_fragments(extract(integrate(pictures, options.voxel, options.truncation), SEEN), options.fragment)

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..geometry.depth import DepthPicture
 from ..io.sequence import SequenceOptions
 from ..types import Mesh, MeshSequence
 from .fusion import FusionOptions, fuse_depths
@@ -47,6 +48,12 @@ class Recording(MeshSequence):
             return fuse_depths(depths, self.options)
         except InputError as error:
             raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
+
+    def pictures(self, index: int) -> list[DepthPicture | None]:
+        """What each camera measured in a frame; None where it lacks it (`SeesDepth`)."""
+        frame, files = self.numbers[index], self.rig.files
+        cameras = enumerate(self.rig.cameras)
+        return [camera.picture(self.rig.depth(k, frame)) if frame in files[k] else None for k, camera in cameras]
 
 
 def open_recording(

@@ -20,6 +20,7 @@ from jaxtyping import Float64, UInt16
 
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
+from ..geometry.depth import DepthPicture
 from ..io.depth import picture_size, read_depth
 from ..io.names import last_number
 from ..io.write import make_folder, replacing
@@ -90,6 +91,10 @@ class DepthCamera:
         near, far = self.depth_range
         metres = depth * self.depth_unit
         return np.where((metres >= near) & (metres <= far), depth, 0).astype(np.uint16)
+
+    def picture(self, depth: UInt16[np.ndarray, "H W"]) -> DepthPicture:
+        """What it measured, with what it takes to see where that is; depths out of its range are 0 already."""
+        return DepthPicture(self.view, depth, self.depth_unit, float(self.depth_range[1]))
 
     def record(self) -> dict[str, Any]:
         """The camera as `rig.json` has it."""

@@ -15,19 +15,20 @@ from jaxtyping import Bool, UInt16
 
 from ..analysis.segment.scene import segment
 from ..capture.fusion import FusionOptions, fuse_depths
-from ..capture.record import open_recording
+from ..capture.record import Recording, open_recording
 from ..capture.rig import RIG, DepthCamera
 from ..capture.simulate import DEEPEST, TRUTH
 from ..capture.truth import Truth, read_truth
 from ..errors import InputError
 from ..geometry.decimate import decimate_faces
+from ..geometry.depth import DepthPicture
 from ..geometry.nearest import Surface
 from ..geometry.raycast import Rays
 from ..geometry.topology import drop_unreferenced
 from ..io.meshes import read_mesh
 from ..io.sequence import open_sequence
 from ..io.write import frame_names, make_folder, replacing, write_mesh
-from ..types import Mesh, MeshSequence
+from ..types import Frames, Mesh, MeshSequence
 from .derived import Chosen
 from .rooms import SPEEDS, RoomOptions, simulate_room
 
@@ -100,6 +101,24 @@ class SceneData:
         return drop_unreferenced(Mesh.of(fused.vertices, fused.faces[votes >= LEAST_VOTES]))
 
 
+class Captured(Frames):
+    """A rig's frames, fused once and kept as files; what its cameras measured comes from the rig itself."""
+
+    def __init__(self, recording: Recording, meshes: MeshSequence) -> None:
+        self._recording, self._meshes = recording, meshes
+        self.frame_rate = meshes.frame_rate
+
+    def __len__(self) -> int:
+        return len(self._meshes)
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self._meshes[index]
+
+    def pictures(self, index: int) -> list[DepthPicture | None]:
+        """What each camera measured in a frame."""
+        return self._recording.pictures(index)
+
+
 class SceneFrames(Chosen):
     """Some frames of a captured scene, which anchors may ask for its labels."""
 
@@ -118,14 +137,13 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
         simulate_room(rig, data, options)
-    _capture(rig, meshes)
-    truth = read_truth(rig / TRUTH)
-    return SceneData(name, folder, open_sequence(meshes), truth)
-
-
-def _capture(rig: Path, meshes: Path) -> None:
-    """Fuses the frames that are not there yet, as `meshreel capture` does."""
     recording, _ = open_recording(rig, FusionOptions(), ":")
+    _capture(recording, meshes)
+    return SceneData(name, folder, Captured(recording, open_sequence(meshes)), read_truth(rig / TRUTH))
+
+
+def _capture(recording: Recording, meshes: Path) -> None:
+    """Fuses the frames that are not there yet, as `meshreel capture` does."""
     make_folder(meshes)
     for number, name in enumerate(frame_names(len(recording), "ply")):
         if not (meshes / name).exists():

@@ -24,6 +24,7 @@ VARIANTS: dict[str, Change] = {
     "errors along the surface count": lambda o: replace(o, layers=replace(o.layers, tangential=1.0)),
     "groups alone": lambda o: replace(o, predict=False),
     "no tails": lambda o: replace(o, tails=None),
+    "background from meshes": lambda o: replace(o, background=replace(o.background, depth=False)),
 }
 
 

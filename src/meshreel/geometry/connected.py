@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Int32, Int64
 
+from ..types import Mesh
+from .topology import drop_unreferenced, face_normals
+
 
 def connected(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:
     """A label 0, 1, ... for each of `count` vertices: the connected component, in order of its first vertex."""
@@ -21,3 +24,12 @@ def connected(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, 
 def connected_faces(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " F"]:
     """The label of each face's component of `count` vertices; not all labels are of a face."""
     return connected(faces, count)[faces[:, 0]]
+
+
+def without_fragments(mesh: Mesh, least: float) -> Mesh:
+    """The mesh without connected pieces of less area, m^2."""
+    if mesh.is_empty:
+        return mesh
+    labels = connected_faces(mesh.faces, len(mesh.vertices))
+    areas = np.bincount(labels, face_normals(mesh)[1])
+    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[areas[labels] >= least]))

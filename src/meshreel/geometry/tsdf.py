@@ -6,16 +6,20 @@ extracted is in an order that follows from its place alone, so the same distance
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float32, Int32
 
+from ..errors import InputError
 from ..types import Mesh
+from .depth import DepthPicture
 from .topology import clean, weld
 
 SIDE = 8  # voxels, of a block
 ROOM = 20_000  # blocks that there is room for at first; more is made when needed
+MOST_BLOCKS = 500_000  # 2 GB, and as much again while room is made
 
 
 def new_grid(voxel: float, room: int = ROOM) -> Any:
@@ -47,6 +51,39 @@ def fill_grid(
     for name, values in (("tsdf", distances), ("weight", weights)):
         grid.attribute(name)[places] = tensor(np.ascontiguousarray(values[..., None]))
     return grid
+
+
+def integrate(pictures: Sequence[DepthPicture], voxel: float, truncation: float) -> Any:
+    """The grid of what depth pictures say within `truncation` voxels of their surfaces.
+
+    Each is integrated into the blocks of all: where one camera sees through what another took for surface (flying
+    pixels, noise), it carves it away. Raises InputError where the surface takes more than `MOST_BLOCKS` blocks.
+    """
+    grid, blocks = new_grid(voxel), []
+    for picture in pictures:
+        found = grid.compute_unique_block_coordinates(*_pinhole(picture), 1.0 / picture.unit, picture.far, truncation)
+        blocks.append(found.numpy())
+    union = np.unique(np.concatenate(blocks), axis=0)
+    if len(union) > MOST_BLOCKS:
+        text = f"surface in {len(union)} blocks of {SIDE * voxel:g} m, over {MOST_BLOCKS}"
+        raise InputError(f"{text}; are depth_unit_m and depth_max_m right? If so, give a larger voxel")
+    for picture in pictures:
+        grid.integrate(_tensor(union), *_pinhole(picture), 1.0 / picture.unit, picture.far, truncation)
+    return grid
+
+
+def _pinhole(picture: DepthPicture) -> tuple[Any, Any, Any]:
+    """Picture, intrinsics and extrinsics as Open3D takes them."""
+    import open3d as o3d
+
+    camera = picture.camera  # whose pixels have their middles at halves: integration cuts projections off
+    return o3d.t.geometry.Image(_tensor(picture.depth)), _tensor(camera.intrinsic), _tensor(camera.extrinsic)
+
+
+def _tensor(values: np.ndarray) -> Any:
+    import open3d as o3d
+
+    return o3d.core.Tensor.from_numpy(np.ascontiguousarray(values))
 
 
 def extract(grid: Any, least: float) -> Mesh:

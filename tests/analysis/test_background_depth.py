@@ -1,0 +1,88 @@
+"""What stands still, from depth: a room measured over time, somebody in it, and pixels between two surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from meshreel.analysis.background import BackgroundOptions
+from meshreel.analysis.background_depth import fuse_still_depth, usual_pictures
+from meshreel.capture.fusion import FusionOptions, fuse_depths
+from meshreel.geometry.depth import SeesDepth
+from meshreel.geometry.nearest import distances
+from meshreel.types import Mesh, MeshList
+from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
+
+VOXEL = 0.02
+AHEAD = camera("ahead", 0)
+SIGMA = 8.0  # mm
+
+
+def noisy(depth: np.ndarray, seed: int) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(0, SIGMA, depth.shape)
+    return np.where(depth > 0, np.maximum(depth + noise, 0), 0).astype(np.uint16)
+
+
+def moments(depths: list[np.ndarray], moves: float | None = None):
+    """Frames with their meshes; what is nearer than `moves` along z, m, is not still."""
+    found = []
+    for depth in depths:
+        mesh = fuse_depths([(AHEAD, depth)], FusionOptions(voxel=VOXEL))
+        still = np.ones(len(mesh.faces), bool)
+        if moves is not None:
+            still = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] > moves
+        found.append(([AHEAD.picture(depth)], mesh, still))
+    return found
+
+
+def wall_error(mesh: Mesh) -> float:
+    wall = mesh.vertices[mesh.vertices[:, 2] > 1]
+    assert len(wall) > 100
+    return float(np.sqrt(((wall[:, 2] - WALL) ** 2).mean()))
+
+
+def test_noise_goes_with_the_frames():
+    depths = [noisy(measured(AHEAD), seed) for seed in range(16)]
+    errors = [wall_error(fuse_still_depth(moments(depths[:count]), VOXEL)) for count in (1, 16)]
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_the_shadow_of_who_moves_away_is_filled_and_nothing_of_him_is_left():
+    with_ball, without = measured(AHEAD), measured(AHEAD, ball=(9.0, 0.0, 0.0))
+    mesh = fuse_still_depth(moments([with_ball, with_ball, without, with_ball], moves=RADIUS + 0.2), VOXEL)
+    assert mesh.vertices[:, 2].min() > RADIUS + 0.2
+    assert np.linalg.norm(mesh.vertices[:, :2], axis=1).min() < 0.05  # the wall behind him
+
+
+def test_who_stands_still_casts_a_shadow():
+    mesh = fuse_still_depth(moments([measured(AHEAD)] * 3, moves=RADIUS + 0.2), VOXEL)
+    assert np.linalg.norm(mesh.vertices[:, :2], axis=1).min() > RADIUS
+
+
+def test_the_usual_depth_is_the_median_of_what_is_measured_and_needs_enough():
+    depth = np.full((AHEAD.height, AHEAD.width), 1000, np.uint16)
+    others = [depth, np.where(np.arange(AHEAD.width) < 8, 0, depth + 4), depth + 400]
+    nothing = Mesh.empty(), np.zeros(0, bool)
+    pictures = [([AHEAD.picture(one.astype(np.uint16))], *nothing) for one in others]
+    usual = usual_pictures(pictures, BackgroundOptions(seen=0.9))[0].depth
+    assert (usual[:, :8] == 0).all() and (usual[:, 8:] == 1004).all()
+    usual = usual_pictures(pictures, BackgroundOptions(seen=0.1))[0].depth
+    assert (usual[:, :8] == 1200).all()  # the mean of the middle two
+
+
+def test_faces_that_no_camera_sees_from_the_front_are_dropped():
+    depth = measured(AHEAD)
+    all_of_it = fuse_still_depth(moments([depth]), VOXEL, BackgroundOptions(facing=0.0))
+    front = fuse_still_depth(moments([depth]), VOXEL, BackgroundOptions(facing=0.5))
+    assert len(front.faces) < len(all_of_it.faces)
+    assert distances(front.vertices, all_of_it).max() < 1e-6
+
+
+@pytest.mark.parametrize("pictures", [[None], [], [AHEAD.picture(np.zeros((AHEAD.height, AHEAD.width), np.uint16))]])
+def test_of_nothing_there_is_nothing(pictures):
+    empty = Mesh.empty()
+    assert fuse_still_depth([(pictures, empty, np.zeros(0, bool))] * 3, VOXEL).is_empty
+
+
+def test_plain_meshes_have_no_depth():
+    assert not isinstance(MeshList((Mesh.empty(),)), SeesDepth)
