@@ -6,6 +6,7 @@ its own data: the pixels of one that stands still mostly see what they always se
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -25,13 +26,18 @@ LEAST = 0.3  # share of the pixels with a measurement below which nothing is sai
 
 
 class Recording(MeshSequence):
-    """The frames of a rig as a MeshSequence, in world coordinates."""
+    """The frames of a rig as a MeshSequence, in world coordinates.
+
+    A frame is fused when it is first asked for, and kept in a folder for temporary files as long as this object lives
+    and there is room (10 MB for half a million faces): who encodes a scene asks for it several times.
+    """
 
     def __init__(self, rig: Rig, options: FusionOptions = FusionOptions(), frames: str = ":") -> None:
         numbers = rig.frames
         chosen = SequenceOptions(frames=frames).chosen(len(numbers))
         self.rig, self.options = rig, options
         self.numbers = [numbers[index] for index in chosen]  # of the frames, in the files' names
+        self._kept = Kept()
 
     @property
     def frame_rate(self) -> float:
@@ -43,17 +49,49 @@ class Recording(MeshSequence):
 
     def __getitem__(self, index: int) -> Mesh:
         number = self.numbers[index]
+        if (kept := self._kept.get(number)) is not None:
+            return kept
         depths = self.rig.depths(number)
         try:
-            return fuse_depths(depths, self.options)
+            mesh = fuse_depths(depths, self.options)
         except InputError as error:
             raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
+        self._kept.put(number, mesh)
+        return mesh
 
     def pictures(self, index: int) -> list[DepthPicture | None]:
         """What each camera measured in a frame; None where it lacks it (`SeesDepth`)."""
         frame, files = self.numbers[index], self.rig.files
         cameras = enumerate(self.rig.cameras)
         return [camera.picture(self.rig.depth(k, frame)) if frame in files[k] else None for k, camera in cameras]
+
+
+class Kept:
+    """Meshes by number, in a folder of its own that goes when it does."""
+
+    def __init__(self) -> None:
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._files: dict[int, Path] = {}
+        self._full = False
+
+    def get(self, number: int) -> Mesh | None:
+        """The mesh as it was put; None where it is not there."""
+        if number not in self._files:
+            return None
+        with np.load(self._files[number], allow_pickle=False) as arrays:
+            return Mesh(arrays["vertices"], arrays["faces"])
+
+    def put(self, number: int, mesh: Mesh) -> None:
+        """Keeps a mesh; from when there is no room for one on, none."""
+        if self._full:
+            return
+        try:
+            self._folder = self._folder or tempfile.TemporaryDirectory(prefix="meshreel-", ignore_cleanup_errors=True)
+            path = Path(self._folder.name) / f"{number}.npz"
+            np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
+            self._files[number] = path
+        except OSError:  # what is asked for again is then made again
+            self._full = True
 
 
 def open_recording(

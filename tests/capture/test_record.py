@@ -1,0 +1,61 @@
+"""A recording fuses each frame once, keeps it while there is room, and knows what its cameras measured."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from meshreel.capture import record
+from meshreel.capture.record import Kept, open_recording
+from meshreel.geometry.depth import SeesDepth
+from meshreel.types import Mesh
+from tests.capture import depth_scenes
+from tests.capture.depth_scenes import camera
+
+CAMERAS = [camera("left", -20), camera("right", 20)]
+TRIANGLE = Mesh.of(np.array([[0, 0, 1 / 3], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
+
+
+@pytest.fixture
+def recording(tmp_path):
+    folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)])
+    return open_recording(folder)[0]
+
+
+def test_a_frame_is_fused_once_and_is_the_same_again(recording, monkeypatch):
+    first = recording[1]
+    monkeypatch.setattr(record, "fuse_depths", None)
+    again = recording[1]
+    assert np.array_equal(first.vertices, again.vertices) and np.array_equal(first.faces, again.faces)
+
+
+def test_what_is_kept_goes_with_the_recording():
+    kept = Kept()
+    kept.put(3, TRIANGLE)
+    folder = next(iter(kept._files.values())).parent
+    assert folder.is_dir() and kept.get(2) is None
+    del kept
+    assert not folder.exists()
+
+
+def test_where_there_is_no_room_frames_are_made_again(recording, monkeypatch):
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(record.np, "savez", full)
+    first, again = recording[0], recording[0]
+    assert np.array_equal(first.vertices, again.vertices) and not recording._kept._files
+
+
+def test_it_knows_what_each_camera_measured_and_which_has_nothing(tmp_path):
+    folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)])
+    (folder / "right" / "depth" / "depth_00001.png").unlink()
+    found, _ = open_recording(folder)
+    assert isinstance(found, SeesDepth)
+    both, one = found.pictures(0), found.pictures(1)
+    assert [picture is not None for picture in both] == [True, True]
+    assert one[0] is not None and one[1] is None
+    assert np.array_equal(one[0].depth, found.rig.depth(0, 1)) and one[0].unit == CAMERAS[0].depth_unit
+    shutil.rmtree(folder)
