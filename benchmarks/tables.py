@@ -146,6 +146,22 @@ def fused(rows: list[Row]) -> Table:
     return heads, told + [[r["body"], r["way"] + ": " + r["note"], *[""] * 9] for r in rows if "note" in r]
 
 
+def backgrounds(rows: list[Row]) -> Table:
+    """A row a kind of background, against the truth."""
+    heads = ["", "> median, mm", "> within 20 mm, %", "> D2, dB", "> normals, degrees", "> CPU s"]
+    return heads, [
+        [
+            r["kind"],
+            f"{1000 * r['median_m']:.2f}",
+            f"{100 * r['covered']:.2f}",
+            f"{r['d2_psnr_backward']:.1f}",
+            f"{r['normal_error_deg']:.1f}",
+            f"{r['cpu_s']:.0f}",
+        ]
+        for r in rows
+    ]
+
+
 TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "noise": noise,
     "anchors": anchors,
@@ -156,6 +172,7 @@ TABLES: dict[str, Callable[[list[Row]], Table]] = {
     "template": template,
     "tails": tails,
     "fused": fused,
+    "backgrounds": backgrounds,
 }
 
 

@@ -28,6 +28,7 @@ PEOPLE_SUBDIVIDED = ((0.1, 10), (0.02, 9))
 PEOPLE_FOUND = ((0.25, 11), (0.1, 10))
 QUALITIES = (20.0, 35.0, 50.0, 65.0, 80.0)
 DEFAULT = 50.0
+MESHES_ALONE = "background from meshes"  # in place of from the cameras' depth
 LENGTHS = (60, 240)  # frames whose memory is compared
 ANCHORS = {"a": "a: decimated Draco", "b": "b: background once, decimated Draco"}  # each with and without subdivision
 
@@ -75,6 +76,7 @@ def points(small: bool) -> Iterator[Point]:
     yield from (_anchor("background_draco", *point, None, levels=1) for point in PEOPLE_SUBDIVIDED)
     yield from (_anchor("labelled_draco", *point, None, labels=FOUND) for point in PEOPLE_FOUND)
     yield from (_system(quality) for quality in QUALITIES)
+    yield _system(DEFAULT, variant=MESHES_ALONE)
     yield Point(ROOM, "meshreel", {"preset": "paper", "centers": 2000, "group_size": 10}, None, SCENE)
     yield from (Point(name, "segmentation", {"labels": FOUND}, None, SEGMENTATION) for name in SCENES)
     yield from (Point(ROOM, "meshreel", {"quality": DEFAULT}, length, MEMORY) for length in LENGTHS)
@@ -183,8 +185,8 @@ def _anchor(codec: str, share: float, qp: int, frames: int | None = None, **chan
     return Point(ROOM, codec, {"share": share, "qp": qp} | changed, frames, SCENE)
 
 
-def _system(quality: float, frames: int | None = None) -> Point:
-    return Point(ROOM, "meshreel", {"preset": "best", "quality": quality}, frames, SCENE)
+def _system(quality: float, frames: int | None = None, **changed: Any) -> Point:
+    return Point(ROOM, "meshreel", {"preset": "best", "quality": quality} | changed, frames, SCENE)
 
 
 def _against(rows: Sequence[Row], anchor: str, measure: Measure, limited: bool) -> BdRate | None:
