@@ -11,32 +11,29 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, UInt16
+from jaxtyping import Bool
 
+from ..analysis.background import BackgroundOptions
+from ..analysis.background_depth import fuse_still_depth
 from ..analysis.segment.scene import segment
-from ..capture.fusion import FusionOptions, fuse_depths
+from ..capture.fusion import FusionOptions
 from ..capture.record import Recording, open_recording
-from ..capture.rig import RIG, DepthCamera
-from ..capture.simulate import DEEPEST, TRUTH
+from ..capture.rig import RIG
+from ..capture.simulate import TRUTH
 from ..capture.truth import Truth, read_truth
 from ..errors import InputError
 from ..geometry.decimate import decimate_faces
 from ..geometry.depth import DepthPicture
-from ..geometry.nearest import Surface
-from ..geometry.raycast import Rays
-from ..geometry.topology import drop_unreferenced
 from ..io.meshes import read_mesh
 from ..io.sequence import open_sequence
 from ..io.write import frame_names, make_folder, replacing, write_mesh
-from ..types import Frames, Mesh, MeshSequence
+from ..types import Frames, Mesh, MeshSequence, evenly
 from .derived import Chosen
 from .rooms import SPEEDS, RoomOptions, simulate_room
 
 SCENES = tuple(SPEEDS)
 TRUE = "truth"  # labels: those of the nearest clean faces
 FOUND = "found"  # labels: those that the encoder finds
-FUSED_EVERY = 2  # frames of which a background is fused
-JUDGES, LEAST_VOTES, AGREED = 5, 2, 0.01  # frames; so many must have a face of the background within so many m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +42,7 @@ class SceneData:
 
     name: str
     folder: Path  # where everything about it is kept
-    meshes: MeshSequence
+    meshes: Captured
     truth: Truth
 
     def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
@@ -70,8 +67,8 @@ class SceneData:
         return np.unpackbits(bits, count=faces).astype(bool)
 
     def background(self, source: str = TRUE) -> Mesh:
-        """What stands, fused over time from what the rig's cameras see of the meshes' static faces."""
-        path = self.folder / "background" / f"{source}.ply"
+        """What stands, fused over time from what the rig's cameras measured of it, as the encoder does."""
+        path = self.folder / "background" / f"depth-{source}.ply"
         return _kept_mesh(path, lambda: self._fused(source))
 
     def decimated(self, number: int, share: float) -> Mesh:
@@ -81,24 +78,10 @@ class SceneData:
         return _kept_mesh(path, lambda: decimate_faces(mesh, round(share * len(mesh.faces))))
 
     def _fused(self, source: str) -> Mesh:
-        depths = []
-        for number in range(0, len(self.meshes), FUSED_EVERY):
-            mesh, moves = self.meshes[number], self.labels(number, source)
-            rays = Rays(mesh)
-            depths += [(camera, _still(rays, moves, camera)) for camera in self.truth.cameras]
-        return self._agreed(fuse_depths(depths), source)
-
-    def _agreed(self, fused: Mesh, source: str) -> Mesh:
-        """What some frames have: what is only in one flew through it."""
-        middles = fused.vertices[fused.faces].mean(axis=1)
-        votes = np.zeros(len(middles), int)
-        for number in np.linspace(0, len(self.meshes) - 1, JUDGES).astype(int).tolist():
-            mesh = self.meshes[number]
-            still = Mesh.of(mesh.vertices, mesh.faces[~self.labels(number, source)])
-            if not still.is_empty:
-                apart = Surface(still).closest(middles).points - middles
-                votes += np.linalg.norm(apart, axis=1) < AGREED
-        return drop_unreferenced(Mesh.of(fused.vertices, fused.faces[votes >= LEAST_VOTES]))
+        options = BackgroundOptions()
+        meshes = ((number, self.meshes[number]) for number in evenly(len(self.meshes), options.frames))
+        moments = ((self.meshes.pictures(k), mesh, ~self.labels(k, source)) for k, mesh in meshes)
+        return fuse_still_depth(moments, FusionOptions().voxel, options)
 
 
 class Captured(Frames):
@@ -157,15 +140,6 @@ def _find_labels(meshes: MeshSequence, path: Path) -> None:
     make_folder(path.parent)
     with replacing(path) as file:
         np.savez_compressed(file, allow_pickle=False, **labels)
-
-
-def _still(rays: Rays, moves: Bool[np.ndarray, " F"], camera: DepthCamera) -> UInt16[np.ndarray, "H W"]:
-    """The depth picture of the faces that stand; 0 where one that moves is in front, or none."""
-    seen = rays.look(camera.view)
-    still = seen.faces >= 0
-    still[still] = ~moves[seen.faces[still]]
-    units = np.rint(np.where(still, seen.depth, 0) / camera.depth_unit)
-    return camera.in_range(np.where(units <= DEEPEST, units, 0).astype(np.uint16))
 
 
 def _kept_mesh(path: Path, make: Callable[[], Mesh]) -> Mesh:

@@ -67,7 +67,7 @@ class BackgroundDracoCodec:
     share: float = 0.25  # of the faces that move
     qp: int = 11
     levels: int = 0  # midpoint subdivisions in the decoder, of what moves
-    background_share: float = 0.1
+    background_share: float = 0.035  # about as many faces as meshreel's has
     background_qp: int = 11
     labels: str = TRUE  # which faces move: see SceneData.labels
 
