@@ -8,7 +8,7 @@ the unit of the meshes, m. The cell is the median length of the frame's edges, s
   the nearest one of the background, and to and fro once more: the length of the last step. 0 where the parts meet or
   cross; where they overlap it is how far one skin is from the other.
 - Overlap, at a point of the seam: how far from the seam the bodies lie on the background, on its two sides together.
-  Bodies lie on it where its closest point is within a cell, not on its border, and faces within 60 degrees the same way.
+  Bodies lie on it where its closest point is within a cell, not on its border, and faces within 45 degrees the same way.
   No more than `reach` is found on a side.
 - Uncovered: the share of the frame's surface within `reach` of the seam that is farther than a cell from both parts.
 """
@@ -34,7 +34,7 @@ from .distance import quantile
 Row = dict[str, Any]
 MM = 1000.0
 _FINE = 8  # points a cell, along the seam and on the bodies
-_SAME_WAY = 0.5  # cosine between normals
+_SAME_WAY = math.cos(math.radians(45))  # cosine between normals
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +146,9 @@ def _within(mesh: Mesh, points: Float64[np.ndarray, "N 3"], reach: float) -> Boo
     corners = mesh.vertices[mesh.faces]
     middles = corners.mean(axis=1)
     sizes = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1, initial=0.0)
-    found = ((middles >= points.min(axis=0) - reach - sizes[:, None]) & (middles <= points.max(axis=0) + reach + sizes[:, None])).all(axis=1)
-    found[found] = cKDTree(points).query(middles[found])[0] <= reach + sizes[found]
+    room = reach + sizes[:, None]
+    found = ((middles >= points.min(axis=0) - room) & (middles <= points.max(axis=0) + room)).all(axis=1)
+    found[found] = cKDTree(points).query(middles[found])[0] <= room[found, 0]
     return found
 
 
