@@ -13,7 +13,7 @@ from jaxtyping import Bool, UInt16
 
 from .analysis.segment.scene import ByMasks, ByPlace
 from .geometry.topology import drop_unreferenced
-from .scene import Tracks, segments
+from .scene import Tracks, moving_part, segments
 from .types import Mesh, MeshSequence
 from .windows import EncoderOptions
 
@@ -33,12 +33,13 @@ def label_frames(
     tracks = Tracks(segmentation.lattice.size, options)
     for frames in segments(sequence, segmentation, options):
         moving = list[Bool[np.ndarray, " F"]]()
-        parts = list[Mesh]()
+        parts, coded = list[Mesh](), list[Mesh]()
         for number in frames:
             mesh = sequence[number]
             moving.append(segmentation.moving(number, mesh))
             parts.append(drop_unreferenced(Mesh(mesh.vertices, mesh.faces[moving[-1]])))
-        bodies = tracks.of(parts)
+            coded.append(moving_part(mesh, moving[-1]))
+        bodies = tracks.of(coded)
         for place, (chosen, part) in enumerate(zip(moving, parts, strict=True)):
             labels = np.zeros(len(chosen), np.uint16)
             labels[chosen] = _numbers(part, [(track + 1, meshes[place]) for track, meshes in bodies])
@@ -46,7 +47,7 @@ def label_frames(
 
 
 def _numbers(part: Mesh, bodies: list[tuple[int, Mesh]]) -> UInt16[np.ndarray, " F"]:
-    """The number of the body that has each face of what moves; bodies have connected pieces of it, whole."""
+    """The number of the body that has each face of what moves; bodies have connected pieces of it, and some more."""
     from scipy.spatial import cKDTree
 
     found = np.zeros(len(part.faces), np.uint16)

@@ -33,7 +33,7 @@ from .geometry.connected import connected
 from .geometry.decimate import decimate, decimate_faces
 from .geometry.depth import SeesDepth
 from .geometry.nearest import distances
-from .geometry.topology import drop_unreferenced
+from .geometry.topology import drop_unreferenced, with_neighbours
 from .layered import MOST_EMPTY, encode_segment
 from .types import Frames, Mesh, MeshSequence, Placement, evenly
 from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_window
@@ -309,7 +309,16 @@ class _Some(Frames):
 
 
 def _moving(mesh: Mesh, segmentation: ByPlace | ByMasks, number: int) -> Mesh:
-    return _part(mesh, segmentation.moving(number, mesh))
+    return moving_part(mesh, segmentation.moving(number, mesh))
+
+
+def moving_part(mesh: Mesh, moves: Bool[np.ndarray, " F"]) -> Mesh:
+    """What bodies are made of: faces that move, and a ring of their neighbours.
+
+    Where a foot stands, fused surface runs from the floor up to it, a cell wide: it rests as long as the foot does, but
+    the background has the floor alone. Without the ring bodies would hover by a cell.
+    """
+    return _part(mesh, with_neighbours(mesh.faces, moves))
 
 
 def _part(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:

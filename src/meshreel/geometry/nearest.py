@@ -11,7 +11,9 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ..types import Mesh
-from .topology import face_normals
+from .topology import face_normals, unique_edges
+
+_AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +58,17 @@ def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndar
     origin = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     local = points - origin
     return np.linalg.norm(Surface(Mesh(mesh.vertices - origin, mesh.faces)).closest(local).points - local, axis=1)
+
+
+def past_border(mesh: Mesh, hits: Hits) -> Bool[np.ndarray, " N"]:
+    """Where the closest point is on the mesh's border: what it was asked for lies past the surface, not above it."""
+    edges, face_edges = unique_edges(mesh.faces)
+    border = np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1
+    ends = np.zeros(len(mesh.vertices), bool)
+    ends[edges[border].reshape(-1)] = True
+    on_edge = border[face_edges[hits.faces]] & (hits.barycentric[:, [2, 0, 1]] < _AT_BORDER)  # opposite corners
+    on_corner = ends[mesh.faces[hits.faces]] & (hits.barycentric > 1 - _AT_BORDER)
+    return on_edge.any(axis=1) | on_corner.any(axis=1)
 
 
 def carried_labels(surface: Surface, labels: Bool[np.ndarray, " F"], mesh: Mesh) -> Bool[np.ndarray, " G"]:

@@ -101,6 +101,13 @@ def drop_unreferenced(mesh: Mesh) -> Mesh:
     return Mesh.of(mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces])
 
 
+def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
+    """The chosen faces and all that share a vertex with one of them."""
+    touched = np.zeros(int(faces.max(initial=-1)) + 1, bool)
+    touched[faces[chosen]] = True
+    return touched[faces].any(axis=1)
+
+
 def concatenate(meshes: Sequence[Mesh]) -> Mesh:
     """All meshes as one, vertices and faces in their order; the mesh itself where no other has vertices."""
     meshes = [mesh for mesh in meshes if len(mesh.vertices)] or list(meshes[:1])

@@ -1,0 +1,205 @@
+"""The seam between what moves and what it touches, as decoded: how far the two parts gape, how far one lies on the other.
+
+In: a frame's mesh, which of its faces move, and the decoded background and bodies of that frame -> a Seam; lengths in
+the unit of the meshes, m. The cell is the median length of the frame's edges, so nothing depends on scale or rotation.
+
+- The seam: the border of the faces that move, where it comes within a cell of a face that stands.
+- Gap, at a point of the seam: the width of the slit. From that point to the nearest one of the bodies, from there to
+  the nearest one of the background, and to and fro once more: the length of the last step. 0 where the parts meet or
+  cross; where they overlap it is how far one skin is from the other.
+- Overlap, at a point of the seam: how far from the seam the bodies lie on the background, on its two sides together.
+  Bodies lie on it where its closest point is within a cell, not on its border, and faces within 45 degrees the same way.
+  No more than `reach` is found on a side.
+- Uncovered: the share of the frame's surface within `reach` of the seam that is farther than a cell from both parts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float64
+
+from ..errors import InputError
+from ..geometry.nearest import Surface, past_border
+from ..geometry.topology import drop_unreferenced, face_normals, unique_edges
+from ..geometry.voxels import spread
+from ..types import Mesh
+from .distance import quantile
+
+Row = dict[str, Any]
+MM = 1000.0
+_FINE = 8  # points a cell, along the seam and on the bodies
+_SAME_WAY = math.cos(math.radians(45))  # cosine between normals
+
+
+@dataclass(frozen=True, slots=True)
+class SeamOptions:
+    """What is near a seam."""
+
+    cell: float | None = None  # m; None: the median length of the frame's edges
+    reach: float = 4.0  # cells from the seam that are looked at
+
+    def __post_init__(self) -> None:
+        if not (0 < self.reach < math.inf and (self.cell is None or 0 < self.cell < math.inf)):
+            raise InputError(f"seam: cell {self.cell}, reach {self.reach:g}: give above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Seam:
+    """The seam of one frame at N points, each of which stands for some of its length."""
+
+    points: Float64[np.ndarray, "N 3"]  # m
+    lengths: Float64[np.ndarray, " N"]  # m
+    gaps: Float64[np.ndarray, " N"]  # m; infinite where a part is empty
+    overlaps: Float64[np.ndarray, " N"]  # m
+    uncovered: float  # share of the surface near the seam
+
+    def gap(self, share: float = 0.5) -> float:
+        """The gap, m, that this share of the seam's length does not exceed."""
+        return quantile(self.gaps, self.lengths, share)
+
+    def overlap(self, share: float = 0.5) -> float:
+        """The overlap, m, that this share of the seam's length does not exceed."""
+        return quantile(self.overlaps, self.lengths, share)
+
+
+def measure_seam(
+    frame: Mesh, moves: Bool[np.ndarray, " F"], background: Mesh, bodies: Mesh, options: SeamOptions = SeamOptions()
+) -> Seam | None:
+    """The seam of one frame; None where nothing that moves is near anything that stands."""
+    if moves.shape != (len(frame.faces),):
+        raise InputError(f"{len(moves)} labels for {len(frame.faces)} faces: give one a face")
+    if not moves.any() or moves.all():
+        return None
+    cell = _median_edge(frame) if options.cell is None else options.cell
+    points, lengths = _border(_part(frame, moves), cell)
+    origin = (points.min(axis=0) + points.max(axis=0)) / 2 if len(points) else np.zeros(3)  # queries are float32
+    frame, background, bodies = (Mesh(mesh.vertices - origin, mesh.faces) for mesh in (frame, background, bodies))
+    points = points - origin
+    near = _within(frame, points, options.reach * cell)
+    still = _part(frame, near & ~moves)
+    on_seam = np.zeros(len(points), bool) if still.is_empty else _distances(still, points) <= cell
+    if not on_seam.any():
+        return None
+    points, lengths = points[on_seam], lengths[on_seam]
+    near &= _within(frame, points, options.reach * cell)
+    place = _Place(points, cell, options.reach * cell, _part(frame, near), moves[near])
+    gaps, overlaps = _gaps(points, background, bodies), _overlaps(place, background, bodies)
+    return Seam(points + origin, lengths, gaps, overlaps, _uncovered(place, background, bodies))
+
+
+def seam_row(seam: Seam | None) -> Row:
+    """The numbers of a frame by name, mm; None where there is no seam."""
+    shares = {"median": 0.5, "95": 0.95}
+    row: Row = {f"seam_gap_mm_{name}": seam and MM * seam.gap(share) for name, share in shares.items()}
+    row |= {f"seam_overlap_mm_{name}": seam and MM * seam.overlap(share) for name, share in shares.items()}
+    return row | {"seam_uncovered": seam and seam.uncovered, "seam_mm": seam and MM * float(seam.lengths.sum())}
+
+
+@dataclass(frozen=True)
+class _Place:
+    """The seam and the frame's surface around it."""
+
+    points: Float64[np.ndarray, "N 3"]
+    cell: float
+    reach: float
+    frame: Mesh
+    moves: Bool[np.ndarray, " F"]
+
+    @cached_property
+    def tree(self) -> Any:
+        """Finds the nearest point of the seam."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.points)
+
+
+def _median_edge(mesh: Mesh) -> float:
+    corners = mesh.vertices[mesh.faces]
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+
+
+def _part(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
+    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen]))
+
+
+def _border(part: Mesh, cell: float) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " N"]]:
+    """Points along the edges that one face has, and the length each stands for."""
+    edges, of_faces = unique_edges(part.faces)
+    a, b = part.vertices[edges[np.bincount(of_faces.reshape(-1), minlength=len(edges)) == 1]].transpose(1, 0, 2)
+    lengths = np.linalg.norm(b - a, axis=1)
+    counts = np.maximum(np.ceil(lengths * _FINE / cell), 1).astype(int)
+    which = np.repeat(np.arange(len(counts)), counts)
+    along = (np.arange(len(which)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[which]
+    return a[which] + along[:, None] * (b - a)[which], (lengths / counts)[which]
+
+
+def _within(mesh: Mesh, points: Float64[np.ndarray, "N 3"], reach: float) -> Bool[np.ndarray, " F"]:
+    """Faces that come within reach of one of some points, and some a little farther."""
+    from scipy.spatial import cKDTree
+
+    corners = mesh.vertices[mesh.faces]
+    middles = corners.mean(axis=1)
+    sizes = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1, initial=0.0)
+    room = reach + sizes[:, None]
+    found = ((middles >= points.min(axis=0) - room) & (middles <= points.max(axis=0) + room)).all(axis=1)
+    found[found] = cKDTree(points).query(middles[found])[0] <= room[found, 0]
+    return found
+
+
+def _distances(mesh: Mesh, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+    if mesh.is_empty:
+        return np.full(len(points), np.inf)
+    return np.linalg.norm(Surface(mesh).closest(points).points - points, axis=1)
+
+
+def _gaps(points: Float64[np.ndarray, "N 3"], background: Mesh, bodies: Mesh) -> Float64[np.ndarray, " N"]:
+    if background.is_empty or bodies.is_empty:
+        return np.full(len(points), np.inf)
+    still, moving, own = Surface(background), Surface(bodies), points
+    for _ in range(2):
+        own = moving.closest(points).points
+        points = still.closest(own).points
+    return np.linalg.norm(points - own, axis=1)
+
+
+def _overlaps(place: _Place, background: Mesh, bodies: Mesh) -> Float64[np.ndarray, " N"]:
+    """At each point of the seam the farthest that bodies lie on the background, one side and the other added."""
+    widths = np.zeros((2, len(place.points)))
+    bodies = _part(bodies, _within(bodies, place.points, place.reach))
+    if not (bodies.is_empty or background.is_empty):
+        points, faces = spread(bodies, place.cell / _FINE)
+        still = Surface(background)
+        hits = still.closest(points)
+        doubled = np.linalg.norm(hits.points - points, axis=1) <= place.cell
+        doubled &= (face_normals(bodies)[0][faces] * still.normals[hits.faces]).sum(axis=1) >= _SAME_WAY
+        doubled &= ~past_border(background, hits)
+        away, at = place.tree.query(points[doubled])
+        of_bodies = place.moves[Surface(place.frame).closest(points[doubled]).faces]
+        inside = away <= place.reach
+        np.maximum.at(widths, (of_bodies[inside].astype(int), at[inside]), away[inside])
+    return _largest_around(place, widths).sum(axis=0)
+
+
+def _largest_around(place: _Place, values: Float64[np.ndarray, "2 N"]) -> Float64[np.ndarray, "2 N"]:
+    """The largest value within a cell: not every point of a jagged seam is the nearest to something."""
+    a, b = place.tree.query_pairs(place.cell, output_type="ndarray").T
+    largest = values.copy()
+    for side, own in zip(largest, values, strict=True):
+        np.maximum.at(side, a, own[b])
+        np.maximum.at(side, b, own[a])
+    return largest
+
+
+def _uncovered(place: _Place, background: Mesh, bodies: Mesh) -> float:
+    points, faces = spread(place.frame, place.cell / 2)
+    areas = (face_normals(place.frame)[1] / np.bincount(faces, minlength=len(place.frame.faces)))[faces]
+    inside = place.tree.query(points)[0] <= place.reach
+    points, areas = points[inside], areas[inside]
+    far = np.minimum(_distances(background, points), _distances(bodies, points)) > place.cell
+    return float(np.average(far, weights=areas)) if areas.sum() > 0 else 0.0
