@@ -53,7 +53,7 @@ def test_who_is_there_only_between_the_frames_looked_at_moves():
     for number in (4, 5):
         moves = found.moving(number, frames[number])
         assert overlap(moves, of_body(frames[number])) > 0.75
-        assert not (moves & found.still_at_first(number, frames[number])).any()
+        assert (moves & found.still_at_first(number, frames[number])).mean() < 0.01  # faces that are half and half
     assert not found.moving(1, frames[1]).any()
 
 
