@@ -20,7 +20,7 @@ from meshreel.encoder import encode
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.geometry.nearest import distances
-from meshreel.geometry.topology import concatenate
+from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
 from meshreel.scene import Parts, TrackGroup, encode_bodies, encode_static, take_apart
 from meshreel.types import Mesh, MeshList, Placement
@@ -325,6 +325,18 @@ def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
     assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.cell == pytest.approx(CELL, rel=0.2)
     number = 2
     assert (parts.segmentation.moving(number, ROLLING[number]) == of_body(ROLLING[number])).mean() > 0.98
+
+
+@pytest.mark.usefixtures("plainly")
+def test_still_surface_that_is_in_no_part_of_the_file_is_told(tmp_path):
+    """A shelf's worth of leaves, each too small for the background: they stand, and are dropped."""
+    leaf = Mesh.of(0.1 * np.eye(3) + 0.9, [[0, 1, 2]])
+    leaves = concatenate([moved(leaf, (0.25 * k, 0.25 * j, 0)) for k in range(5) for j in range(5)])
+    frames = [concatenate([frame, leaves]) for frame in ROLLING]
+    _, summary = encoded(frames, tmp_path / "a.reel")
+    areas = [face_normals(mesh)[1].sum() for mesh in (leaves, frames[0])]
+    (told,) = [line for line in summary.warnings if "stands still" in line]
+    assert told.startswith(f"{100 * areas[0] / areas[1]:.1f} % of the surface") and "--dynamic-only" in told
 
 
 def test_a_scene_that_is_not_in_metres_is_refused_with_its_size(tmp_path):

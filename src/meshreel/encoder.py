@@ -36,6 +36,7 @@ from .types import Frames, Mesh, MeshSequence, evenly
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
 
 MEASURED = 4  # frames of a scene that are compared with what is decoded
+ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +151,8 @@ def _encode_scene(work: _Work, path: Path, masker: Masker | None) -> Summary:
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tracks)
-    return Summary(path.stat().st_size, tuple(groups), (*_warnings(seen), *_lost(coded.dropped)), scene)
+    warnings = (*_warnings(seen), *_astray(parts.astray), *_lost(coded.dropped))
+    return Summary(path.stat().st_size, tuple(groups), warnings, scene)
 
 
 def _added_in_order(
@@ -207,6 +209,16 @@ def _lost(faces: int) -> tuple[str, ...]:
     if not faces:
         return ()
     return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
+
+
+def _astray(share: float) -> tuple[str, ...]:
+    """What a user must know of surface that stands still, by its share of all, and is in no part of the file."""
+    if share <= ASTRAY:
+        return ()
+    text = f"{100 * share:.1f} % of the surface stands still, but is far from the background that frames share"
+    return (
+        f"{text}, and is not kept: it flies, or is there for a while only; to keep all, encode with --dynamic-only",
+    )
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:

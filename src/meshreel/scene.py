@@ -33,7 +33,7 @@ from .geometry.connected import connected
 from .geometry.decimate import decimate, decimate_faces
 from .geometry.depth import SeesDepth
 from .geometry.nearest import distances
-from .geometry.topology import drop_unreferenced, with_neighbours
+from .geometry.topology import concatenate, drop_unreferenced, face_normals, with_neighbours
 from .layered import MOST_EMPTY, encode_segment
 from .types import Frames, Mesh, MeshSequence, Placement, evenly
 from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_window
@@ -67,6 +67,7 @@ class Parts:
     cell: float  # m, of the scene's mesh
     noise: float  # m, RMS distance of a frame's still surface from the background, tails and all: what bodies have
     deviation: float  # m, the same by the median, as a standard deviation: without its tails
+    astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +113,10 @@ def take_apart(
         _check_nothing_lost(sequence, segmentation, options.background)
     changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
     stages.add("background", len(sequence))
-    noise, deviation, sizes = _measured(sequence, segmentation, background, OUTLIER * cell)
+    noise, deviation, sizes, astray = _measured(sequence, segmentation, background, changes)
     unit = float(np.median(sizes)) if sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
-    return Parts(seen, segmentation, background, changes, cell, noise, deviation)
+    return Parts(seen, segmentation, background, changes, cell, noise, deviation, astray)
 
 
 def _check_nothing_lost(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: BackgroundOptions) -> None:
@@ -326,26 +327,34 @@ def _part(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
 
 
 def _measured(
-    sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh, far: float
-) -> tuple[float, float, list[float]]:
+    sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh, changes: Sequence[Change]
+) -> tuple[float, float, list[float], float]:
     """RMS distance of still surface from the background, m, its deviation by the median, m; sizes of largest bodies.
 
-    What is farther than `far` is past a border of the background.
+    What is far from the background is no noise: what it is of all surface comes last.
     """
-    squares, deviations, sizes = [], [], []
+    far = OUTLIER * segmentation.lattice.size
+    squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
     for number in evenly(len(sequence), PROBES):
         mesh = sequence[number]
         moves = segmentation.moving(number, mesh)
         if moves.any():
             sizes.append(_largest(_part(mesh, moves)))
         still = _part(mesh, ~moves)
-        if not still.is_empty and not background.is_empty:
-            gaps = distances(still.vertices, background)
+        areas = face_normals(still)[1]
+        whole += float(face_normals(mesh)[1].sum())
+        there = concatenate([background, *(change.came for change in changes if change.frame <= number)])
+        if there.is_empty:
+            lost += float(areas.sum())
+        elif not still.is_empty:
+            gaps = distances(still.vertices, there)
             deviations.append(float(np.median(gaps)) / NORMAL_MEDIAN)
             squares.append(float((gaps[gaps < far] ** 2).mean()) if (gaps < far).any() else 0.0)
+            lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
+    astray = lost / whole if whole else 0.0
     if not squares:
-        return 0.0, 0.0, sizes
-    return math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes
+        return 0.0, 0.0, sizes, astray
+    return math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes, astray
 
 
 def _largest(mesh: Mesh) -> float:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.analysis.segment.cut import _UNIT, CutOptions, _cut, _hollow, moving_places
-from meshreel.analysis.segment.places import Places
+from meshreel.analysis.segment.places import Places, Tally
 from meshreel.errors import InputError
 from meshreel.geometry.voxels import Lattice, neighbours
 
@@ -60,7 +60,10 @@ def sheet(free: np.ndarray, normals=(0.0, 0.0, 1.0)) -> Places:
     keys = lattice.keys(SIZE * (cells + 0.5))
     assert (np.diff(keys) > 0).all()
     seen = np.arange(10)[:, None] < np.broadcast_to(free, (20, 20)).reshape(-1)
-    return Places(lattice, keys, neighbours(keys), ~seen, seen, np.broadcast_to(np.array(normals), (400, 3)).copy())
+    tally = Tally(len(keys))
+    for row in seen:
+        tally.add(~row, row)
+    return Places(lattice, keys, neighbours(keys), np.broadcast_to(np.array(normals), (400, 3)).copy(), tally)
 
 
 def square(start: int, stop: int, count: int = 9) -> np.ndarray:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import tracemalloc
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
+from meshreel.analysis.segment import places as module
 from meshreel.analysis.segment.cut import moving_places
-from meshreel.analysis.segment.places import Places, PlacesOptions, find_places
+from meshreel.analysis.segment.places import Places, PlacesOptions, find_places, look
 from meshreel.analysis.segment.views import place_views
 from meshreel.errors import InputError
 from meshreel.geometry.voxels import Lattice
-from meshreel.types import Mesh
+from meshreel.types import Frames, Mesh
 from tests.metrics.shapes import moved
 from tests.scenes import CELL, RADIUS, SEGMENT, ball, room, with_room
 
@@ -24,9 +28,28 @@ def views():
     return place_views(FRAMES, SEGMENT.views)
 
 
+@dataclass(frozen=True)
+class Seen:
+    """What each frame says of each place."""
+
+    occupied: np.ndarray
+    free: np.ndarray
+
+
+def each_frame(frames, views, options: PlacesOptions = PlacesOptions()) -> Seen:
+    found = find_places(frames, views, LATTICE, options)
+    occupied, free = zip(*look(frames, range(len(frames)), found, views, options), strict=True)
+    return Seen(np.stack(occupied), np.stack(free))
+
+
 @pytest.fixture(scope="module")
 def places(views) -> Places:
     return find_places(FRAMES, views, LATTICE)
+
+
+@pytest.fixture(scope="module")
+def seen(views) -> Seen:
+    return each_frame(FRAMES, views)
 
 
 def on_ball(places: Places, x: float) -> np.ndarray:
@@ -35,18 +58,18 @@ def on_ball(places: Places, x: float) -> np.ndarray:
     return (np.abs(away - RADIUS) < 0.4 * CELL) & (places.middles[:, 2] > 3 * CELL)
 
 
-def test_where_a_ball_was_it_is_free_before_and_after(places):
+def test_where_a_ball_was_it_is_free_before_and_after(places, seen):
     first, second = on_ball(places, FROM), on_ball(places, TO)
     assert first.sum() > 100
-    assert places.occupied[:2, first].mean() > 0.98 and places.free[:2, first].mean() < 0.01
-    assert places.occupied[2:, first].mean() < 0.05 and places.free[2:, first].mean() > 0.6  # the rest is hidden
-    assert places.occupied[2:, second].mean() > 0.98 and places.free[:2, second].mean() > 0.6
+    assert seen.occupied[:2, first].mean() > 0.98 and seen.free[:2, first].mean() < 0.01
+    assert seen.occupied[2:, first].mean() < 0.05 and seen.free[2:, first].mean() > 0.6  # the rest is hidden
+    assert seen.occupied[2:, second].mean() > 0.98 and seen.free[:2, second].mean() > 0.6
 
 
-def test_the_room_is_never_free(places):
-    of_room = (places.middles < 0.6 * CELL).any(axis=1) & ~places.free.any(axis=0)
+def test_the_room_is_never_free(places, seen):
+    of_room = (places.middles < 0.6 * CELL).any(axis=1) & ~seen.free.any(axis=0)
     assert (of_room.sum() / (places.middles < 0.6 * CELL).any(axis=1).sum()) > 0.97
-    assert not (places.occupied & places.free).any()
+    assert not (seen.occupied & seen.free).any()
 
 
 def test_normals_are_those_of_what_was_there(places):
@@ -57,26 +80,84 @@ def test_normals_are_those_of_what_was_there(places):
     assert np.allclose(np.linalg.norm(places.normals, axis=1), 1, atol=1e-5)
 
 
-def test_the_order_of_time_does_not_matter(places, views):
+def test_the_order_of_time_does_not_matter(places, views, seen):
     back = find_places(FRAMES[::-1], views, LATTICE)
     assert np.array_equal(back.keys, places.keys) and np.array_equal(back.beside, places.beside)
-    assert np.array_equal(back.free, places.free[::-1]) and np.array_equal(back.occupied, places.occupied[::-1])
+    rows = each_frame(FRAMES[::-1], views)
+    assert np.array_equal(rows.free, seen.free[::-1]) and np.array_equal(rows.occupied, seen.occupied[::-1])
     assert np.array_equal(back.free_share, places.free_share)
+    for one, other in ((back.tally.before, places.tally.after), (back.tally.after, places.tally.before)):
+        assert np.array_equal(one.first, other.first) and (one.count == other.count)[one.first >= 0].all()
     np.testing.assert_allclose(back.normals, places.normals, atol=1e-4)
     assert np.array_equal(moving_places(back), moving_places(places))
 
 
 def test_the_same_frames_have_the_same_places(places, views):
-    again = find_places(iter(FRAMES), views, LATTICE)
-    for name in ("keys", "beside", "occupied", "free", "normals"):
+    again = find_places(list(FRAMES), views, LATTICE)
+    for name in ("keys", "beside", "normals"):
         assert getattr(again, name).tobytes() == getattr(places, name).tobytes()
+    for name in ("occupied", "free"):
+        assert getattr(again.tally, name).tobytes() == getattr(places.tally, name).tobytes()
 
 
-def test_more_views_that_must_agree_find_less_free(places, views):
-    strict = find_places(FRAMES, views, LATTICE, PlacesOptions(views=4))
-    assert 0 < strict.free.sum() < places.free.sum() and not (strict.free & ~places.free).any()
-    far = find_places(FRAMES, views, LATTICE, PlacesOptions(past=6.0))
-    assert far.free.sum() < places.free.sum() and not (far.free & ~places.free).any()
+def test_what_is_counted_is_what_each_frame_says(places, seen):
+    tally, rows = places.tally, np.arange(len(FRAMES))[:, None]
+    assert tally.frames == len(FRAMES)
+    assert np.array_equal(tally.free, seen.free.sum(axis=0)) and np.array_equal(
+        tally.occupied, seen.occupied.sum(axis=0)
+    )
+    after = seen.occupied & (rows > np.where(seen.free, rows, -1).max(axis=0))
+    stays = seen.free.any(axis=0) & after.any(axis=0)
+    assert stays.sum() > 100 and np.array_equal(tally.after.first >= 0, stays)
+    assert np.array_equal(tally.after.first[stays], np.argmax(after, axis=0)[stays])
+    assert np.array_equal(tally.after.count[stays], after.sum(axis=0)[stays])
+
+
+def test_places_do_not_depend_on_how_many_frames_are_in_memory_together(places, views, monkeypatch):
+    monkeypatch.setattr(module, "_TOGETHER", 1)
+    alone = find_places(FRAMES, views, LATTICE)
+    for name in ("keys", "beside", "normals", "free_share"):
+        assert getattr(alone, name).tobytes() == getattr(places, name).tobytes()
+    for name in ("before", "after"):
+        assert getattr(alone.tally, name).first.tobytes() == getattr(places.tally, name).first.tobytes()
+
+
+def test_memory_does_not_grow_with_the_number_of_frames(views):
+    """Frames that are read when they are asked for, and more of them than are in memory together."""
+
+    def peak(count: int) -> int:
+        tracemalloc.start()
+        find_places(Again(count), views, LATTICE)
+        size = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return size
+
+    assert peak(192) < 1.02 * peak(64)
+
+
+class Again(Frames):
+    """Four frames again and again, each new when it is read."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, index: int) -> Mesh:
+        if index >= self._count:
+            raise IndexError(index)
+        mesh = FRAMES[index % len(FRAMES)]
+        return Mesh(mesh.vertices.copy(), mesh.faces.copy())
+
+
+@pytest.mark.parametrize(
+    ("count", "rate", "least"), [(20, 30.0, 20), (60, 30.0, 32), (240, 30.0, 32), (900, 30.0, 120), (5, 0.1, 5)]
+)
+def test_some_frames_of_each_second_are_looked_at_however_long_a_recording_is(count, rate, least):
+    numbers = PlacesOptions().chosen(count, rate)
+    assert least <= len(numbers) <= least + 2 and numbers[0] == 0 and numbers[-1] == count - 1
+    assert max(np.diff(numbers)) <= max(1, 0.25 * rate + 1)
 
 
 def test_the_back_of_a_face_says_nothing_of_what_is_before_it():
@@ -84,16 +165,20 @@ def test_the_back_of_a_face_says_nothing_of_what_is_before_it():
     wall = Mesh.of(room().vertices, room().faces[:, ::-1])
     frames = [wall, moved(wall, (0, 0, 0.3))]
     there = place_views([room()], SEGMENT.views)
-    assert not find_places(frames, there, LATTICE).free.any()
+    assert not find_places(frames, there, LATTICE).tally.free.any()
 
 
 def test_nobody_looks_behind_nothing(views):
     """Where nothing is met, a place is not known to be free."""
-    alone = find_places([ball(FROM), ball(TO)], views, LATTICE)
+    alone = each_frame([ball(FROM), ball(TO)], views)
     assert alone.free.mean() < 0.2
 
 
-@pytest.mark.parametrize("wrong", [{"frames": 1}, {"past": 0.0}, {"past": float("nan")}, {"views": 0}], ids=str)
+@pytest.mark.parametrize(
+    "wrong",
+    [{"frames": 1}, {"rate": -1.0}, {"rate": float("inf")}, {"past": 0.0}, {"past": float("nan")}, {"views": 0}],
+    ids=str,
+)
 def test_options_that_cannot_be_are_refused(wrong):
     with pytest.raises(InputError, match="give"):
         PlacesOptions(**wrong)

@@ -45,6 +45,18 @@ def test_frames_that_were_not_looked_at_are_labelled_as_well():
     assert min(overlaps(ROLLING, few)) > 0.3
 
 
+def test_who_is_there_only_between_the_frames_looked_at_moves():
+    """A ball that comes after a look and is gone before the next; but for its foot, two cells above the floor."""
+    frames = with_room([NONE] * 4 + [ball(1.2)] * 2 + [NONE])
+    found = segment(MeshList(tuple(frames)), replace(SEGMENT, places=PlacesOptions(frames=3)))
+    assert not found.chosen.any()  # nothing is known of it
+    for number in (4, 5):
+        moves = found.moving(number, frames[number])
+        assert overlap(moves, of_body(frames[number])) > 0.75
+        assert (moves & found.still_at_first(number, frames[number])).mean() < 0.01  # faces that are half and half
+    assert not found.moving(1, frames[1]).any()
+
+
 @pytest.mark.parametrize("body", [NONE, ball(1.2)], ids=["alone", "with a ball that lies"])
 def test_a_still_room_with_noise_has_no_moving_places(body):
     frames = with_room([body] * 6)

@@ -1,14 +1,16 @@
 """What happens at each place of a scene over time: occupied, seen free, or not known (free-space carving).
 
 In: some frames of a scene, spread over the sequence, and views of them. Out: for every cell that any of the frames has
-surface in, in which frames there is surface in or beside it, and in which frames views see past it.
+surface in, in how many frames there is surface in or beside it, in how many views see past it, and how long it stayed.
 
 A cell beside surface counts as occupied, whatever is seen: noise moves a surface from cell to cell, and rays graze it.
+Memory does not grow with the number of frames: what happens in a frame is counted, and forgotten.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,40 +21,95 @@ from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
-from ...types import Mesh
+from ...types import Frames, Mesh, evenly
 
 _DEEPEST = 65_535  # of a stored depth; 0: nothing seen
+_FINENESS = 16  # units of a stored depth in a cell
+_TOGETHER = 32  # frames whose pictures are in memory together: what each view sees of the places is worked out once
 
 
 @dataclass(frozen=True, slots=True)
 class PlacesOptions:
     """How finely a scene is looked at, and what counts as seen free."""
 
-    frames: int = 32  # looked at, at most, spread over the sequence: memory does not grow with its length
+    frames: int = 32  # looked at, at least, spread over the sequence, or all where it has fewer
+    rate: float = 4.0  # 1/s, looked at, at least: who is there only between frames that are looked at is not carved
     past: float = 2.0  # cells that a view must see past a cell's middle
     views: int = 2  # that must see past it
 
     def __post_init__(self) -> None:
-        if self.frames < 2 or not self.past > 0 or self.views < 1:
-            raise InputError(f"{self.frames} frames, past {self.past:g}, {self.views} views: give >= 2, > 0, >= 1")
+        if self.frames < 2 or not 0 <= self.rate < math.inf or not self.past > 0 or self.views < 1:
+            text = f"{self.frames} frames, {self.rate:g} a second, past {self.past:g}, {self.views} views"
+            raise InputError(f"{text}: give >= 2, from 0 on, > 0, >= 1")
+
+    def chosen(self, count: int, frame_rate: float) -> list[int]:
+        """The frames to look at of a sequence of `count`."""
+        return evenly(count, max(self.frames, math.ceil((count - 1) / frame_rate * self.rate) + 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Stay:
+    """The time from which on there is surface at each place without it being seen free any more, by frames looked at.
+
+    Or, in reverse, until which.
+    """
+
+    first: Int32[np.ndarray, " P"]  # that has surface; -1 where the place is never seen free, or has no surface then
+    count: Int32[np.ndarray, " P"]  # frames that have surface in that time
+
+
+class Tally:
+    """What has happened at each of P places in the frames so far."""
+
+    def __init__(self, places: int) -> None:
+        self.frames = 0
+        self.occupied, self.free = np.zeros(places, np.int32), np.zeros(places, np.int32)  # frames
+        none = np.full(places, -1, np.int32)
+        self._after, self._before = (
+            Stay(none, np.zeros(places, np.int32)),
+            Stay(none.copy(), np.zeros(places, np.int32)),
+        )
+
+    def add(self, occupied: Bool[np.ndarray, " P"], free: Bool[np.ndarray, " P"]) -> None:
+        """Counts the next frame."""
+        early = occupied & (self.free == 0)
+        self._before.first[early] = self.frames
+        self._before.count[early] += 1
+        self._after.first[free] = -1
+        self._after.count[free] = 0
+        self._after.first[occupied & (self._after.first < 0)] = self.frames
+        self._after.count[occupied] += 1
+        self.occupied += occupied
+        self.free += free
+        self.frames += 1
+
+    @property
+    def after(self) -> Stay:
+        """Since each place was seen free for the last time."""
+        seen = self.free > 0
+        return Stay(np.where(seen, self._after.first, -1).astype(np.int32), self._after.count)
+
+    @property
+    def before(self) -> Stay:
+        """Until each place was seen free for the first time; frames count from the last one, backwards."""
+        known = (self.free > 0) & (self._before.first >= 0)
+        return Stay(np.where(known, self.frames - 1 - self._before.first, -1).astype(np.int32), self._before.count)
 
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Cells of a scene in T frames that were looked at."""
+    """Cells of a scene, and what happened there in the frames that were looked at."""
 
     lattice: Lattice
     keys: Int64[np.ndarray, " P"]  # sorted
     beside: Int32[np.ndarray, "P 26"]  # numbers of the cells around each; its own for none
-    occupied: Bool[np.ndarray, "T P"]  # there is surface in or beside the cell
-    free: Bool[np.ndarray, "T P"]  # and not: seen past
     normals: Float64[np.ndarray, "P 3"]  # mean of what was there, of unit length; 0 where they cancel
+    tally: Tally
 
     @property
     def free_share(self) -> Float64[np.ndarray, " P"]:
         """The share of the frames that know a place in which it is seen free."""
-        known = self.free.sum(axis=0) + self.occupied.sum(axis=0)
-        return self.free.sum(axis=0) / np.maximum(known, 1)
+        return self.tally.free / np.maximum(self.tally.free + self.tally.occupied, 1)
 
     @property
     def middles(self) -> Float64[np.ndarray, "P 3"]:
@@ -60,33 +117,105 @@ class Places:
         return self.lattice.centers(self.keys)
 
 
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """What is known of one frame."""
+
+    cells: Int64[np.ndarray, " C"]  # keys of those that it has surface in, sorted
+    depths: list[UInt16[np.ndarray, "H W"]]  # of each view, in units
+
+
 def find_places(
-    frames: Iterable[Mesh], views: Sequence[PinholeCamera], lattice: Lattice, options: PlacesOptions = PlacesOptions()
+    frames: Sequence[Mesh] | Frames,
+    views: Sequence[PinholeCamera],
+    lattice: Lattice,
+    options: PlacesOptions = PlacesOptions(),
 ) -> Places:
-    """The places of a scene; one frame in memory at a time."""
-    cells, sums, depths, unit = [], [], [], lattice.size / 16
-    for mesh in frames:
+    """The places of a scene; one frame in memory at a time. What comes after the first 32 frames is read twice.
+
+    About 1 s of CPU for a frame of 500,000 faces.
+    """
+    first, known = list[_Look](), _Known()
+    for number, mesh in enumerate(frames):
         own, normals = _cells(mesh, lattice)
-        cells.append(own)
-        sums.append(normals)
-        rays = Rays(mesh)
-        depths.append([_stored(rays, view, unit) for view in views])
-    keys = distinct(np.concatenate(cells))
-    beside = neighbours(keys)
-    mean = np.zeros((len(keys), 3), np.float32)
-    for own, normals in zip(cells, sums, strict=True):
-        mean[np.searchsorted(keys, own)] += normals
-    occupied = np.stack([_near(keys, beside, own) for own in cells])
-    seen = np.zeros((len(cells), len(keys)), np.uint8)
-    middles = lattice.centers(keys)
+        known.add(own, normals)
+        if number < _TOGETHER:
+            first.append(_Look(own, _depths(mesh, views, lattice)))
+    keys, normals = known.places()
+    places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)))
+    for occupied, free in _seen(first, places, views, options):
+        places.tally.add(occupied, free)
+    first.clear()
+    for occupied, free in look(frames, range(_TOGETHER, len(frames)), places, views, options):
+        places.tally.add(occupied, free)
+    return places
+
+
+def look(
+    frames: Sequence[Mesh] | Frames,
+    numbers: range,
+    places: Places,
+    views: Sequence[PinholeCamera],
+    options: PlacesOptions = PlacesOptions(),
+) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
+    """Where each of some frames has surface in or beside a place, and where not, and views see past it."""
+    for start in range(0, len(numbers), _TOGETHER):
+        meshes = (frames[number] for number in numbers[start : start + _TOGETHER])
+        yield from _seen([_look(mesh, places.lattice, views) for mesh in meshes], places, views, options)
+
+
+def _seen(
+    looks: Sequence[_Look], places: Places, views: Sequence[PinholeCamera], options: PlacesOptions
+) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
+    """As `look`, of frames whose pictures are in memory."""
+    seen = np.zeros((len(looks), len(places.keys)), np.uint8)
+    middles, size = places.middles, places.lattice.size
     for number, view in enumerate(views):
         pixels, inside, depth = _projected(view, middles)
-        limit = (depth + options.past * lattice.size) / unit
-        for frame, pictures in enumerate(depths):
-            seen[frame, inside[pictures[number].reshape(-1)[pixels] > limit]] += 1
-    length = np.linalg.norm(mean, axis=1, keepdims=True)
-    normals = (mean / np.where(length > 0, length, 1)).astype(np.float64)
-    return Places(lattice, keys, beside, occupied, (seen >= options.views) & ~occupied, normals)
+        limit = (depth + options.past * size) / (size / _FINENESS)
+        for row, one in zip(seen, looks, strict=True):
+            row[inside[one.depths[number].reshape(-1)[pixels] > limit]] += 1
+    for row, one in zip(seen, looks, strict=True):
+        occupied = _near(places.keys, places.beside, one.cells)
+        yield occupied, (row >= options.views) & ~occupied
+
+
+class _Known:
+    """The cells that any of the frames so far has surface in, and the sums of its normals there."""
+
+    def __init__(self) -> None:
+        self._keys, self._sums = np.zeros(0, np.int64), np.zeros((0, 3), np.float32)
+        self._new = list[tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]]()
+
+    def add(self, cells: Int64[np.ndarray, " C"], normals: Float32[np.ndarray, "C 3"]) -> None:
+        """Takes in a frame."""
+        self._new.append((cells, normals))
+        if len(self._new) == _TOGETHER:  # sorting all keys anew for each frame would take longer
+            self._take()
+
+    def places(self) -> tuple[Int64[np.ndarray, " P"], Float64[np.ndarray, "P 3"]]:
+        """The keys of the cells, sorted, and the mean normals there, of unit length; 0 where they cancel."""
+        self._take()
+        length = np.linalg.norm(self._sums, axis=1, keepdims=True)
+        return self._keys, (self._sums / np.where(length > 0, length, 1)).astype(np.float64)
+
+    def _take(self) -> None:
+        before = (self._keys, self._sums)
+        self._keys = distinct(np.concatenate([self._keys, *(cells for cells, _ in self._new)]))
+        self._sums = np.zeros((len(self._keys), 3), np.float32)
+        for cells, normals in (before, *self._new):
+            self._sums[np.searchsorted(self._keys, cells)] += normals
+        self._new.clear()
+
+
+def _look(mesh: Mesh, lattice: Lattice, views: Sequence[PinholeCamera]) -> _Look:
+    points, _ = spread(mesh, 1.5 * lattice.size)
+    return _Look(distinct(lattice.keys(points)), _depths(mesh, views, lattice))
+
+
+def _depths(mesh: Mesh, views: Sequence[PinholeCamera], lattice: Lattice) -> list[UInt16[np.ndarray, "H W"]]:
+    rays = Rays(mesh)
+    return [_stored(rays, view, lattice.size / _FINENESS) for view in views]
 
 
 def _cells(mesh: Mesh, lattice: Lattice) -> tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]:

@@ -21,7 +21,7 @@ from ...geometry.connected import connected_faces
 from ...geometry.raycast import Rays, Seen
 from ...geometry.topology import face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
-from ...types import Frames, Mesh, MeshSequence
+from ...types import Frames, Mesh, MeshSequence, evenly
 from .cut import CutOptions, moving_places
 from .masks import Masker
 from .places import PlacesOptions, find_places
@@ -30,6 +30,7 @@ from .views import ViewsOptions, place_views
 from .votes import Votes
 
 _PROBES = 3  # frames that the views are placed by
+_ELSEWHERE = 2.0  # cells from the middle of the nearest known place, from which on a surface is at none
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,7 @@ class Segmentation(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ByPlace:
-    """What is at a moving place moves, whenever it is there."""
+    """What is at a moving place moves, whenever it is there; and what is at none that is known: the room is known."""
 
     lattice: Lattice
     keys: Int64[np.ndarray, " P"]  # of the places, sorted
@@ -70,29 +71,33 @@ class ByPlace:
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """By where the faces are; the frame's number matters where the room changes."""
         chosen = self.chosen & (frame >= self.rest.until) & (frame < self.rest.since)
-        return without_islands(mesh, self.faces_at(mesh, chosen), self.island)
+        return without_islands(mesh, self.faces_at(mesh, chosen, elsewhere=True), self.island)
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """The faces of frame `frame` that belong to the room as it is in the first frame."""
         return self.faces_at(mesh, ~self.chosen | (self.rest.until > frame))
 
-    def faces_at(self, mesh: Mesh, chosen: Bool[np.ndarray, " P"]) -> Bool[np.ndarray, " F"]:
-        """The faces most of whose surface is at chosen places; where nobody looked, the nearest place counts."""
-        if mesh.is_empty or not chosen.any():
+    def faces_at(self, mesh: Mesh, chosen: Bool[np.ndarray, " P"], elsewhere: bool = False) -> Bool[np.ndarray, " F"]:
+        """The faces most of whose surface is at chosen places, or, where that is asked for, at none that is known.
+
+        What is beside a known place counts as there.
+        """
+        if mesh.is_empty or not (chosen.any() or (elsewhere and len(self.keys))):
             return np.zeros(len(mesh.faces), bool)
         points, faces = spread(mesh, 1.5 * self.lattice.size)
-        there = np.bincount(faces, chosen[self._place(points)], len(mesh.faces))
+        there = np.bincount(faces, np.append(chosen, elsewhere)[self._place(points)], len(mesh.faces))
         return there >= 0.5 * np.bincount(faces, minlength=len(mesh.faces))
 
     def _place(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
-        """The number of the place that each point is at, or of the nearest."""
+        """The number of the place that each point is at, or of the nearest; P where none is near."""
         from scipy.spatial import cKDTree
 
         asked = self.lattice.keys(points)
-        number = np.minimum(np.searchsorted(self.keys, asked), len(self.keys) - 1)
-        unknown = np.flatnonzero(self.keys[number] != asked)
+        number = np.searchsorted(self.keys, asked)
+        unknown = np.flatnonzero(np.append(self.keys, -1)[number] != asked)
         if len(unknown):
-            number[unknown] = cKDTree(self.lattice.centers(self.keys)).query(points[unknown])[1]
+            tree, reach = cKDTree(self.lattice.centers(self.keys)), _ELSEWHERE * self.lattice.size
+            number[unknown] = tree.query(points[unknown], distance_upper_bound=reach)[1]
         return number
 
 
@@ -133,13 +138,13 @@ class ByMasks:
 
 
 def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByPlace:
-    """What moves in a scene, by geometric change over the whole of it; at most so many frames are looked at."""
-    chosen = _with_surface(frames, options.places.frames)
+    """What moves in a scene, by geometric change over the whole of it; `options` say which frames are looked at."""
+    chosen = _with_surface(frames, options.places.chosen(len(frames), frames.frame_rate))
     lattice = _lattice(frames, chosen)
     if not chosen:
         return ByPlace(lattice, np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), options.island)
     views = _views(frames, chosen, options)
-    places = find_places((frames[number] for number in chosen), views, lattice, options.places)
+    places = find_places(_Some(frames, chosen), views, lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
     return ByPlace(lattice, places.keys, moving, rest, options.island)
@@ -147,7 +152,7 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) ->
 
 def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
     """What moves by somebody's masks. Who must see all frames before the first mask has a method `observe`."""
-    chosen = _with_surface(frames, _PROBES) or _with_surface(frames, len(frames))
+    chosen = _to_see(frames)
     views = _looking(getattr(masker, "views", None), frames, chosen) or _views(frames, chosen, options)
     if observe := getattr(masker, "observe", None):
         for number in range(len(frames)):
@@ -157,7 +162,7 @@ def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = Segment
 
 def scene_views(frames: Frames, options: SegmentOptions = SegmentOptions()) -> tuple[PinholeCamera, ...]:
     """What a scene is looked at from. Raises InputError where no frame has a surface to place views by."""
-    return _views(frames, _with_surface(frames, _PROBES) or _with_surface(frames, len(frames)), options)
+    return _views(frames, _to_see(frames), options)
 
 
 def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) -> Bool[np.ndarray, " F"]:
@@ -205,9 +210,13 @@ def _looks(mesh: Mesh, views: Sequence[PinholeCamera]) -> list[Seen]:
     return [rays.look(view) for view in views]
 
 
-def _with_surface(frames: Frames, most: int) -> list[int]:
-    """Some frames, evenly spread; of at most so many, those that have a surface."""
-    numbers = sorted({round(k) for k in np.linspace(0, len(frames) - 1, min(most, len(frames)))})
+def _to_see(frames: Frames) -> list[int]:
+    """A few frames that have a surface; all that have where that is none of the few."""
+    return _with_surface(frames, evenly(len(frames), _PROBES)) or _with_surface(frames, range(len(frames)))
+
+
+def _with_surface(frames: Frames, numbers: Sequence[int]) -> list[int]:
+    """Those of some frames that have a surface."""
     return [number for number in numbers if not frames[number].is_empty]
 
 

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Int32, Int64
 
 from ...errors import InputError
 from .cut import connected
-from .places import Places
+from .places import Places, Stay
 
 NEVER = np.iinfo(np.int32).max
 _FEWEST = 3  # frames looked at that know a place in its time of rest
@@ -65,8 +65,8 @@ def find_rest(
     """The rest of moving places; `numbers` are the frames that were looked at."""
     rest = Rest.none(len(places.keys))
     frames = np.asarray(numbers, np.int32)
-    late = _settled(places.occupied, places.free, frames, frame_rate, options)
-    early = _settled(places.occupied[::-1], places.free[::-1], -frames[::-1], frame_rate, options)
+    late = _settled(places.tally.after, frames, frame_rate, options)
+    early = _settled(places.tally.before, -frames[::-1], frame_rate, options)
     least = round(options.least / places.lattice.size**2)
     for at, order, out, sign in ((late, frames, rest.since, 1), (early, frames[::-1], rest.until, -1)):
         for group in _together(places, moving & (at >= 0), at, least):
@@ -79,8 +79,8 @@ def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) ->
     """Moving places that are never seen free, as where a chair meets the floor, rest as the nearest that are."""
     from scipy.spatial import cKDTree
 
-    known = np.flatnonzero(moving & places.free.any(axis=0))
-    unknown = np.flatnonzero(moving & ~places.free.any(axis=0))
+    free = places.tally.free > 0
+    known, unknown = np.flatnonzero(moving & free), np.flatnonzero(moving & ~free)
     if not rest.changes or not len(unknown):
         return rest
     nearest = known[cKDTree(places.middles[known]).query(places.middles[unknown])[1]]
@@ -90,25 +90,16 @@ def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) ->
 
 
 def _settled(
-    occupied: Bool[np.ndarray, "T P"],
-    free: Bool[np.ndarray, "T P"],
-    frames: Int32[np.ndarray, " T"],
-    frame_rate: float,
-    options: SettleOptions,
+    stay: Stay, frames: Int32[np.ndarray, " T"], frame_rate: float, options: SettleOptions
 ) -> Int64[np.ndarray, " P"]:
     """The first of the frames looked at from which each place has surface to the end; -1 where it has not.
 
     Only places that are seen free before.
     """
-    count = len(frames)
-    number = np.arange(count)[:, None]
-    last = np.where(free, number, -1).max(axis=0)  # that sees the place free
-    after = occupied & (number > last)
-    first = np.argmax(after, axis=0)
-    share = after.sum(axis=0) / (count - first)
-    long = frames[-1] - frames[first] >= options.rest * frame_rate
-    full = (share >= options.share) & (after.sum(axis=0) >= _FEWEST)
-    return np.where((last >= 0) & long & full, first, -1)
+    share = stay.count / (len(frames) - stay.first)
+    long = frames[-1] - frames[stay.first] >= options.rest * frame_rate
+    full = (share >= options.share) & (stay.count >= _FEWEST)
+    return np.where((stay.first >= 0) & long & full, stay.first, -1).astype(np.int64)
 
 
 def _together(
