@@ -16,7 +16,6 @@ the unit of the meshes, m. The cell is the median length of the frame's edges, s
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

@@ -25,8 +25,8 @@ WHOLE = ((0.2, 12), (0.1, 11), (0.05, 11), (0.02, 10), (0.01, 9), (0.005, 9))  #
 WHOLE_SUBDIVIDED = ((0.05, 11), (0.02, 10))
 PEOPLE = ((0.5, 11), (0.25, 11), (0.1, 10), (0.05, 10), (0.02, 9))  # anchor b, of what moves
 PEOPLE_SUBDIVIDED = ((0.1, 10), (0.02, 9))
-PEOPLE_FOUND = ((0.25, 11), (0.1, 10))
-QUALITIES = (20.0, 35.0, 50.0, 65.0, 80.0)
+PEOPLE_FOUND = ((0.1, 10),)
+QUALITIES = (50.0, 20.0, 80.0, 35.0)
 DEFAULT = 50.0
 MESHES_ALONE = "background from meshes"  # in place of from the cameras' depth
 LENGTHS = (60, 240)  # frames whose memory is compared
@@ -70,15 +70,15 @@ def points(small: bool) -> Iterator[Point]:
         yield _system(DEFAULT, frames)
         return
     yield Point(STANDING, "captured", {}, None, FLOOR)
-    yield from (_anchor("scene_draco", *point) for point in WHOLE)
-    yield from (_anchor("scene_draco", *point, None, levels=1) for point in WHOLE_SUBDIVIDED)
+    yield from (_system(quality) for quality in QUALITIES)
+    yield Point(ROOM, "meshreel", {"preset": "paper", "centers": 2000, "group_size": 10}, None, SCENE)
+    yield from (Point(name, "segmentation", {"labels": FOUND}, None, SEGMENTATION) for name in SCENES)
     yield from (_anchor("background_draco", *point) for point in PEOPLE)
     yield from (_anchor("background_draco", *point, None, levels=1) for point in PEOPLE_SUBDIVIDED)
     yield from (_anchor("labelled_draco", *point, None, labels=FOUND) for point in PEOPLE_FOUND)
-    yield from (_system(quality) for quality in QUALITIES)
+    yield from (_anchor("scene_draco", *point) for point in WHOLE)
+    yield from (_anchor("scene_draco", *point, None, levels=1) for point in WHOLE_SUBDIVIDED)
     yield _system(DEFAULT, variant=MESHES_ALONE)
-    yield Point(ROOM, "meshreel", {"preset": "paper", "centers": 2000, "group_size": 10}, None, SCENE)
-    yield from (Point(name, "segmentation", {"labels": FOUND}, None, SEGMENTATION) for name in SCENES)
     yield from (Point(ROOM, "meshreel", {"quality": DEFAULT}, length, MEMORY) for length in LENGTHS)
 
 
