@@ -10,7 +10,7 @@ quality means the same for a person in a room as for one alone.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -219,19 +219,27 @@ def encode_bodies(
             normalised = [parts.seen.normalise(mesh) for mesh in meshes]
             for run in _runs(normalised, frames, parts.seen, options):
                 jobs.append((track, frames.start + run.start, normalised[run.start : run.stop]))
-        coded = map if executor is None else executor.map
-        for (track, first, _), groups in zip(jobs, coded(_encoded, [(job[2], options) for job in jobs]), strict=True):
+        tasks = [(job[2], options) for job in jobs]
+        coded = map(_groups, tasks) if executor is None else executor.map(_encoded, tasks)
+        done, count = 0, sum(len(job[2]) for job in jobs)
+        for (track, first, _), groups in zip(jobs, coded, strict=True):
             for group in groups:
                 found.append(TrackGroup(track, first, group))
                 first += group.frame_count
-        stages.add("code", len(frames))
+                before, done = done, done + group.frame_count  # frames of all tracks are told as frames of the scene
+                stages.add("code", done * len(frames) // count - before * len(frames) // count)
         found += tracks.late(frames)
     return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
 
 
-def _encoded(job: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
-    frames, options = job
-    return list((encode_segment if options.form == Form.LAYERS else encode_window)(frames, options))
+def _groups(task: tuple[list[Mesh], EncoderOptions]) -> Iterable[EncodedGroup]:
+    frames, options = task
+    return (encode_segment if options.form == Form.LAYERS else encode_window)(frames, options)
+
+
+def _encoded(task: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
+    """In a worker."""
+    return list(_groups(task))
 
 
 def segments(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: EncoderOptions) -> Iterator[range]:

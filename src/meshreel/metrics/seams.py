@@ -1,4 +1,4 @@
-"""The seam between what moves and what it touches, as decoded: how far the two parts gape, how far one lies on the other.
+"""The seam between what moves and what it touches, as decoded: how far both gape, how far one lies on the other.
 
 In: a frame's mesh, which of its faces move, and the decoded background and bodies of that frame -> a Seam; lengths in
 the unit of the meshes, m. The cell is the median length of the frame's edges, so nothing depends on scale or rotation.
@@ -8,7 +8,7 @@ the unit of the meshes, m. The cell is the median length of the frame's edges, s
   the nearest one of the background, and to and fro once more: the length of the last step. 0 where the parts meet or
   cross; where they overlap it is how far one skin is from the other.
 - Overlap, at a point of the seam: how far from the seam the bodies lie on the background, on its two sides together.
-  Bodies lie on it where its closest point is within a cell, not on its border, and faces within 45 degrees the same way.
+  Bodies lie on it where its closest point is within a cell, not on its border, and faces the same way within 45 degrees.
   No more than `reach` is found on a side.
 - Uncovered: the share of the frame's surface within `reach` of the seam that is farther than a cell from both parts.
 """
