@@ -14,7 +14,7 @@ from jaxtyping import Float64
 
 from meshreel.analysis.segment.scene import segment
 from meshreel.capture.fusion import FusionOptions
-from meshreel.capture.record import open_recording
+from meshreel.capture.record import Recording, open_recording
 from meshreel.capture.room import RoomOptions, furnished_room, room_cameras
 from meshreel.capture.simulate import SensorOptions, simulate_rig
 from meshreel.decoder import open as open_video
@@ -22,7 +22,7 @@ from meshreel.encoder import encode
 from meshreel.geometry.topology import components, concatenate, drop_unreferenced
 from meshreel.metrics.cameras import Box, OrthographicCamera
 from meshreel.presets import preset_options
-from meshreel.types import Mesh, MeshList
+from meshreel.types import Mesh
 
 FRAMES, SHOWN = 20, 9
 WIDTH, NOISE, VOXEL = 256, 0.3, 0.03  # as `meshreel demo` has them
@@ -34,9 +34,9 @@ FROM = np.array([0.42, 0.42, 1.0])  # where the picture is seen from
 
 def draw(path: Path) -> None:
     """A fused frame, the faces that move, the background alone, the frame decoded."""
-    capture = captured()
-    frame, moves = capture[SHOWN], segment(capture).moving(SHOWN, capture[SHOWN])
     with tempfile.TemporaryDirectory() as folder:
+        capture = captured(Path(folder) / "rig")
+        frame, moves = capture[SHOWN], segment(capture).moving(SHOWN, capture[SHOWN])
         encode(capture, Path(folder) / "room.reel", preset_options())
         with open_video(Path(folder) / "room.reel") as video:
             background, decoded = video.background(SHOWN), video[SHOWN]
@@ -49,13 +49,11 @@ def draw(path: Path) -> None:
     sheet.write(path)
 
 
-def captured() -> MeshList:
+def captured(folder: Path) -> Recording:
     """The frames as they are fused."""
     room = furnished_room(RoomOptions(frames=FRAMES))
-    with tempfile.TemporaryDirectory() as folder:
-        simulate_rig(Path(folder), room, room_cameras(WIDTH), room.options.frame_rate, SensorOptions(noise=NOISE))
-        recording, _ = open_recording(Path(folder), FusionOptions(VOXEL))
-        return MeshList(tuple(recording), recording.frame_rate)
+    simulate_rig(folder, room, room_cameras(WIDTH), room.options.frame_rate, SensorOptions(noise=NOISE))
+    return open_recording(folder, FusionOptions(VOXEL))[0]
 
 
 def _colored(mesh: Mesh, moves: np.ndarray) -> tuple[Mesh, Float64[np.ndarray, "V 3"]]:

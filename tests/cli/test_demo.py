@@ -13,6 +13,7 @@ from meshreel.capture.record import open_recording
 from meshreel.capture.room import RoomOptions
 from meshreel.capture.truth import read_truth
 from meshreel.cli.console import called_as
+from tests.capture.depth_scenes import camera, record
 from tests.cli.conftest import failed
 from tests.small_options import quick
 
@@ -60,6 +61,13 @@ def test_a_demo_again_leaves_nothing_of_the_one_before(run, tmp_path):
     assert (first["frames"], again["frames"]) == (3, 2)
     recording, warnings = open_recording(folder / "rig")
     assert (len(recording), len(read_truth(folder / "rig" / "truth")), warnings) == (2, 2, [])
+
+
+def test_the_rig_of_somebody_else_is_not_overwritten(run, tmp_path):
+    record(tmp_path / "rig", [camera("mine")], [(0.0, 0.0, 0.0)])
+    before = sorted(path for path in (tmp_path / "rig").rglob("*") if path.is_file())
+    failed(run("demo", "-o", tmp_path, "--frames", "2"), "rig that is not of a demo", "--output")
+    assert sorted(path for path in (tmp_path / "rig").rglob("*") if path.is_file()) == before
 
 
 @pytest.mark.usefixtures("coarse")

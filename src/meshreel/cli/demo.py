@@ -11,7 +11,8 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from ..capture.fusion import FusionOptions
-from ..capture.record import open_recording
+from ..capture.record import Recording, open_recording
+from ..capture.rig import RIG, read_cameras
 from ..capture.room import RoomOptions, furnished_room, room_cameras
 from ..capture.simulate import TRUTH, SensorOptions, simulate_rig
 from ..capture.truth import read_truth
@@ -22,7 +23,7 @@ from ..errors import InputError
 from ..evaluation.truth import compare_with_truth
 from ..metrics.sheet import SheetOptions, write_sheet
 from ..presets import preset_options
-from ..types import MeshList
+from ..types import MeshSequence
 from .compare import truth_table
 from .console import Common, StageBars, called_as
 from .encode import describe, summary_row, workers
@@ -89,28 +90,30 @@ def command(
     )
 
 
-def _captured(folder: Path, room: RoomOptions, progress: StageBars) -> MeshList:
-    """The room as its cameras see it, fused; few enough frames to keep, and slow to make."""
-    _forget(folder)
+def _captured(folder: Path, room: RoomOptions, progress: StageBars) -> Recording:
+    """The room as its cameras see it, fused."""
     sensor = SensorOptions(noise=_NOISE, seed=room.seed)
     scenes, cameras = furnished_room(room), room_cameras(WIDTH)
+    _forget(folder, [camera.name for camera in cameras])
     simulate_rig(folder, scenes, cameras, room.frame_rate, sensor, lambda k: progress("simulate", k, room.frames))
     recording, _ = open_recording(folder, FusionOptions(VOXEL))
-    meshes = []
-    for mesh in recording:
-        meshes.append(mesh)
-        progress("fuse", len(meshes), len(recording))
-    return MeshList(tuple(meshes), recording.frame_rate)
+    for number, _ in enumerate(recording):  # which keeps them
+        progress("fuse", number + 1, len(recording))
+    return recording
 
 
-def _forget(folder: Path) -> None:
-    """Removes the frames of a demo before: the rig and its truth must have the same ones."""
+def _forget(folder: Path, names: list[str]) -> None:
+    """Removes the frames of a demo before: rig and truth must have the same ones. Raises InputError for another rig."""
+    if not (folder / RIG).exists():
+        return
+    if not (folder / TRUTH).is_dir() or [camera.name for camera in read_cameras(folder)[0]] != names:
+        raise InputError(f"{folder}: has a rig that is not of a demo, and would be overwritten; give another --output")
     for pattern in ("rig.json", "corner*/depth/depth_*.png", f"{TRUTH}/frame_*.ply"):
         for path in folder.glob(pattern):
             path.unlink()
 
 
-def _judged(rig: Path, capture: MeshList, video: Video, progress: StageBars) -> dict[str, Any]:
+def _judged(rig: Path, capture: MeshSequence, video: Video, progress: StageBars) -> dict[str, Any]:
     numbers = _spread(len(capture), _JUDGED)
     truth = read_truth(rig / TRUTH)
     return compare_with_truth(capture, video, truth, numbers, lambda k: progress("truth", k, len(numbers)))
