@@ -135,22 +135,22 @@ def encode_static(parts: Parts, count: int, frame_rate: float, options: Backgrou
 
     A whole one at the start and, where it is to be refreshed, again; and a patch for each change of the room.
     """
-    if parts.background.is_empty:
-        return []
     noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
     step, most = options.lattice * noise, options.coarse * noise
     payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
-    changes = {change.frame: change for change in parts.changes}
-    found = [Static(0, payload, False)]
-    for frame in sorted({*changes, *refreshes(count, frame_rate, options)} - {0}):
+    found = [] if state.is_empty else [Static(0, payload, False)]
+    changes, again = {change.frame: change for change in parts.changes}, set(refreshes(count, frame_rate, options))
+    for frame in sorted({*changes, *again} - {0}):
+        whole = state.is_empty or frame in again
         if change := changes.get(frame):
-            gone = _gone(parts, state, change)
             came = _coded(_normalised(change.came, parts.seen), most, step)[1]
-            payload = encode_change(state, gone, came, step)
+            payload = encode_change(state, _gone(parts, state, change), came, step)
             state = decode_change(payload, state)
-            found.append(Static(frame, payload, True))
-        else:
-            found.append(Static(frame, encode_background(state, step), False))
+        if whole and not state.is_empty:
+            payload = encode_background(state, step)
+            state = decode_background(payload)  # in the order of faces that the next patch counts in
+        if not (whole and state.is_empty):
+            found.append(Static(frame, payload, not whole))
     return found
 
 
