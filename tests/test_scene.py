@@ -15,9 +15,10 @@ from meshreel.analysis.segment.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.choice import NO_ERROR
 from meshreel.coding.background import decode_background
-from meshreel.coding.intra import encode_empty, encode_intra
+from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
 from meshreel.encoder import encode
 from meshreel.errors import InputError
+from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate, face_normals
@@ -298,6 +299,18 @@ def test_a_body_keeps_its_track_whatever_the_order_of_faces():
 def test_a_body_with_a_frame_of_faces_without_area_is_coded_as_not_there():
     flat = Mesh.of(np.zeros((3, 3)), [[0, 1, 2]])
     assert tracks([at(0), flat, at(0), at(0)], segment=4) == ["x.xx"]
+
+
+@pytest.mark.usefixtures("plainly")
+def test_more_bodies_than_a_file_has_tracks_share_some():
+    plate = plane(0.5, 1)
+    many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
+    sequence = MeshList((many, many), 1.0)
+    seen = replace(survey(sequence), scale=1.0)
+    coded = encode_bodies(sequence, Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0), OPTIONS, None, Stages(None, 2))
+    assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
+    faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
+    assert sum(faces) == len(many.faces)
 
 
 @pytest.mark.usefixtures("plainly")

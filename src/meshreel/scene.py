@@ -20,7 +20,7 @@ from jaxtyping import Bool
 
 from .analysis.background import BackgroundOptions, fuse_background
 from .analysis.background_depth import fuse_still_depth
-from .analysis.bodies import find_bodies, same_bodies
+from .analysis.bodies import at_most, find_bodies, same_bodies
 from .analysis.segment.masks import Masker
 from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
 from .analysis.survey import Survey, check_one_unit
@@ -28,6 +28,7 @@ from .choice import NO_ERROR
 from .coding.background import decode_background, decode_change, encode_background, encode_change
 from .coding.intra import encode_empty
 from .errors import InputError
+from .format.checks import MOST_TRACKS
 from .format.layout import Form
 from .geometry.connected import connected
 from .geometry.decimate import decimate, decimate_faces
@@ -278,7 +279,7 @@ class Tracks:
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
         """Each track's mesh in each frame of the next segment."""
         apart = find_bodies(moving, self._cell, self._options.bodies)
-        bodies, self.dropped = apart.meshes, self.dropped + apart.dropped
+        bodies, self.dropped = at_most(apart.meshes, MOST_TRACKS), self.dropped + apart.dropped
         before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self._options.bodies)
         free = [number for number in range(len(self._last) + len(bodies) + 1) if number not in before]
         numbers = [free.pop(0) if old < 0 else old for old in before]
