@@ -341,6 +341,14 @@ def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
 
 
 @pytest.mark.usefixtures("plainly")
+def test_where_nothing_is_found_to_move_that_is_told(tmp_path):
+    """Two frames of balls that move by less than two cells."""
+    _, summary = encoded(small_scene.scene(2), tmp_path / "a.reel")
+    (told,) = summary.warnings
+    assert told.startswith("nothing moves by more than 0.16 m") and "--dynamic-only" in told
+
+
+@pytest.mark.usefixtures("plainly")
 def test_still_surface_that_is_in_no_part_of_the_file_is_told(tmp_path):
     """A shelf's worth of leaves, each too small for the background: they stand, and are dropped."""
     leaf = Mesh.of(0.1 * np.eye(3) + 0.9, [[0, 1, 2]])
