@@ -15,9 +15,10 @@ from meshreel.analysis.segment.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.choice import NO_ERROR
 from meshreel.coding.background import decode_background
-from meshreel.coding.intra import encode_empty, encode_intra
+from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
 from meshreel.encoder import encode
 from meshreel.errors import InputError
+from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate, face_normals
@@ -301,6 +302,18 @@ def test_a_body_with_a_frame_of_faces_without_area_is_coded_as_not_there():
 
 
 @pytest.mark.usefixtures("plainly")
+def test_more_bodies_than_a_file_has_tracks_share_some():
+    plate = plane(0.5, 1)
+    many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
+    sequence = MeshList((many, many), 1.0)
+    seen = replace(survey(sequence), scale=1.0)
+    coded = encode_bodies(sequence, Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0), OPTIONS, None, Stages(None, 2))
+    assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
+    faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
+    assert sum(faces) == len(many.faces)
+
+
+@pytest.mark.usefixtures("plainly")
 def test_a_background_is_no_finer_than_its_noise_asks_for():
     seen = replace(survey(MeshList((room(),))), scale=1.0)
     sizes = []
@@ -325,6 +338,14 @@ def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
     assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.cell == pytest.approx(CELL, rel=0.2)
     number = 2
     assert (parts.segmentation.moving(number, ROLLING[number]) == of_body(ROLLING[number])).mean() > 0.98
+
+
+@pytest.mark.usefixtures("plainly")
+def test_where_nothing_is_found_to_move_that_is_told(tmp_path):
+    """Two frames of balls that move by less than two cells."""
+    _, summary = encoded(small_scene.scene(2), tmp_path / "a.reel")
+    (told,) = summary.warnings
+    assert told.startswith("nothing moves by more than 0.16 m") and "--dynamic-only" in told
 
 
 @pytest.mark.usefixtures("plainly")

@@ -151,7 +151,8 @@ def _encode_scene(work: _Work, path: Path, masker: Masker | None) -> Summary:
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tracks)
-    warnings = (*_warnings(seen), *_astray(parts.astray), *_lost(coded.dropped))
+    still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.cell)
+    warnings = (*_warnings(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
     return Summary(path.stat().st_size, tuple(groups), warnings, scene)
 
 
@@ -209,6 +210,12 @@ def _lost(faces: int) -> tuple[str, ...]:
     if not faces:
         return ()
     return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
+
+
+def _still(least: float) -> tuple[str, ...]:
+    """What a user must know of a scene in which nothing was found to move, by how far it must, m."""
+    text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
+    return (f"{text}; if something does, encode with --dynamic-only",)
 
 
 def _astray(share: float) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from jaxtyping import Bool
 
 from .analysis.background import BackgroundOptions, fuse_background
 from .analysis.background_depth import fuse_still_depth
-from .analysis.bodies import find_bodies, same_bodies
+from .analysis.bodies import at_most, find_bodies, same_bodies
 from .analysis.segment.masks import Masker
 from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
 from .analysis.survey import Survey, check_one_unit
@@ -28,6 +28,7 @@ from .choice import NO_ERROR
 from .coding.background import decode_background, decode_change, encode_background, encode_change
 from .coding.intra import encode_empty
 from .errors import InputError
+from .format.checks import MOST_TRACKS
 from .format.layout import Form
 from .geometry.connected import connected
 from .geometry.decimate import decimate, decimate_faces
@@ -135,22 +136,22 @@ def encode_static(parts: Parts, count: int, frame_rate: float, options: Backgrou
 
     A whole one at the start and, where it is to be refreshed, again; and a patch for each change of the room.
     """
-    if parts.background.is_empty:
-        return []
     noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
     step, most = options.lattice * noise, options.coarse * noise
     payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
-    changes = {change.frame: change for change in parts.changes}
-    found = [Static(0, payload, False)]
-    for frame in sorted({*changes, *refreshes(count, frame_rate, options)} - {0}):
+    found = [] if state.is_empty else [Static(0, payload, False)]
+    changes, again = {change.frame: change for change in parts.changes}, set(refreshes(count, frame_rate, options))
+    for frame in sorted({*changes, *again} - {0}):
+        whole = state.is_empty or frame in again
         if change := changes.get(frame):
-            gone = _gone(parts, state, change)
             came = _coded(_normalised(change.came, parts.seen), most, step)[1]
-            payload = encode_change(state, gone, came, step)
+            payload = encode_change(state, _gone(parts, state, change), came, step)
             state = decode_change(payload, state)
-            found.append(Static(frame, payload, True))
-        else:
-            found.append(Static(frame, encode_background(state, step), False))
+        if whole and not state.is_empty:
+            payload = encode_background(state, step)
+            state = decode_background(payload)  # in the order of faces that the next patch counts in
+        if not (whole and state.is_empty):
+            found.append(Static(frame, payload, not whole))
     return found
 
 
@@ -278,7 +279,7 @@ class Tracks:
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
         """Each track's mesh in each frame of the next segment."""
         apart = find_bodies(moving, self._cell, self._options.bodies)
-        bodies, self.dropped = apart.meshes, self.dropped + apart.dropped
+        bodies, self.dropped = at_most(apart.meshes, MOST_TRACKS), self.dropped + apart.dropped
         before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self._options.bodies)
         free = [number for number in range(len(self._last) + len(bodies) + 1) if number not in before]
         numbers = [free.pop(0) if old < 0 else old for old in before]

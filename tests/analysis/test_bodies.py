@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.bodies import BodyOptions, find_bodies, same_bodies
+from meshreel.analysis.bodies import BodyOptions, at_most, find_bodies, same_bodies
 from meshreel.errors import InputError
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
@@ -57,6 +57,16 @@ def test_bits_go_to_the_nearest_body(where):
     found = find_bodies(frames, CELL)
     sizes = [len(body[0].faces) - len(BALL.faces) for body in found.meshes]
     assert sizes == ([len(BIT.faces), 0] if where == 0 else [0, len(BIT.faces)]) and found.dropped == 0
+
+
+def test_the_smallest_of_too_many_are_part_of_the_nearest():
+    bodies = [[at(0), at(0.1)], [at(4.5, mesh=BIT), NONE], [at(5), at(5)], [NONE, at(1, mesh=BIT)]]
+    found = at_most(bodies, 2)
+    assert [[len(mesh.faces) for mesh in body] for body in found] == [
+        [len(BALL.faces), len(BALL.faces) + len(BIT.faces)],
+        [len(BALL.faces) + len(BIT.faces), len(BALL.faces)],
+    ]
+    assert at_most(bodies, 4) == bodies and at_most([], 4) == []
 
 
 def test_bits_far_from_all_are_dropped_and_counted():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -184,3 +185,14 @@ def test_a_truth_that_does_not_fit_is_told(run, rig, balls, tmp_path):
     assert failed(run("compare", balls, balls, "--truth", tmp_path), "rig.json")
     assert failed(run("compare", balls, balls, "--truth", rig / "truth", "--truth-every", "0"), "--truth-every 0")
     assert failed(run("compare", balls, balls, "--truth", rig), "no clean meshes")
+
+
+def test_a_rig_is_an_original(run, rig, tmp_path):
+    """What `encode` takes, `compare` takes, with what must be known of it."""
+    assert run("capture", rig, "-o", tmp_path / "meshes", "--quiet").code == 0
+    said = run("compare", rig, tmp_path / "meshes", "--no-ssim", "--json")
+    assert said.code == 0 and said.row["frames_compared"] == 3 and said.row["d2_psnr_paper"] > 90
+    shutil.copytree(rig, tmp_path / "lossy")
+    sorted((tmp_path / "lossy").glob("*/depth/*.png"))[1].unlink()
+    said = run("compare", tmp_path / "lossy", tmp_path / "meshes", "--no-ssim", "--json")
+    assert "lacks 1 of 3 frames" in said.row["warnings"][0]

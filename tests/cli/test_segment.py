@@ -79,6 +79,29 @@ def test_masks_of_more_frames_than_are_read_are_told(run, scan, painted, tmp_pat
     assert said.code == 0 and "has masks of 2 more frames than the 2 there are" in said.err
 
 
+def test_masks_that_were_painted_in_place_are_not_replaced_by_pictures(run, scan, painted, tmp_path):
+    shutil.copytree(painted, tmp_path / "painted")
+    mask = tmp_path / "painted" / "view00" / "frame_00000.png"
+    before = mask.read_bytes()
+    said = run("segment", scan, "-o", tmp_path / "painted", "--views-only")
+    assert failed(said, "view00/frame_00000.png and 23 others are masks", "choose another folder")
+    assert mask.read_bytes() == before
+
+
+def test_what_is_left_of_a_run_before_is_told(run, scan, tmp_path):
+    out = tmp_path / "out"
+    assert run("segment", scan, "-o", out, "--previews", "2").err == ""
+    assert run("segment", scan, "-o", out, "--previews", "2").err == ""  # the same again
+    said = run("segment", scan, "-o", out, "--previews", "1", "--frames", "1:3", "--json")
+    assert [line.split("; ")[0].removeprefix(str(out)) for line in said.row["warnings"]] == [
+        "/labels holds 2 other frame files, as frame_00002.npz",
+        "/colored holds 1 other frame files, as frame_00003.ply",
+    ]
+    assert run("segment", scan, "-o", tmp_path / "views", "--views-only").err == ""
+    said = run("segment", scan, "-o", tmp_path / "views", "--views-only", "--frames", ":3", "--json")
+    assert len(said.row["warnings"]) == 6 and "view00 holds 1 other frame files" in said.row["warnings"][0]
+
+
 def test_given_cameras_are_looked_from(run, scan, painted, tmp_path):
     record = json.loads((painted / "cameras.json").read_text())
     record["parameters"] = record["parameters"][:2]

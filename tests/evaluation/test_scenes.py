@@ -10,6 +10,7 @@ import pytest
 from meshreel.capture.simulate import SceneFrame, SensorOptions, simulate_rig
 from meshreel.capture.truth import read_truth
 from meshreel.errors import InputError
+from meshreel.evaluation import scenes as module
 from meshreel.evaluation.codecs import make_codec
 from meshreel.evaluation.experiments import scenes
 from meshreel.evaluation.report import write_report
@@ -60,18 +61,39 @@ def test_labels_are_those_of_the_nearest_clean_faces_or_those_of_a_file(scene):
     middles = scene.meshes[3].vertices[scene.meshes[3].faces].mean(axis=1)
     assert np.array_equal(labels[3], middles[:, 2] < 0.5) and labels[3].any()
     assert np.array_equal(scene.labels(3), labels[3])  # as kept
-    path = scene.folder / "labels" / "found.npz"
+    path = scene.folder / "labels" / "planted.npz"
     np.savez(
         path, **{f"frame_{i:05}": np.packbits(~found) for i, found in enumerate(labels[:3])}, frame_00003=np.zeros(1)
     )
-    assert np.array_equal(scene.labels(2, "found"), ~labels[2])
+    assert np.array_equal(scene.labels(2, "planted"), ~labels[2])
     with pytest.raises(InputError, match="frame_00003 for"):
-        scene.labels(3, "found")
+        scene.labels(3, "planted")
     with pytest.raises(InputError, match=r"none\.npz: no labels of frame_00000"):
         scene.labels(0, "none")
     np.savez(path, frame_00000=np.zeros(1))
     with pytest.raises(InputError, match="no labels of frame_00001"):
-        scene.labels(1, "found")
+        scene.labels(1, "planted")
+
+
+def test_labels_that_another_encoder_has_found_are_not_taken_for_this_ones(scene, monkeypatch):
+    """Rows of a changed segmenter would have the numbers of the old one."""
+    calls = []
+
+    class Found:
+        def moving(self, _, mesh):
+            return np.full(len(mesh.faces), len(calls) == 2)
+
+    monkeypatch.setattr(module, "segment", lambda meshes: calls.append(len(meshes)) or Found())
+    module._kept_as.cache_clear()
+    assert not scene.labels(0, "found").any() and not scene.labels(1, "found").any() and calls == [4]
+    real = module.SegmentOptions
+    monkeypatch.setattr(module, "SegmentOptions", lambda: real(island=0.5))
+    module._kept_as.cache_clear()
+    assert scene.labels(0, "found").all() and calls == [4, 4]
+    monkeypatch.undo()
+    module._kept_as.cache_clear()
+    for path in (scene.folder / "labels").glob("found*"):
+        path.unlink()
 
 
 def test_the_background_is_what_stands_also_behind_what_moves(scene):
@@ -130,8 +152,8 @@ def test_the_noise_floor_is_the_input_against_the_truth(cache):
 
 def test_found_labels_are_scored(cache, scene):
     labels = {f"frame_{i:05}": np.packbits(scene.labels(i)) for i in range(4)}
-    np.savez(scene.folder / "labels" / "found.npz", **labels)
-    row = measure_scene(point("segmentation", SEGMENTATION, labels="found"), cache, cache)
+    np.savez(scene.folder / "labels" / "planted.npz", **labels)
+    row = measure_scene(point("segmentation", SEGMENTATION, labels="planted"), cache, cache)
     assert (row["iou_mean"], row["iou_worst"], row["static_called_dynamic"]) == (1.0, 1.0, 0.0)
 
 

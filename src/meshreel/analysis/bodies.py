@@ -71,6 +71,19 @@ def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = Body
     return Bodies([[concatenate(meshes) for meshes in body] for body in bodies], dropped)
 
 
+def at_most(bodies: Sequence[list[Mesh]], most: int) -> list[list[Mesh]]:
+    """So many bodies: the smallest of more become part of that which they are nearest to, by their middles."""
+    if len(bodies) <= most:
+        return list(bodies)
+    middles = np.array([np.concatenate([mesh.vertices for mesh in body]).mean(axis=0) for body in bodies])
+    order = np.argsort([-sum(len(mesh.faces) for mesh in body) for body in bodies], kind="stable")
+    kept = np.sort(order[:most])
+    parts = [[bodies[number]] for number in kept]
+    for number in np.sort(order[most:]):
+        parts[int(np.linalg.norm(middles[kept] - middles[number], axis=1).argmin())].append(bodies[number])
+    return [[concatenate(meshes) for meshes in zip(*part, strict=True)] for part in parts]
+
+
 def same_bodies(before: Sequence[Mesh], now: Sequence[Mesh], size: float, options: BodyOptions) -> list[int]:
     """For each mesh of a frame the number, among those of the frame before, of the one it continues; -1 for none.
 

@@ -27,6 +27,7 @@ from ..types import Frames, Mesh, MeshSequence
 from .console import Common, StageBars
 from .info import describe_file
 from .reading import Knowing, Looking, Reading
+from .scenes import open_source
 
 
 def command(
@@ -48,7 +49,8 @@ def command(
     Parameters
     ----------
     originals
-        The original sequence: a directory, a glob, a file or an .npz. It takes --frames and --scale as `encode` did.
+        The original sequence: a directory, a glob, a file, an .npz or a rig's folder. It takes --frames and --scale as
+        `encode` did.
     decoded
         A .reel file, or the decoded meshes.
     sheet
@@ -57,7 +59,8 @@ def command(
     options = looking.options()
     if sheet is not None and not sheet.parent.is_dir():
         raise InputError(f"{sheet}: there is no folder {sheet.parent}; make it or choose another")
-    sequence = open_sequence(originals, reading.options())
+    source = open_source([originals], reading)
+    sequence = source.sequence
     reel = is_reel(decoded)
     meshes = SequenceOptions(reading.fps, weld=weld)
     other: Video | FileSequence = open_video(decoded) if reel else open_sequence(decoded, meshes)
@@ -78,7 +81,7 @@ def command(
     if reel:
         described = describe_file(Path(decoded))
         row = {name: described[name] for name in ("bytes", "mbps", "parts", "parts_mbps")} | row
-    warnings = [*sequence.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
+    warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
     common.warn(warnings)
     texts: list[object] = [] if truth is None else [truth_table(row["truth"])]
     texts += [f"picture: {sheet}"] if sheet is not None else []
@@ -116,7 +119,7 @@ def open_truth(folder: Path, reading: Reading, count: int) -> ChosenTruth:
 
 
 def _against_truth(
-    sequence: FileSequence, other: Frames, truth: ChosenTruth, every: int, progress: StageBars
+    sequence: MeshSequence, other: Frames, truth: ChosenTruth, every: int, progress: StageBars
 ) -> dict[str, Any]:
     numbers = range(0, len(sequence), every)
     return compare_with_truth(sequence, other, truth, numbers, lambda done: progress("truth", done, len(numbers)))

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from ..container.reader import ReelReader
 from ..decoder import open as open_video
 from ..errors import FormatError, InputError
-from ..io.write import frame_names, make_folder, write_mesh
+from ..io.write import frame_names, left_over, make_folder, write_mesh
 from ..types import Mesh
 from .console import Common
 
@@ -50,9 +50,7 @@ def command(
     look = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
     make_folder(output)
     names = frame_names(len(video), format)
-    others = {path.name for path in output.glob(f"frame_*.{format}")} - set(names)
-    if others:
-        common.warn([f"{output} holds {len(others)} other frame files, as {min(others)}; they are not of this video"])
+    common.warn(left_over(output, names, f"frame_*.{format}"))
     failed: list[FormatError] = []
     with common.stages(len(video)) as progress:
         for i, name in enumerate(names):

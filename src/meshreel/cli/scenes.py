@@ -37,9 +37,13 @@ class Source:
 
 
 def open_source(inputs: Sequence[str], reading: Reading) -> Source:
-    """The frames of mesh files, or of a rig's folder, fused when they are asked for. Raises InputError."""
+    """The frames of mesh files, or of a rig's folder, fused when they are asked for. Raises InputError.
+
+    A simulated rig's truth describes its cameras, too, but has the frames themselves.
+    """
     folder = Path(inputs[0])
-    if len(inputs) > 1 or not any((folder / name).is_file() for name in (RIG, SINGLE)):
+    described = any((folder / name).is_file() for name in (RIG, SINGLE))
+    if len(inputs) > 1 or not described or any(folder.glob("frame_*.ply")):
         return Source(open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), reading.options()))
     reading.options()  # refuses what no sequence can have
     if reading.scale != _READ.scale:

@@ -16,8 +16,8 @@ from ..analysis.segment.preview import label_colors, look_at_labels, sheet
 from ..analysis.segment.scene import ByMasks, ByPlace, scene_views, segment, segment_by
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
-from ..io.masks import write_picture
-from ..io.write import frame_names, make_folder, replacing, write_colored
+from ..io.masks import is_mask, write_picture
+from ..io.write import frame_names, left_over, make_folder, replacing, write_colored
 from ..labels import FrameLabels, label_frames
 from ..presets import preset_options
 from ..types import evenly
@@ -67,15 +67,29 @@ def command(
     options = replace(options, segment=masking.options(options.segment))
     source = open_source(inputs, reading)
     masker = masking.masker(len(source.sequence))
+    left = _left_over(output, len(source.sequence), views_only, previews)
     if views_only:
         row = _write_views(source, output, options, common)
         text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
     else:
         row = _write_labels(source, masker, output, options, previews, common)
         text = f"{output}: {_told(row)}"
-    warnings = (*source.warnings, *getattr(masker, "remarks", ()))
+    warnings = (*source.warnings, *getattr(masker, "remarks", ()), *left)
     common.warn(warnings)
     common.result({"output": str(output), "warnings": warnings} | row, text)
+
+
+def _left_over(output: Path, count: int, views_only: bool, previews: int) -> tuple[str, ...]:
+    """A line for each folder with files of a run before that are not replaced. InputError where pictures are masks."""
+    if views_only:
+        places = sorted(output.glob("view*"))
+        painted = [path for place in places for path in sorted(place.glob("frame_*.png")) if is_mask(path)]
+        if painted:
+            text = f"{painted[0]} and {len(painted) - 1} others are masks"
+            raise InputError(f"{text}, which pictures would replace; choose another folder, and paint in a copy")
+        return tuple(line for place in places for line in left_over(place, frame_names(count, "png")))
+    colored = [frame_names(count, "ply")[number] for number in evenly(count, previews)]
+    return (*left_over(output / LABELS, frame_names(count, "npz")), *left_over(output / COLORED, colored))
 
 
 def _write_views(source: Source, output: Path, options: EncoderOptions, common: Common) -> dict[str, Any]:

@@ -1,21 +1,27 @@
 """The benchmark scenes, captured: noisy fused meshes, the truth, and labels of the faces that move.
 
 In: a scene's name, the benchmark data, a folder to keep things in. Out: a SceneData. What is made is kept: the rig
-(minutes), the fused meshes (a frame a second or two), the labels and the background that an anchor is given.
+(minutes), the fused meshes (a frame a second or two), the labels and the background that an anchor is given; labels
+that the encoder finds for as long as its code is the same.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from jaxtyping import Bool
 
+from .. import geometry
+from ..analysis import segment as segmenter
 from ..analysis.background import BackgroundOptions
 from ..analysis.background_depth import fuse_still_depth
-from ..analysis.segment.scene import segment
+from ..analysis.segment.scene import SegmentOptions, segment
 from ..capture.fusion import FusionOptions
 from ..capture.record import Recording, open_recording
 from ..capture.rig import RIG
@@ -53,7 +59,7 @@ class SceneData:
         if source == TRUE:
             path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
             return _kept_array(path, lambda: self.truth[number].labels_for(self.meshes[number]))
-        path, frame = self.folder / "labels" / f"{source}.npz", f"frame_{number:05}"
+        path, frame = self.folder / "labels" / f"{_kept_as(source)}.npz", f"frame_{number:05}"
         if source == FOUND and not path.exists():
             _find_labels(self.meshes, path)
         faces = len(self.meshes[number].faces)
@@ -68,7 +74,7 @@ class SceneData:
 
     def background(self, source: str = TRUE) -> Mesh:
         """What stands, fused over time from what the rig's cameras measured of it, as the encoder does."""
-        path = self.folder / "background" / f"depth-{source}.ply"
+        path = self.folder / "background" / f"depth-{_kept_as(source)}.ply"
         return _kept_mesh(path, lambda: self._fused(source))
 
     def decimated(self, number: int, share: float) -> Mesh:
@@ -131,6 +137,22 @@ def _capture(recording: Recording, meshes: Path) -> None:
     for number, name in enumerate(frame_names(len(recording), "ply")):
         if not (meshes / name).exists():
             write_mesh(recording[number], meshes / name)
+
+
+@cache
+def _kept_as(source: str) -> str:
+    """The name that labels are kept under: what the encoder finds, by the code that found it."""
+    if source != FOUND:
+        return source
+    digest = hashlib.sha256(repr(SegmentOptions()).encode())
+    for path in (path for package in (segmenter, geometry) for path in _sources(package)):
+        digest.update(path.read_bytes())
+    return f"{FOUND}-{digest.hexdigest()[:12]}"
+
+
+def _sources(package: ModuleType) -> list[Path]:
+    """The files of a package, in order."""
+    return sorted(path for folder in package.__path__ for path in Path(folder).glob("*.py"))
 
 
 def _find_labels(meshes: MeshSequence, path: Path) -> None:

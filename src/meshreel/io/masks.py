@@ -17,6 +17,7 @@ from ..errors import InputError
 from .names import last_number
 from .write import replacing
 
+_MODES = ("L", "P", "1")  # of the library that reads them: gray, palette, black and white
 _LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
 
 
@@ -26,7 +27,7 @@ def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
 
     try:
         with Image.open(path) as image:
-            if image.mode not in ("L", "P", "1"):
+            if image.mode not in _MODES:
                 raise InputError(f"{path}: a mask of mode {image.mode}; store object numbers as 8-bit gray PNG")
             return np.array(image).astype(np.uint8)
     except UnidentifiedImageError:
@@ -34,6 +35,17 @@ def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:  # SyntaxError: a damaged chunk
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({reason}); make the mask again") from None
+
+
+def is_mask(path: Path) -> bool:
+    """True for a file that could be a mask, by its header; False for pictures in colors, and for what is neither."""
+    from PIL import Image
+
+    try:
+        with Image.open(path) as image:
+            return image.mode in _MODES
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+        return False
 
 
 def write_picture(picture: UInt8[np.ndarray, "H W *C"], path: Path) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -19,6 +19,14 @@ from ..errors import InputError
 from ..types import Mesh
 
 _TOLERANCE = 1e-6  # of the diagonal: what rounding a coordinate may cost
+
+
+def left_over(folder: Path, names: Iterable[str], pattern: str = "frame_*") -> tuple[str, ...]:
+    """A line where a folder, which need not be there, holds other frames than those that are to be written into it."""
+    others = {path.name for path in folder.glob(pattern)} - set(names)
+    if not others:
+        return ()
+    return (f"{folder} holds {len(others)} other frame files, as {min(others)}; they are not of this run",)
 
 
 def frame_names(count: int, extension: str) -> list[str]:

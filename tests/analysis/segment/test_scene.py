@@ -39,6 +39,13 @@ def test_a_ball_that_rolls_is_found_and_the_room_rests(rolling):
         assert not rolling.moving(number, mesh)[on_wall].any()
 
 
+def test_a_scene_with_its_faces_inside_out_is_taken_apart_as_well(rolling):
+    inside_out = [Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1])) for mesh in ROLLING]
+    found = segment(MeshList(tuple(inside_out)), SEGMENT)
+    assert min(overlaps(inside_out, found)) > 0.9
+    assert np.array_equal(found.chosen, rolling.chosen)
+
+
 def test_frames_that_were_not_looked_at_are_labelled_as_well():
     few = segment(MeshList(tuple(ROLLING)), replace(SEGMENT, places=PlacesOptions(frames=3)))
     assert overlaps(ROLLING, few)[2] > 0.9  # where it was looked at; between, it is where nobody has looked

@@ -108,6 +108,32 @@ def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
     assert max(apart(room, np.array([1.2, 0.0, 1.5])) for room in (first, between, last)) < 0.01
 
 
+def test_a_background_that_is_sent_again_where_it_changes_is_whole(scene: MeshList, found: ByPlace) -> None:
+    """Who joins then waits for the next whole one, and patches after it count in its faces."""
+    gone, came = found.rest.changes
+    room = replace(preset_options().background, refresh=gone / 4.0)
+    parts = take_apart(scene, survey(scene), replace(preset_options(quality=30), segment=OPTIONS), Stages(None, FRAMES))
+    states = encode_static(parts, FRAMES, 4.0, room)
+    whole = {frame: frame % gone == 0 for frame in sorted({*range(0, FRAMES, gone), came})}
+    assert {state.frame: not state.is_patch for state in states} == whole
+    place, mesh = Placement(parts.seen.unit, tuple(parts.seen.center)), Mesh.empty()
+    here, there = (np.array([x, 0.4, 1.0]) for x in (0.5, 1.8))
+    for state in states:
+        mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
+        assert (apart(place.of(mesh), here) < 0.03) == (state.frame < gone)
+        assert (apart(place.of(mesh), there) < 0.03) == (state.frame >= came)
+        assert apart(place.of(mesh), np.array([1.2, 0.0, 1.5])) < 0.01
+
+
+def test_what_comes_to_stand_where_nothing_stood_is_a_background_of_its_own(scene: MeshList) -> None:
+    options = replace(preset_options(quality=30), segment=OPTIONS)
+    parts = take_apart(scene, survey(scene), options, Stages(None, FRAMES))
+    states = encode_static(replace(parts, background=Mesh.empty()), FRAMES, 4.0, options.background)
+    came = parts.changes[-1].frame
+    assert [(state.frame, state.is_patch) for state in states] == [(came, False)]
+    assert not decode_background(states[0].payload).is_empty
+
+
 def apart(mesh: Mesh, point: np.ndarray) -> float:
     return float(np.linalg.norm(Surface(mesh).closest(point[None]).points - point))
 

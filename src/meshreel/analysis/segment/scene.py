@@ -138,16 +138,34 @@ class ByMasks:
 
 
 def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByPlace:
-    """What moves in a scene, by geometric change over the whole of it; `options` say which frames are looked at."""
+    """What moves in a scene, by geometric change over the whole of it; `options` say which frames are looked at.
+
+    A scene whose faces turn their backs to it, in which nothing can be seen to move, is turned over.
+    """
     chosen = _with_surface(frames, options.places.chosen(len(frames), frames.frame_rate))
-    lattice = _lattice(frames, chosen)
     if not chosen:
-        return ByPlace(lattice, np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), options.island)
-    views = _views(frames, chosen, options)
+        return ByPlace(_lattice(frames, chosen), np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), options.island)
+    found = _by_place(frames, chosen, options)
+    if not found.chosen.any() and _faces_away(frames[chosen[0]]):
+        turned = _by_place(_TurnedOver(frames), chosen, options)
+        found = turned if turned.chosen.any() else found
+    return found
+
+
+def _by_place(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> ByPlace:
+    lattice, views = _lattice(frames, chosen), _views(frames, chosen, options)
     places = find_places(_Some(frames, chosen), views, lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
     return ByPlace(lattice, places.keys, moving, rest, options.island)
+
+
+def _faces_away(mesh: Mesh) -> bool:
+    """True where most of a surface has its front where the middle of all is not: a room's faces look into it."""
+    normals, areas = face_normals(mesh)
+    middles = mesh.vertices[mesh.faces].mean(axis=1)
+    away = middles - (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    return bool((areas * (normals * away).sum(axis=1)).sum() > 0)
 
 
 def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
@@ -263,3 +281,21 @@ class _Some(Frames):
 
     def __getitem__(self, index: int) -> Mesh:
         return self._frames[self._numbers[index]]
+
+
+class _TurnedOver(MeshSequence):
+    """The same frames with the fronts of all faces where their backs were."""
+
+    def __init__(self, frames: MeshSequence) -> None:
+        self._frames = frames
+
+    @property
+    def frame_rate(self) -> float:
+        return self._frames.frame_rate
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, index: int) -> Mesh:
+        mesh = self._frames[index]
+        return Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1]))
