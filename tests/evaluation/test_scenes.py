@@ -177,7 +177,9 @@ def row(codec, mbps, quality, **changed):
     decode = {"frame_ms": 3.0, "first_frame_ms": 100.0}
     base = {"point": f"{codec} {mbps}", "kind": scenes.SCENE, "experiment": "scenes", "sequence": "room2"}
     base |= {"codec": codec, "options": {"quality": 50.0}, "frames": 60, "mbps": mbps, "background_bytes": 50_000}
-    return base | metrics | {"decode": decode, "encode_s": 5.0} | changed
+    seam = {"seam_gap_mm_median": 4.25, "seam_gap_mm_95": 15.75, "seam_overlap_mm_median": 0.0}
+    seam |= {"seam_overlap_mm_95": 8.0, "seam_uncovered": 0.002, "seam_mm": 2400.0}
+    return base | metrics | seam | {"decode": decode, "encode_s": 5.0} | changed
 
 
 FLOOR_ROW = row(scenes.NOISE_FLOOR, 0, 0, kind=FLOOR, point="floor", options={}) | {
@@ -260,4 +262,6 @@ def test_the_report_has_the_noise_floor_and_every_row(tmp_path):
     assert "noise floor (the input against the truth)" in page and "nan" not in page
     assert page.count("| room2 | ") == 13 and "| room2 | meshreel best | quality 50.0 | 0.400 | 50.0 | 2.00 |" in page
     assert "BD-rate, D2 to the input, below the noise floor" in page
+    told = "median (95 %): gap 4.2 (15.8) mm, overlap 0.0 (8.0) mm; surface near it uncovered 0.20%"
+    assert page.count("seam of bodies") == 1 and told in page
     assert scenes.floors(GOOD)["input_d2_psnr_forward"] == 60.0 and scenes.floors(GOOD[1:]) == {}

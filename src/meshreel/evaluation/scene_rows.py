@@ -14,9 +14,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ..decoder import Video
 from ..decoder import open as open_video
 from ..errors import InputError
 from ..format.layout import ChunkKind
+from ..metrics.seams import measure_seam, seam_row
 from ..metrics.truth import Scene, scene_means, scene_row
 from ..types import Mesh
 from .codec import Codec
@@ -72,7 +74,15 @@ def _stream(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
     once = sum(chunk.size for chunk in video.reader.chunks if chunk.kind == ChunkKind.STATIC)
     row = _rate(len(data), once, len(scene.meshes), scene.meshes.frame_rate)
     row |= {"encode_s": seconds, "decode": _decoding(data)}
+    row |= _seams(scene, numbers, video)
     return row | _metrics(scene, numbers, [video[number] for number in numbers])
+
+
+def _seams(scene: SceneData, numbers: Sequence[int], video: Video) -> Row:
+    """Means over frames of the seam between bodies and what they touch, where the input's labels have one."""
+    labelled = ((number, scene.meshes[number], scene.labels(number)) for number in numbers)
+    parts = ((mesh, moves, video.background(number), video.moving(number)) for number, mesh, moves in labelled)
+    return finite(scene_means([seam_row(measure_seam(*each)) for each in parts]))
 
 
 def _decoding(data: bytes) -> Row:
