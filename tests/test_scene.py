@@ -22,7 +22,7 @@ from meshreel.format.layout import Form
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate
 from meshreel.geometry.voxels import Lattice
-from meshreel.scene import Parts, TrackGroup, encode_bodies, encode_static, moving_part, take_apart
+from meshreel.scene import Parts, TrackGroup, encode_bodies, encode_static, take_apart
 from meshreel.types import Mesh, MeshList, Placement
 from meshreel.windows import EncodedGroup, Stages
 from tests import small_scene
@@ -252,14 +252,6 @@ SMALL = sphere(0.3, 2)
 
 def at(*places: float) -> Mesh:
     return concatenate([moved(SMALL, (x, 0, 0)) for x in places]) if places else NONE
-
-
-def test_a_body_keeps_the_faces_around_it_so_that_it_reaches_what_it_stands_on():
-    floor = plane(1.0, 10)
-    middle = np.abs(floor.vertices[floor.faces].mean(axis=1)[:, :2] - 0.5).max(axis=1) < 0.1  # of 2 x 2 cells
-    part = moving_part(floor, middle)
-    assert middle.sum() == 8 and np.ptp(part.vertices, axis=0)[:2] == pytest.approx(0.4)
-    assert moving_part(floor, np.zeros_like(middle)).is_empty
 
 
 @pytest.mark.usefixtures("plainly")

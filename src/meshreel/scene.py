@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from .analysis.background import BackgroundOptions, fuse_background
-from .analysis.bodies import find_bodies, same_bodies
+from .analysis.bodies import find_bodies, ring, same_bodies
 from .analysis.segment.masks import Masker
 from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
 from .analysis.survey import Survey, check_one_unit
@@ -31,7 +31,7 @@ from .format.layout import Form
 from .geometry.connected import connected
 from .geometry.decimate import decimate
 from .geometry.nearest import distances
-from .geometry.topology import drop_unreferenced, with_neighbours
+from .geometry.topology import drop_unreferenced
 from .layered import MOST_EMPTY, encode_segment
 from .types import Frames, Mesh, MeshSequence, Placement, evenly
 from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_window
@@ -105,7 +105,12 @@ def take_apart(
     stages.add("segment", len(sequence))
     cell = segmentation.lattice.size
     numbers = evenly(len(sequence), options.background.frames)
-    still = _Some(sequence, numbers, segmentation.still_at_first)
+
+    def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        stands = segmentation.still_at_first(number, mesh)
+        return stands & ~ring(mesh, ~stands, cell)
+
+    still = _Some(sequence, numbers, clear)
     background = fuse_background(still, cell, options.background)
     if background.is_empty and len(numbers):
         _check_nothing_lost(sequence, numbers, segmentation)
@@ -197,7 +202,7 @@ def encode_bodies(
     options = replace(options, noise=noise)
     tracks, found = Tracks(parts.cell, options), list[TrackGroup]()
     for frames in segments(sequence, parts.segmentation, options):
-        moving = [_moving(sequence[number], parts.segmentation, number) for number in frames]
+        moving = [_moving(sequence[number], parts, number) for number in frames]
         jobs = []
         for track, meshes in tracks.of(moving):
             normalised = [parts.seen.normalise(mesh) for mesh in meshes]
@@ -293,17 +298,9 @@ class _Some(Frames):
         return _part(mesh, self._choose(number, mesh))
 
 
-def _moving(mesh: Mesh, segmentation: ByPlace | ByMasks, number: int) -> Mesh:
-    return moving_part(mesh, segmentation.moving(number, mesh))
-
-
-def moving_part(mesh: Mesh, moves: Bool[np.ndarray, " F"]) -> Mesh:
-    """What bodies are made of: faces that move, and a ring of their neighbours.
-
-    Where a foot stands, fused surface runs from the floor up to it, a cell wide: it rests as long as the foot does, but
-    the background has the floor alone. Without the ring bodies would hover by a cell.
-    """
-    return _part(mesh, with_neighbours(mesh.faces, moves))
+def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
+    moves = parts.segmentation.moving(number, mesh)
+    return _part(mesh, moves | ring(mesh, moves, parts.cell))
 
 
 def _part(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:

@@ -15,10 +15,11 @@ from meshreel.evaluation.experiments import scenes
 from meshreel.evaluation.report import write_report
 from meshreel.evaluation.rooms import RoomOptions
 from meshreel.evaluation.rows import Point
-from meshreel.evaluation.scene_rows import BACKGROUND_S, FLOOR, MEMORY, SEGMENTATION, measure_scene
-from meshreel.evaluation.scenes import SceneFrames, open_scene
+from meshreel.evaluation.scene_rows import BACKGROUND_S, FLOOR, MEMORY, SEGMENTATION, measure_scene, seams_of
+from meshreel.evaluation.scenes import SceneData, SceneFrames, open_scene
 from meshreel.evaluation.truth import compare_with_truth
 from meshreel.geometry.nearest import Surface
+from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import camera
 from tests.metrics.shapes import moved, plane, sphere
@@ -126,6 +127,33 @@ def test_the_noise_floor_is_the_input_against_the_truth(cache):
     row = measure_scene(point("captured", FLOOR), cache, cache)
     assert row["codec"] == scenes.NOISE_FLOOR and row["truth_people_median_m"] < 0.005
     assert not any(name.startswith("input_") for name in row)
+
+
+def test_rows_of_a_stream_have_their_seams(scene, monkeypatch):
+    ring = np.abs(np.linalg.norm(scene.meshes[0].vertices[:, :2] - (-0.15, 0), axis=1) - 0.3) < 0.1
+    touching = ring[scene.meshes[0].faces].all(axis=1)  # some of the plate and of the ball's rim: they meet in labels
+    parts = {"background": ~touching, "moving": touching}
+
+    class Apart:
+        """A video that has both parts of the frame as they are."""
+
+        def background(self, index):
+            del index
+            return self._part("background")
+
+        def moving(self, index):
+            del index
+            return self._part("moving")
+
+        def _part(self, name):
+            return drop_unreferenced(Mesh.of(scene.meshes[0].vertices, scene.meshes[0].faces[parts[name]]))
+
+    monkeypatch.setattr(SceneData, "labels", lambda *_: touching)
+    row = seams_of(scene, [0], Apart())
+    assert row["seam_gap_mm_median"] < 0.01 and row["seam_uncovered"] == 0 and row["seam_mm"] > 0
+    monkeypatch.setattr(SceneData, "labels", lambda *_: np.zeros_like(touching))
+    assert set(seams_of(scene, [0, 0], Apart()).values()) == {None}
+    json.dumps(row, allow_nan=False)
 
 
 def test_found_labels_are_scored(cache, scene):

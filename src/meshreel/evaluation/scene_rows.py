@@ -12,9 +12,8 @@ import time
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
-from ..decoder import Video
 from ..decoder import open as open_video
 from ..errors import InputError
 from ..format.layout import ChunkKind
@@ -36,6 +35,19 @@ FLOOR, SCENE, SEGMENTATION, MEMORY = "scene floor", "scene", "segmentation", "sc
 KINDS = (FLOOR, SCENE, SEGMENTATION, MEMORY)
 INTRA = ("scene_draco", "background_draco", "labelled_draco")  # codecs of single frames
 NOISE_FLOOR = "noise floor"
+
+
+@runtime_checkable
+class Apart(Protocol):
+    """A decoded scene, part by part."""
+
+    def background(self, index: int) -> Mesh:
+        """What does not move in a frame."""
+        ...
+
+    def moving(self, index: int) -> Mesh:
+        """The rest of it."""
+        ...
 
 
 def measure_scene(point: Point, data: Path, cache: Path | None) -> Row:
@@ -74,11 +86,11 @@ def _stream(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
     once = sum(chunk.size for chunk in video.reader.chunks if chunk.kind == ChunkKind.STATIC)
     row = _rate(len(data), once, len(scene.meshes), scene.meshes.frame_rate)
     row |= {"encode_s": seconds, "decode": _decoding(data)}
-    row |= _seams(scene, numbers, video)
+    row |= seams_of(scene, numbers, video)
     return row | _metrics(scene, numbers, [video[number] for number in numbers])
 
 
-def _seams(scene: SceneData, numbers: Sequence[int], video: Video) -> Row:
+def seams_of(scene: SceneData, numbers: Sequence[int], video: Apart) -> Row:
     """Means over frames of the seam between bodies and what they touch, where the input's labels have one."""
     labelled = ((number, scene.meshes[number], scene.labels(number)) for number in numbers)
     parts = ((mesh, moves, video.background(number), video.moving(number)) for number, mesh, moves in labelled)
