@@ -23,7 +23,8 @@ from meshreel.format.layout import Form
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
-from meshreel.scene import Parts, TrackGroup, encode_bodies, encode_static, take_apart
+from meshreel.parts import Parts, take_apart
+from meshreel.scene import TrackGroup, encode_bodies, encode_static
 from meshreel.types import Mesh, MeshList, Placement
 from meshreel.windows import EncodedGroup, Stages
 from tests import small_scene

@@ -30,8 +30,9 @@ from .geometry.nearest import distances
 from .geometry.topology import drop_unreferenced
 from .layered import encode_segment
 from .metrics.distance import PSNR_CEILING, psnr
+from .parts import take_apart
 from .presets import preset_options
-from .scene import Static, TrackGroup, encode_bodies, encode_static, take_apart
+from .scene import Static, TrackGroup, encode_bodies, encode_static
 from .types import Frames, Mesh, MeshSequence, evenly
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
 

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, UInt16
 
+from .analysis.bodies import ring
 from .analysis.segment.scene import ByMasks, ByPlace
-from .geometry.topology import drop_unreferenced
-from .scene import Tracks, moving_part, segments
+from .parts import part_of
+from .scene import Tracks, segments
 from .types import Mesh, MeshSequence
 from .windows import EncoderOptions
 
@@ -37,8 +38,8 @@ def label_frames(
         for number in frames:
             mesh = sequence[number]
             moving.append(segmentation.moving(number, mesh))
-            parts.append(drop_unreferenced(Mesh(mesh.vertices, mesh.faces[moving[-1]])))
-            coded.append(moving_part(mesh, moving[-1]))
+            parts.append(part_of(mesh, moving[-1]))
+            coded.append(part_of(mesh, moving[-1] | ring(mesh, moving[-1], segmentation.lattice.size)))
         bodies = tracks.of(coded)
         for place, (chosen, part) in enumerate(zip(moving, parts, strict=True)):
             labels = np.zeros(len(chosen), np.uint16)

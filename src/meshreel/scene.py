@@ -9,8 +9,7 @@ quality means the same for a person in a room as for one alone.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -18,57 +17,25 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool
 
-from .analysis.background import BackgroundOptions, fuse_background
-from .analysis.background_depth import fuse_still_depth
-from .analysis.bodies import at_most, find_bodies, same_bodies
-from .analysis.segment.masks import Masker
-from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
-from .analysis.survey import Survey, check_one_unit
+from .analysis.background import BackgroundOptions
+from .analysis.bodies import at_most, find_bodies, ring, same_bodies
+from .analysis.segment.scene import ByMasks, ByPlace
+from .analysis.survey import Survey
 from .choice import NO_ERROR
 from .coding.background import decode_background, decode_change, encode_background, encode_change
 from .coding.intra import encode_empty
-from .errors import InputError
 from .format.checks import MOST_TRACKS
 from .format.layout import Form
-from .geometry.connected import connected
 from .geometry.decimate import decimate, decimate_faces
-from .geometry.depth import SeesDepth
 from .geometry.nearest import distances
-from .geometry.topology import concatenate, drop_unreferenced, face_normals, with_neighbours
 from .layered import MOST_EMPTY, encode_segment
-from .types import Frames, Mesh, MeshSequence, Placement, evenly
+from .parts import Change, Parts, part_of
+from .types import Mesh, MeshSequence, Placement
 from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_window
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 HALFWAY = 0.3  # of the vertices: what has fewer than half as many is decimated from there, a third of the time
-PROBES = 8  # frames, at most, that what moves is measured in
 LEAST_NOISE = 1e-4  # of the unit: a background is no finer than with that much
-LOST = 0.5  # of a frame's faces: as many stand still only where there is a background
-OUTLIER = 3.0  # cells: still surface farther from the background is no noise
-NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
-
-
-@dataclass(frozen=True, slots=True)
-class Change:
-    """From a frame on, the room is another."""
-
-    frame: int
-    gone: Bool[np.ndarray, " P"]  # places of the segmentation where something is no more
-    came: Mesh  # m, what has come to stand
-
-
-@dataclass(frozen=True, slots=True)
-class Parts:
-    """What does not change over a scene's segments."""
-
-    seen: Survey  # of the scene; its unit is the diagonal of the largest body that moves, or its own where nothing does
-    segmentation: ByPlace | ByMasks
-    background: Mesh  # m, as in the first frame; empty where nothing stands still
-    changes: list[Change]
-    cell: float  # m, of the scene's mesh
-    noise: float  # m, RMS distance of a frame's still surface from the background, tails and all: what bodies have
-    deviation: float  # m, the same by the median, as a standard deviation: without its tails
-    astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,40 +62,6 @@ class CodedBodies:
 
     groups: list[TrackGroup]  # in the order that a file has them
     dropped: int  # faces of bits that were only there for a moment, and are in none of the groups
-
-
-def take_apart(
-    sequence: MeshSequence, seen: Survey, options: EncoderOptions, stages: Stages, masker: Masker | None = None
-) -> Parts:
-    """What stands still in a scene, and what is known of what moves; by somebody's masks where there are any.
-
-    Raises InputError where frames are of different units, or of another than metres.
-    """
-    check_one_unit(seen)
-    found = segment(sequence, options.segment) if masker is None else segment_by(masker, sequence, options.segment)
-    segmentation: ByPlace | ByMasks = found
-    stages.add("segment", len(sequence))
-    cell = segmentation.lattice.size
-    background = _background(sequence, segmentation, cell, options.background)
-    if background.is_empty:
-        _check_nothing_lost(sequence, segmentation, options.background)
-    changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
-    stages.add("background", len(sequence))
-    noise, deviation, sizes, astray = _measured(sequence, segmentation, background, changes)
-    unit = float(np.median(sizes)) if sizes else 0.0
-    seen = replace(seen, scale=unit or seen.diagonal)
-    return Parts(seen, segmentation, background, changes, cell, noise, deviation, astray)
-
-
-def _check_nothing_lost(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: BackgroundOptions) -> None:
-    """Where a background is empty, no frame may have much that stands still: it would be in no part of the file."""
-    for number in evenly(len(sequence), options.frames):
-        mesh = sequence[number]
-        still = segmentation.still_at_first(number, mesh)
-        if still.sum() > LOST * len(mesh.faces):
-            text = f"frame {number}: {still.sum()} of {len(mesh.faces)} faces stand still, but are too small for a room"
-            size = f"the frame is {mesh.diagonal:.3g} m large; is it in metres? If not, give --scale"
-            raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
 
 
 def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:
@@ -158,27 +91,6 @@ def encode_static(parts: Parts, count: int, frame_rate: float, options: Backgrou
 def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> range:
     """The frames at which the background is sent, whole, the first among them."""
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
-
-
-def _background(
-    sequence: MeshSequence, segmentation: ByPlace | ByMasks, cell: float, options: BackgroundOptions
-) -> Mesh:
-    """What stands still at first, from the cameras' depth where it is known; cells in m."""
-    numbers = evenly(len(sequence), options.frames)
-    if options.depth and isinstance(sequence, SeesDepth):
-        meshes = ((number, sequence[number]) for number in numbers)
-        moments = ((sequence.pictures(k), mesh, segmentation.still_at_first(k, mesh)) for k, mesh in meshes)
-        return fuse_still_depth(moments, cell, options)
-    return fuse_background(_Some(sequence, numbers, segmentation.still_at_first), cell, options)
-
-
-def _change(sequence: MeshSequence, segmentation: ByPlace | ByMasks, frame: int, options: EncoderOptions) -> Change:
-    assert isinstance(segmentation, ByPlace)  # masks know of no changes
-    came = segmentation.rest.since == frame
-    numbers = [frame + number for number in evenly(len(sequence) - frame, options.background.frames)]
-    later = _Some(sequence, numbers, lambda _, mesh: segmentation.faces_at(mesh, came))
-    mesh = fuse_background(later, segmentation.lattice.size, options.background) if came.any() else Mesh.empty()
-    return Change(frame, segmentation.rest.until == frame, mesh)
 
 
 def _gone(parts: Parts, state: Mesh, change: Change) -> Bool[np.ndarray, " F"]:
@@ -214,7 +126,7 @@ def encode_bodies(
     options = replace(options, noise=noise)
     tracks, found = Tracks(parts.cell, options), list[TrackGroup]()
     for frames in segments(sequence, parts.segmentation, options):
-        moving = [_moving(sequence[number], parts.segmentation, number) for number in frames]
+        moving = [_moving(sequence[number], parts, number) for number in frames]
         jobs = []
         for track, meshes in tracks.of(moving):
             normalised = [parts.seen.normalise(mesh) for mesh in meshes]
@@ -301,75 +213,9 @@ class Tracks:
                 yield TrackGroup(track, start, EncodedGroup(Form.EMPTY, count, encode_empty(), (), NO_ERROR))
 
 
-class _Some(Frames):
-    """Chosen faces of some frames."""
-
-    def __init__(
-        self, sequence: Frames, numbers: Sequence[int], choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]]
-    ) -> None:
-        self._sequence, self._numbers, self._choose = sequence, numbers, choose
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __getitem__(self, index: int) -> Mesh:
-        number = self._numbers[index]
-        mesh = self._sequence[number]
-        return _part(mesh, self._choose(number, mesh))
-
-
-def _moving(mesh: Mesh, segmentation: ByPlace | ByMasks, number: int) -> Mesh:
-    return moving_part(mesh, segmentation.moving(number, mesh))
-
-
-def moving_part(mesh: Mesh, moves: Bool[np.ndarray, " F"]) -> Mesh:
-    """What bodies are made of: faces that move, and a ring of their neighbours.
-
-    Where a foot stands, fused surface runs from the floor up to it, a cell wide: it rests as long as the foot does, but
-    the background has the floor alone. Without the ring bodies would hover by a cell.
-    """
-    return _part(mesh, with_neighbours(mesh.faces, moves))
-
-
-def _part(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
-    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen]))
-
-
-def _measured(
-    sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh, changes: Sequence[Change]
-) -> tuple[float, float, list[float], float]:
-    """RMS distance of still surface from the background, m, its deviation by the median, m; sizes of largest bodies.
-
-    What is far from the background is no noise: what it is of all surface comes last.
-    """
-    far = OUTLIER * segmentation.lattice.size
-    squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
-    for number in evenly(len(sequence), PROBES):
-        mesh = sequence[number]
-        moves = segmentation.moving(number, mesh)
-        if moves.any():
-            sizes.append(_largest(_part(mesh, moves)))
-        still = _part(mesh, ~moves)
-        areas = face_normals(still)[1]
-        whole += float(face_normals(mesh)[1].sum())
-        there = concatenate([background, *(change.came for change in changes if change.frame <= number)])
-        if there.is_empty:
-            lost += float(areas.sum())
-        elif not still.is_empty:
-            gaps = distances(still.vertices, there)
-            deviations.append(float(np.median(gaps)) / NORMAL_MEDIAN)
-            squares.append(float((gaps[gaps < far] ** 2).mean()) if (gaps < far).any() else 0.0)
-            lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
-    astray = lost / whole if whole else 0.0
-    if not squares:
-        return 0.0, 0.0, sizes, astray
-    return math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes, astray
-
-
-def _largest(mesh: Mesh) -> float:
-    """The diagonal of the connected piece with most vertices, m."""
-    label = connected(mesh.faces, len(mesh.vertices))
-    return Mesh(mesh.vertices[label == np.bincount(label).argmax()], mesh.faces[:0]).diagonal
+def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
+    moves = parts.segmentation.moving(number, mesh)
+    return part_of(mesh, moves | ring(mesh, moves, parts.cell))
 
 
 def _apart(mesh: Mesh, small: Mesh) -> float:

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.bodies import BodyOptions, at_most, find_bodies, same_bodies
+from meshreel.analysis.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies
 from meshreel.errors import InputError
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
-from tests.metrics.shapes import moved, sphere
+from tests.metrics.shapes import moved, plane, sphere
 
 CELL = 0.05
 BALL = sphere(0.3, 3)  # 1.1 m^2
@@ -140,3 +140,17 @@ def test_a_body_is_continued_by_that_which_shares_most_with_it():
 def test_options_that_cannot_be_are_refused(wrong):
     with pytest.raises(InputError, match="give"):
         BodyOptions(**wrong)
+
+
+def test_a_ring_is_all_around_what_moves_but_for_large_faces():
+    floor = plane(1.0, 10)
+    middles = floor.vertices[floor.faces].mean(axis=1)[:, :2]
+    moves = np.abs(middles - 0.5).max(axis=1) < 0.1  # 2 x 2 cells
+    found = ring(floor, moves, 0.1)
+    assert moves.sum() == 8 and not (found & moves).any()
+    around = np.ptp(floor.vertices[floor.faces[found | moves]].reshape(-1, 3), axis=0)[:2]
+    assert (
+        around == pytest.approx(0.4) and found.sum() == 4 * 4 * 2 - 8 - 2
+    )  # two corners only touch by their far halves
+    assert not ring(floor, moves, 0.05).any() and not ring(floor, np.zeros_like(moves), 0.1).any()
+    assert len(ring(NONE, np.zeros(0, bool), 0.1)) == 0

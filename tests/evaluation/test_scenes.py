@@ -16,10 +16,11 @@ from meshreel.evaluation.experiments import scenes
 from meshreel.evaluation.report import write_report
 from meshreel.evaluation.rooms import RoomOptions
 from meshreel.evaluation.rows import Point
-from meshreel.evaluation.scene_rows import BACKGROUND_S, FLOOR, MEMORY, SEGMENTATION, measure_scene
-from meshreel.evaluation.scenes import SceneFrames, open_scene
+from meshreel.evaluation.scene_rows import BACKGROUND_S, FLOOR, MEMORY, SEGMENTATION, measure_scene, seams_of
+from meshreel.evaluation.scenes import SceneData, SceneFrames, open_scene
 from meshreel.evaluation.truth import compare_with_truth
 from meshreel.geometry.nearest import Surface
+from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import camera
 from tests.metrics.shapes import moved, plane, sphere
@@ -150,6 +151,33 @@ def test_the_noise_floor_is_the_input_against_the_truth(cache):
     assert not any(name.startswith("input_") for name in row)
 
 
+def test_rows_of_a_stream_have_their_seams(scene, monkeypatch):
+    ring = np.abs(np.linalg.norm(scene.meshes[0].vertices[:, :2] - (-0.15, 0), axis=1) - 0.3) < 0.1
+    touching = ring[scene.meshes[0].faces].all(axis=1)  # some of the plate and of the ball's rim: they meet in labels
+    parts = {"background": ~touching, "moving": touching}
+
+    class Apart:
+        """A video that has both parts of the frame as they are."""
+
+        def background(self, index):
+            del index
+            return self._part("background")
+
+        def moving(self, index):
+            del index
+            return self._part("moving")
+
+        def _part(self, name):
+            return drop_unreferenced(Mesh.of(scene.meshes[0].vertices, scene.meshes[0].faces[parts[name]]))
+
+    monkeypatch.setattr(SceneData, "labels", lambda *_: touching)
+    row = seams_of(scene, [0], Apart())
+    assert row["seam_gap_mm_median"] < 0.01 and row["seam_uncovered"] == 0 and row["seam_mm"] > 0
+    monkeypatch.setattr(SceneData, "labels", lambda *_: np.zeros_like(touching))
+    assert set(seams_of(scene, [0, 0], Apart()).values()) == {None}
+    json.dumps(row, allow_nan=False)
+
+
 def test_found_labels_are_scored(cache, scene):
     labels = {f"frame_{i:05}": np.packbits(scene.labels(i)) for i in range(4)}
     np.savez(scene.folder / "labels" / "planted.npz", **labels)
@@ -199,7 +227,9 @@ def row(codec, mbps, quality, **changed):
     decode = {"frame_ms": 3.0, "first_frame_ms": 100.0}
     base = {"point": f"{codec} {mbps}", "kind": scenes.SCENE, "experiment": "scenes", "sequence": "room2"}
     base |= {"codec": codec, "options": {"quality": 50.0}, "frames": 60, "mbps": mbps, "background_bytes": 50_000}
-    return base | metrics | {"decode": decode, "encode_s": 5.0} | changed
+    seam = {"seam_gap_mm_median": 4.25, "seam_gap_mm_95": 15.75, "seam_overlap_mm_median": 0.0}
+    seam |= {"seam_overlap_mm_95": 8.0, "seam_uncovered": 0.002, "seam_mm": 2400.0}
+    return base | metrics | seam | {"decode": decode, "encode_s": 5.0} | changed
 
 
 FLOOR_ROW = row(scenes.NOISE_FLOOR, 0, 0, kind=FLOOR, point="floor", options={}) | {
@@ -282,4 +312,6 @@ def test_the_report_has_the_noise_floor_and_every_row(tmp_path):
     assert "noise floor (the input against the truth)" in page and "nan" not in page
     assert page.count("| room2 | ") == 13 and "| room2 | meshreel best | quality 50.0 | 0.400 | 50.0 | 2.00 |" in page
     assert "BD-rate, D2 to the input, below the noise floor" in page
+    told = "median (95 %): gap 4.2 (15.8) mm, overlap 0.0 (8.0) mm; surface near it uncovered 0.20%"
+    assert page.count("seam of bodies") == 1 and told in page
     assert scenes.floors(GOOD)["input_d2_psnr_forward"] == 60.0 and scenes.floors(GOOD[1:]) == {}

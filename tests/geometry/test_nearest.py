@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.geometry.nearest import distances
-from tests.metrics.shapes import brute_force_distances, moved, sphere
+from meshreel.geometry.nearest import Surface, distances, past_border
+from tests.metrics.shapes import brute_force_distances, moved, plane, sphere
 
 
 @pytest.mark.parametrize("place", [(0, 0, 0), (1e6, -2e6, 3e6)])
@@ -14,3 +14,10 @@ def test_distances_are_those_of_all_pairs_wherever_in_the_world(place):
     ball, points = sphere(0.5, 2), np.random.default_rng(0).normal(0, 0.6, (60, 3))
     found = distances(points + np.asarray(place, float), moved(ball, place))
     np.testing.assert_allclose(found, brute_force_distances(points, ball), atol=1e-6)
+
+
+def test_what_lies_past_the_border_is_told_from_what_lies_above():
+    square, ball = plane(1.0, 4), sphere(0.5, 2)
+    points = np.array([[0.5, 0.5, 0.3], [0.98, 0.4, -0.2], [1.1, 0.4, 0.2], [-0.1, -0.1, 0], [0.4, 1.3, 0]])
+    assert past_border(square, Surface(square).closest(points)).tolist() == [False, False, True, True, True]
+    assert not past_border(ball, Surface(ball).closest(points)).any()  # it has none

@@ -17,6 +17,7 @@ from meshreel.geometry.topology import (
     unique_edges,
     vertex_normals,
     weld,
+    with_neighbours,
 )
 from meshreel.types import Mesh
 
@@ -129,3 +130,12 @@ def test_one_mesh_among_empty_ones_is_itself():
     assert concatenate([nothing, one, Mesh.empty()]) is one
     assert concatenate([nothing, Mesh.empty()]) is nothing
     assert concatenate([]).is_empty
+
+
+def test_neighbours_share_a_vertex_with_a_chosen_face() -> None:
+    strip = np.array([[0, 1, 2], [1, 3, 2], [2, 3, 4], [3, 5, 4], [4, 5, 6], [8, 9, 7]], np.int32)
+    first = np.arange(6) == 0
+    assert with_neighbours(strip, first).tolist() == [True, True, True, False, False, False]
+    assert with_neighbours(strip, with_neighbours(strip, first)).tolist() == [True] * 5 + [False]
+    assert not with_neighbours(strip, np.zeros(6, bool)).any()
+    assert len(with_neighbours(np.zeros((0, 3), np.int32), np.zeros(0, bool))) == 0

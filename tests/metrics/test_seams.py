@@ -9,7 +9,7 @@ from meshreel.errors import InputError
 from meshreel.geometry.topology import concatenate
 from meshreel.metrics.seams import SeamOptions, measure_seam, seam_row
 from meshreel.types import Mesh
-from tests.metrics.shapes import moved, noisy
+from tests.metrics.shapes import moved, noisy, sphere
 
 CELL = 0.02  # m
 SIDE, HALF, HIGH = 1.0, 0.2, 0.3  # m: of the floor, of half the box, of the box
@@ -146,6 +146,10 @@ def test_without_a_seam_there_is_none():
     mesh, moves = scene()
     for all_or_none in (np.ones_like(moves), np.zeros_like(moves)):
         assert measure_seam(mesh, all_or_none, floor(), box()) is None
+    ball = moved(sphere(HALF), (0, 0, HALF))  # closed: it has no border
+    assert measure_seam(*scene(floor(0), ball), floor(0), ball) is None
+    point = Mesh.of(np.zeros((6, 3)), [[0, 1, 2], [3, 4, 5]])
+    assert measure_seam(point, np.array([True, False]), floor(), box()) is None
     assert measure_seam(Mesh.empty(), np.zeros(0, bool), floor(), box()) is None
     assert set(seam_row(None).values()) == {None}
 

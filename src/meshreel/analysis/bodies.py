@@ -11,13 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 
 from ..errors import InputError
 from ..geometry.connected import connected_faces
-from ..geometry.topology import concatenate, drop_unreferenced, face_normals
+from ..geometry.topology import concatenate, drop_unreferenced, face_normals, with_neighbours
 from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
+
+RING = 2.0  # cells: the longest edges of a body's ring; a wall of a few faces is no part of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,19 @@ class _Piece:
     mesh: Mesh
     area: float  # m^2
     cells: Int64[np.ndarray, " C"]  # keys of the coarse cells it lies in
+
+
+def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndarray, " F"]:
+    """Small faces around those that move, which go with the body and not into the background; cells are in m.
+
+    Where a foot stands, fused surface runs from the floor up to it, a cell wide: it rests as long as the foot does, but
+    the floor is all that is there in other frames. Without it bodies would hover by a cell.
+    """
+    found = with_neighbours(mesh.faces, moves) & ~moves
+    corners = mesh.vertices[mesh.faces[found]]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
+    found[found] = longest <= RING * cell
+    return found
 
 
 def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:

@@ -12,11 +12,12 @@ import time
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from ..decoder import open as open_video
 from ..errors import InputError
 from ..format.layout import ChunkKind
+from ..metrics.seams import measure_seam, seam_row
 from ..metrics.truth import Scene, scene_means, scene_row
 from ..types import Mesh
 from .codec import Codec
@@ -34,6 +35,19 @@ FLOOR, SCENE, SEGMENTATION, MEMORY = "scene floor", "scene", "segmentation", "sc
 KINDS = (FLOOR, SCENE, SEGMENTATION, MEMORY)
 INTRA = ("scene_draco", "background_draco", "labelled_draco")  # codecs of single frames
 NOISE_FLOOR = "noise floor"
+
+
+@runtime_checkable
+class Apart(Protocol):
+    """A decoded scene, part by part."""
+
+    def background(self, index: int) -> Mesh:
+        """What does not move in a frame."""
+        ...
+
+    def moving(self, index: int) -> Mesh:
+        """The rest of it."""
+        ...
 
 
 def measure_scene(point: Point, data: Path, cache: Path | None) -> Row:
@@ -72,7 +86,15 @@ def _stream(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
     once = sum(chunk.size for chunk in video.reader.chunks if chunk.kind == ChunkKind.STATIC)
     row = _rate(len(data), once, len(scene.meshes), scene.meshes.frame_rate)
     row |= {"encode_s": seconds, "decode": _decoding(data)}
+    row |= seams_of(scene, numbers, video)
     return row | _metrics(scene, numbers, [video[number] for number in numbers])
+
+
+def seams_of(scene: SceneData, numbers: Sequence[int], video: Apart) -> Row:
+    """Means over frames of the seam between bodies and what they touch, where the input's labels have one."""
+    labelled = ((number, scene.meshes[number], scene.labels(number)) for number in numbers)
+    parts = ((mesh, moves, video.background(number), video.moving(number)) for number, mesh, moves in labelled)
+    return finite(scene_means([seam_row(measure_seam(*each)) for each in parts]))
 
 
 def _decoding(data: bytes) -> Row:

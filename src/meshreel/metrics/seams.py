@@ -1,4 +1,4 @@
-"""The seam between what moves and what it touches, as decoded: how far both gape, how far one lies on the other.
+"""The seam between what moves and what it touches, as decoded: how far the parts gape, how far one lies on the other.
 
 In: a frame's mesh, which of its faces move, and the decoded background and bodies of that frame -> a Seam; lengths in
 the unit of the meshes, m. The cell is the median length of the frame's edges, so nothing depends on scale or rotation.
@@ -8,7 +8,7 @@ the unit of the meshes, m. The cell is the median length of the frame's edges, s
   the nearest one of the background, and to and fro once more: the length of the last step. 0 where the parts meet or
   cross; where they overlap it is how far one skin is from the other.
 - Overlap, at a point of the seam: how far from the seam the bodies lie on the background, on its two sides together.
-  Bodies lie on it where its closest point is within a cell, not on its border, and faces the same way within 45 degrees.
+  They lie on it where its closest point is within a cell, not on its border, and faces the same way within 45 degrees.
   No more than `reach` is found on a side.
 - Uncovered: the share of the frame's surface within `reach` of the seam that is farther than a cell from both parts.
 """
@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -71,13 +70,17 @@ def measure_seam(
     frame: Mesh, moves: Bool[np.ndarray, " F"], background: Mesh, bodies: Mesh, options: SeamOptions = SeamOptions()
 ) -> Seam | None:
     """The seam of one frame; None where nothing that moves is near anything that stands."""
+    from scipy.spatial import cKDTree
+
     if moves.shape != (len(frame.faces),):
         raise InputError(f"{len(moves)} labels for {len(frame.faces)} faces: give one a face")
     if not moves.any() or moves.all():
         return None
     cell = _median_edge(frame) if options.cell is None else options.cell
-    points, lengths = _border(_part(frame, moves), cell)
-    origin = (points.min(axis=0) + points.max(axis=0)) / 2 if len(points) else np.zeros(3)  # queries are float32
+    points, lengths = _border(_part(frame, moves), cell) if cell > 0 else (np.zeros((0, 3)), np.zeros(0))
+    if not len(points):  # closed
+        return None
+    origin = (points.min(axis=0) + points.max(axis=0)) / 2  # queries are float32
     frame, background, bodies = (Mesh(mesh.vertices - origin, mesh.faces) for mesh in (frame, background, bodies))
     points = points - origin
     near = _within(frame, points, options.reach * cell)
@@ -87,7 +90,7 @@ def measure_seam(
         return None
     points, lengths = points[on_seam], lengths[on_seam]
     near &= _within(frame, points, options.reach * cell)
-    place = _Place(points, cell, options.reach * cell, _part(frame, near), moves[near])
+    place = _Place(cKDTree(points), cell, options.reach * cell, _part(frame, near), moves[near])
     gaps, overlaps = _gaps(points, background, bodies), _overlaps(place, background, bodies)
     return Seam(points + origin, lengths, gaps, overlaps, _uncovered(place, background, bodies))
 
@@ -100,22 +103,15 @@ def seam_row(seam: Seam | None) -> Row:
     return row | {"seam_uncovered": seam and seam.uncovered, "seam_mm": seam and MM * float(seam.lengths.sum())}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class _Place:
     """The seam and the frame's surface around it."""
 
-    points: Float64[np.ndarray, "N 3"]
-    cell: float
-    reach: float
+    tree: Any  # of the points of the seam
+    cell: float  # m
+    reach: float  # m
     frame: Mesh
     moves: Bool[np.ndarray, " F"]
-
-    @cached_property
-    def tree(self) -> Any:
-        """Finds the nearest point of the seam."""
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self.points)
 
 
 def _median_edge(mesh: Mesh) -> float:
@@ -169,8 +165,8 @@ def _gaps(points: Float64[np.ndarray, "N 3"], background: Mesh, bodies: Mesh) ->
 
 def _overlaps(place: _Place, background: Mesh, bodies: Mesh) -> Float64[np.ndarray, " N"]:
     """At each point of the seam the farthest that bodies lie on the background, one side and the other added."""
-    widths = np.zeros((2, len(place.points)))
-    bodies = _part(bodies, _within(bodies, place.points, place.reach))
+    widths = np.zeros((2, len(place.tree.data)))
+    bodies = _part(bodies, _within(bodies, place.tree.data, place.reach))
     if not (bodies.is_empty or background.is_empty):
         points, faces = spread(bodies, place.cell / _FINE)
         still = Surface(background)

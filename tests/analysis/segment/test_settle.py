@@ -15,8 +15,9 @@ from meshreel.coding.background import decode_background, decode_change
 from meshreel.errors import InputError
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld
+from meshreel.parts import take_apart
 from meshreel.presets import preset_options
-from meshreel.scene import encode_static, take_apart
+from meshreel.scene import encode_static
 from meshreel.types import Mesh, MeshList, Placement
 from meshreel.windows import Stages
 

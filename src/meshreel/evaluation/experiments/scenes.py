@@ -151,7 +151,19 @@ def sections(rows: Sequence[Row]) -> Iterator[str]:
         cells = [row["sequence"], row["codec"], options, rate, size]
         yield f"| {' | '.join([*cells, *(_cell(row, key) for _, key in _COLUMNS)])} |"
     yield ""
+    yield from _seams(own)
     yield from _rates([row for row in rows if row["sequence"] == ROOM])
+
+
+def _seams(rows: Sequence[Row]) -> Iterator[str]:
+    """Lines of Markdown on where bodies meet the background, at the default quality."""
+    at_default = (row for row in rows if row["codec"] == SYSTEM and row["options"].get("quality") == DEFAULT)
+    for row in at_default:
+        if row.get("seam_gap_mm_median") is None:
+            continue
+        gap, overlap = (f"{row[f'seam_{n}_mm_median']:.1f} ({row[f'seam_{n}_mm_95']:.1f})" for n in ("gap", "overlap"))
+        text = f"- {row['sequence']}, {row['codec']}, quality {DEFAULT:g}: seam of bodies and what they touch, median "
+        yield f"{text}(95 %): gap {gap} mm, overlap {overlap} mm; surface near it uncovered {row['seam_uncovered']:.2%}"
 
 
 _COLUMNS = (
