@@ -1,4 +1,4 @@
-"""A scene is taken apart: what moves and what stands still of it, how noisy it is, and how large what moves (section 3.2).
+"""A scene is taken apart: what moves, what stands still, how noisy it is, and how large what moves (section 3.2).
 
 In: the frames of a scene, options. Out: Parts, which every segment of the scene is coded by.
 """

@@ -21,7 +21,7 @@ from .scenes_goals import own_goals, segmentation_goal
 COMPARISON = ComparisonOptions(ssim=True)  # scenes are looked at from where their cameras stood
 ROOM, STANDING = SCENES
 SYSTEM = "meshreel best"
-WHOLE = ((0.2, 12), (0.1, 11), (0.05, 11), (0.02, 10), (0.01, 9), (0.005, 9))  # anchor a: share of the faces, bits
+WHOLE = ((0.2, 12), (0.1, 11), (0.05, 11), (0.02, 10), (0.01, 9))  # anchor a: share of the faces, bits
 WHOLE_SUBDIVIDED = ((0.05, 11), (0.02, 10))
 PEOPLE = ((0.5, 11), (0.25, 11), (0.1, 10), (0.05, 10), (0.02, 9))  # anchor b, of what moves
 PEOPLE_SUBDIVIDED = ((0.1, 10), (0.02, 9))
