@@ -10,12 +10,15 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.segment import sam3
-from meshreel.analysis.segment.hypotheses import HypothesisOptions, Tracked
+from meshreel.analysis.segment.hypotheses import HypothesisOptions, Tracked, reference_view
 from meshreel.analysis.segment.masks import Masker
+from meshreel.analysis.segment.pictures import normal_picture
+from meshreel.analysis.segment.scene import SegmentOptions, segment_by
 from meshreel.analysis.segment.views import ViewsOptions, place_views
 from meshreel.analysis.segment.votes import Votes
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
+from meshreel.types import MeshList
 from tests.analysis.segment.test_views import box, together
 from tests.metrics.shapes import moved, sphere
 
@@ -121,6 +124,37 @@ def test_who_goes_through_the_frames_again_is_answered_from_memory(tmp_path: Pat
         found.append([masker.masks(frame, seen, VIEWS) for frame, seen in enumerate(SEEN)])
     assert np.array_equal(*found) and found[0][0].shape == (3, 60, 80) and np.any(found)
     assert tracker.asked == ["time", *["views"] * len(FRAMES)]
+
+
+class Pictures(Followed):
+    """One that keeps the pictures that it is given over time."""
+
+    def over_time(self, pictures: list[np.ndarray]) -> Tracked:
+        self.pictures = pictures
+        return Tracked(np.zeros((len(pictures), 60, 80), np.int32), {})
+
+
+def best_last() -> tuple:
+    """The views, that in which most changes behind the others."""
+    best = reference_view([SEEN[0], SEEN[2], SEEN[3]])
+    return (*VIEWS[:best], *VIEWS[best + 1 :], VIEWS[best])
+
+
+def test_the_view_in_which_most_changes_is_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    tracker, views = Pictures(), best_last()
+    monkeypatch.setattr(sam3, "_Tracker", lambda *_: tracker)
+    found = segment_by(sam3.Sam3Masks(tmp_path), MeshList(tuple(FRAMES)), SegmentOptions(cameras=views))
+    assert not found.moving(0, FRAMES[0]).any()
+    wanted = [normal_picture(Rays(mesh).look(views[-1]), views[-1]) for mesh in FRAMES]
+    assert all(np.array_equal(*pair) for pair in zip(tracker.pictures, wanted, strict=True))
+
+
+def test_a_scene_is_segmented_by_a_model_that_knows_nothing(weights: Path):
+    """As the command line does: no reference view is named."""
+    masker = sam3.Sam3Masks(weights, ("person", "ball"), sam3.Sam3Options(hypotheses=EASILY.hypotheses))
+    found = segment_by(masker, MeshList(tuple(FRAMES)), SegmentOptions(cameras=best_last()))
+    assert found.moving(1, FRAMES[1]).shape == (len(FRAMES[1].faces),)
+    assert masker.reference == len(VIEWS) - 1
 
 
 @pytest.mark.parametrize("files", [None, [], ["config.json"], ["config.json", "model.safetensors"]])

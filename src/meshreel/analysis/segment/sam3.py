@@ -21,7 +21,7 @@ from jaxtyping import Bool, Int32, UInt8
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Seen
-from .hypotheses import Hypotheses, HypothesisOptions, Tracked, hypotheses, moving_in_views, tour
+from .hypotheses import Hypotheses, HypothesisOptions, Tracked, hypotheses, moving_in_views, reference_view, tour
 from .pictures import normal_picture
 
 AUTOMATIC = ("person", "animal", "vehicle", "object")  # what may move; what of it does, its masks over time say
@@ -34,7 +34,7 @@ _NEEDED = f"config.json, model.safetensors (or its shards) and {_TOKENIZER}: the
 class Sam3Options:
     """How SAM3 is used."""
 
-    reference: int = 0  # the view that is followed over time; `hypotheses.reference_view` finds a good one
+    reference: int | None = None  # the view that is followed over time; None: that in which most changes
     device: str = "cpu"  # as torch names it: cpu, cuda, cuda:1 ...
     hypotheses: HypothesisOptions = field(default_factory=HypothesisOptions)
 
@@ -49,9 +49,20 @@ class Sam3Masks:
         """Loads the weights in the folder `path`. Raises InputError where they or the extra are not there."""
         self._tracker = _Tracker(path, tuple(prompts or AUTOMATIC), options.device)
         self._options = options
+        self._chosen = options.reference
         self._pictures: list[UInt8[np.ndarray, "H W 3"]] = []
         self._moving: Hypotheses | None = None
         self._known: dict[int, UInt8[np.ndarray, " B"]] = {}
+
+    @property
+    def reference(self) -> int:
+        """The number of the view that is followed over time."""
+        return self._chosen or 0
+
+    def foresee(self, moments: Sequence[Sequence[Seen]]) -> None:
+        """Chooses the reference view, once, by what all views see at a few moments; without it, it is the first."""
+        if self._chosen is None:
+            self._chosen = reference_view(moments)
 
     def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
         """Takes note of a frame, once; frames come in order from 0 on, all before the first masks."""
@@ -87,7 +98,7 @@ class Sam3Masks:
         return self._moving
 
     def _reference(self, views: Sequence[PinholeCamera]) -> int:
-        number = self._options.reference
+        number = self.reference
         if not 0 <= number < len(views):
             raise InputError(f"reference view {number} of {len(views)}: give 0 to {len(views) - 1}")
         return number

@@ -169,9 +169,14 @@ def _faces_away(mesh: Mesh) -> bool:
 
 
 def segment_by(masker: Masker, frames: Frames, options: SegmentOptions = SegmentOptions()) -> ByMasks:
-    """What moves by somebody's masks. Who must see all frames before the first mask has a method `observe`."""
+    """What moves by somebody's masks.
+
+    Who must see all frames before the first mask has a method `observe`; who must see a few before that, `foresee`.
+    """
     chosen = _to_see(frames)
     views = _looking(getattr(masker, "views", None), frames, chosen) or _views(frames, chosen, options)
+    if foresee := getattr(masker, "foresee", None):
+        foresee([_looks(frames[number], views) for number in chosen[:: max(1, len(chosen) // _PROBES)]])
     if observe := getattr(masker, "observe", None):
         for number in range(len(frames)):
             observe(number, _looks(frames[number], views), views)
