@@ -11,18 +11,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 
 from ..errors import InputError
 from ..geometry.connected import without_fragments
-from ..geometry.nearest import Surface
-from ..geometry.topology import unique_edges
+from ..geometry.nearest import Surface, past_border
 from ..geometry.tsdf import SIDE, extract, fill_grid
 from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
 
 _REACH = 1.5  # voxels on both sides of a surface that know their distance to it: cubes that it goes through, and noise
-_AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,21 +125,8 @@ class _Sums:
         away = points - hits.points
         along = (away * surface.normals[hits.faces]).sum(axis=1)
         distance = np.linalg.norm(away, axis=1)
-        beyond = _beyond(mesh, hits.faces, hits.barycentric)
+        beyond = past_border(mesh, hits)
         aside = np.sqrt(np.maximum(distance**2 - along**2, 0))
         known = (distance <= _REACH * size) & (~beyond | (aside <= self._options.past * size))
         signed = np.where(beyond, along, np.where(along < 0, -distance, distance))
         return keys[known], signed[known]
-
-
-def _beyond(
-    mesh: Mesh, faces: Int64[np.ndarray, " N"], barycentric: Float64[np.ndarray, "N 3"]
-) -> Bool[np.ndarray, " N"]:
-    """Where the closest point of a face is on the mesh's border: what lies there is past the surface, not above it."""
-    edges, face_edges = unique_edges(mesh.faces)
-    border = np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1
-    ends = np.zeros(len(mesh.vertices), bool)
-    ends[edges[border].reshape(-1)] = True
-    on_edge = border[face_edges[faces]] & (barycentric[:, [2, 0, 1]] < _AT_BORDER)
-    on_corner = ends[mesh.faces[faces]] & (barycentric > 1 - _AT_BORDER)
-    return on_edge.any(axis=1) | on_corner.any(axis=1)
