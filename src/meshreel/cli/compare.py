@@ -67,7 +67,7 @@ def command(
     if len(sequence) != len(other):
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
     if isinstance(other, Video) and not options.keys:
-        options = replace(options, keys=recorded_keys(other))
+        options = replace(options, keys=recorded_keys(other.reader.metadata, len(other)))
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
         with common.stages(len(sequence)) as progress:
@@ -143,11 +143,11 @@ def is_reel(path: str) -> bool:
         return source.get_bytes(0, len(MAGIC)) == MAGIC
 
 
-def recorded_keys(video: Video) -> tuple[int, ...]:
-    """The key frames that the encoder has recorded in a file; what else may stand there is passed over."""
-    recorded = video.reader.metadata.get("key_frames")
+def recorded_keys(metadata: dict[str, Any], count: int) -> tuple[int, ...]:
+    """The key frames of `count` that the encoder has recorded in a file; what else may stand there is passed over."""
+    recorded = metadata.get("key_frames")
     numbers = recorded if isinstance(recorded, list) else []
-    return tuple(number for number in numbers if type(number) is int and 0 <= number < len(video))
+    return tuple(number for number in numbers if type(number) is int and 0 <= number < count)
 
 
 def metric_table(row: dict[str, Any]) -> Table:
