@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, UInt16
 
 from .analysis.bodies import ring
-from .analysis.segment.scene import ByMasks, ByPlace
+from .analysis.segment.scene import ByMasks, ByPlace, edge_length
 from .parts import part_of
 from .scene import Tracks, segments
 from .types import Mesh, MeshSequence
@@ -31,7 +31,8 @@ def label_frames(
     sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: EncoderOptions
 ) -> Iterator[FrameLabels]:
     """The labels of each frame; a body has the same number in all frames."""
-    tracks = Tracks(segmentation.lattice.size, options)
+    cell = edge_length(sequence)
+    tracks = Tracks(cell, options)
     for frames in segments(sequence, segmentation, options):
         moving = list[Bool[np.ndarray, " F"]]()
         parts, coded = list[Mesh](), list[Mesh]()
@@ -39,7 +40,7 @@ def label_frames(
             mesh = sequence[number]
             moving.append(segmentation.moving(number, mesh))
             parts.append(part_of(mesh, moving[-1]))
-            coded.append(part_of(mesh, moving[-1] | ring(mesh, moving[-1], segmentation.lattice.size)))
+            coded.append(part_of(mesh, moving[-1] | ring(mesh, moving[-1], cell)))
         bodies = tracks.of(coded)
         for place, (chosen, part) in enumerate(zip(moving, parts, strict=True)):
             labels = np.zeros(len(chosen), np.uint16)

@@ -16,7 +16,7 @@ from .analysis.background import BackgroundOptions, fuse_background
 from .analysis.background_depth import fuse_still_depth
 from .analysis.bodies import ring
 from .analysis.segment.masks import Masker
-from .analysis.segment.scene import ByMasks, ByPlace, segment, segment_by
+from .analysis.segment.scene import ByMasks, ByPlace, edge_length, segment, segment_by
 from .analysis.survey import Survey, check_one_unit
 from .errors import InputError
 from .geometry.connected import connected
@@ -66,11 +66,11 @@ def take_apart(
     found = segment(sequence, options.segment) if masker is None else segment_by(masker, sequence, options.segment)
     segmentation: ByPlace | ByMasks = found
     stages.add("segment", len(sequence))
-    cell = segmentation.lattice.size
+    cell = edge_length(sequence)
     background = _background(sequence, segmentation, cell, options.background)
     if background.is_empty:
         _check_nothing_lost(sequence, segmentation, options.background)
-    changes = [_change(sequence, segmentation, frame, options) for frame in segmentation.rest.changes]
+    changes = [_change(sequence, segmentation, frame, cell, options.background) for frame in segmentation.rest.changes]
     stages.add("background", len(sequence))
     noise, deviation, sizes, astray = _measured(sequence, segmentation, background, changes)
     unit = float(np.median(sizes)) if sizes else 0.0
@@ -106,12 +106,14 @@ def _background(
     return fuse_background(_Some(sequence, numbers, clear), cell, options)
 
 
-def _change(sequence: MeshSequence, segmentation: ByPlace | ByMasks, frame: int, options: EncoderOptions) -> Change:
+def _change(
+    sequence: MeshSequence, segmentation: ByPlace | ByMasks, frame: int, cell: float, options: BackgroundOptions
+) -> Change:
     assert isinstance(segmentation, ByPlace)  # masks know of no changes
     came = segmentation.rest.since == frame
-    numbers = [frame + number for number in evenly(len(sequence) - frame, options.background.frames)]
+    numbers = [frame + number for number in evenly(len(sequence) - frame, options.frames)]
     later = _Some(sequence, numbers, lambda _, mesh: segmentation.faces_at(mesh, came))
-    mesh = fuse_background(later, segmentation.lattice.size, options.background) if came.any() else Mesh.empty()
+    mesh = fuse_background(later, cell, options) if came.any() else Mesh.empty()
     return Change(frame, segmentation.rest.until == frame, mesh)
 
 

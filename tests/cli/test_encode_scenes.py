@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 import meshreel
+from meshreel.capture.record import open_recording
 from meshreel.cli.encode import describe
 from meshreel.io.depth import write_depth
 from meshreel.io.write import write_mesh
@@ -110,6 +111,19 @@ def test_a_rig_is_fused_on_the_fly_at_its_own_rate(run, rig, tmp_path):
     assert failed(run("encode", rig, "-o", out, "--fps", "24"), "--fps 24", "a rig of 15 frames")
     assert failed(run("encode", rig, "-o", out, "--scale", "0.001"), "--scale 0.001", "metres")
     assert failed(run("encode", rig, "-o", out, "--frames", "3:"), "leave 0")
+
+
+def test_captured_meshes_have_the_rate_of_their_recording(run, rig, tmp_path):
+    scan = tmp_path / "scan"
+    assert run("capture", rig, "-o", scan, "--voxel", "0.06").code == 0
+    rate = open_recording(rig)[0].frame_rate
+    assert rate != 30
+    assert run("encode", scan, "-o", tmp_path / "a.reel", "--dynamic-only", "--json").code == 0
+    with meshreel.open(tmp_path / "a.reel") as video:
+        assert video.frame_rate == rate
+    run("encode", scan, "-o", tmp_path / "b.reel", "--dynamic-only", "--fps", "7")
+    with meshreel.open(tmp_path / "b.reel") as video:
+        assert video.frame_rate == 7
 
 
 def test_a_camera_that_moves_is_refused(run, tmp_path):

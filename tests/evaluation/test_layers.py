@@ -209,7 +209,7 @@ def test_a_variant_changes_the_preset_and_its_curve_has_its_own_name(name, prese
 
 
 def test_an_unknown_variant_is_told():
-    with pytest.raises(InputError, match="known: errors"):
+    with pytest.raises(InputError, match="known: background"):
         make_codec("meshreel", {"variant": "everything"})
 
 

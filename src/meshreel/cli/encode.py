@@ -113,9 +113,10 @@ def command(
     ----------
     inputs
         A directory, a glob, mesh files (OBJ, PLY, GLB, STL, OFF) or an .npz of vertices (T x V x 3) and faces (F x 3).
-        Vertices that repeat a position are welded. Or the folder of a rig, as `capture` takes it, with its defaults:
-        each frame is fused whenever it is asked for, some three times; `capture` first where time counts. A scene, of
-        which most stands still, is taken apart: its background is in the file once, each moving body has its own track.
+        Vertices that repeat a position are welded. Or the folder of a rig, as `capture` takes it, with its defaults,
+        which gives a better background than the meshes that `capture` writes: it is fused from the depth itself. A
+        scene, of which most stands still, is taken apart: its background is in the file once, each moving body has its
+        own track.
     output
         The .reel file to write; it appears only when it is complete.
     jobs

@@ -24,7 +24,7 @@ class Reading:
     """How mesh files become a sequence."""
 
     fps: float = _READ.frame_rate
-    """Frames per second of the meshes."""
+    """Frames per second of the meshes; of a folder that `capture` wrote, those of the recording."""
     frames: str = _READ.frames
     """Which frames, as A:B with B excluded."""
     scale: float = _READ.scale

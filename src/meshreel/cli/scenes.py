@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from ..errors import InputError
 from ..geometry.cameras import unpack_cameras
 from ..io.sequence import open_sequence
 from ..types import MeshSequence
+from .capture import MADE
 from .reading import Reading
 
 _READ = Reading()
@@ -44,7 +46,10 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
     folder = Path(inputs[0])
     described = any((folder / name).is_file() for name in (RIG, SINGLE))
     if len(inputs) > 1 or not described or any(folder.glob("frame_*.ply")):
-        return Source(open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), reading.options()))
+        options = reading.options()
+        if len(inputs) == 1 and reading.fps == _READ.fps:
+            options = replace(options, frame_rate=captured_rate(folder) or options.frame_rate)
+        return Source(open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options))
     reading.options()  # refuses what no sequence can have
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
@@ -53,6 +58,15 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
         text = f"--fps {reading.fps:g}: {folder} is a rig of {recording.frame_rate:g} frames a second"
         raise InputError(f"{text}; leave it out, or mend the rig's description")
     return Source(recording, tuple(remarks))
+
+
+def captured_rate(folder: Path) -> float | None:
+    """The frame rate that `capture` has written beside the meshes in a folder, 1/s; None where there is none."""
+    try:
+        rate = json.loads((folder / MADE).read_text(encoding="utf-8")).get("frames_per_second")
+    except (OSError, ValueError, AttributeError):
+        return None
+    return float(rate) if isinstance(rate, (int, float)) and rate > 0 else None
 
 
 @Parameter(name="*")

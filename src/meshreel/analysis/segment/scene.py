@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.connected import connected_faces
+from ...geometry.nearest import distances
 from ...geometry.raycast import Rays, Seen
 from ...geometry.topology import face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
@@ -30,6 +31,9 @@ from .views import ViewsOptions, place_views
 from .votes import Votes
 
 _PROBES = 3  # frames that the views are placed by
+_WIDTH = 4.75  # median distances between two frames that a cell is wide at least: noise moves no surface by two cells
+_WIDEST = 4.0  # edges that a cell is wide at most
+_THINNED = 7  # vertices of a frame of which one is measured
 _ELSEWHERE = 2.0  # cells from the middle of the nearest known place, from which on a surface is at none
 
 
@@ -153,7 +157,7 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) ->
 
 
 def _by_place(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> ByPlace:
-    lattice, views = _lattice(frames, chosen), _views(frames, chosen, options)
+    lattice, views = _noisy_lattice(frames, chosen), _views(frames, chosen, options)
     places = find_places(_Some(frames, chosen), views, lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
@@ -259,20 +263,41 @@ def _looking(
     return views
 
 
-def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
-    """Cells as large as the frames' edges are long, which is about a voxel of what they were fused on.
+def _noisy_lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
+    """As `_lattice`, but no finer than noise lets a surface stay in its cell.
 
-    Edges without length say nothing; 1 m where there are no others.
+    Noise by the median distance from a frame to another one: what stands still is more than half of a scene.
     """
+    lattice = _lattice(frames, chosen)
     if not chosen:
-        return Lattice(np.zeros(3), 1.0)
+        return lattice
+    apart = distances(frames[chosen[0]].vertices[::_THINNED], frames[chosen[len(chosen) // 2]])
+    noise = min(_WIDTH * float(np.median(apart)), _WIDEST * lattice.size)
+    return Lattice(lattice.origin, max(lattice.size, noise))
+
+
+def _lattice(frames: Frames, chosen: Sequence[int]) -> Lattice:
+    """Cells as large as the frames' edges are long."""
+    size = edge_length(frames, chosen)
+    return Lattice.near(frames[chosen[0]], size) if chosen else Lattice(np.zeros(3), size)
+
+
+def edge_length(frames: Frames, chosen: Sequence[int] | None = None) -> float:
+    """How long the edges of a scene's frames usually are, m: about a voxel of what they were fused on.
+
+    Of the first, the middle and the last frame that are chosen, or that have surface. Edges without length say nothing;
+    1 m where there are no others.
+    """
+    chosen = _to_see(frames) if chosen is None else chosen
+    if not chosen:
+        return 1.0
     edges = []
     for number in (chosen[0], chosen[len(chosen) // 2], chosen[-1]):
         mesh = frames[number]
         pairs = mesh.vertices[unique_edges(mesh.faces)[0]]
         lengths = np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1)
         edges += [np.median(lengths[lengths > 0])] if lengths.any() else []
-    return Lattice.near(frames[chosen[0]], float(np.median(edges)) if edges else 1.0)
+    return float(np.median(edges)) if edges else 1.0
 
 
 class _Some(Frames):
