@@ -49,6 +49,12 @@ def test_where_there_is_no_room_frames_are_made_again(recording, monkeypatch):
     assert np.array_equal(first.vertices, again.vertices) and not recording._kept._files
 
 
+def test_who_reads_each_frame_once_has_nothing_kept(tmp_path, monkeypatch):
+    folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0)])
+    monkeypatch.setattr(record, "Kept", None)
+    assert not open_recording(folder, keep=False)[0][0].is_empty
+
+
 def test_it_knows_what_each_camera_measured_and_which_has_nothing(tmp_path):
     folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)])
     (folder / "right" / "depth" / "depth_00001.png").unlink()

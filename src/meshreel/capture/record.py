@@ -29,15 +29,18 @@ class Recording(MeshSequence):
     """The frames of a rig as a MeshSequence, in world coordinates.
 
     A frame is fused when it is first asked for, and kept in a folder for temporary files as long as this object lives
-    and there is room (10 MB for half a million faces): who encodes a scene asks for it several times.
+    and there is room (10 MB for half a million faces): who encodes a scene asks for it several times. Who reads each
+    frame once says `keep=False`.
     """
 
-    def __init__(self, rig: Rig, options: FusionOptions = FusionOptions(), frames: str = ":") -> None:
+    def __init__(
+        self, rig: Rig, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True
+    ) -> None:
         numbers = rig.frames
         chosen = SequenceOptions(frames=frames).chosen(len(numbers))
         self.rig, self.options = rig, options
         self.numbers = [numbers[index] for index in chosen]  # of the frames, in the files' names
-        self._kept = Kept()
+        self._kept = Kept() if keep else None
 
     @property
     def frame_rate(self) -> float:
@@ -49,14 +52,15 @@ class Recording(MeshSequence):
 
     def __getitem__(self, index: int) -> Mesh:
         number = self.numbers[index]
-        if (kept := self._kept.get(number)) is not None:
+        if self._kept is not None and (kept := self._kept.get(number)) is not None:
             return kept
         depths = self.rig.depths(number)
         try:
             mesh = fuse_depths(depths, self.options)
         except InputError as error:
             raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
-        self._kept.put(number, mesh)
+        if self._kept is not None:
+            self._kept.put(number, mesh)
         return mesh
 
     def pictures(self, index: int) -> list[DepthPicture | None]:
@@ -95,12 +99,12 @@ class Kept:
 
 
 def open_recording(
-    folder: Path, options: FusionOptions = FusionOptions(), frames: str = ":"
+    folder: Path, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True
 ) -> tuple[Recording, list[str]]:
     """The recording in a rig's folder, and a line for each thing that a user must know of it.
 
-    `frames` is a range of them, as A:B with B excluded. Raises InputError where the rig is wrong or one of
-    its cameras moves.
+    `frames` is a range of them, as A:B with B excluded; `keep` is that of the recording. Raises InputError where the
+    rig is wrong or one of its cameras moves.
     """
     rig = read_rig(folder)
     warnings = [*rig.remarks, *rig.missing()]
@@ -114,7 +118,7 @@ def open_recording(
                 f"{folder}: camera {camera.name} seems to move: {100 * share:.0f} % of its pixels see something else "
                 "than usual; record with cameras that stand still, or cut the recording where it was moved"
             )
-    return Recording(rig, options, frames), warnings
+    return Recording(rig, options, frames, keep), warnings
 
 
 def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:

@@ -58,7 +58,7 @@ def command(
         Of the mesh files.
     """
     options = FusionOptions(voxel, truncation, fragment)
-    recording, warnings = open_recording(rig, options, frames)
+    recording, warnings = open_recording(rig, options, frames, keep=False)
     common.warn(warnings)
     names = frame_names(len(recording), format)
     missing = _started(output, _made(rig, recording), names)

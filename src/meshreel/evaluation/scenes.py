@@ -126,7 +126,7 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
         simulate_room(rig, data, options)
-    recording, _ = open_recording(rig, FusionOptions(), ":")
+    recording, _ = open_recording(rig, keep=False)
     _capture(recording, meshes)
     return SceneData(name, folder, Captured(recording, open_sequence(meshes)), read_truth(rig / TRUTH))
 
