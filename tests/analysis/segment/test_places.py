@@ -10,12 +10,14 @@ import pytest
 
 from meshreel.analysis.segment import places as module
 from meshreel.analysis.segment.cut import moving_places
-from meshreel.analysis.segment.places import Places, PlacesOptions, find_places, look
+from meshreel.analysis.segment.places import Places, PlacesOptions, Watched, find_places, look
 from meshreel.analysis.segment.views import place_views
 from meshreel.errors import InputError
+from meshreel.geometry.depth import DepthPicture
+from meshreel.geometry.raycast import Rays
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Frames, Mesh
-from tests.metrics.shapes import moved
+from tests.metrics.shapes import moved, plane
 from tests.scenes import CELL, RADIUS, SEGMENT, ball, room, with_room
 
 LATTICE = Lattice(np.zeros(3), CELL)
@@ -37,14 +39,14 @@ class Seen:
 
 
 def each_frame(frames, views, options: PlacesOptions = PlacesOptions()) -> Seen:
-    found = find_places(frames, views, LATTICE, options)
-    occupied, free = zip(*look(frames, range(len(frames)), found, views, options), strict=True)
+    found = find_places(Watched(frames, views), LATTICE, options)
+    occupied, free = zip(*look(Watched(frames, views), range(len(frames)), found, options), strict=True)
     return Seen(np.stack(occupied), np.stack(free))
 
 
 @pytest.fixture(scope="module")
 def places(views) -> Places:
-    return find_places(FRAMES, views, LATTICE)
+    return find_places(Watched(FRAMES, views), LATTICE)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +83,7 @@ def test_normals_are_those_of_what_was_there(places):
 
 
 def test_the_order_of_time_does_not_matter(places, views, seen):
-    back = find_places(FRAMES[::-1], views, LATTICE)
+    back = find_places(Watched(FRAMES[::-1], views), LATTICE)
     assert np.array_equal(back.keys, places.keys) and np.array_equal(back.beside, places.beside)
     rows = each_frame(FRAMES[::-1], views)
     assert np.array_equal(rows.free, seen.free[::-1]) and np.array_equal(rows.occupied, seen.occupied[::-1])
@@ -93,7 +95,7 @@ def test_the_order_of_time_does_not_matter(places, views, seen):
 
 
 def test_the_same_frames_have_the_same_places(places, views):
-    again = find_places(list(FRAMES), views, LATTICE)
+    again = find_places(Watched(list(FRAMES), views), LATTICE)
     for name in ("keys", "beside", "normals"):
         assert getattr(again, name).tobytes() == getattr(places, name).tobytes()
     for name in ("occupied", "free"):
@@ -115,7 +117,7 @@ def test_what_is_counted_is_what_each_frame_says(places, seen):
 
 def test_places_do_not_depend_on_how_many_frames_are_in_memory_together(places, views, monkeypatch):
     monkeypatch.setattr(module, "_TOGETHER", 1)
-    alone = find_places(FRAMES, views, LATTICE)
+    alone = find_places(Watched(FRAMES, views), LATTICE)
     for name in ("keys", "beside", "normals", "free_share"):
         assert getattr(alone, name).tobytes() == getattr(places, name).tobytes()
     for name in ("before", "after"):
@@ -127,7 +129,7 @@ def test_memory_does_not_grow_with_the_number_of_frames(views):
 
     def peak(count: int) -> int:
         tracemalloc.start()
-        find_places(Again(count), views, LATTICE)
+        find_places(Watched(Again(count), views), LATTICE)
         size = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return size
@@ -165,7 +167,38 @@ def test_the_back_of_a_face_says_nothing_of_what_is_before_it():
     wall = Mesh.of(room().vertices, room().faces[:, ::-1])
     frames = [wall, moved(wall, (0, 0, 0.3))]
     there = place_views([room()], SEGMENT.views)
-    assert not find_places(frames, there, LATTICE).tally.free.any()
+    assert not find_places(Watched(frames, there), LATTICE).tally.free.any()
+
+
+TABLE = moved(plane(0.8, 14), (0.8, 0.8, 0.5))
+WITH, WITHOUT = (with_room([body])[0] for body in (TABLE, Mesh.empty()))
+
+
+def measured(mesh: Mesh, view, hidden: Mesh | None = None) -> DepthPicture:
+    """What a camera measures of a mesh; nothing where another mesh would be in the way."""
+    seen = Rays(mesh).look(view)
+    depth = np.where(seen.faces >= 0, seen.depth, 0.0)
+    if hidden is not None:
+        depth[Rays(hidden).look(view).faces >= 0] = 0.0
+    return DepthPicture(view, depth.astype(np.float32), 1.0, 10.0)
+
+
+@pytest.mark.parametrize(("hidden", "free"), [(None, True), (TABLE, False)], ids=["taken away", "in a shadow"])
+def test_what_no_camera_looked_past_is_not_known_to_be_free(views, hidden, free):
+    """A hole in a surface: something went, or somebody stands before it. The views look through it either way."""
+    frames = [WITH, WITHOUT]
+    pictures = [[measured(WITH, view) for view in views], [measured(WITHOUT, view, hidden) for view in views]]
+    places, known = (find_places(Watched(frames, views, sees), LATTICE) for sees in (None, pictures.__getitem__))
+    table = (np.abs(places.middles[:, 2] - 0.5) < CELL) & (np.abs(places.middles[:, :2] - 1.2) < 0.3).all(axis=1)
+    assert table.sum() > 50 and (places.tally.free[table] == 1).mean() > 0.9
+    share = (known.tally.free[table] == 1).mean()
+    assert share > 0.9 if free else share == 0
+    assert (known.tally.free <= places.tally.free).all()
+
+
+def test_a_camera_that_lacks_a_frame_looks_past_nothing(views):
+    none = find_places(Watched(FRAMES, views, ([[None, None]] * len(FRAMES)).__getitem__), LATTICE)
+    assert not none.tally.free.any() and none.tally.occupied.any()
 
 
 def test_nobody_looks_behind_nothing(views):

@@ -4,13 +4,15 @@ In: some frames of a scene, spread over the sequence, and views of them. Out: fo
 surface in, in how many frames there is surface in or beside it, in how many views see past it, and how long it stayed.
 
 A cell beside surface counts as occupied, whatever is seen: noise moves a surface from cell to cell, and rays graze it.
+Views stand where no camera did, and look through the holes that shadows leave in a surface. Where a frame's depth
+pictures are known, a cell is seen free only if a camera, too, measured something past it.
 Memory does not grow with the number of frames: what happens in a frame is counted, and forgotten.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +20,7 @@ from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
+from ...geometry.depth import DepthPicture
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
@@ -45,6 +48,26 @@ class PlacesOptions:
     def chosen(self, count: int, frame_rate: float) -> list[int]:
         """The frames to look at of a sequence of `count`."""
         return evenly(count, max(self.frames, math.ceil((count - 1) / frame_rate * self.rate) + 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """Frames, the views that look at them, and what depth cameras measured in each of them, where that is known."""
+
+    frames: Sequence[Mesh] | Frames
+    views: Sequence[PinholeCamera]
+    pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame, a camera each
+
+    def look(self, number: int, lattice: Lattice) -> _Look:
+        """What is known of one frame."""
+        points, _ = spread(mesh := self.frames[number], 1.5 * lattice.size)
+        return self.seen(number, mesh, distinct(lattice.keys(points)), lattice)
+
+    def seen(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Look:
+        """As `look`, of a frame that has been read and whose cells are known."""
+        rays = Rays(mesh)
+        depths = [_stored(rays, view, lattice.size / _FINENESS) for view in self.views]
+        return _Look(cells, depths, None if self.pictures is None else self.pictures(number))
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,45 +146,37 @@ class _Look:
 
     cells: Int64[np.ndarray, " C"]  # keys of those that it has surface in, sorted
     depths: list[UInt16[np.ndarray, "H W"]]  # of each view, in units
+    measured: list[DepthPicture | None] | None  # by each camera; None where nothing is known of cameras
 
 
-def find_places(
-    frames: Sequence[Mesh] | Frames,
-    views: Sequence[PinholeCamera],
-    lattice: Lattice,
-    options: PlacesOptions = PlacesOptions(),
-) -> Places:
+def find_places(watched: Watched, lattice: Lattice, options: PlacesOptions = PlacesOptions()) -> Places:
     """The places of a scene; one frame in memory at a time. What comes after the first 32 frames is read twice.
 
     About 1 s of CPU for a frame of 500,000 faces.
     """
     first, known = list[_Look](), _Known()
-    for number, mesh in enumerate(frames):
-        own, normals = _cells(mesh, lattice)
+    for number in range(len(watched.frames)):
+        own, normals = _cells(mesh := watched.frames[number], lattice)
         known.add(own, normals)
         if number < _TOGETHER:
-            first.append(_Look(own, _depths(mesh, views, lattice)))
+            first.append(watched.seen(number, mesh, own, lattice))
     keys, normals = known.places()
     places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)))
-    for occupied, free in _seen(first, places, views, options):
+    for occupied, free in _seen(first, places, watched.views, options):
         places.tally.add(occupied, free)
     first.clear()
-    for occupied, free in look(frames, range(_TOGETHER, len(frames)), places, views, options):
+    for occupied, free in look(watched, range(_TOGETHER, len(watched.frames)), places, options):
         places.tally.add(occupied, free)
     return places
 
 
 def look(
-    frames: Sequence[Mesh] | Frames,
-    numbers: range,
-    places: Places,
-    views: Sequence[PinholeCamera],
-    options: PlacesOptions = PlacesOptions(),
+    watched: Watched, numbers: range, places: Places, options: PlacesOptions = PlacesOptions()
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
     """Where each of some frames has surface in or beside a place, and where not, and views see past it."""
     for start in range(0, len(numbers), _TOGETHER):
-        meshes = (frames[number] for number in numbers[start : start + _TOGETHER])
-        yield from _seen([_look(mesh, places.lattice, views) for mesh in meshes], places, views, options)
+        together = (watched.look(number, places.lattice) for number in numbers[start : start + _TOGETHER])
+        yield from _seen(list(together), places, watched.views, options)
 
 
 def _seen(
@@ -175,9 +190,24 @@ def _seen(
         limit = (depth + options.past * size) / (size / _FINENESS)
         for row, one in zip(seen, looks, strict=True):
             row[inside[one.depths[number].reshape(-1)[pixels] > limit]] += 1
-    for row, one in zip(seen, looks, strict=True):
+    measured = _measured(looks, middles, options.past * size)
+    for row, sure, one in zip(seen, measured, looks, strict=True):
         occupied = _near(places.keys, places.beside, one.cells)
-        yield occupied, (row >= options.views) & ~occupied
+        yield occupied, (row >= options.views) & sure & ~occupied
+
+
+def _measured(looks: Sequence[_Look], middles: Float64[np.ndarray, "P 3"], past: float) -> Bool[np.ndarray, "T P"]:
+    """Where a camera measured something so far, m, past a place, or nothing is known of cameras."""
+    found = np.array([[one.measured is None] for one in looks]).repeat(len(middles), axis=1)
+    cameras: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}  # they stand still
+    for row, one in zip(found, looks, strict=True):
+        for number, picture in enumerate(one.measured or ()):
+            if picture is not None:
+                if number not in cameras:
+                    cameras[number] = _projected(picture.camera, middles)
+                pixels, inside, depth = cameras[number]
+                row[inside[picture.depth.reshape(-1)[pixels] * picture.unit > depth + past]] = True
+    return found
 
 
 class _Known:
@@ -206,16 +236,6 @@ class _Known:
         for cells, normals in (before, *self._new):
             self._sums[np.searchsorted(self._keys, cells)] += normals
         self._new.clear()
-
-
-def _look(mesh: Mesh, lattice: Lattice, views: Sequence[PinholeCamera]) -> _Look:
-    points, _ = spread(mesh, 1.5 * lattice.size)
-    return _Look(distinct(lattice.keys(points)), _depths(mesh, views, lattice))
-
-
-def _depths(mesh: Mesh, views: Sequence[PinholeCamera], lattice: Lattice) -> list[UInt16[np.ndarray, "H W"]]:
-    rays = Rays(mesh)
-    return [_stored(rays, view, lattice.size / _FINENESS) for view in views]
 
 
 def _cells(mesh: Mesh, lattice: Lattice) -> tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]:

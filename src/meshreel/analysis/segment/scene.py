@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float64, Int64, UInt8
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.connected import connected_faces
+from ...geometry.depth import SeesDepth
 from ...geometry.nearest import distances
 from ...geometry.raycast import Rays, Seen
 from ...geometry.topology import face_normals, unique_edges
@@ -25,7 +26,7 @@ from ...geometry.voxels import Lattice, spread
 from ...types import Frames, Mesh, MeshSequence, evenly
 from .cut import CutOptions, moving_places
 from .masks import Masker
-from .places import PlacesOptions, find_places
+from .places import PlacesOptions, Watched, find_places
 from .settle import Rest, SettleOptions, find_rest
 from .views import ViewsOptions, place_views
 from .votes import Votes
@@ -158,10 +159,17 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) ->
 
 def _by_place(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> ByPlace:
     lattice, views = _noisy_lattice(frames, chosen), _views(frames, chosen, options)
-    places = find_places(_Some(frames, chosen), views, lattice, options.places)
+    places = find_places(_watched(frames, chosen, views), lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
     return ByPlace(lattice, places.keys, moving, rest, options.island)
+
+
+def _watched(frames: MeshSequence, chosen: Sequence[int], views: Sequence[PinholeCamera]) -> Watched:
+    if not isinstance(frames, SeesDepth):
+        return Watched(_Some(frames, chosen), views)
+    pictures = frames.pictures
+    return Watched(_Some(frames, chosen), views, lambda number: pictures(chosen[number]))
 
 
 def _faces_away(mesh: Mesh) -> bool:
