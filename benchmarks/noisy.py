@@ -26,7 +26,7 @@ from meshreel.format.layout import Form, LayersPatches
 from meshreel.format.records import unpack_all
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.nearest import Surface
-from meshreel.geometry.topology import drop_unreferenced, face_normals
+from meshreel.geometry.topology import face_normals, part_of
 from meshreel.io.meshes import read_mesh
 from meshreel.layered import encode_segment
 from meshreel.metrics.bd_rate import Curve, bd_rate
@@ -77,8 +77,8 @@ def body_of(given: argparse.Namespace, name: str) -> Body:
             own[moving[_own(given.data, name)]] = True
             fused = read_mesh(given.meshes / f"frame_{number:05}.ply").mesh
             near = Surface(clean).closest(fused.vertices[fused.faces].mean(axis=1)).faces
-            frames.append(drop_unreferenced(Mesh(fused.vertices, fused.faces[own[near]])))
-            truth.append(drop_unreferenced(Mesh(clean.vertices, clean.faces[own])))
+            frames.append(part_of(fused, own[near]))
+            truth.append(part_of(clean, own))
     corners = np.concatenate([mesh.vertices for mesh in frames])
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = float(np.linalg.norm(high - low))

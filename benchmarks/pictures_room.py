@@ -19,7 +19,7 @@ from meshreel.capture.room import RoomOptions, furnished_room, room_cameras
 from meshreel.capture.simulate import SensorOptions, simulate_rig
 from meshreel.decoder import open as open_video
 from meshreel.encoder import encode
-from meshreel.geometry.topology import components, concatenate, drop_unreferenced
+from meshreel.geometry.topology import components, concatenate, part_of
 from meshreel.metrics.cameras import Box, OrthographicCamera
 from meshreel.presets import preset_options
 from meshreel.types import Mesh
@@ -58,7 +58,7 @@ def captured(folder: Path) -> Recording:
 
 def _colored(mesh: Mesh, moves: np.ndarray) -> tuple[Mesh, Float64[np.ndarray, "V 3"]]:
     """The mesh with what moves split off, and a color for each of its vertices: one a body, the largest first."""
-    still, moving = (drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen])) for chosen in (~moves, moves))
+    still, moving = (part_of(mesh, chosen) for chosen in (~moves, moves))
     label = components(moving.faces, len(moving.vertices))
     rank = np.argsort(np.argsort(-np.bincount(label), kind="stable"), kind="stable")[label]
     colors = np.concatenate([np.tile(GREY, (len(still.vertices), 1)), BODIES[rank % len(BODIES)]])

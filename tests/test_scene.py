@@ -10,7 +10,7 @@ import pytest
 
 import meshreel
 from meshreel.analysis.background import BackgroundOptions
-from meshreel.analysis.segment.scene import ByPlace
+from meshreel.analysis.segment.labelling import ByPlace
 from meshreel.analysis.segment.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.choice import NO_ERROR
@@ -223,14 +223,14 @@ class AllMoves(ByPlace):
         return np.ones(len(mesh.faces), bool)
 
 
-ALL = AllMoves(Lattice(np.zeros(3), CELL), np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), 0.0)
+ALL = AllMoves(CELL, Lattice(np.zeros(3), CELL), np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), 0.0)
 
 
 def tracks(frames: list[Mesh], segment: int = 2) -> list[str]:
     """Of each track, which frames it has a body in; segments of so many frames."""
     sequence = MeshList(tuple(frames), 1.0)
     seen = replace(survey(sequence), scale=1.0)
-    parts = Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0)
+    parts = Parts(seen, ALL, NONE, [], 0.0, 0.0)
     options = replace(OPTIONS, key_interval=float(segment))
     coded = encode_bodies(sequence, parts, options, None, Stages(None, len(frames)))
     assert coded.dropped == 0
@@ -336,7 +336,7 @@ def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
     sequence = MeshList(tuple(ROLLING))
     parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS, Stages(None, 4))
     assert rms(parts.background.vertices, room()) < NOISE
-    assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.cell == pytest.approx(CELL, rel=0.2)
+    assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.segmentation.cell == pytest.approx(CELL, rel=0.2)
     number = 2
     assert (parts.segmentation.moving(number, ROLLING[number]) == of_body(ROLLING[number])).mean() > 0.98
 

@@ -152,7 +152,7 @@ def _encode_scene(work: _Work, path: Path, masker: Masker | None) -> Summary:
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tracks)
-    still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.cell)
+    still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
     warnings = (*_warnings(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
     return Summary(path.stat().st_size, tuple(groups), warnings, scene)
 

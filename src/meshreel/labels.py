@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, UInt16
 
-from .analysis.bodies import ring
-from .analysis.segment.scene import ByMasks, ByPlace, edge_length
-from .parts import part_of
+from .analysis.bodies import with_ring
+from .analysis.segment.labelling import Segmentation
+from .geometry.topology import part_of
 from .scene import Tracks, segments
 from .types import Mesh, MeshSequence
 from .windows import EncoderOptions
@@ -27,11 +27,9 @@ class FrameLabels:
     bodies: UInt16[np.ndarray, " F"]  # the track that codes the face, and one; 0: it rests, or is of no body
 
 
-def label_frames(
-    sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: EncoderOptions
-) -> Iterator[FrameLabels]:
+def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[FrameLabels]:
     """The labels of each frame; a body has the same number in all frames."""
-    cell = edge_length(sequence)
+    cell = segmentation.cell
     tracks = Tracks(cell, options)
     for frames in segments(sequence, segmentation, options):
         moving = list[Bool[np.ndarray, " F"]]()
@@ -40,7 +38,7 @@ def label_frames(
             mesh = sequence[number]
             moving.append(segmentation.moving(number, mesh))
             parts.append(part_of(mesh, moving[-1]))
-            coded.append(part_of(mesh, moving[-1] | ring(mesh, moving[-1], cell)))
+            coded.append(with_ring(mesh, moving[-1], cell))
         bodies = tracks.of(coded)
         for place, (chosen, part) in enumerate(zip(moving, parts, strict=True)):
             labels = np.zeros(len(chosen), np.uint16)

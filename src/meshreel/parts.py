@@ -6,7 +6,7 @@ In: the frames of a scene, options. Out: Parts, which every segment of the scene
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,20 +15,22 @@ from jaxtyping import Bool
 from .analysis.background import BackgroundOptions, fuse_background
 from .analysis.background_depth import fuse_still_depth
 from .analysis.bodies import ring
+from .analysis.segment.labelling import Segmentation
 from .analysis.segment.masks import Masker
-from .analysis.segment.scene import ByMasks, ByPlace, edge_length, segment, segment_by
+from .analysis.segment.scene import segment, segment_by
 from .analysis.survey import Survey, check_one_unit
+from .derived import ChosenParts
 from .errors import InputError
 from .geometry.connected import connected
 from .geometry.depth import SeesDepth
 from .geometry.nearest import distances
-from .geometry.topology import concatenate, drop_unreferenced, face_normals
-from .types import Frames, Mesh, MeshSequence, evenly
+from .geometry.topology import concatenate, face_normals, part_of
+from .types import Mesh, MeshSequence, evenly
 from .windows import EncoderOptions, Stages
 
 PROBES = 8  # frames, at most, that what moves is measured in
 LOST = 0.5  # of a frame's faces: as many stand still only where there is a background
-OUTLIER = 3.0  # cells: still surface farther from the background is no noise
+OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise
 NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
 
 
@@ -37,7 +39,6 @@ class Change:
     """From a frame on, the room is another."""
 
     frame: int
-    gone: Bool[np.ndarray, " P"]  # places of the segmentation where something is no more
     came: Mesh  # m, what has come to stand
 
 
@@ -46,10 +47,9 @@ class Parts:
     """What does not change over a scene's segments."""
 
     seen: Survey  # of the scene; its unit is the diagonal of the largest body that moves, or its own where nothing does
-    segmentation: ByPlace | ByMasks
+    segmentation: Segmentation
     background: Mesh  # m, as in the first frame; empty where nothing stands still
     changes: list[Change]
-    cell: float  # m, of the scene's mesh
     noise: float  # m, RMS distance of a frame's still surface from the background, tails and all: what bodies have
     deviation: float  # m, the same by the median, as a standard deviation: without its tails
     astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
@@ -63,22 +63,24 @@ def take_apart(
     Raises InputError where frames are of different units, or of another than metres.
     """
     check_one_unit(seen)
-    found = segment(sequence, options.segment) if masker is None else segment_by(masker, sequence, options.segment)
-    segmentation: ByPlace | ByMasks = found
+    segmentation: Segmentation
+    if masker is None:
+        segmentation = segment(sequence, options.segment)
+    else:
+        segmentation = segment_by(masker, sequence, options.segment)
     stages.add("segment", len(sequence))
-    cell = edge_length(sequence)
-    background = _background(sequence, segmentation, cell, options.background)
+    background = _background(sequence, segmentation, options.background)
     if background.is_empty:
         _check_nothing_lost(sequence, segmentation, options.background)
-    changes = [_change(sequence, segmentation, frame, cell, options.background) for frame in segmentation.rest.changes]
+    changes = [_change(sequence, segmentation, frame, options.background) for frame in segmentation.changes]
     stages.add("background", len(sequence))
     noise, deviation, sizes, astray = _measured(sequence, segmentation, background, changes)
     unit = float(np.median(sizes)) if sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
-    return Parts(seen, segmentation, background, changes, cell, noise, deviation, astray)
+    return Parts(seen, segmentation, background, changes, noise, deviation, astray)
 
 
-def _check_nothing_lost(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: BackgroundOptions) -> None:
+def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions) -> None:
     """Where a background is empty, no frame may have much that stands still: it would be in no part of the file."""
     for number in evenly(len(sequence), options.frames):
         mesh = sequence[number]
@@ -89,11 +91,9 @@ def _check_nothing_lost(sequence: MeshSequence, segmentation: ByPlace | ByMasks,
             raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
 
 
-def _background(
-    sequence: MeshSequence, segmentation: ByPlace | ByMasks, cell: float, options: BackgroundOptions
-) -> Mesh:
+def _background(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions) -> Mesh:
     """What stands still at first, from the cameras' depth where it is known; cells in m."""
-    numbers = evenly(len(sequence), options.frames)
+    numbers, cell = evenly(len(sequence), options.frames), segmentation.cell
     if options.depth and isinstance(sequence, SeesDepth):
         meshes = ((number, sequence[number]) for number in numbers)
         moments = ((sequence.pictures(k), mesh, segmentation.still_at_first(k, mesh)) for k, mesh in meshes)
@@ -103,50 +103,23 @@ def _background(
         stands = segmentation.still_at_first(number, mesh)
         return stands & ~ring(mesh, ~stands, cell)
 
-    return fuse_background(_Some(sequence, numbers, clear), cell, options)
+    return fuse_background(ChosenParts(sequence, numbers, clear), cell, options)
 
 
-def _change(
-    sequence: MeshSequence, segmentation: ByPlace | ByMasks, frame: int, cell: float, options: BackgroundOptions
-) -> Change:
-    assert isinstance(segmentation, ByPlace)  # masks know of no changes
-    came = segmentation.rest.since == frame
+def _change(sequence: MeshSequence, segmentation: Segmentation, frame: int, options: BackgroundOptions) -> Change:
     numbers = [frame + number for number in evenly(len(sequence) - frame, options.frames)]
-    later = _Some(sequence, numbers, lambda _, mesh: segmentation.faces_at(mesh, came))
-    mesh = fuse_background(later, cell, options) if came.any() else Mesh.empty()
-    return Change(frame, segmentation.rest.until == frame, mesh)
-
-
-class _Some(Frames):
-    """Chosen faces of some frames."""
-
-    def __init__(
-        self, sequence: Frames, numbers: Sequence[int], choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]]
-    ) -> None:
-        self._sequence, self._numbers, self._choose = sequence, numbers, choose
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __getitem__(self, index: int) -> Mesh:
-        number = self._numbers[index]
-        mesh = self._sequence[number]
-        return part_of(mesh, self._choose(number, mesh))
-
-
-def part_of(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
-    """The chosen faces alone."""
-    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen]))
+    later = ChosenParts(sequence, numbers, lambda _, mesh: segmentation.came(frame, mesh))
+    return Change(frame, fuse_background(later, segmentation.cell, options))
 
 
 def _measured(
-    sequence: MeshSequence, segmentation: ByPlace | ByMasks, background: Mesh, changes: Sequence[Change]
+    sequence: MeshSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change]
 ) -> tuple[float, float, list[float], float]:
     """RMS distance of still surface from the background, m, its deviation by the median, m; sizes of largest bodies.
 
     What is far from the background is no noise: what it is of all surface comes last.
     """
-    far = OUTLIER * segmentation.lattice.size
+    far = OUTLIER * segmentation.noise
     squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
     for number in evenly(len(sequence), PROBES):
         mesh = sequence[number]

@@ -18,8 +18,8 @@ import numpy as np
 from jaxtyping import Bool
 
 from .analysis.background import BackgroundOptions
-from .analysis.bodies import at_most, find_bodies, ring, same_bodies
-from .analysis.segment.scene import ByMasks, ByPlace
+from .analysis.bodies import at_most, find_bodies, same_bodies, with_ring
+from .analysis.segment.labelling import Segmentation
 from .analysis.survey import Survey
 from .choice import NO_ERROR
 from .coding.background import decode_background, decode_change, encode_background, encode_change
@@ -29,7 +29,7 @@ from .format.layout import Form
 from .geometry.decimate import decimate, decimate_faces
 from .geometry.nearest import distances
 from .layered import MOST_EMPTY, encode_segment
-from .parts import Change, Parts, part_of
+from .parts import Change, Parts
 from .types import Mesh, MeshSequence, Placement
 from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_window
 
@@ -95,9 +95,8 @@ def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> rang
 
 def _gone(parts: Parts, state: Mesh, change: Change) -> Bool[np.ndarray, " F"]:
     """The faces of a state of the background, normalised, that a change takes away."""
-    assert isinstance(parts.segmentation, ByPlace)
     place = Placement(parts.seen.unit, tuple(parts.seen.center))
-    return parts.segmentation.faces_at(place.of(state), change.gone)
+    return parts.segmentation.gone(change.frame, place.of(state))
 
 
 def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
@@ -124,7 +123,7 @@ def encode_bodies(
     """The groups of all tracks; each track has all frames, and no group has frames with surface and without."""
     noise = min(parts.noise / parts.seen.unit, MOST_NOISE) if options.form == Form.LAYERS else 0.0
     options = replace(options, noise=noise)
-    tracks, found = Tracks(parts.cell, options), list[TrackGroup]()
+    tracks, found = Tracks(parts.segmentation.cell, options), list[TrackGroup]()
     for frames in segments(sequence, parts.segmentation, options):
         moving = [_moving(sequence[number], parts, number) for number in frames]
         jobs = []
@@ -155,11 +154,11 @@ def _encoded(task: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
     return list(_groups(task))
 
 
-def segments(sequence: MeshSequence, segmentation: ByPlace | ByMasks, options: EncoderOptions) -> Iterator[range]:
+def segments(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:
     """Runs of frames that are coded on their own, of even lengths, cut also where the background is another."""
     count, frame_rate = len(sequence), sequence.frame_rate
     longest = max(1, round(options.key_interval * frame_rate))
-    others = set(segmentation.rest.changes) | set(refreshes(count, frame_rate, options.background))
+    others = set(segmentation.changes) | set(refreshes(count, frame_rate, options.background))
     for start, stop in pairwise(sorted({0, count} | others)):
         pieces = -(-(stop - start) // longest)
         yield from (range(a, b) for a, b in pairwise(start + (stop - start) * k // pieces for k in range(pieces + 1)))
@@ -214,8 +213,7 @@ class Tracks:
 
 
 def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
-    moves = parts.segmentation.moving(number, mesh)
-    return part_of(mesh, moves | ring(mesh, moves, parts.cell))
+    return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell)
 
 
 def _apart(mesh: Mesh, small: Mesh) -> float:

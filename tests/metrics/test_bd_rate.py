@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.errors import InputError
-from meshreel.metrics.bd_rate import Curve, bd_rate, gain_end, hull
+from meshreel.metrics.bd_rate import Curve, bd_bound, bd_rate, gain_end, hull
 
 # The points of VCEG-M33's often reprinted example, and those in the README of FAU's `bjontegaard` package.
 VCEG = (
@@ -72,6 +72,20 @@ def test_without_common_quality_there_is_no_number_and_a_reason():
     assert "no BD-rate" in str(result)
     touching = bd_rate(_curve("a", [1, 2], [50, 53]), _curve("b", [1, 2], [53, 63]))
     assert touching.percent is None
+
+
+def test_who_is_better_at_the_least_rate_than_the_anchor_ever_is_has_a_bound():
+    anchor, test = _curve("a", [1, 4], [50, 56]), _curve("b", [0.5, 2], [60, 63])
+    result = bd_bound(anchor, test)
+    assert result.at_most and (result.low, result.high) == (50, 56)
+    assert result.percent == pytest.approx(100 * (0.5 / 2 - 1))  # 2 is the anchor's mean rate: 1 to 4, logarithmic
+    assert "at most" in str(result)
+    worse = _curve("c", [0.5, 1, 2], [55, 60, 63])  # the same codec, had it gone lower
+    assert bd_bound(anchor, worse) == bd_rate(anchor, worse) and not bd_bound(anchor, worse).at_most
+    below = bd_bound(anchor, test, 53)
+    assert below.high == 53 and below.percent == pytest.approx(100 * (0.5 / np.sqrt(2) - 1))
+    assert bd_bound(test, anchor).percent is None  # the other way round nothing is known
+    assert bd_bound(_curve("a", [1], [50]), test).percent is None
 
 
 def test_too_few_points_give_no_number_and_a_reason():

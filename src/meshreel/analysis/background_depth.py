@@ -15,13 +15,11 @@ from jaxtyping import Bool, Float32
 from ..geometry.connected import without_fragments
 from ..geometry.depth import DepthPicture
 from ..geometry.raycast import Rays
-from ..geometry.topology import drop_unreferenced, face_normals
-from ..geometry.tsdf import extract, integrate
+from ..geometry.topology import face_normals, part_of
+from ..geometry.tsdf import SEEN, TRUNCATION, extract, integrate
 from ..types import Mesh
 from .background import BackgroundOptions
 
-TRUNCATION = 3.0  # voxels that a depth says something about before and behind it
-SEEN = 0.5  # measurements of a voxel above which it counts: one is enough, it is of many frames
 BESIDE = 3  # pixels around what moves that are not believed
 
 Moment = tuple[list[DepthPicture | None], Mesh, Bool[np.ndarray, " _"]]  # pictures, the mesh of them, its still faces
@@ -81,4 +79,4 @@ def _facing(mesh: Mesh, pictures: list[DepthPicture], least: float) -> Mesh:
     for picture in pictures:
         rays = picture.camera.eye - middles
         best = np.maximum(best, (rays * normals).sum(axis=1) / np.maximum(np.linalg.norm(rays, axis=1), 1e-12))
-    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[best >= least]))
+    return part_of(mesh, best >= least)

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float64, Int64
 
 from ..errors import InputError
 from ..geometry.connected import connected_faces
-from ..geometry.topology import concatenate, drop_unreferenced, face_normals, with_neighbours
+from ..geometry.topology import concatenate, face_normals, part_of, with_neighbours
 from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
 
@@ -68,6 +68,11 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
     found[found] = longest <= RING * cell
     return found
+
+
+def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Mesh:
+    """What moves of a frame, as bodies are coded: with its `ring`."""
+    return part_of(mesh, moves | ring(mesh, moves, cell))
 
 
 def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:
@@ -126,7 +131,7 @@ def _pieces(frame: int, mesh: Mesh, lattice: Lattice) -> list[_Piece]:
     areas = np.bincount(label, face_normals(mesh)[1])
     found = []
     for number in np.flatnonzero(np.bincount(label)):
-        part = drop_unreferenced(Mesh(mesh.vertices, mesh.faces[label == number]))
+        part = part_of(mesh, label == number)
         found.append(_Piece(frame, part, float(areas[number]), _cells(part, lattice)))
     return found
 

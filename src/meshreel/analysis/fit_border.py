@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
-from ..geometry.topology import face_normals, unique_edges
+from ..geometry.topology import border_mask, face_normals, unique_edges
 from ..types import Mesh
 from .fit_rows import Rows, no_rows
 
@@ -32,22 +32,21 @@ class Border:
 
 
 @dataclass(frozen=True, slots=True)
-class BorderEdges:
+class BorderSides:
     """The half-edges of a mesh that no second face shares: the face, and the corner that each starts from."""
 
     faces: Int64[np.ndarray, " E"]
     sides: Int64[np.ndarray, " E"]
 
 
-def border_edges(faces: np.ndarray) -> BorderEdges:
+def border_sides(faces: np.ndarray) -> BorderSides:
     """The border half-edges of a connectivity."""
     edges, of_faces = unique_edges(faces)
-    single = np.bincount(of_faces.reshape(-1), minlength=len(edges)) == 1
-    at, sides = np.nonzero(single[of_faces])
-    return BorderEdges(at, sides)
+    at, sides = np.nonzero(border_mask(edges, of_faces)[of_faces])
+    return BorderSides(at, sides)
 
 
-def sample_border(mesh: Mesh, edges: BorderEdges) -> Border:
+def sample_border(mesh: Mesh, edges: BorderSides) -> Border:
     """Evenly spaced points along each border edge, in order."""
     share = np.tile((np.arange(SAMPLES) + 0.5) / SAMPLES, len(edges.faces))
     faces, sides = np.repeat(edges.faces, SAMPLES), np.repeat(edges.sides, SAMPLES)

@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..geometry.nearest import Hits, Surface
-from ..geometry.topology import face_normals, unique_edges, vertex_normals
+from ..geometry.topology import border_edges, face_normals, vertex_normals
 from ..types import Mesh
-from .fit_border import border_edges, match_borders, sample_border
+from .fit_border import border_sides, match_borders, sample_border
 from .fit_rows import Rows
 from .fit_system import Template
 
@@ -37,7 +37,7 @@ class Target:
         self.surface = Surface(mesh)
         self.normals = vertex_normals(mesh)
         self.inside = _inside(mesh)
-        self.border = sample_border(mesh, border_edges(mesh.faces))
+        self.border = sample_border(mesh, border_sides(mesh.faces))
 
     def normals_at(self, hits: Hits) -> Float64[np.ndarray, "N 3"]:
         """Unit interpolated normals at points of the surface."""
@@ -50,7 +50,7 @@ def match(template: Template, positions: Float64[np.ndarray, "V 3"], target: Tar
     forward = _from_target(mesh, target, options)
     backward = _from_template(template, mesh, target, options)
     border = match_borders(
-        sample_border(mesh, border_edges(mesh.faces)), target.border, 2 * options.gate, options.agreement
+        sample_border(mesh, border_sides(mesh.faces)), target.border, 2 * options.gate, options.agreement
     )
     return forward + backward + border
 
@@ -111,8 +111,6 @@ def interpolated_scalar(values: Float64[np.ndarray, " V"], faces: np.ndarray, hi
 
 
 def _inside(mesh: Mesh) -> Float64[np.ndarray, " V"]:
-    edges, of_faces = unique_edges(mesh.faces)
-    border = edges[np.bincount(of_faces.reshape(-1), minlength=len(edges)) == 1]
     inside = np.ones(len(mesh.vertices))
-    inside[border.reshape(-1)] = 0.0
+    inside[border_edges(mesh).reshape(-1)] = 0.0
     return inside

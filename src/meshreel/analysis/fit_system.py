@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ..geometry.topology import unique_edges
 from .conjugate_gradients import Limits, conjugate_gradients
-from .fit_border import border_edges
+from .fit_border import border_sides
 from .fit_rows import Rows, no_rows
 
 
@@ -36,7 +36,7 @@ class Template:
         self.faces = faces.astype(np.int64)
         self.count = count
         self.edges = unique_edges(faces)[0]
-        self.border = border_edges(faces)
+        self.border = border_sides(faces)
         self.laplacian = _uniform_laplacian(self.edges, count)
         self._place_blocks()
         corner = np.full(count, -1)

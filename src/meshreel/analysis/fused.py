@@ -15,7 +15,7 @@ from jaxtyping import Int64
 
 from ..errors import InputError
 from ..geometry.poisson import PoissonOptions, drop_small, reconstruct
-from ..geometry.topology import clean, unique_edges, vertex_normals
+from ..geometry.topology import clean, edge_lengths, vertex_normals
 from ..types import Mesh
 from .embedded import Motion
 from .fit_match import ON_BORDER, Target, interpolated_scalar
@@ -82,9 +82,4 @@ def _agreeing(surface: Mesh, frames: Sequence[Target], reach: float) -> Int64[np
 
 def _spacing(targets: Sequence[Target]) -> float:
     """The median length of the frames' edges."""
-    found = []
-    for target in targets:
-        edges, _ = unique_edges(target.mesh.faces)
-        ends = target.mesh.vertices[edges]
-        found.append(float(np.median(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))))
-    return float(np.median(found))
+    return float(np.median([np.median(edge_lengths(target.mesh)) for target in targets]))

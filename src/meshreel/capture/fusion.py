@@ -14,11 +14,9 @@ from jaxtyping import UInt16
 
 from ..errors import InputError
 from ..geometry.connected import without_fragments
-from ..geometry.tsdf import extract, integrate
+from ..geometry.tsdf import SEEN, TRUNCATION, extract, integrate
 from ..types import Mesh
 from .rig import DepthCamera
-
-SEEN = 0.5  # measurements of a voxel above which it counts: one is enough
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +24,7 @@ class FusionOptions:
     """How depth becomes surface."""
 
     voxel: float = 0.02  # m, side of a voxel
-    truncation: float = 3.0  # voxels that a depth says something about before and behind it
+    truncation: float = TRUNCATION  # voxels that a depth says something about before and behind it
     fragment: float = 0.01  # m^2: connected pieces with less area are dropped
 
     def __post_init__(self) -> None:

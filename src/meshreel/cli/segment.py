@@ -10,10 +10,11 @@ import numpy as np
 from cyclopts import Parameter
 from jaxtyping import UInt8
 
+from ..analysis.segment.labelling import Segmentation
 from ..analysis.segment.masks import CAMERAS, Masker
 from ..analysis.segment.pictures import write_views
 from ..analysis.segment.preview import label_colors, look_at_labels, sheet
-from ..analysis.segment.scene import ByMasks, ByPlace, scene_views, segment, segment_by
+from ..analysis.segment.scene import scene_views, segment, segment_by
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..io.masks import is_mask, write_picture
@@ -108,12 +109,12 @@ def _write_labels(
     names = [Path(name).stem for name in frame_names(count, "npz")]
     tally, preview = _Tally(), _Preview()
     with common.stages(count) as progress:
-        by: ByPlace | ByMasks
+        by: Segmentation
         if masker is None:
             views, by = scene_views(frames, options.segment), segment(frames, options.segment)
         else:
-            by = segment_by(masker, frames, options.segment)
-            views = tuple(by.views)
+            masks = segment_by(masker, frames, options.segment)
+            views, by = tuple(masks.views), masks
         progress("segment", count, count)
         for folder in (LABELS, *([COLORED] if chosen else [])):
             make_folder(output / folder)

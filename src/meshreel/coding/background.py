@@ -12,7 +12,7 @@ from jaxtyping import Bool
 from ..errors import FormatError
 from ..format.layout import Form, StaticPatch
 from ..format.records import pack, unpack_all
-from ..geometry.topology import concatenate, drop_unreferenced
+from ..geometry.topology import concatenate, part_of
 from ..types import Mesh, Placement
 from . import entropy
 from .intra import decode_intra, encode_intra
@@ -58,7 +58,7 @@ def decode_change(data: bytes, before: Mesh, place: Placement | None = None) -> 
         raise FormatError(f"background: a patch of form {record.form.name}")
     check_step(record.step)
     dropped = _dropped(record, len(before.faces))
-    kept = drop_unreferenced(Mesh(before.vertices, before.faces[~dropped])) if dropped.any() else before
+    kept = part_of(before, ~dropped) if dropped.any() else before
     added = decode_mesh(record.mesh, record.step)
     check_growth(added, 0)
     after = concatenate([kept, added if place is None else place.of(added)])

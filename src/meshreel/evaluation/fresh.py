@@ -103,9 +103,9 @@ def measure_encode(name: str, data: str, frames: str, options: str) -> dict[str,
 
 def measure_scene_encode(name: str, data: str, cache: str, frames: str, quality: str) -> dict[str, Any]:
     """The same of a captured scene and the preset `best`; longer than it is, it is played forth and back."""
+    from ..derived import forth_and_back
     from ..encoder import encode
     from ..presets import preset_options
-    from .derived import forth_and_back
     from .scenes import open_scene
 
     sequence = forth_and_back(open_scene(name, Path(data), Path(cache)).meshes, int(frames))

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
+from ..derived import DerivedSequence
 from ..errors import InputError
 from ..geometry.decimate import decimate
 from ..geometry.nearest import Surface
@@ -20,7 +21,6 @@ from ..geometry.topology import subdivide_midpoint, unique_edges, vertex_normals
 from ..io.meshes import read_mesh
 from ..io.write import write_mesh
 from ..types import Mesh, MeshSequence
-from .derived import DerivedSequence
 
 
 @dataclass(frozen=True, slots=True)

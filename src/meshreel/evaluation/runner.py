@@ -20,6 +20,7 @@ import numpy as np
 from .. import __version__
 from ..coding.mesh import encode_mesh
 from ..decoder import open as open_video
+from ..derived import Backwards
 from ..metrics.report import ComparisonOptions, compare_sequences
 from ..types import Mesh, MeshSequence
 from .bridges import count_bridges, count_degenerate
@@ -27,7 +28,6 @@ from .codec import Codec
 from .codecs import make_codec
 from .codecs.draco import lattice_step
 from .datasets import open_dataset
-from .derived import Backwards
 from .fresh import peak_rss_mb
 from .groups import group_records
 from .peers import cheapest_forms, measure_pair, run_fresh

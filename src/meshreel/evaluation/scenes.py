@@ -27,6 +27,7 @@ from ..capture.record import Recording, open_recording
 from ..capture.rig import RIG
 from ..capture.simulate import TRUTH
 from ..capture.truth import Truth, read_truth
+from ..derived import Chosen
 from ..errors import InputError
 from ..geometry.decimate import decimate_faces
 from ..geometry.depth import DepthPicture
@@ -34,7 +35,6 @@ from ..io.meshes import read_mesh
 from ..io.sequence import open_sequence
 from ..io.write import frame_names, make_folder, replacing, write_mesh
 from ..types import Frames, Mesh, MeshSequence, evenly
-from .derived import Chosen
 from .rooms import SPEEDS, RoomOptions, simulate_room
 
 SCENES = tuple(SPEEDS)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Int32, Int64
 
 from ..types import Mesh
-from .topology import drop_unreferenced, face_normals
+from .topology import face_normals, part_of
 
 
 def connected(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:
@@ -32,4 +32,4 @@ def without_fragments(mesh: Mesh, least: float) -> Mesh:
         return mesh
     labels = connected_faces(mesh.faces, len(mesh.vertices))
     areas = np.bincount(labels, face_normals(mesh)[1])
-    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[areas[labels] >= least]))
+    return part_of(mesh, areas[labels] >= least)

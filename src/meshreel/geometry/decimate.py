@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Mesh
-from .topology import clean, unique_edges
+from .topology import border_edges, clean
 
 CLOSED_DIAGONAL = 10.0  # at this size AGGRESSION 4 reaches the target and loses nothing; at 1 and at 1000 it may not
 OPEN_DIAGONAL = 100.0  # below it Open3D takes whole regions for flat
@@ -60,8 +60,7 @@ def decimate_faces(mesh: Mesh, faces: int) -> Mesh:
 
 def has_boundary(mesh: Mesh) -> bool:
     """True where some edge belongs to one face only."""
-    _, face_edges = unique_edges(mesh.faces)
-    return bool((np.bincount(face_edges.reshape(-1)) == 1).any())
+    return len(border_edges(mesh)) > 0
 
 
 def _collapse_closed(mesh: Mesh, faces: int) -> Mesh:

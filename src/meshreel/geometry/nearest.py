@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ..types import Mesh
-from .topology import face_normals, unique_edges
+from .topology import border_mask, face_normals, unique_edges
 
 _AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
 
@@ -63,7 +63,7 @@ def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndar
 def past_border(mesh: Mesh, hits: Hits) -> Bool[np.ndarray, " N"]:
     """Where the closest point is on the mesh's border: what it was asked for lies past the surface, not above it."""
     edges, face_edges = unique_edges(mesh.faces)
-    border = np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1
+    border = border_mask(edges, face_edges)
     ends = np.zeros(len(mesh.vertices), bool)
     ends[edges[border].reshape(-1)] = True
     on_edge = border[face_edges[hits.faces]] & (hits.barycentric[:, [2, 0, 1]] < _AT_BORDER)  # opposite corners

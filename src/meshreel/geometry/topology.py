@@ -22,6 +22,23 @@ def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 
     return np.stack([keys // count, keys % count], axis=1), inverse.reshape(-1, 3)
 
 
+def border_mask(edges: Int64[np.ndarray, "E 2"], face_edges: Int64[np.ndarray, "F 3"]) -> Bool[np.ndarray, " E"]:
+    """Which of the `unique_edges` belong to one face only."""
+    return np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1
+
+
+def border_edges(mesh: Mesh) -> Int64[np.ndarray, "B 2"]:
+    """The edges that belong to one face only; none for a closed mesh."""
+    edges, face_edges = unique_edges(mesh.faces)
+    return edges[border_mask(edges, face_edges)]
+
+
+def edge_lengths(mesh: Mesh) -> Float64[np.ndarray, " E"]:
+    """The length of each of the `unique_edges`, in the unit of the vertices."""
+    ends = mesh.vertices[unique_edges(mesh.faces)[0]]
+    return np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+
+
 def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
     """The mesh with each triangle cut in four at its edge midpoints, `levels` times (paper, section 3.3.2).
 
@@ -99,6 +116,11 @@ def drop_unreferenced(mesh: Mesh) -> Mesh:
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.faces.reshape(-1)] = True
     return Mesh.of(mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces])
+
+
+def part_of(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
+    """The chosen faces alone, and the vertices that they use."""
+    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen]))
 
 
 def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:

@@ -19,6 +19,8 @@ from .topology import clean, weld
 
 SIDE = 8  # voxels, of a block
 ROOM = 20_000  # blocks that there is room for at first; more is made when needed
+TRUNCATION = 3.0  # voxels that a depth says something about before and behind it
+SEEN = 0.5  # measurements of a voxel above which it counts: one is enough
 MOST_BLOCKS = 500_000  # 2 GB, and as much again while room is made
 
 

@@ -47,11 +47,14 @@ class BdRate:
     high: float
     points: tuple[int, int]  # used of anchor and test, after dropping points that another one beats
     reason: str = ""  # why `percent` is None
+    at_most: bool = False  # `percent` is a bound: the cheapest point of the test is better than all of the anchor
 
     def __str__(self) -> str:
         if self.percent is None:
             return f"{self.test} against {self.anchor}: no BD-rate ({self.reason})"
-        return f"{self.test} against {self.anchor}: {self.percent:+.1f} % over {self.low:.4g} to {self.high:.4g}"
+        told = f"{self.percent:+.1f} % over {self.low:.4g} to {self.high:.4g}"
+        bound = f"{told}, at most: its cheapest point is better than all of the other's" if self.at_most else told
+        return f"{self.test} against {self.anchor}: {bound}"
 
 
 def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
@@ -72,6 +75,22 @@ def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
         return BdRate(anchor.name, test.name, None, low, high, counts, reason)
     mean = (_integral(b, low, high) - _integral(a, low, high)) / (high - low)
     return BdRate(anchor.name, test.name, 100 * math.expm1(mean), low, high, counts)
+
+
+def bd_bound(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
+    """As `bd_rate`; where the test's cheapest point is better than all of the anchor up to `highest`, a bound of it.
+
+    That point's rate is compared with those of all of the anchor: who made it worse still would need no more.
+    """
+    found = bd_rate(anchor, test, highest)
+    a, b = _front(anchor), _front(test)
+    if found.percent is not None or len(a) < 2 or not len(b):
+        return found
+    low, high = float(a[0, 0]), float(min(a[-1, 0], highest))
+    if not low < high <= b[0, 0]:
+        return found
+    mean = float(b[0, 1]) - _integral(a, low, high) / (high - low)
+    return BdRate(anchor.name, test.name, 100 * math.expm1(mean), low, high, found.points, at_most=True)
 
 
 @dataclass(frozen=True, slots=True)

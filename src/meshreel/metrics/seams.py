@@ -24,7 +24,7 @@ from jaxtyping import Bool, Float64
 
 from ..errors import InputError
 from ..geometry.nearest import Surface, past_border
-from ..geometry.topology import drop_unreferenced, face_normals, unique_edges
+from ..geometry.topology import border_edges, edge_lengths, face_normals, part_of
 from ..geometry.voxels import spread
 from ..types import Mesh
 from .distance import quantile
@@ -76,21 +76,21 @@ def measure_seam(
         raise InputError(f"{len(moves)} labels for {len(frame.faces)} faces: give one a face")
     if not moves.any() or moves.all():
         return None
-    cell = _median_edge(frame) if options.cell is None else options.cell
-    points, lengths = _border(_part(frame, moves), cell) if cell > 0 else (np.zeros((0, 3)), np.zeros(0))
+    cell = float(np.median(edge_lengths(frame))) if options.cell is None else options.cell
+    points, lengths = _border(part_of(frame, moves), cell) if cell > 0 else (np.zeros((0, 3)), np.zeros(0))
     if not len(points):  # closed
         return None
     origin = (points.min(axis=0) + points.max(axis=0)) / 2  # queries are float32
     frame, background, bodies = (Mesh(mesh.vertices - origin, mesh.faces) for mesh in (frame, background, bodies))
     points = points - origin
     near = _within(frame, points, options.reach * cell)
-    still = _part(frame, near & ~moves)
+    still = part_of(frame, near & ~moves)
     on_seam = np.zeros(len(points), bool) if still.is_empty else _distances(still, points) <= cell
     if not on_seam.any():
         return None
     points, lengths = points[on_seam], lengths[on_seam]
     near &= _within(frame, points, options.reach * cell)
-    place = _Place(cKDTree(points), cell, options.reach * cell, _part(frame, near), moves[near])
+    place = _Place(cKDTree(points), cell, options.reach * cell, part_of(frame, near), moves[near])
     gaps, overlaps = _gaps(points, background, bodies), _overlaps(place, background, bodies)
     return Seam(points + origin, lengths, gaps, overlaps, _uncovered(place, background, bodies))
 
@@ -114,19 +114,9 @@ class _Place:
     moves: Bool[np.ndarray, " F"]
 
 
-def _median_edge(mesh: Mesh) -> float:
-    corners = mesh.vertices[mesh.faces]
-    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
-
-
-def _part(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
-    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen]))
-
-
 def _border(part: Mesh, cell: float) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " N"]]:
     """Points along the edges that one face has, and the length each stands for."""
-    edges, of_faces = unique_edges(part.faces)
-    a, b = part.vertices[edges[np.bincount(of_faces.reshape(-1), minlength=len(edges)) == 1]].transpose(1, 0, 2)
+    a, b = part.vertices[border_edges(part)].transpose(1, 0, 2)
     lengths = np.linalg.norm(b - a, axis=1)
     counts = np.maximum(np.ceil(lengths * _FINE / cell), 1).astype(int)
     which = np.repeat(np.arange(len(counts)), counts)
@@ -166,7 +156,7 @@ def _gaps(points: Float64[np.ndarray, "N 3"], background: Mesh, bodies: Mesh) ->
 def _overlaps(place: _Place, background: Mesh, bodies: Mesh) -> Float64[np.ndarray, " N"]:
     """At each point of the seam the farthest that bodies lie on the background, one side and the other added."""
     widths = np.zeros((2, len(place.tree.data)))
-    bodies = _part(bodies, _within(bodies, place.tree.data, place.reach))
+    bodies = part_of(bodies, _within(bodies, place.tree.data, place.reach))
     if not (bodies.is_empty or background.is_empty):
         points, faces = spread(bodies, place.cell / _FINE)
         still = Surface(background)

@@ -114,7 +114,7 @@ def test_a_frame_is_asked_for_its_masks_once_and_an_empty_one_never(masks: Path)
     by = segment_by(Counted(masks, 2), frames, SegmentOptions(island=0))
     found = [by.moving(frame, frames[frame]) for frame in (0, 1, 0, 2)]
     assert asked == [0, 1] and np.array_equal(found[0], found[2]) and found[0].any() and len(found[3]) == 0
-    assert 0 < by.lattice.size < ROOM.diagonal
+    assert 0 < by.cell < ROOM.diagonal
 
 
 def test_views_are_placed_by_frames_that_have_a_surface_and_given_ones_are_taken():

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from meshreel.analysis.segment.labelling import ByPlace, without_islands
 from meshreel.analysis.segment.places import PlacesOptions
-from meshreel.analysis.segment.scene import ByPlace, SegmentOptions, segment, segment_by, without_islands
+from meshreel.analysis.segment.scene import SegmentOptions, segment, segment_by
 from meshreel.analysis.segment.settle import Rest
 from meshreel.errors import InputError
 from meshreel.geometry.topology import components, concatenate, face_normals
@@ -157,7 +158,7 @@ def test_no_island_that_something_else_surrounds_is_left_of_those_that_move(bits
 
 def test_no_faces_have_no_labels():
     assert without_islands(NONE, np.zeros(0, bool), 1.0).shape == (0,)
-    assert ByPlace(Lattice(np.zeros(3), 1.0), np.zeros(1, np.int64), np.ones(1, bool), Rest.none(1), 0.01).moving(
+    assert ByPlace(1.0, Lattice(np.zeros(3), 1.0), np.zeros(1, np.int64), np.ones(1, bool), Rest.none(1), 0.01).moving(
         0, NONE
     ).shape == (0,)
 
@@ -180,7 +181,7 @@ class Right:
 
 def test_masks_from_elsewhere_become_labels_and_what_is_not_seen_takes_its_neighbours():
     masker = Right()
-    found = segment_by(masker, ROLLING[:2], SEGMENT)
+    found = segment_by(masker, MeshList(tuple(ROLLING[:2])), SEGMENT)
     assert masker.observed == [0, 1]
     wanted = ROLLING[1].vertices[ROLLING[1].faces].mean(axis=1)[:, 0] > 1.2
     assert (found.moving(1, ROLLING[1]) == wanted).mean() > 0.97

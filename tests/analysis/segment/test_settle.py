@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.segment.cut import CutOptions
+from meshreel.analysis.segment.labelling import ByPlace
 from meshreel.analysis.segment.places import PlacesOptions
-from meshreel.analysis.segment.scene import ByPlace, SegmentOptions, segment
+from meshreel.analysis.segment.scene import SegmentOptions, segment
 from meshreel.analysis.segment.settle import NEVER, SettleOptions
 from meshreel.analysis.segment.views import ViewsOptions
 from meshreel.analysis.survey import survey

@@ -4,8 +4,9 @@ In: some frames of a scene, spread over the sequence, and views of them. Out: fo
 surface in, in how many frames there is surface in or beside it, in how many views see past it, and how long it stayed.
 
 A cell beside surface counts as occupied, whatever is seen: noise moves a surface from cell to cell, and rays graze it.
-Views stand where no camera did, and look through the holes that shadows leave in a surface. Where a frame's depth
-pictures are known, a cell is seen free only if a camera, too, measured something past it.
+Views stand where no camera did, and look through the holes that shadows leave in a surface. So where cameras usually
+measure something, a cell is seen free only if one of them, too, measured something past it; and it is, whatever views
+see, if a camera did so in the pixels around, too: what comes close to a camera is often in no other view.
 Memory does not grow with the number of frames: what happens in a frame is counted, and forgotten.
 """
 
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
@@ -120,6 +121,14 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
+class Eye:
+    """A depth camera that stands still."""
+
+    camera: PinholeCamera
+    sees: Bool[np.ndarray, "H W"]  # where it measures something in half of the frames at least
+
+
+@dataclass(frozen=True, slots=True)
 class Places:
     """Cells of a scene, and what happened there in the frames that were looked at."""
 
@@ -128,6 +137,7 @@ class Places:
     beside: Int32[np.ndarray, "P 26"]  # numbers of the cells around each; its own for none
     normals: Float64[np.ndarray, "P 3"]  # mean of what was there, of unit length; 0 where they cancel
     tally: Tally
+    eyes: dict[int, Eye] = field(default_factory=dict)  # by the number of the camera
 
     @property
     def free_share(self) -> Float64[np.ndarray, " P"]:
@@ -154,14 +164,17 @@ def find_places(watched: Watched, lattice: Lattice, options: PlacesOptions = Pla
 
     About 1 s of CPU for a frame of 500,000 faces.
     """
-    first, known = list[_Look](), _Known()
+    first, known, cameras = list[_Look](), _Known(), _Cameras()
     for number in range(len(watched.frames)):
         own, normals = _cells(mesh := watched.frames[number], lattice)
         known.add(own, normals)
         if number < _TOGETHER:
             first.append(watched.seen(number, mesh, own, lattice))
+            cameras.add(first[-1].measured)
+        elif watched.pictures is not None:
+            cameras.add(watched.pictures(number))
     keys, normals = known.places()
-    places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)))
+    places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), cameras.eyes())
     for occupied, free in _seen(first, places, watched.views, options):
         places.tally.add(occupied, free)
     first.clear()
@@ -190,24 +203,57 @@ def _seen(
         limit = (depth + options.past * size) / (size / _FINENESS)
         for row, one in zip(seen, looks, strict=True):
             row[inside[one.depths[number].reshape(-1)[pixels] > limit]] += 1
-    measured = _measured(looks, middles, options.past * size)
-    for row, sure, one in zip(seen, measured, looks, strict=True):
+    sensed = _sensed(looks, places, options.past * size)
+    for row, one, (doubtful, clear) in zip(seen, looks, sensed, strict=True):
         occupied = _near(places.keys, places.beside, one.cells)
-        yield occupied, (row >= options.views) & sure & ~occupied
+        yield occupied, ((row >= options.views) & ~doubtful | clear) & ~occupied
 
 
-def _measured(looks: Sequence[_Look], middles: Float64[np.ndarray, "P 3"], past: float) -> Bool[np.ndarray, "T P"]:
-    """Where a camera measured something so far, m, past a place, or nothing is known of cameras."""
-    found = np.array([[one.measured is None] for one in looks]).repeat(len(middles), axis=1)
-    cameras: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}  # they stand still
-    for row, one in zip(found, looks, strict=True):
-        for number, picture in enumerate(one.measured or ()):
+def _sensed(
+    looks: Sequence[_Look], places: Places, reach: float
+) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
+    """Where each frame's cameras should have measured something past a place, m, and did not; where some surely did."""
+    middles = places.middles
+    at = {number: _projected(eye.camera, middles) for number, eye in places.eyes.items()}
+    for one in looks:
+        expected, past, clear = np.zeros((3, len(middles)), bool)
+        for number, eye in places.eyes.items():
+            pixels, inside, depth = at[number]
+            expected[inside[eye.sees.reshape(-1)[pixels]]] = True
+            if one.measured and (picture := one.measured[number]) is not None:
+                found = picture.depth.reshape(-1)[pixels] * picture.unit
+                expected[inside[found > 0]] = True
+                past[inside[found > depth + reach]] = True
+                least = _least_around(picture.depth).reshape(-1)[pixels] * picture.unit
+                clear[inside[least > depth + reach]] = True
+        yield expected & ~past, clear
+
+
+def _least_around(depth: np.ndarray) -> np.ndarray:
+    """The least of each pixel and those around it; 0 where one of them measured nothing."""
+    from scipy.ndimage import minimum_filter
+
+    return np.asarray(minimum_filter(depth, 3))
+
+
+class _Cameras:
+    """The cameras of the frames so far, and in how many frames each of their pixels measures something."""
+
+    def __init__(self) -> None:
+        self._frames = 0
+        self._counts: dict[int, tuple[PinholeCamera, Int32[np.ndarray, "H W"]]] = {}
+
+    def add(self, pictures: Sequence[DepthPicture | None] | None) -> None:
+        """Takes in a frame."""
+        self._frames += 1
+        for number, picture in enumerate(pictures or ()):
             if picture is not None:
-                if number not in cameras:
-                    cameras[number] = _projected(picture.camera, middles)
-                pixels, inside, depth = cameras[number]
-                row[inside[picture.depth.reshape(-1)[pixels] * picture.unit > depth + past]] = True
-    return found
+                none = np.zeros(picture.depth.shape, np.int32)
+                self._counts.setdefault(number, (picture.camera, none))[1][picture.depth > 0] += 1
+
+    def eyes(self) -> dict[int, Eye]:
+        """Those that are known, by number."""
+        return {number: Eye(camera, 2 * count >= self._frames) for number, (camera, count) in self._counts.items()}
 
 
 class _Known:

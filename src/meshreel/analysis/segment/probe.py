@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Int64
 
-from ...geometry.topology import drop_unreferenced, unique_edges
+from ...geometry.topology import border_edges, drop_unreferenced, edge_lengths
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Frames, Mesh, evenly
 from ..survey import check
@@ -35,7 +35,7 @@ def is_scene(frames: Frames) -> bool:
     sizes = [mesh.diagonal for mesh in meshes]
     if len(meshes) < 2 or sizes[0] == 0 or max(sizes) > UNLIKE * min(sizes):
         return False
-    if not _is_open(meshes[0]) or _edge(meshes[0]) * COARSEST > sizes[0]:
+    if not _is_open(meshes[0]) or np.median(edge_lengths(meshes[0])) * COARSEST > sizes[0]:
         return False
     lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
@@ -46,16 +46,9 @@ def is_scene(frames: Frames) -> bool:
 
 def _is_open(mesh: Mesh) -> bool:
     """True where the borders are long; a few small holes do not open a body."""
-    edges, face_edges = unique_edges(mesh.faces)
-    border = edges[np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1]
+    border = border_edges(mesh)
     length = np.linalg.norm(mesh.vertices[border[:, 0]] - mesh.vertices[border[:, 1]], axis=1).sum()
     return bool(length > BORDER * mesh.diagonal)
-
-
-def _edge(mesh: Mesh) -> float:
-    """The usual length of a side of a face, m."""
-    corners = mesh.vertices[mesh.faces]
-    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
 
 def _shared(own: Int64[np.ndarray, " C"], other: Int64[np.ndarray, " D"]) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from ...metrics.bd_rate import BdRate, Curve, bd_rate, hull
+from ...metrics.bd_rate import BdRate, Curve, bd_bound, hull
 from ...metrics.report import ComparisonOptions
 from ..curves import Measure, curve, value
 from ..promises import Promise
@@ -208,7 +208,7 @@ def _against(rows: Sequence[Row], anchor: str, measure: Measure, limited: bool) 
         return None
     highest = floors(rows).get(measure.key, float("inf")) if limited else float("inf")
     peers: list[Curve] = [curve(_of(rows, name), name, measure) for name in forms]
-    return bd_rate(hull(f"anchor {anchor}", peers), curve(_of(rows, SYSTEM), SYSTEM, measure), highest)
+    return bd_bound(hull(f"anchor {anchor}", peers), curve(_of(rows, SYSTEM), SYSTEM, measure), highest)
 
 
 def _gain(rows: Sequence[Row], anchor: str) -> Promise:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from ..types import Mesh, MeshSequence
+import numpy as np
+from jaxtyping import Bool
+
+from .geometry.topology import part_of
+from .types import Mesh, MeshSequence
 
 
 class DerivedSequence(MeshSequence):
@@ -29,6 +33,14 @@ class Backwards(DerivedSequence):
         return self._source[range(len(self))[::-1][index]]
 
 
+class TurnedOver(DerivedSequence):
+    """The same frames with the fronts of all faces where their backs were."""
+
+    def __getitem__(self, index: int) -> Mesh:
+        mesh = self._source[index]
+        return Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1]))
+
+
 class Chosen(DerivedSequence):
     """Some frames of a sequence, by their numbers."""
 
@@ -41,6 +53,20 @@ class Chosen(DerivedSequence):
 
     def __getitem__(self, index: int) -> Mesh:
         return self._source[self._numbers[index]]
+
+
+class ChosenParts(Chosen):
+    """Chosen faces of some frames: `choose` says which, of a frame's number in the source and its mesh."""
+
+    def __init__(
+        self, source: MeshSequence, numbers: Sequence[int], choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]]
+    ) -> None:
+        super().__init__(source, numbers)
+        self._choose = choose
+
+    def __getitem__(self, index: int) -> Mesh:
+        mesh = super().__getitem__(index)
+        return part_of(mesh, self._choose(self._numbers[index], mesh))
 
 
 def forth_and_back(source: MeshSequence, count: int) -> Chosen:
