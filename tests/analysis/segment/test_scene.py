@@ -18,7 +18,7 @@ from meshreel.geometry.topology import components, concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Mesh, MeshList
 from tests.metrics.shapes import moved, plane
-from tests.scenes import SEGMENT, ball, figure, of_body, overlap, room, with_room
+from tests.scenes import CELL, SEGMENT, ball, figure, of_body, overlap, room, with_room
 
 NONE = Mesh.empty()
 ROLLING = with_room([ball(0.5 + 0.25 * t) for t in range(6)])
@@ -70,6 +70,25 @@ def test_a_still_room_with_noise_has_no_moving_places(body):
     frames = with_room([body] * 6)
     found = segment(MeshList(tuple(frames)), SEGMENT)
     assert not found.chosen.any() and not found.moving(0, frames[0]).any()
+
+
+def waving(mesh: Mesh, seed: int, height: float) -> Mesh:
+    """The mesh with noise that is alike nearby, as that of a depth camera: edges stay as long as they are; m."""
+    generator = np.random.default_rng(seed)
+    waves, phases = generator.normal(size=(3, 4, 3)) * 6, generator.uniform(0, 2 * np.pi, (3, 4))
+    noise = np.sin(np.einsum("vd,akd->vak", mesh.vertices, waves) + phases).sum(axis=2) / 2
+    return Mesh(mesh.vertices + height * noise, mesh.faces)
+
+
+@pytest.mark.parametrize(("height", "least"), [(0.8, 0.7), (1.3, 0.0)])
+def test_noise_as_high_as_cells_does_not_make_a_room_move(height, least):
+    """Cells are as wide as noise: with those of the edges' length 3 % and 91 % of the room would move here."""
+    frames = [waving(mesh, seed, height * CELL) for seed, mesh in enumerate(ROLLING)]
+    found = segment(MeshList(tuple(frames)), SEGMENT)
+    assert found.cell < 1.3 * CELL and found.noise > 2 * CELL
+    assert min(overlaps(frames, found)) >= least
+    for number, mesh in enumerate(frames):
+        assert not (found.moving(number, mesh) & ~of_body(mesh)).mean() > 0.002
 
 
 def test_somebody_who_stands_and_swings_the_arms_is_found_whole():
