@@ -128,7 +128,7 @@ def test_a_target_out_of_reach_is_told_and_leaves_nothing(goal: Goal, tmp_path) 
 
 
 def test_a_place_that_cannot_be_written_is_told_before_anything_is_coded(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("meshreel.rate_control.encode", lambda *_: pytest.fail("coded"))
+    monkeypatch.setattr("meshreel.rate_control.Encoder.encode", lambda *_: pytest.fail("coded"))
     for path in (tmp_path, tmp_path / "none" / "a.reel"):
         with pytest.raises(InputError, match=f"{path}: "):
             encode_to(BODY, path, Goal(psnr=58.5), options_at)

@@ -16,7 +16,7 @@ from meshreel.analysis.survey import survey
 from meshreel.choice import NO_ERROR
 from meshreel.coding.background import decode_background
 from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
-from meshreel.encoder import encode
+from meshreel.encoder import Encoder, encode
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
@@ -110,12 +110,32 @@ def test_the_unit_is_the_size_of_what_moves(rolling):
 
 @pytest.mark.usefixtures("plainly")
 def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
-    stages: dict[str, int] = {}
+    stages: dict[str, list[int]] = {}
     encoded(ROLLING, tmp_path / "a.reel")
     with ThreadPoolExecutor(2) as executor:
-        encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=lambda s, done, _: stages.update({s: done}))
+        told = lambda stage, done, _: stages.setdefault(stage, []).append(done)  # noqa: E731
+        encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=told)
     assert (tmp_path / "b.reel").read_bytes() == (tmp_path / "a.reel").read_bytes()
-    assert stages == dict.fromkeys(("survey", "segment", "background", "code"), 4)
+    assert {stage: done[-1] for stage, done in stages.items()} == dict.fromkeys(
+        ("survey", "segment", "background", "code"), 4
+    )
+    for stage in ("segment", "background"):  # frame by frame, and not all at the end
+        assert sorted(stages[stage]) == stages[stage] and len(set(stages[stage])) > 2
+
+
+@pytest.mark.usefixtures("plainly")
+def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch):
+    count = []
+    monkeypatch.setattr("meshreel.encoder.take_apart", lambda *args: count.append(1) or take_apart(*args))
+    encoder = Encoder(MeshList(tuple(ROLLING), 4.0))
+    for quality in (30, 60):
+        encoder.encode(tmp_path / f"{quality}.reel", quick_scene(quality=quality))
+    assert len(count) == 1
+    encoded(ROLLING, tmp_path / "alone.reel", quick_scene(quality=60), rate=4.0)
+    assert (tmp_path / "alone.reel").read_bytes() == (tmp_path / "60.reel").read_bytes()
+    other = quick_scene(quality=60)
+    encoder.encode(tmp_path / "other.reel", replace(other, segment=replace(other.segment, threshold=0.4)))
+    assert len(count) == 3
 
 
 def test_preset_paper_has_scenes_too(tmp_path):

@@ -17,8 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from .analysis.background import BackgroundOptions
 from .analysis.segment.masks import Masker
 from .analysis.segment.probe import is_scene
+from .analysis.segment.scene import SegmentOptions
 from .analysis.survey import Survey, survey
 from .choice import Quality
 from .coding.background import decode_background
@@ -30,7 +32,7 @@ from .geometry.nearest import distances
 from .geometry.topology import drop_unreferenced
 from .layered import encode_segment
 from .metrics.distance import PSNR_CEILING, psnr
-from .parts import take_apart
+from .parts import Parts, take_apart
 from .presets import preset_options
 from .scene import Static, TrackGroup, encode_bodies, encode_static
 from .types import Frames, Mesh, MeshSequence, evenly
@@ -102,14 +104,41 @@ def encode(
     as it has workers and one more, each of a key interval (preset `best`) or a group; of a scene, what moves in one
     key interval. Raises InputError for frames that cannot be used, before anything is coded.
     """
-    options = options or preset_options()
-    if options.dynamic_only and masker is not None:
-        raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
-    check_target(Path(path))
-    work = _Work(sequence, options, executor, Stages(progress, len(sequence)))
-    if not options.dynamic_only and len(sequence) and (masker is not None or is_scene(sequence)):
-        return _encode_scene(work, Path(path), masker)
-    return _encode_bodies(work, Path(path))
+    return Encoder(sequence, executor, progress, masker).encode(path, options or preset_options())
+
+
+class Encoder:
+    """A sequence that is encoded once, or at several qualities: it is taken apart once."""
+
+    def __init__(
+        self,
+        sequence: MeshSequence,
+        executor: Executor | None = None,
+        progress: Progress | None = None,
+        masker: Masker | None = None,
+    ) -> None:
+        """As `encode`."""
+        self._sequence, self._executor, self._progress, self._masker = sequence, executor, progress, masker
+        self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
+
+    def encode(self, path: str | Path, options: EncoderOptions) -> Summary:
+        """As the function `encode`, which says what is raised."""
+        sequence, masker = self._sequence, self._masker
+        if options.dynamic_only and masker is not None:
+            raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
+        check_target(Path(path))
+        work = _Work(sequence, options, self._executor, Stages(self._progress, len(sequence)))
+        if not options.dynamic_only and len(sequence) and (masker is not None or is_scene(sequence)):
+            return _encode_scene(work, Path(path), self._parts(work))
+        return _encode_bodies(work, Path(path))
+
+    def _parts(self, work: _Work) -> Parts:
+        """What the scene is made of; found anew where other options say otherwise."""
+        how = (work.options.segment, work.options.background)
+        if self._scene is None or self._scene[:2] != how:
+            seen = survey(work.sequence, work.stages, cleaned=False)
+            self._scene = (*how, take_apart(work.sequence, seen, work.options, work.stages, self._masker))
+        return self._scene[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,12 +165,9 @@ def _encode_bodies(work: _Work, path: Path) -> Summary:
     return Summary(path.stat().st_size, tuple(groups), _warnings(seen))
 
 
-def _encode_scene(work: _Work, path: Path, masker: Masker | None) -> Summary:
+def _encode_scene(work: _Work, path: Path, parts: Parts) -> Summary:
     """As `encode`, for a scene with a background."""
-    sequence, options, stages = work.sequence, work.options, work.stages
-    seen = survey(sequence, stages, cleaned=False)
-    parts = take_apart(sequence, seen, options, stages, masker)
-    seen = parts.seen
+    sequence, options, stages, seen = work.sequence, work.options, work.stages, parts.seen
     states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
         coded = encode_bodies(sequence, parts, options, work.executor, stages)

@@ -65,15 +65,15 @@ def take_apart(
     check_one_unit(seen)
     segmentation: Segmentation
     if masker is None:
-        segmentation = segment(sequence, options.segment)
+        segmentation = segment(sequence, options.segment, lambda share: stages.reach("segment", share))
     else:
         segmentation = segment_by(masker, sequence, options.segment)
-    stages.add("segment", len(sequence))
-    background = _background(sequence, segmentation, options.background)
+    stages.reach("segment", 1.0)
+    background = _background(sequence, segmentation, options.background, stages)
     if background.is_empty:
         _check_nothing_lost(sequence, segmentation, options.background)
     changes = [_change(sequence, segmentation, frame, options.background) for frame in segmentation.changes]
-    stages.add("background", len(sequence))
+    stages.reach("background", 1.0)
     noise, deviation, sizes, astray = _measured(sequence, segmentation, background, changes)
     unit = float(np.median(sizes)) if sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
@@ -91,17 +91,22 @@ def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, opti
             raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
 
 
-def _background(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions) -> Mesh:
+def _background(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions, stages: Stages) -> Mesh:
     """What stands still at first, from the cameras' depth where it is known; cells in m."""
     numbers, cell = evenly(len(sequence), options.frames), segmentation.cell
+
+    def stands(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
+        stages.reach("background", number / len(sequence))
+        return segmentation.still_at_first(number, mesh)
+
     if options.depth and isinstance(sequence, SeesDepth):
         meshes = ((number, sequence[number]) for number in numbers)
-        moments = ((sequence.pictures(k), mesh, segmentation.still_at_first(k, mesh)) for k, mesh in meshes)
+        moments = ((sequence.pictures(k), mesh, stands(k, mesh)) for k, mesh in meshes)
         return fuse_still_depth(moments, cell, options)
 
     def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        stands = segmentation.still_at_first(number, mesh)
-        return stands & ~ring(mesh, ~stands, cell)
+        still = stands(number, mesh)
+        return still & ~ring(mesh, ~still, cell)
 
     return fuse_background(ChosenParts(sequence, numbers, clear), cell, options)
 

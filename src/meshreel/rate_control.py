@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from .analysis.segment.masks import Masker
-from .encoder import Summary, encode
+from .encoder import Encoder, Summary
 from .errors import InputError
 from .types import MeshSequence
 from .windows import EncoderOptions, Progress
@@ -92,13 +92,14 @@ def encode_to(
     search, path = Search(goal), Path(path)
     if path.is_dir() or not path.parent.is_dir():
         raise InputError(f"{path}: cannot be written: {'is a folder' if path.is_dir() else 'no such folder'}")
+    encoder = Encoder(sequence, executor, progress, masker)
     partial = path.with_name(f".{uuid.uuid4().hex}.tmp")
     try:
         for _ in range(TRIALS):
             quality = search.next()
             if quality is None:
                 break
-            summary = encode(sequence, partial, options_at(quality), executor, progress, masker)
+            summary = encoder.encode(partial, options_at(quality))
             value = goal.measured(summary, sequence.frame_rate)
             if abs(value - goal.wanted) <= goal.tolerance:
                 partial.replace(path)

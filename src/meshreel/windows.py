@@ -114,6 +114,10 @@ class Stages:
         self._total = total
         self._done: dict[str, int] = {}
 
+    def reach(self, stage: str, share: float) -> None:
+        """As many frames have passed `stage` as this share of all."""
+        self.add(stage, max(round(share * self._total) - self._done.get(stage, 0), 0))
+
     def add(self, stage: str, count: int) -> None:
         """`count` more frames have passed `stage`."""
         self._done[stage] = self._done.get(stage, 0) + count

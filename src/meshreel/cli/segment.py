@@ -111,7 +111,8 @@ def _write_labels(
     with common.stages(count) as progress:
         by: Segmentation
         if masker is None:
-            views, by = scene_views(frames, options.segment), segment(frames, options.segment)
+            views = scene_views(frames, options.segment)
+            by = segment(frames, options.segment, lambda share: progress("segment", round(share * count), count))
         else:
             masks = segment_by(masker, frames, options.segment)
             views, by = tuple(masks.views), masks

@@ -51,6 +51,14 @@ class PlacesOptions:
         return evenly(count, max(self.frames, math.ceil((count - 1) / frame_rate * self.rate) + 1))
 
 
+Tell = Callable[[float], None]  # the share of the work that is done
+
+
+def nobody(share: float) -> None:
+    """Hears how far the work is, and does nothing."""
+    del share
+
+
 @dataclass(frozen=True, slots=True)
 class Watched:
     """Frames, the views that look at them, and what depth cameras measured in each of them, where that is known."""
@@ -58,6 +66,7 @@ class Watched:
     frames: Sequence[Mesh] | Frames
     views: Sequence[PinholeCamera]
     pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame, a camera each
+    tell: Tell = nobody  # who hears how far `find_places` is
 
     def look(self, number: int, lattice: Lattice) -> _Look:
         """What is known of one frame."""
@@ -164,6 +173,7 @@ def find_places(watched: Watched, lattice: Lattice, options: PlacesOptions = Pla
 
     About 1 s of CPU for a frame of 500,000 faces.
     """
+    passes = len(watched.frames) + max(0, len(watched.frames) - _TOGETHER)
     first, known, cameras = list[_Look](), _Known(), _Cameras()
     for number in range(len(watched.frames)):
         own, normals = _cells(mesh := watched.frames[number], lattice)
@@ -173,6 +183,7 @@ def find_places(watched: Watched, lattice: Lattice, options: PlacesOptions = Pla
             cameras.add(first[-1].measured)
         elif watched.pictures is not None:
             cameras.add(watched.pictures(number))
+        watched.tell((number + 1) / passes)
     keys, normals = known.places()
     places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), cameras.eyes())
     for occupied, free in _seen(first, places, watched.views, options):
@@ -180,6 +191,7 @@ def find_places(watched: Watched, lattice: Lattice, options: PlacesOptions = Pla
     first.clear()
     for occupied, free in look(watched, range(_TOGETHER, len(watched.frames)), places, options):
         places.tally.add(occupied, free)
+        watched.tell((len(watched.frames) - _TOGETHER + places.tally.frames) / passes)
     return places
 
 

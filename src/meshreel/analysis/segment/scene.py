@@ -8,7 +8,7 @@ Differs from the paper: without masks, what moves is found in space, not in pict
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from ...derived import Chosen, TurnedOver
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
-from ...geometry.depth import SeesDepth
+from ...geometry.depth import DepthPicture, SeesDepth
 from ...geometry.nearest import distances
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
@@ -24,7 +24,7 @@ from ...types import Mesh, MeshSequence, evenly
 from .cut import CutOptions, moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
-from .places import PlacesOptions, Watched, find_places
+from .places import PlacesOptions, Tell, Watched, find_places, nobody
 from .settle import Rest, SettleOptions, find_rest
 from .views import ViewsOptions, place_views
 
@@ -51,7 +51,7 @@ class SegmentOptions:
             raise InputError(f"threshold {self.threshold:g}, island {self.island:g} m^2: give (0, 1] and from 0 on")
 
 
-def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByPlace:
+def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), tell: Tell = nobody) -> ByPlace:
     """What moves in a scene, by geometric change over the whole of it; `options` say which frames are looked at.
 
     A scene whose faces turn their backs to it, in which nothing can be seen to move, is turned over.
@@ -60,27 +60,26 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) ->
     if not chosen:
         nothing = np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0)
         return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, options.island)
-    found = _by_place(frames, chosen, options)
+    found = _by_place(frames, chosen, options, tell)
     if not found.chosen.any() and _faces_away(frames[chosen[0]]):
-        turned = _by_place(TurnedOver(frames), chosen, options)
+        turned = _by_place(TurnedOver(frames), chosen, options, nobody)
         found = turned if turned.chosen.any() else found
     return found
 
 
-def _by_place(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> ByPlace:
+def _by_place(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions, tell: Tell) -> ByPlace:
     cell, views = edge_length(frames, chosen), _views(frames, chosen, options)
     lattice = _lattice(frames, chosen, cell)
-    places = find_places(_watched(frames, chosen, views), lattice, options.places)
+    pictures = _pictures_of(frames, chosen) if isinstance(frames, SeesDepth) else None
+    places = find_places(Watched(Chosen(frames, chosen), views, pictures, tell), lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
     return ByPlace(cell, lattice, places.keys, moving, rest, options.island)
 
 
-def _watched(frames: MeshSequence, chosen: Sequence[int], views: Sequence[PinholeCamera]) -> Watched:
-    if not isinstance(frames, SeesDepth):
-        return Watched(Chosen(frames, chosen), views)
-    pictures = frames.pictures
-    return Watched(Chosen(frames, chosen), views, lambda number: pictures(chosen[number]))
+def _pictures_of(frames: SeesDepth, chosen: Sequence[int]) -> Callable[[int], list[DepthPicture | None]]:
+    """What cameras measured in each of the chosen frames, by their number among these."""
+    return lambda number: frames.pictures(chosen[number])
 
 
 def _faces_away(mesh: Mesh) -> bool:
