@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import meshreel
 from meshreel.capture.procedural import sliding_sphere
@@ -159,6 +160,16 @@ def test_with_the_truth_both_are_compared_with_it(run, rig):
     assert decoded["people_ssim_masked"] < 0.99 and "d2_psnr_paper" in said.row
     told = run("compare", rig / "truth", rig / "larger", "--no-ssim", "--truth", rig / "truth", "--truth-every", "2")
     assert "against the truth, 2 frames" in told.out and "people_coverage_rms_m" in told.out
+
+
+def test_a_sheet_of_a_rig_is_what_its_cameras_see_of_the_chosen_frames(run, rig, tmp_path):
+    """Two cameras of 64 x 64 pixels, two of three frames; an axis may begin with a hyphen."""
+    said = run("compare", rig, rig / "truth", "--no-ssim", "--sheet", tmp_path / "a.png", "--sheet-frames", "0", "2")
+    assert said.code == 0, said
+    with Image.open(tmp_path / "a.png") as sheet:
+        assert 4 * 64 < sheet.height < 5 * 64 + 40 and 3 * 64 < sheet.width < 3 * 64 + 200
+    said = run("compare", rig, rig / "truth", "--no-ssim", "--up", "-y")
+    assert said.code == 0, said
 
 
 def test_the_truth_takes_the_frames_of_the_originals(run, rig):

@@ -46,7 +46,7 @@ def test_the_sheet_the_cameras_and_the_colored_frames_are_beside_them(run, scan,
     shown = open_sequence(out / "colored")[1]
     assert len(shown.faces) == ROOM_FACES + 256
     with Image.open(out / "sheet.png") as sheet:
-        assert sheet.size == (4 * 124 - 4, 2 * 94 - 4)
+        assert sheet.size == (64 + 4 * 124, 24 + 2 * 94 + 24)
         colors = np.array(sheet).reshape(-1, 3).astype(int)
     assert (colors[:, 0] > 2 * colors[:, 2]).any() and (colors[:, 2] > 2 * colors[:, 0]).any()  # red and blue balls
     assert len(json.loads((out / "cameras.json").read_text())["parameters"]) == 6

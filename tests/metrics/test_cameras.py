@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
+from meshreel.geometry.cameras import UP_AXES
 from meshreel.metrics.cameras import (
     Box,
     ViewOptions,
@@ -24,7 +25,7 @@ def _in_camera(points: np.ndarray, camera) -> np.ndarray:
     return points @ camera.extrinsic[:3, :3].T + camera.extrinsic[:3, 3]
 
 
-@pytest.mark.parametrize("up", ["y", "z"])
+@pytest.mark.parametrize("up", ["y", "z", "-y", "-z"])
 @pytest.mark.parametrize("size", [(1, 2, 1), (5, 1, 0.2), (0, 3, 0), (2, 2, 0)])
 def test_the_whole_box_is_in_every_view(up: str, size: tuple[float, ...]):
     box = Box(np.array([10.0, 20, 30]), np.array([10.0, 20, 30]) + size)
@@ -46,6 +47,15 @@ def test_the_views_are_front_right_back_left_with_up_upwards():
         assert np.allclose(eye / np.linalg.norm(eye), side)
         above = camera.project(_in_camera(np.array([[0, 0.5, 0.0]]), camera))
         assert above[0] == pytest.approx([960, above[0, 1]]) and above[0, 1] < 540
+
+
+@pytest.mark.parametrize(("up", "side"), [("z", (0, -1, 0)), ("-y", (0, 0, -1)), ("-z", (0, 1, 0))])
+def test_what_is_up_is_up_in_the_pictures_and_the_front_is_its_own(up: str, side: tuple[int, ...]):
+    front = views_around(Box(np.full(3, -1.0), np.full(3, 1.0)), ViewOptions(up=up))[0]
+    eye = -front.extrinsic[:3, :3].T @ front.extrinsic[:3, 3]
+    assert np.allclose(eye / np.linalg.norm(eye), side)
+    above = front.project(_in_camera(0.5 * np.array([UP_AXES[up]]), front))
+    assert above[0, 0] == pytest.approx(960) and above[0, 1] < 540
 
 
 def test_rays_undo_projection():

@@ -39,6 +39,16 @@ def test_a_sheet_is_a_png_with_a_line_for_each_frame_and_view(tmp_path: Path, un
     assert picture[..., :3].std() > 0.02
 
 
+def test_a_sheet_is_seen_from_the_cameras_that_are_given(tmp_path: Path):
+    image = pytest.importorskip("matplotlib.image")
+    cameras = tuple(views_around(Box.of([BODY]), ViewOptions(96, 64)))
+    write_sheet(MeshList((BODY,)), MeshList((BODY,)), tmp_path / "sheet.png", SheetOptions(cameras=cameras[:3]))
+    picture = image.imread(tmp_path / "sheet.png")
+    assert 3 * 64 < picture.shape[0] < 4 * 64 and 3 * 96 < picture.shape[1] < 3 * 96 + 300
+    with pytest.raises(InputError, match="one size"):
+        SheetOptions(cameras=(cameras[0], views_around(Box.of([BODY]), ViewOptions(32, 32))[0]))
+
+
 @pytest.mark.parametrize(
     "pair", [(BODY, Mesh.empty()), (Mesh.empty(), BODY), (Mesh.empty(), Mesh.empty()), (BODY, BODY)]
 )
@@ -57,7 +67,15 @@ def test_the_same_meshes_give_the_same_bytes(tmp_path: Path):
 
 @pytest.mark.parametrize(
     "options",
-    [{"unit": "inch"}, {"views": (4,)}, {"views": ()}, {"height": 3}, {"limit": -1.0}, {"limit": float("nan")}],
+    [
+        {"unit": "inch"},
+        {"views": (4,)},
+        {"views": ()},
+        {"height": 3},
+        {"limit": -1.0},
+        {"limit": np.nan},
+        {"up": "x"},
+    ],
 )
 def test_bad_sheet_options_are_refused(options: dict):
     with pytest.raises(InputError):

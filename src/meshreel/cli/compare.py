@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 from rich.table import Table
 
+from ..capture.record import Recording
 from ..capture.rig import DepthCamera
 from ..capture.simulate import SceneFrame
 from ..capture.truth import Truth, read_truth
@@ -19,8 +21,10 @@ from ..decoder import open as open_video
 from ..errors import FormatError, InputError
 from ..evaluation.truth import compare_with_truth
 from ..format.layout import MAGIC
+from ..geometry.cameras import PinholeCamera
 from ..geometry.topology import weld
 from ..io.sequence import FileSequence, SequenceOptions, open_sequence
+from ..metrics.cameras import read_cameras
 from ..metrics.report import compare_sequences
 from ..metrics.sheet import SheetOptions, write_sheet
 from ..types import Frames, Mesh, MeshSequence
@@ -38,6 +42,7 @@ def command(
     reading: Reading = Reading(),
     looking: Looking = Looking(),
     sheet: Path | None = None,
+    sheet_frames: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = (),
     knowing: Knowing = Knowing(),
     common: Common = Common(),
 ) -> None:
@@ -54,7 +59,9 @@ def command(
     decoded
         A .reel file, or the decoded meshes.
     sheet
-        Write a PNG: original, decoded, error heat map.
+        Write a PNG: original, decoded, error heat map; seen from the cameras of --cameras or of a rig, or the front.
+    sheet_frames
+        The frames in it; the first, the middle and the last where none is given.
     """
     options = looking.options()
     if sheet is not None and not sheet.parent.is_dir():
@@ -75,7 +82,8 @@ def command(
             if truth is not None:
                 row |= {"truth": _against_truth(sequence, other, truth, knowing.truth_every, progress)}
         if sheet is not None:
-            write_sheet(sequence, other, sheet, SheetOptions(up=looking.up))
+            cameras = _sheet_cameras(looking, sequence)
+            write_sheet(sequence, other, sheet, SheetOptions(sheet_frames, cameras=cameras, up=looking.up))
     except FormatError as error:  # a chunk that the decoder knows by its number only
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
     if reel:
@@ -86,6 +94,16 @@ def command(
     texts: list[object] = [] if truth is None else [truth_table(row["truth"])]
     texts += [f"picture: {sheet}"] if sheet is not None else []
     common.result({"warnings": warnings} | row, metric_table(row), *_cameras(row), *texts)
+
+
+def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[PinholeCamera, ...]:
+    """Those that are given, or those of the rig; of the size of the first one."""
+    given: Sequence[PinholeCamera] = ()
+    if looking.cameras is not None:
+        given = read_cameras(looking.cameras)
+    elif isinstance(sequence, Recording):
+        given = [camera.view for camera in sequence.rig.cameras]
+    return tuple(camera for camera in given if (camera.width, camera.height) == (given[0].width, given[0].height))
 
 
 @dataclass(frozen=True, slots=True)

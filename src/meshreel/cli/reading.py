@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -35,6 +35,9 @@ class Reading:
         return SequenceOptions(self.fps, self.frames, self.scale, weld)
 
 
+Up = Literal["y", "z", "-y", "-z"]
+
+
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Looking:
@@ -48,9 +51,9 @@ class Looking:
     """Of the rendered pictures, pixels."""
     height: int = _VIEWS.height
     """Of the rendered pictures, pixels."""
-    up: Literal["y", "z"] = "y"
+    up: Annotated[Up, Parameter(allow_leading_hyphen=True)] = "y"
     """The axis that points up."""
-    keys: tuple[int, ...] = ()
+    keys: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = ()
     """Key frames: means are also given without them. Those that a .reel file names where none is given."""
 
     def options(self) -> ComparisonOptions:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -20,7 +20,7 @@ from ..geometry.cameras import unpack_cameras
 from ..io.sequence import open_sequence
 from ..types import MeshSequence
 from .capture import MADE
-from .reading import Reading
+from .reading import Reading, Up
 
 _READ = Reading()
 
@@ -79,14 +79,14 @@ class Masking:
     PNG of object numbers, 0 for what stands still. `segment --views-only` makes pictures and cameras for it."""
     sam3: Path | None = None
     """Masks by SAM3 (extra `sam3`): a folder with its weights, as of facebook/sam3."""
-    prompts: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    prompts: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
     """What SAM3 looks for, in words, as --prompts person --prompts dog; of it counts what moves. Common words where
     none is given."""
     device: str = "cpu"
     """Where SAM3 runs, as torch names it: cpu, cuda, cuda:1."""
     views: Path | None = None
     """A file of Open3D pinhole cameras, all of one size, that look at the scene; placed where it is not given."""
-    up: Literal["y", "z", "-y", "-z"] = "y"
+    up: Annotated[Up, Parameter(allow_leading_hyphen=True)] = "y"
     """The axis that points up, for placed views: pictures are upright."""
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera, pack_cameras, pinhole_record, unpack_cameras
+from ..geometry.cameras import UP_AXES, PinholeCamera, check_up, pack_cameras, pinhole_record, unpack_cameras
 from ..io.write import replacing
 from ..types import Mesh
 
@@ -78,15 +78,14 @@ class ViewOptions:
     width: int = 1920  # pixels
     height: int = 1080  # pixels
     fov: float = 60.0  # degrees, vertical
-    up: str = "y"  # the axis that points up: y or z
+    up: str = "y"  # the axis that points up: y, z, -y or -z
 
     def __post_init__(self) -> None:
         if self.width < 8 or self.height < 8:
             raise InputError(f"view size {self.width} x {self.height}: give at least 8 x 8 pixels")
         if not 1 <= self.fov <= 170:
             raise InputError(f"field of view {self.fov}: give 1 to 170 degrees")
-        if self.up not in ("y", "z"):
-            raise InputError(f"up axis {self.up!r}: give y or z")
+        check_up(self.up)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +93,7 @@ class ParallelViewOptions:
     """How four small parallel views stand around a bounding box, one a side: quick to draw."""
 
     size: int = 512  # pixels, width and height
-    up: str = "y"  # the axis that points up: y or z
+    up: str = "y"  # the axis that points up: y, z, -y or -z
 
     def __post_init__(self) -> None:
         ViewOptions(self.size, self.size, up=self.up)
@@ -132,7 +131,8 @@ class Box:
 def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[PinholeCamera]:
     """Perspective views of the box from its front, right, back and left (of the viewer), all at one distance.
 
-    The front is seen from +z where y is up and from -y where z is up. The distance lets the box fit in every view.
+    The front is seen from +z where y is up and from -y where z is up; from -z and +y where -y and -z are. The distance
+    lets the box fit in every view.
     """
     across, height = _extent(box, options.up)
     tangent = math.tan(math.radians(options.fov) / 2)
@@ -185,15 +185,15 @@ def camera_record(camera: PinholeCamera | OrthographicCamera) -> dict[str, Any]:
 
 def _extent(box: Box, up: str) -> tuple[float, float]:
     """The larger horizontal side and the height; never 0."""
-    vertical = "xyz".index(up)
+    vertical = int(np.abs(UP_AXES[up]).argmax())
     least = float(box.size.max()) * 1e-3 or 1.0
     return max(float(np.delete(box.size, vertical).max()), least), max(float(box.size[vertical]), least)
 
 
 def _axes(up: str) -> list[np.ndarray]:
     """Per view the rows right, down, forward."""
-    above = np.array([0.0, 1, 0]) if up == "y" else np.array([0.0, 0, 1])
-    front = np.array([0.0, 0, 1]) if up == "y" else np.array([0.0, -1, 0])
+    above = np.array(UP_AXES[up])
+    front = np.array([0.0, -above[2], above[1]])
     side = np.cross(above, front)
     return [np.stack([np.cross(-to, above), -above, -to]) for to in (front, side, -front, -side)]
 

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera
+from ..geometry.cameras import UP_AXES, PinholeCamera, check_up
 from ..geometry.nearest import Surface
 from ..io.write import replacing
 from ..types import Mesh
@@ -25,7 +25,7 @@ from .distance import surface_errors
 from .render import View, Window, look
 from .samples import box_center, used_surface
 
-_COLUMNS = ("original", "decoded", "error")
+_COLUMNS = ("original", "decoded", "error (magenta: only decoded)")
 _LEFT, _RIGHT, _TOP, _GAP = 64, 100, 32, 8  # pixels around and between the pictures
 _DPI = 100
 _INVENTED = (1.0, 0.0, 1.0)  # magenta
@@ -46,11 +46,12 @@ class SheetOptions:
     """What the sheet shows."""
 
     frames: tuple[int, ...] = ()  # none given: first, middle and last
-    views: tuple[int, ...] = (0,)  # 0 front, 1 right, 2 back, 3 left
+    views: tuple[int, ...] = (0,)  # 0 front, 1 right, 2 back, 3 left; none of these where there are cameras
+    cameras: tuple[PinholeCamera, ...] = ()  # what to look from, of one size; none: around all that is shown
     height: int = 480  # pixels of one picture
     unit: str = "percent"  # of the heat map: percent (of the diagonal) or mm
     limit: float = 0.0  # where the color bar ends, in that unit; 0: the 99 % quantile of what is seen
-    up: str = "y"  # the axis that points up
+    up: str = "y"  # the axis that points up: y, z, -y or -z
 
     def __post_init__(self) -> None:
         if self.unit not in ("percent", "mm"):
@@ -59,6 +60,9 @@ class SheetOptions:
             raise InputError(f"views {self.views}: give some of 0 to 3")
         if not 32 <= self.height <= 4096:
             raise InputError(f"picture height {self.height}: give 32 to 4096 pixels")
+        check_up(self.up)
+        if len({(camera.width, camera.height) for camera in self.cameras}) > 1:
+            raise InputError("cameras of several sizes: give a sheet cameras of one size")
         if not self.limit >= 0:
             raise InputError(f"limit {self.limit}: give 0 or more")
 
@@ -115,8 +119,10 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
 
 
 def _cameras(meshes: list[Mesh], options: SheetOptions) -> list[PinholeCamera]:
+    if options.cameras:
+        return list(options.cameras)
     box = Box.of(meshes)
-    vertical = "xyz".index(options.up) if options.up in "yz" else 1
+    vertical = int(np.abs(UP_AXES[options.up]).argmax())
     aspect = float(np.delete(box.size, vertical).max()) / max(float(box.size[vertical]), 1e-9)
     width = int(options.height * min(max(aspect, 0.5), 3.0))
     cameras = views_around(box, ViewOptions(width, options.height, fov=30.0, up=options.up))

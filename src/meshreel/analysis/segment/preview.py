@@ -6,6 +6,7 @@ In: what moves in some frames, and the views. Out: colors, and pictures as array
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Integer, UInt8
@@ -26,7 +27,8 @@ _BODIES = (
 )
 _LIGHT = np.array([0.36, 0.80, 0.48])
 _AMBIENT = 0.45  # what no light reaches has this much of its color
-_GAP = 4  # pixels
+_GAP, _LEFT, _TOP, _TEXT = 4, 64, 24, 14  # pixels: between pictures, left of them, above and below them, of text
+_LEGEND = "light gray: rests; a color: moves, a color a body (six in turn); dark gray: moves, of no body"
 
 
 def label_colors(moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"]) -> UInt8[np.ndarray, "F 3"]:
@@ -56,12 +58,28 @@ def look_at_labels(
     return pictures, [int(moving[np.unique(seen.faces[seen.faces >= 0])].sum()) for seen in looks]
 
 
-def sheet(rows: Sequence[Sequence[UInt8[np.ndarray, "H W 3"]]]) -> UInt8[np.ndarray, "Y X 3"]:
-    """Pictures of one size, in rows of one length, on white."""
-    height, width, _ = rows[0][0].shape
-    whole = np.full((len(rows) * (height + _GAP) - _GAP, len(rows[0]) * (width + _GAP) - _GAP, 3), 255, np.uint8)
+@dataclass(frozen=True, slots=True)
+class SheetRow:
+    """What the views see of one frame."""
+
+    frame: int
+    pictures: Sequence[UInt8[np.ndarray, "H W 3"]]
+
+
+def sheet(rows: Sequence[SheetRow], views: Sequence[int]) -> UInt8[np.ndarray, "Y X 3"]:
+    """Pictures of one size, a row a frame and a column a view, with the numbers of both and what the colors mean."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    height, width, _ = rows[0].pictures[0].shape
+    size = (_LEFT + len(views) * (width + _GAP), _TOP + len(rows) * (height + _GAP) + _TOP)
+    whole = Image.new("RGB", size, "white")
+    draw, font = ImageDraw.Draw(whole), ImageFont.load_default(_TEXT)
+    for k, view in enumerate(views):
+        draw.text((_LEFT + k * (width + _GAP), _GAP), f"view {view}", "black", font)
     for i, row in enumerate(rows):
-        for k, picture in enumerate(row):
-            y, x = i * (height + _GAP), k * (width + _GAP)
-            whole[y : y + height, x : x + width] = picture
-    return whole
+        top = _TOP + i * (height + _GAP)
+        draw.text((_GAP, top), f"frame\n{row.frame}", "black", font)
+        for k, picture in enumerate(row.pictures):
+            whole.paste(Image.fromarray(picture), (_LEFT + k * (width + _GAP), top))
+    draw.text((_LEFT, size[1] - _TOP + _GAP), _LEGEND, "black", font)
+    return np.asarray(whole)

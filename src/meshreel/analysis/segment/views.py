@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
 from ...errors import InputError
-from ...geometry.cameras import PinholeCamera
+from ...geometry.cameras import UP_AXES, PinholeCamera, check_up
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
 from ...types import Frames, Mesh
@@ -27,7 +27,6 @@ _TOUCHES = 1e-3  # of a ray's length: what it meets so near its end is the sampl
 _INSIDE = 0.5  # share of what a place sees from behind from which on it is taken to be inside of something
 _SURE = 0.9  # that a face which has a whole pixel is met: where all is seen, further views go where fewest see
 _WAYS = np.array([w for w in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(w)])
-_UP = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +50,7 @@ class ViewsOptions:
             raise InputError(f"views of {self.width} x {self.height} pixels: give 8 to 4096 a side")
         if not 10 <= self.fov <= 150:
             raise InputError(f"field of view {self.fov:g}: give 10 to 150 degrees")
-        if self.up not in _UP:
-            raise InputError(f"up axis {self.up!r}: give {', '.join(_UP)}")
+        check_up(self.up)
         if not 1 <= self.reach <= 10:
             raise InputError(f"reach {self.reach:g}: give 1 to 10 boxes")
         if not (2 <= self.places <= 10 and 1 <= self.frames <= 16 and 16 <= self.samples <= 8192):
@@ -181,7 +179,7 @@ def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], o
 @cache
 def _turns(options: ViewsOptions) -> Float64[np.ndarray, "W 3 3"]:
     """World to camera for each way to look; upright where the way is not vertical."""
-    up = np.array(_UP[options.up])
+    up = np.array(UP_AXES[options.up])
     turns = []
     for way in _WAYS:
         forward = way / np.linalg.norm(way)
