@@ -63,6 +63,7 @@ class SceneSummary:
     faces: int  # of the first of them, as decoded
     noise: float  # m, RMS distance of a frame's still surface from the background
     psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
+    measured: tuple[int, ...]  # these frames
     tracks: int
 
 
@@ -174,10 +175,11 @@ def _encode_scene(work: _Work, path: Path, parts: Parts) -> Summary:
         groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
         writer.header = make_header(sequence.frame_rate, seen, metadata)
-    psnr = _measured(sequence, path, seen.diagonal)
+    measured = evenly(len(sequence), MEASURED)
+    psnr = _measured(sequence, path, seen.diagonal, measured)
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
-    scene = SceneSummary(size, faces, parts.noise, psnr, tracks)
+    scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
     warnings = (*_warnings(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
     return Summary(path.stat().st_size, tuple(groups), warnings, scene)
@@ -207,11 +209,11 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     return GroupSummary(group.form, group.frame_count, len(group.payload), quality, group.predicted, key, track)
 
 
-def _measured(sequence: MeshSequence, path: Path, diagonal: float) -> float:
-    """d2_psnr_paper, dB, mean over a few frames of a file."""
+def _measured(sequence: MeshSequence, path: Path, diagonal: float, numbers: Sequence[int]) -> float:
+    """d2_psnr_paper, dB, mean over some frames of a file."""
     with open_video(path) as video:
         found = []
-        for number in evenly(len(sequence), MEASURED):
+        for number in numbers:
             points, shown = drop_unreferenced(sequence[number]).vertices, video[number]
             if not len(points) or shown.is_empty:
                 found.append(PSNR_CEILING if not len(points) and shown.is_empty else 0.0)

@@ -91,7 +91,7 @@ def test_the_quality_that_a_target_took_and_the_psnr_that_was_reached_are_told(r
     row = run("encode", balls, "-o", out, "--frames", ":1", *goal, "--json").row
     assert row["quality"] == float(f"{row['quality']:.4g}")
     text = run("encode", balls, "-o", out, "--frames", ":1", *goal).out
-    assert text.endswith(f"; quality {row['quality']:g}, {row['d2_psnr_paper']:.2f} dB\n")
+    assert text.endswith(f"; quality {row['quality']:g}, D2-PSNR {row['d2_psnr_paper']:.2f} dB\n")
 
 
 @pytest.mark.usefixtures("quick_presets")

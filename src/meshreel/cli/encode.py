@@ -184,6 +184,7 @@ def _scene_row(summary: Summary, scene: SceneSummary, frame_rate: float) -> dict
         "background_bytes": scene.background,
         "background_faces": scene.faces,
         "noise_m": scene.noise,
+        "measured_frames": list(scene.measured),
         "parts_bytes": parts,
         "parts_mbps": {name: _mbps(size, summary, frame_rate) for name, size in parts.items()},
     }
@@ -211,7 +212,10 @@ def describe(row: dict[str, Any]) -> str:
 
 def _reached(row: dict[str, Any]) -> str:
     psnr = row["d2_psnr_paper"]
-    return f"quality {row['quality']:g}" + ("" if psnr is None else f", {psnr:.2f} dB")
+    if psnr is None:
+        return f"quality {row['quality']:g}"
+    some = "" if row["scene"] is None else f" in {len(row['scene']['measured_frames'])} frames"
+    return f"quality {row['quality']:g}, D2-PSNR {psnr:.2f} dB{some}"
 
 
 @contextmanager
