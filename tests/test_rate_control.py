@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.choice import Quality
-from meshreel.encoder import GroupSummary, SceneSummary, Summary
+from meshreel.encoder import Encoder, GroupSummary, SceneSummary, Summary
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
@@ -103,7 +103,7 @@ def options_at(quality: float) -> meshreel.EncoderOptions:
 
 
 def test_a_file_meets_the_psnr_that_was_asked_for(tmp_path) -> None:
-    summary, quality = encode_to(BODY, tmp_path / "a.reel", Goal(psnr=58.5), options_at)
+    summary, quality = encode_to(Encoder(BODY), tmp_path / "a.reel", Goal(psnr=58.5), options_at)
     row = compare_sequences(BODY, meshreel.open(tmp_path / "a.reel"), ComparisonOptions(ssim=False)).to_row()
     assert abs(row["d2_psnr_paper"] - 58.5) <= 0.3
     with meshreel.open(tmp_path / "a.reel") as video:
@@ -113,7 +113,7 @@ def test_a_file_meets_the_psnr_that_was_asked_for(tmp_path) -> None:
 
 
 def test_a_file_meets_the_rate_that_was_asked_for(tmp_path) -> None:
-    summary, _ = encode_to(BODY, tmp_path / "a.reel", Goal(mbps=0.33), options_at)
+    summary, _ = encode_to(Encoder(BODY), tmp_path / "a.reel", Goal(mbps=0.33), options_at)
     assert summary.size * 8 * BODY.frame_rate / len(BODY) / 1e6 == pytest.approx(0.33, rel=0.05)
 
 
@@ -122,7 +122,7 @@ def test_a_target_out_of_reach_is_told_and_leaves_nothing(goal: Goal, tmp_path) 
     (tmp_path / "a.reel").write_bytes(b"before")
     balls = MeshList(tuple(deforming_sphere(1, levels=1)))
     with pytest.raises(InputError, match=r"a\.reel: no quality gives .*; quality .* gives "):
-        encode_to(balls, tmp_path / "a.reel", goal, options_at)
+        encode_to(Encoder(balls), tmp_path / "a.reel", goal, options_at)
     assert [path.name for path in tmp_path.iterdir()] == ["a.reel"]
     assert (tmp_path / "a.reel").read_bytes() == b"before"
 
@@ -131,4 +131,4 @@ def test_a_place_that_cannot_be_written_is_told_before_anything_is_coded(tmp_pat
     monkeypatch.setattr("meshreel.rate_control.Encoder.encode", lambda *_: pytest.fail("coded"))
     for path in (tmp_path, tmp_path / "none" / "a.reel"):
         with pytest.raises(InputError, match=f"{path}: "):
-            encode_to(BODY, path, Goal(psnr=58.5), options_at)
+            encode_to(Encoder(BODY), path, Goal(psnr=58.5), options_at)

@@ -95,17 +95,16 @@ def encode(
     options: EncoderOptions | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    masker: Masker | None = None,
 ) -> Summary:
     """Writes `sequence` to a .reel file at `path`, which appears only when it is complete; None: preset `best` at 50.
 
-    A scene with a background is taken apart; who has masks of what moves gives a `masker`, and it is a scene then.
+    A scene with a background is taken apart; who has masks of what moves gives them to an `Encoder`.
 
     With an executor, runs of frames are encoded side by side; the bytes are the same. In memory are then as many runs
     as it has workers and one more, each of a key interval (preset `best`) or a group; of a scene, what moves in one
     key interval. Raises InputError for frames that cannot be used, before anything is coded.
     """
-    return Encoder(sequence, executor, progress, masker).encode(path, options or preset_options())
+    return Encoder(sequence, executor, progress).encode(path, options or preset_options())
 
 
 class Encoder:
@@ -118,9 +117,14 @@ class Encoder:
         progress: Progress | None = None,
         masker: Masker | None = None,
     ) -> None:
-        """As `encode`."""
+        """Executor and progress are those of `encode`; with a `masker`, who says what moves, it is a scene."""
         self._sequence, self._executor, self._progress, self._masker = sequence, executor, progress, masker
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
+
+    @property
+    def frame_rate(self) -> float:
+        """Of the sequence, 1/s."""
+        return self._sequence.frame_rate
 
     def encode(self, path: str | Path, options: EncoderOptions) -> Summary:
         """As the function `encode`, which says what is raised."""

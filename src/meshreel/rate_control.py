@@ -9,15 +9,12 @@ from __future__ import annotations
 import math
 import uuid
 from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
-from .analysis.segment.masks import Masker
 from .encoder import Encoder, Summary
 from .errors import InputError
-from .types import MeshSequence
-from .windows import EncoderOptions, Progress
+from .windows import EncoderOptions
 
 TRIALS = 8  # whole encodes, at most
 FIRST_QUALITY = 50.0
@@ -76,23 +73,16 @@ class Goal:
 
 
 def encode_to(
-    sequence: MeshSequence,
-    path: str | Path,
-    goal: Goal,
-    options_at: Callable[[float], EncoderOptions],
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-    masker: Masker | None = None,
+    encoder: Encoder, path: str | Path, goal: Goal, options_at: Callable[[float], EncoderOptions]
 ) -> tuple[Summary, float]:
     """Writes a file that meets the goal; gives its summary and the quality it took.
 
-    `options_at` makes the options of a quality from 0 to 100; `masker` is that of `encode`. Raises InputError, and
-    leaves no file, where no quality meets the goal: at once where a scene's background alone is more than the rate.
+    `options_at` makes the options of a quality from 0 to 100. Raises InputError, and leaves no file, where no quality
+    meets the goal: at once where a scene's background alone is more than the rate.
     """
     search, path = Search(goal), Path(path)
     if path.is_dir() or not path.parent.is_dir():
         raise InputError(f"{path}: cannot be written: {'is a folder' if path.is_dir() else 'no such folder'}")
-    encoder = Encoder(sequence, executor, progress, masker)
     partial = path.with_name(f".{uuid.uuid4().hex}.tmp")
     try:
         for _ in range(TRIALS):
@@ -100,11 +90,11 @@ def encode_to(
             if quality is None:
                 break
             summary = encoder.encode(partial, options_at(quality))
-            value = goal.measured(summary, sequence.frame_rate)
+            value = goal.measured(summary, encoder.frame_rate)
             if abs(value - goal.wanted) <= goal.tolerance:
                 partial.replace(path)
                 return summary, quality
-            if over := goal.exceeded_by_background(summary, sequence.frame_rate):
+            if over := goal.exceeded_by_background(summary, encoder.frame_rate):
                 raise InputError(f"{path}: {over}")
             search.learn(quality, value)
     finally:

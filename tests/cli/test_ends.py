@@ -19,18 +19,18 @@ import meshreel.cli.encode as command
 from meshreel.cli import main
 from tests.small_options import quick
 
-real = command.encode
+real = command.Encoder
 
-def slow(sequence, path, options, executor, progress, masker=None):
+def slow(sequence, executor, progress, masker):
     def wait(stage, done, total):
         if stage == "code" and done == 1:
             print("coding", flush=True)
             time.sleep(120)
-    return real(sequence, path, options, executor, wait, masker)
+    return real(sequence, executor, wait, masker)
 
 command.preset_options = quick
 if sys.argv.pop(1) == "wait":
-    command.encode = slow
+    command.Encoder = slow
 if __name__ == "__main__":
     main()
 """

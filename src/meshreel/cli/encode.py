@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..analysis.segment.scene import SegmentOptions
-from ..encoder import SceneSummary, Summary, encode
+from ..encoder import Encoder, SceneSummary, Summary
 from ..errors import InputError
 from ..presets import preset_options
 from ..rate_control import Goal, encode_to
@@ -137,10 +137,11 @@ def command(
     source = open_source(inputs, reading)
     sequence, masker = source.sequence, masking.masker(len(source.sequence))
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
+        encoder = Encoder(sequence, executor, progress, masker)
         if goal is None:
-            summary = encode(sequence, output, options, executor, progress, masker)
+            summary = encoder.encode(output, options)
         else:
-            summary, quality = encode_to(sequence, output, goal, options_at, executor, progress, masker)
+            summary, quality = encode_to(encoder, output, goal, options_at)
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
     if summary.scene is None and parting.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
