@@ -253,6 +253,20 @@ def memory(frames, peak):
     return base | {"codec": "meshreel", "options": {}, "frames": frames, "peak_rss_mb": peak}
 
 
+def test_memory_is_measured_in_a_fresh_process_that_takes_words(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr("meshreel.evaluation.scene_rows.open_scene", lambda *_: None)
+    monkeypatch.setattr(
+        "meshreel.evaluation.peers.subprocess.run",
+        lambda command, **_: asked.append(command) or SimpleNamespace(returncode=0, stdout='{"peak_rss_mb": 1}'),
+    )
+    points = [point for point in scenes.points(False) if point.kind == MEMORY]
+    rows = [measure_scene(point, tmp_path, tmp_path) for point in points]
+    assert [row["peak_rss_mb"] for row in rows] == [1, 1]
+    assert all(isinstance(word, str) for command in asked for word in command)
+    assert [command[-2:] for command in asked] == [["60", "50.0"], ["240", "50.0"]]
+
+
 GOOD = [
     FLOOR_ROW,
     *(row(scenes.SYSTEM, mbps, quality, options={"quality": 50.0 + i}) for i, (mbps, quality) in enumerate(CURVE)),

@@ -149,4 +149,4 @@ def _memory(point: Point, data: Path, cache: Path) -> Row:
     """Peak memory of an encode in a fresh process; longer than the scene, it is played forth and back."""
     open_scene(point.sequence, data, cache)
     options: dict[str, Any] = point.options
-    return run_fresh("scene", point.sequence, str(data), str(cache), str(point.frames), options["quality"])
+    return run_fresh("scene", point.sequence, str(data), str(cache), str(point.frames), str(options["quality"]))
