@@ -154,7 +154,7 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
             panel.set(xticks=[], yticks=[], title=title if i == 0 else "")
     unit = "mm" if options.unit == "mm" else "% of the diagonal"
     bar = axes_at(int(size[0]) - _RIGHT + _GAP, _TOP, 16, height)
-    figure.colorbar(image, cax=bar, label=f"distance to the decoded surface, {unit}", extend="max")
+    figure.colorbar(image, cax=bar, label=f"error, {unit}", extend="max")
     return figure
 
 
