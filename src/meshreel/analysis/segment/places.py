@@ -36,7 +36,7 @@ _TOGETHER = 32  # frames whose pictures are in memory together: what each view s
 class PlacesOptions:
     """How finely a scene is looked at, and what counts as seen free."""
 
-    frames: int = 32  # looked at, at least, spread over the sequence, or all where it has fewer
+    frames: int = 16  # looked at, at least, spread over the sequence, or all where it has fewer
     rate: float = 4.0  # 1/s, looked at, at least: who is there only between frames that are looked at is not carved
     past: float = 2.0  # cells that a view must see past a cell's middle
     views: int = 2  # that must see past it
