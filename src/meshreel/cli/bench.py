@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+import math
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -11,18 +14,50 @@ from cyclopts import App, Parameter
 from rich.table import Table
 
 from ..errors import InputError
+from ..evaluation.apart import end_all
 from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
 from ..evaluation.promises import Promise
 from ..evaluation.report import write_report
-from ..evaluation.rows import Row, join_rows, read_rows
+from ..evaluation.rows import FAILED, Row, failed_rows, join_rows, read_rows
 from ..evaluation.runner import Bench, run_points
 from ..evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from .console import Common
-from .encode import workers
 
 command = App(name="bench", help="Measure codecs against each other, and make tables and plots of the rows.")
 DATA = Path("../shared/data/performers")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Running:
+    """How points are measured."""
+
+    jobs: int = 1
+    """Points to measure side by side, each in a process; the rows are the same but for times."""
+    limit: float = 3600.0
+    """Seconds that a point may take; one that takes longer, crashes or decodes nonsense becomes a row that says so."""
+    retry: Annotated[bool, Parameter(negative="")] = False
+    """Measure points again that failed before."""
+
+    def __post_init__(self) -> None:
+        if self.jobs < 1 or not 0 < self.limit < math.inf:
+            raise InputError(f"--jobs {self.jobs}, --limit {self.limit:g}: give at least 1, and seconds above 0")
+
+
+@contextmanager
+def side_by_side(jobs: int) -> Iterator[Executor | None]:
+    """Threads that wait for so many processes, none for one; an interrupt ends these at once."""
+    if jobs == 1:
+        yield None
+        return
+    with ThreadPoolExecutor(jobs) as executor:
+        try:
+            yield executor
+        except BaseException:
+            executor.shutdown(wait=False, cancel_futures=True)
+            end_all()
+            raise
 
 
 @command.command
@@ -35,7 +70,7 @@ def run(
     small: bool = False,
     only: tuple[str, ...] = (),
     ssim: bool = True,
-    jobs: int = 1,
+    running: Running = Running(),
     common: Common = Common(),
 ) -> None:
     """Run an experiment and print what it promised and reached.
@@ -57,17 +92,14 @@ def run(
         Only the points of these codecs, as `scene_draco`; the others keep the rows they have.
     ssim
         Render and compare pictures too (slower).
-    jobs
-        Points to measure side by side, each in a process; the rows are the same but for times.
     """
-    if jobs < 1:
-        raise InputError(f"--jobs must be at least 1, got {jobs}")
     chosen = find_experiment(experiment)
     points = [point for point in chosen.points(small) if not only or point.codec in only]
     if not points:
         raise InputError(f"--only {' '.join(only)}: {experiment} has no such points")
-    bench = Bench(data, experiment, replace(chosen.COMPARISON, ssim=ssim), output.with_suffix(".cache"))
-    with common.stages(len(points)) as progress, workers(jobs) as executor:
+    comparison, cache = replace(chosen.COMPARISON, ssim=ssim), output.with_suffix(".cache")
+    bench = Bench(data, experiment, comparison, cache, running.limit, running.retry)
+    with common.stages(len(points)) as progress, side_by_side(running.jobs) as executor:
 
         def tell(row: Row, new: bool) -> None:
             done[0] += 1
@@ -76,8 +108,11 @@ def run(
 
         done = [0]
         rows = run_points(points, output, bench, tell, executor)
-    reached = chosen.promises(rows)
-    common.result({"output": str(output), "rows": len(rows)} | _promised(reached), promise_table(reached))
+    failed = failed_rows(rows)
+    common.warn(tuple(describe(row) for row in failed))
+    reached = chosen.promises([row for row in rows if FAILED not in row])
+    told = {"output": str(output), "rows": len(rows), "failed": len(failed)}
+    common.result(told | _promised(reached), promise_table(reached))
 
 
 @command.command
@@ -97,7 +132,9 @@ def report(
     output
         The folder to write into.
     """
-    measured = join_rows([read_rows(path) for path in rows])
+    joined = join_rows([read_rows(path) for path in rows])
+    measured = [row for row in joined if FAILED not in row]
+    common.warn(tuple(describe(row) for row in failed_rows(joined)))
     written = [str(path) for path in write_report(measured, EXPERIMENTS, output)]
     reached = [
         promise
@@ -112,6 +149,8 @@ def describe(row: Row) -> str:
     """A row in one line."""
     options = " ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
     head = f"{row['sequence']} {row['codec']} {options}:"
+    if FAILED in row:
+        return f"{head} failed: {row[FAILED]}"
     if row["kind"] == "decode":
         peer = f"DracoPy {row['draco_ms']:.2f}, with subdivision {row['subdivided_ms']:.2f}"
         return f"{head} {row['frame_ms']:.2f} ms/frame, {peer}"

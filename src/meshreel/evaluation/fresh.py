@@ -1,25 +1,29 @@
-"""Measures one thing in this process and prints it as JSON: the runner starts it as a fresh process.
+"""Measurements in a process of its own, which `runner.py` and `peers.py` start: nothing else is in memory, or warm.
 
-`decode FILE` gives times of decoding a .reel file; `draco FILE` the same of DracoPy on the frames in an .npz, the named
-peer; `pair FILE FILE` decodes two files by turns, the second with DracoPy alone too; `encode NAME DATA FRAMES OPTIONS`
-encodes a sequence, `scene` one of the benchmark's scenes. Times are processor time; decoding starts from bytes. The
-steady state is the best of three passes, each group's cost spread over its frames.
+`decode FILE [CODEC]` gives times of decoding a .reel file, or that of another codec; `draco FILE` the same of DracoPy
+on the frames in an .npz, the named peer; `pair FILE FILE` decodes two files by turns, the second with DracoPy alone
+too; `encode NAME DATA FRAMES OPTIONS` encodes a sequence, `scene` one of the benchmark's scenes. Times are processor
+time; decoding starts from bytes. The steady state is the best of three passes, each group's cost spread over its
+frames.
 """
 
 from __future__ import annotations
 
 import json
+import pickle
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..decoder import Video
 from ..decoder import open as open_video
+from ..types import Mesh
 
 PASSES = 3
+SLOW_MS = 2000.0  # a frame: who takes so long in all passes so far is not asked again
 PAIR_PASSES = 7
 
 
@@ -36,14 +40,17 @@ def main(task: str, *arguments: str) -> None:
     sys.stdout.write(json.dumps(row | {"peak_rss_mb": peak_rss_mb()}) + "\n")
 
 
-def measure_decode(path: str) -> dict[str, Any]:
-    """First frame and steady state, ms a frame, of the file at `path`."""
+def measure_decode(path: str, decoder: str | None = None) -> dict[str, Any]:
+    """First frame and steady state, ms a frame, of the file at `path`; `decoder` is a file with a pickled codec."""
+    decode = open_video if decoder is None else pickle.loads(Path(decoder).read_bytes()).decode
     data = Path(path).read_bytes()
     start = time.process_time()
-    open_video(data)[0]
+    decode(data)[0]
     first_ms = 1e3 * (time.process_time() - start)
-    frame_ms = min(_pass_ms(open_video(data)) for _ in range(PASSES))
-    sizes = [len(mesh.vertices) for mesh in open_video(data)]
+    passes = [_pass_ms(decode(data))]
+    while len(passes) < PASSES and len(passes) * passes[0] < SLOW_MS:
+        passes.append(_pass_ms(decode(data)))
+    frame_ms, sizes = min(passes), [len(mesh.vertices) for mesh in decode(data)]
     return {"first_frame_ms": first_ms, "frame_ms": frame_ms, "frames": len(sizes), "vertices": sum(sizes) / len(sizes)}
 
 
@@ -130,7 +137,7 @@ def peak_rss_mb() -> float | None:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
 
 
-def _pass_ms(video: Video) -> float:
+def _pass_ms(video: Sequence[Mesh] | Video) -> float:
     start = time.process_time()
     for _ in video:
         pass

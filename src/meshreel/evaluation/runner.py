@@ -7,7 +7,7 @@ carries DracoPy's decoding time of the same body from the same run, so that mach
 from __future__ import annotations
 
 import json
-import platform
+import pickle
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -17,12 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from .. import __version__
 from ..coding.mesh import encode_mesh
 from ..decoder import open as open_video
-from ..derived import Backwards
+from ..derived import Backwards, DerivedSequence
+from ..errors import InputError
 from ..metrics.report import ComparisonOptions, compare_sequences
-from ..types import Mesh, MeshSequence
+from ..types import Frames, Mesh, MeshSequence
+from .apart import measure_apart
 from .bridges import count_bridges, count_degenerate
 from .codec import Codec
 from .codecs import make_codec
@@ -31,7 +32,8 @@ from .datasets import open_dataset
 from .fresh import peak_rss_mb
 from .groups import group_records
 from .peers import cheapest_forms, measure_pair, run_fresh
-from .rows import Point, Row, append_row, read_rows
+from .provenance import made_by
+from .rows import FAILED, Point, Row, append_row, read_rows
 from .scene_rows import KINDS as SCENE_KINDS
 from .scene_rows import measure_scene
 
@@ -49,6 +51,8 @@ class Bench:
     experiment: str = "targets"  # rows of other experiments in the same file are left alone
     comparison: ComparisonOptions = field(default_factory=ComparisonOptions)
     cache: Path | None = None  # sequences that take long to make are kept here
+    limit_s: float | None = None  # wall time of a point, which then has a process of its own; None: measured in this
+    retry: bool = False  # points that failed before are measured again
 
 
 def run_points(
@@ -64,11 +68,13 @@ def run_points(
     executor points are measured side by side, but for those that compare with other rows (`AFTER`): they come last.
     """
     stored = read_rows(file) if file.exists() else []
-    known = {row["point"]: row for row in stored if row.get("experiment", "targets") == bench.experiment}
+    own = [row for row in stored if row.get("experiment", "targets") == bench.experiment]
+    known = {row["point"]: row for row in own if not (bench.retry and FAILED in row)}
     for point in points:
         if point.key in known:
             tell(known[point.key], False)
     missing = [point for point in points if point.key not in known]
+    _check_sequences(missing, bench)
     for row in _measured(missing, list(known.values()), bench, executor):
         append_row(file, row)
         known[row["point"]] = row
@@ -80,15 +86,26 @@ def _measured(points: Sequence[Point], rows: list[Row], bench: Bench, executor: 
     """A row a point, as each is there."""
     first = [point for point in points if point.kind not in AFTER]
     if executor is None:
-        found = (measure_point(point, bench) for point in first)
+        found = (_row_of(point, bench) for point in first)
     else:
-        found = (task.result() for task in as_completed([executor.submit(measure_point, p, bench) for p in first]))
+        found = (task.result() for task in as_completed([executor.submit(_row_of, p, bench) for p in first]))
     for row in found:
         rows.append(row)
         yield row
     for point in points:
         if point.kind in AFTER:
-            yield measure_point(point, bench, tuple(rows))
+            yield _row_of(point, bench, tuple(rows))
+
+
+def _check_sequences(points: Sequence[Point], bench: Bench) -> None:
+    """Raises InputError where data are missing: that is no codec's failure."""
+    for sequence, frames in dict.fromkeys((p.sequence, p.frames) for p in points if p.kind not in SCENE_KINDS):
+        open_dataset(sequence, bench.data, frames, bench.cache)
+
+
+def _row_of(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
+    """As `measure_point`; where there is a limit, in a process of its own."""
+    return measure_point(point, bench, rows) if bench.limit_s is None else measure_apart(point, bench, rows)
 
 
 def run_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
@@ -101,8 +118,8 @@ def _measured_codec(name: str, sequence: MeshSequence, codec: Codec, options: Co
     timer = StageTimer()
     data = codec.encode(sequence, timer)
     encode_s = timer.stop() / len(sequence)
-    video = codec.decode(data)
-    decode = measure_fresh_decode(data)
+    video = Checked(codec.decode(data), codec.name, sequence)
+    decode = measure_fresh_decode(data, codec)
     peer = measure_peer(video)
     row = _rate(name, sequence, codec, data) | {
         "encode_s": encode_s,
@@ -111,7 +128,6 @@ def _measured_codec(name: str, sequence: MeshSequence, codec: Codec, options: Co
         "decode": decode,
         "peer": peer,
         "decode_over_peer": decode["frame_ms"] / peer["frame_ms"] if peer else None,
-        "machine": {"platform": platform.platform(), "python": platform.python_version(), "meshreel": __version__},
     }
     row |= compare_sequences(sequence, video, options).to_row() | {"groups": group_records(data)}
     row |= {"bridges": [count_bridges(a, b) for a, b in zip(sequence, video, strict=True)]}
@@ -123,7 +139,8 @@ def run_curve_point(name: str, sequence: MeshSequence, codec: Codec, options: Co
     start = time.process_time()
     data = codec.encode(sequence)
     row = _rate(name, sequence, codec, data) | {"encode_s": (time.process_time() - start) / len(sequence)}
-    measured = compare_sequences(sequence, codec.decode(data), options).to_row()
+    video = Checked(codec.decode(data), codec.name, sequence)
+    measured = compare_sequences(sequence, video, options).to_row()
     frames = [{key: frame[key] for key in CURVE_METRICS if key in frame} for frame in measured["per_frame"]]
     return row | measured | {"per_frame": frames, "groups": group_records(data)}
 
@@ -150,15 +167,33 @@ def _rate(name: str, sequence: MeshSequence, codec: Codec, data: bytes) -> Row:
     }
 
 
-def measure_fresh_decode(data: bytes) -> Row:
-    """First frame and steady state, ms, and peak memory of decoding these bytes in a fresh process."""
+class Checked(DerivedSequence):
+    """What a codec has decoded, a frame at a time: as many frames as there were, and coordinates that are finite."""
+
+    def __init__(self, decoded: Sequence[Mesh], codec: str, source: MeshSequence) -> None:
+        """Raises InputError where the number of frames is another."""
+        super().__init__(source)
+        if len(decoded) != len(source):
+            raise InputError(f"{codec} decodes {len(decoded)} frames of {len(source)}")
+        self._decoded, self._codec = decoded, codec
+
+    def __getitem__(self, index: int) -> Mesh:
+        mesh = self._decoded[index]
+        if not np.isfinite(mesh.vertices).all():
+            raise InputError(f"{self._codec} decodes coordinates that are not finite in frame {index}")
+        return mesh
+
+
+def measure_fresh_decode(data: bytes, codec: Codec) -> Row:
+    """First frame and steady state, ms, and peak memory of decoding these bytes from a file in a fresh process."""
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "video.reel"
+        path, decoder = Path(folder) / "video", Path(folder) / "codec"
         path.write_bytes(data)
-        return run_fresh("decode", str(path))
+        decoder.write_bytes(pickle.dumps(codec))
+        return run_fresh("decode", str(path), str(decoder))
 
 
-def measure_peer(video: Sequence[Mesh]) -> Row:
+def measure_peer(video: Frames) -> Row:
     """The same of DracoPy on the same decoded frames at qp 9, in a fresh process; empty where there is no surface."""
     frames = []
     for mesh in video:
@@ -194,7 +229,7 @@ class StageTimer:
 
 def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
     """The row of a point, by its kind; `rows` are those measured before, for the kinds of `AFTER`."""
-    head = {"point": point.key, "kind": point.kind, "experiment": bench.experiment}
+    head = {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | made_by()
     if point.kind in SCENE_KINDS:
         return head | measure_scene(point, bench.data, bench.cache)
     sequence = open_dataset(point.sequence, bench.data, point.frames, bench.cache)

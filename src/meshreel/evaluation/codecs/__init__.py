@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
+from importlib.metadata import entry_points
 from typing import Any
 
 from ...errors import InputError
@@ -11,6 +13,7 @@ from .draco import DecimatedDracoCodec, DracoCodec
 from .meshreel import MeshreelCodec
 from .scenes import BackgroundDracoCodec, SceneDracoCodec
 
+ENTRY_POINTS = "meshreel.codecs"
 CODECS: dict[str, Callable[..., Codec]] = {
     "draco": DracoCodec,
     "decimated_draco": DecimatedDracoCodec,
@@ -21,11 +24,27 @@ CODECS: dict[str, Callable[..., Codec]] = {
 }
 
 
+def known_codecs() -> dict[str, Callable[[], Callable[..., Codec]]]:
+    """What makes each codec, by name, found when it is asked for: those here, and those of other packages.
+
+    A package of anybody's has its own by an entry point of the group `meshreel.codecs`; names of ours stay ours.
+    """
+    others = {entry.name: entry.load for entry in entry_points(group=ENTRY_POINTS)}
+    return others | {name: partial(_itself, make) for name, make in CODECS.items()}
+
+
+def _itself(make: Callable[..., Codec]) -> Callable[..., Codec]:
+    return make
+
+
 def make_codec(kind: str, options: dict[str, Any]) -> Codec:
     """The codec of that kind at the operating point `options`. Raises InputError for a kind or option it lacks."""
-    if kind not in CODECS:
-        raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted(CODECS))}")
+    known = known_codecs()
+    if kind not in known:
+        raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted(known))}")
     try:
-        return CODECS[kind](**options)
+        return known[kind]()(**options)
+    except ImportError as error:
+        raise InputError(f"codec {kind!r} cannot be loaded ({error}); install what its package needs") from error
     except TypeError as error:
         raise InputError(f"codec {kind!r} does not take {options}: {error}") from error

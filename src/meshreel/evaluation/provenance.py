@@ -1,0 +1,52 @@
+"""What made a row: the version of the package, the commit of its checkout, the machine.
+
+In: nothing. Out: JSON-ready records. Rows of several makers in one plot are told apart by them.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+from .. import __version__
+from .rows import Row
+
+MADE_BY = "made_by"  # of a row
+_DIGITS = 12  # of a commit
+
+
+@cache
+def commit() -> str | None:
+    """The commit of the checkout that this package runs from, with + where files differ; None outside of one."""
+    here = Path(__file__).resolve().parent
+    try:
+        head = _git(here, "rev-parse", "HEAD")
+        tracked = _git(here, "ls-files", "--error-unmatch", Path(__file__).name)
+        changed = _git(here, "status", "--porcelain", "--untracked-files=no", "--", "..")
+    except (OSError, subprocess.SubprocessError):  # no git, or the package is installed
+        return None
+    return head[:_DIGITS] + ("+" if changed else "") if tracked else None
+
+
+def _git(folder: Path, *words: str) -> str:
+    answer = subprocess.run(["git", *words], cwd=folder, capture_output=True, text=True, check=True, timeout=10)
+    return answer.stdout.strip()
+
+
+def made_by() -> Row:
+    """For a row: version, commit, and the machine."""
+    machine = {"platform": platform.platform(), "python": platform.python_version(), "cores": os.cpu_count()}
+    return {MADE_BY: {"meshreel": __version__, "commit": commit()} | machine}
+
+
+def makers(rows: Sequence[Row]) -> list[str]:
+    """The versions and commits that some rows are of, in order of their first row; rows that do not say are one."""
+    found = []
+    for row in rows:
+        made = row.get(MADE_BY)
+        found.append("not recorded" if made is None else f"{made['meshreel']} {made['commit'] or '(installed)'}")
+    return list(dict.fromkeys(found))
