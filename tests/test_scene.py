@@ -11,6 +11,7 @@ import pytest
 import meshreel
 from meshreel.analysis.background import BackgroundOptions
 from meshreel.analysis.segment.labelling import ByPlace
+from meshreel.analysis.segment.scene import scene_views
 from meshreel.analysis.segment.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.choice import NO_ERROR
@@ -136,6 +137,11 @@ def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch
     other = quick_scene(quality=60)
     encoder.encode(tmp_path / "other.reel", replace(other, segment=replace(other.segment, threshold=0.4)))
     assert len(count) == 3
+    for _ in range(2):  # cameras of the same numbers, made anew
+        views = scene_views(MeshList(tuple(ROLLING), 4.0), other.segment)
+        cameras = tuple(replace(view, extrinsic=view.extrinsic.copy()) for view in views)
+        encoder.encode(tmp_path / "given.reel", replace(other, segment=replace(other.segment, cameras=cameras)))
+    assert len(count) == 4
 
 
 def test_preset_paper_has_scenes_too(tmp_path):

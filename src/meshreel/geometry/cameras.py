@@ -29,14 +29,24 @@ def check_up(axis: str) -> None:
         raise InputError(f"up axis {axis!r}: give {', '.join(UP_AXES)}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class PinholeCamera:
-    """A perspective camera."""
+    """A perspective camera; equal to one of the same numbers, so that options with cameras can be compared."""
 
     width: int
     height: int
     intrinsic: Float64[np.ndarray, "3 3"]  # pixels; the last row is 0 0 1
     extrinsic: Float64[np.ndarray, "4 4"]  # world to camera
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, PinholeCamera):
+            return NotImplemented
+        sizes = (self.width, self.height) == (other.width, other.height)
+        pairs = ((self.intrinsic, other.intrinsic), (self.extrinsic, other.extrinsic))
+        return sizes and all(np.array_equal(a, b) for a, b in pairs)
+
+    def __hash__(self) -> int:
+        return hash((self.width, self.height))
 
     @property
     def eye(self) -> Float64[np.ndarray, " 3"]:
