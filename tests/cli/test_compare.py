@@ -12,10 +12,12 @@ from PIL import Image
 
 import meshreel
 from meshreel.capture.procedural import sliding_sphere
+from meshreel.capture.rig import read_rig
 from meshreel.capture.simulate import SceneFrame, simulate_rig
 from meshreel.container.writer import ReelWriter
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
+from meshreel.metrics.cameras import write_cameras
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import camera
 from tests.cli.conftest import FILE, failed
@@ -170,6 +172,14 @@ def test_a_sheet_of_a_rig_is_what_its_cameras_see_of_the_chosen_frames(run, rig,
         assert 4 * 64 < sheet.height < 5 * 64 + 40 and 3 * 64 < sheet.width < 3 * 64 + 200
     said = run("compare", rig, rig / "truth", "--no-ssim", "--up", "-y")
     assert said.code == 0, said
+
+
+def test_cameras_of_several_sizes_are_refused_before_anything_is_measured(run, rig, tmp_path):
+    views = [camera.view for camera in read_rig(rig).cameras]
+    write_cameras(tmp_path / "views.json", [views[0], replace(views[1], width=32, height=32)])
+    command = ("compare", rig, rig / "truth", "--no-ssim", "--sheet", tmp_path / "a.png")
+    said = run(*command, "--cameras", tmp_path / "views.json")
+    assert failed(said, "several sizes") and not (tmp_path / "a.png").exists()
 
 
 def test_the_truth_takes_the_frames_of_the_originals(run, rig):

@@ -132,6 +132,17 @@ def test_the_report_is_made_of_the_rows(tmp_path):
     )
 
 
+@pytest.mark.parametrize("commits", [("1a", "1a"), ("1a", "2b"), ("1a", None)])
+def test_rows_of_several_commits_are_not_mixed_without_saying_so(tmp_path, commits):
+    rows = [
+        row("dancer", "draco", 4.0 + place, 60.0, point=f"{place}", made_by={"meshreel": "0.1", "commit": commit})
+        for place, commit in enumerate(commits)
+    ]
+    assert write_report(rows, {"targets": TARGETS}, tmp_path)
+    told = f"Rows of more than one version: 0.1 {commits[0]}, 0.1 {commits[1] or '(installed)'}."
+    assert (told in (tmp_path / "results.md").read_text()) == (commits[0] != commits[1])
+
+
 def test_a_metric_that_was_not_measured_has_no_panel_and_no_number(tmp_path):
     rows = [row("dancer", "draco", 4.0, 60.0, d2_psnr_paper_worst=None, peer={}, decode_over_peer=None)]
     assert write_report(rows, {"targets": TARGETS}, tmp_path)

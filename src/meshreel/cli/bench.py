@@ -19,7 +19,7 @@ from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
 from ..evaluation.promises import Promise
 from ..evaluation.report import write_report
-from ..evaluation.rows import FAILED, Row, failed_rows, join_rows, read_rows
+from ..evaluation.rows import FAILED, Row, failed_rows, join_rows, measured_rows, read_rows
 from ..evaluation.runner import Bench, run_points
 from ..evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from .console import Common
@@ -110,7 +110,7 @@ def run(
         rows = run_points(points, output, bench, tell, executor)
     failed = failed_rows(rows)
     common.warn(tuple(describe(row) for row in failed))
-    reached = chosen.promises([row for row in rows if FAILED not in row])
+    reached = chosen.promises(measured_rows(rows))
     told = {"output": str(output), "rows": len(rows), "failed": len(failed)}
     common.result(told | _promised(reached), promise_table(reached))
 
@@ -133,7 +133,7 @@ def report(
         The folder to write into.
     """
     joined = join_rows([read_rows(path) for path in rows])
-    measured = [row for row in joined if FAILED not in row]
+    measured = measured_rows(joined)
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
     written = [str(path) for path in write_report(measured, EXPERIMENTS, output)]
     reached = [

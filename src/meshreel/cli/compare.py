@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -75,6 +75,7 @@ def command(
         raise InputError(f"{originals} has {len(sequence)} frames and {decoded} {len(other)}; choose with --frames A:B")
     if isinstance(other, Video) and not options.keys:
         options = replace(options, keys=recorded_keys(other.reader.metadata, len(other)))
+    shown = SheetOptions(sheet_frames, cameras=_sheet_cameras(looking, sequence), up=looking.up)
     truth = None if knowing.truth is None else open_truth(knowing.truth, reading, len(sequence))
     try:
         with common.stages(len(sequence)) as progress:
@@ -82,8 +83,7 @@ def command(
             if truth is not None:
                 row |= {"truth": _against_truth(sequence, other, truth, knowing.truth_every, progress)}
         if sheet is not None:
-            cameras = _sheet_cameras(looking, sequence)
-            write_sheet(sequence, other, sheet, SheetOptions(sheet_frames, cameras=cameras, up=looking.up))
+            write_sheet(sequence, other, sheet, shown)
     except FormatError as error:  # a chunk that the decoder knows by its number only
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
     if reel:
@@ -97,13 +97,11 @@ def command(
 
 
 def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[PinholeCamera, ...]:
-    """Those that are given, or those of the rig; of the size of the first one."""
-    given: Sequence[PinholeCamera] = ()
+    """Those that are given, or those of the rig that are of its first one's size."""
     if looking.cameras is not None:
-        given = read_cameras(looking.cameras)
-    elif isinstance(sequence, Recording):
-        given = [camera.view for camera in sequence.rig.cameras]
-    return tuple(camera for camera in given if (camera.width, camera.height) == (given[0].width, given[0].height))
+        return tuple(read_cameras(looking.cameras))
+    views = [camera.view for camera in sequence.rig.cameras] if isinstance(sequence, Recording) else []
+    return tuple(view for view in views if (view.width, view.height) == (views[0].width, views[0].height))
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from jaxtyping import UInt8
 from ..analysis.segment.labelling import Segmentation
 from ..analysis.segment.masks import CAMERAS, Masker
 from ..analysis.segment.pictures import write_views
-from ..analysis.segment.preview import SheetRow, label_colors, look_at_labels, sheet
+from ..analysis.segment.preview import FrameViews, label_colors, look_at_labels, sheet
 from ..analysis.segment.scene import scene_views, segment, segment_by
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
@@ -168,18 +168,18 @@ class _Preview:
     """Pictures of some frames; the sheet has those views that see most faces that move."""
 
     def __init__(self) -> None:
-        self._rows = list[SheetRow]()
+        self._rows = list[FrameViews]()
         self._counts = list[list[int]]()
 
     def add(self, frame: int, pictures: list[UInt8[np.ndarray, "H W 3"]], moving: list[int]) -> None:
         """Takes in a frame: a picture a view, and how many moving faces it sees."""
-        self._rows.append(SheetRow(frame, pictures))
+        self._rows.append(FrameViews(frame, pictures))
         self._counts.append(moving)
 
     def picture(self) -> UInt8[np.ndarray, "Y X 3"]:
         """A row a frame."""
         best = sorted(np.argsort(-np.sum(self._counts, axis=0), kind="stable")[:COLUMNS].tolist())
-        return sheet([SheetRow(row.frame, [row.pictures[view] for view in best]) for row in self._rows], best)
+        return sheet([FrameViews(row.frame, [row.pictures[view] for view in best]) for row in self._rows], best)
 
 
 def _told(row: dict[str, Any]) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import subprocess
 import sys
 import tempfile
@@ -21,6 +22,7 @@ from ..choice import IntraOptions, cheapest_intra, measure
 from ..decoder import Video
 from ..errors import InputError
 from ..types import Mesh, MeshSequence
+from .codec import Codec
 from .codecs import make_codec
 from .rows import Point, Row
 
@@ -89,6 +91,15 @@ def run_fresh(task: str, *arguments: str) -> Row:
     if answer.returncode != 0:
         raise RuntimeError(f"measuring `{task}` in a fresh process failed: {answer.stderr.strip().splitlines()[-1:]}")
     return dict(json.loads(answer.stdout))
+
+
+def measure_fresh_decode(data: bytes, codec: Codec) -> Row:
+    """First frame and steady state, ms, and peak memory of decoding these bytes from a file in a fresh process."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, decoder = Path(folder) / "video", Path(folder) / "codec"
+        path.write_bytes(data)
+        decoder.write_bytes(pickle.dumps(codec))
+        return run_fresh("decode", str(path), str(decoder))
 
 
 def _own_row(name: str, options: Row, point: Point, rows: Sequence[Row]) -> Row:

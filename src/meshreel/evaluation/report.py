@@ -13,6 +13,7 @@ from types import ModuleType
 from ..io.write import replacing
 from .curves import SSIM_WITHOUT_KEYS, curve_of, value
 from .promises import Promise
+from .provenance import makers
 from .rows import CURVE_KINDS, Row, curve_rows
 from .scene_rows import NOISE_FLOOR
 
@@ -124,6 +125,8 @@ def _page(rows: Sequence[Row], name: str, chosen: ModuleType) -> Iterator[str]:
         own = curve_rows(rows, sequence)
         picture = f"![{sequence}](results/{_plot(name, sequence)})"
         yield from ("", f"## {sequence}, {own[0]['frames']} frames", "", picture, "")
+        if len(made := makers(own)) > 1:
+            yield from (f"Rows of more than one version: {', '.join(made)}.", "")
         shown = chosen.shown(own)
         yield from (*(point_table(shown) if shown else ()), "", *chosen.comparisons(own))
     yield from chosen.sections(rows)

@@ -61,7 +61,7 @@ def read_rows(path: Path) -> list[Row]:
 def join_rows(files: Sequence[Sequence[Row]]) -> list[Row]:
     """The rows of several files, each point of an experiment once: the first of a point counts that has not failed."""
     rows = [row for file in files for row in file]
-    ordered = [row for row in rows if FAILED not in row] + failed_rows(rows)
+    ordered = measured_rows(rows) + failed_rows(rows)
     joined = {(row.get("experiment", "targets"), row["point"]): row for row in reversed(ordered)}
     return list(reversed(joined.values()))
 
@@ -103,7 +103,12 @@ def curve_rows(rows: Sequence[Row], sequence: str, codec: str | None = None) -> 
 def select(rows: Sequence[Row], sequence: str, codec: str | None = None, kind: str = "quality") -> list[Row]:
     """The rows of a sequence and, where it is given, of a codec; without those that failed."""
     own = [r for r in rows if r["sequence"] == sequence and codec in (None, r["codec"]) and r["kind"] == kind]
-    return [row for row in own if FAILED not in row]
+    return measured_rows(own)
+
+
+def measured_rows(rows: Sequence[Row]) -> list[Row]:
+    """Those of which something was measured."""
+    return [row for row in rows if FAILED not in row]
 
 
 def failed_rows(rows: Sequence[Row]) -> list[Row]:

@@ -7,7 +7,6 @@ carries DracoPy's decoding time of the same body from the same run, so that mach
 from __future__ import annotations
 
 import json
-import pickle
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -31,7 +30,7 @@ from .codecs.draco import lattice_step
 from .datasets import open_dataset
 from .fresh import peak_rss_mb
 from .groups import group_records
-from .peers import cheapest_forms, measure_pair, run_fresh
+from .peers import cheapest_forms, measure_fresh_decode, measure_pair, run_fresh
 from .provenance import made_by
 from .rows import FAILED, Point, Row, append_row, read_rows
 from .scene_rows import KINDS as SCENE_KINDS
@@ -182,15 +181,6 @@ class Checked(DerivedSequence):
         if not np.isfinite(mesh.vertices).all():
             raise InputError(f"{self._codec} decodes coordinates that are not finite in frame {index}")
         return mesh
-
-
-def measure_fresh_decode(data: bytes, codec: Codec) -> Row:
-    """First frame and steady state, ms, and peak memory of decoding these bytes from a file in a fresh process."""
-    with tempfile.TemporaryDirectory() as folder:
-        path, decoder = Path(folder) / "video", Path(folder) / "codec"
-        path.write_bytes(data)
-        decoder.write_bytes(pickle.dumps(codec))
-        return run_fresh("decode", str(path), str(decoder))
 
 
 def measure_peer(video: Frames) -> Row:

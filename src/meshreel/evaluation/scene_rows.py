@@ -7,7 +7,6 @@ once counts as sent every ten seconds (`BACKGROUND_S`), whatever the length of t
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Sequence
 from functools import lru_cache
@@ -23,7 +22,7 @@ from ..types import Mesh
 from .codec import Codec
 from .codecs import make_codec
 from .codecs.scenes import BackgroundDracoCodec
-from .peers import run_fresh
+from .peers import measure_fresh_decode, run_fresh
 from .rows import Point, Row
 from .scenes import SceneData, SceneFrames, open_scene
 from .segmentation import score_labels
@@ -85,7 +84,7 @@ def _stream(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
     video = open_video(data)
     once = sum(chunk.size for chunk in video.reader.chunks if chunk.kind == ChunkKind.STATIC)
     row = _rate(len(data), once, len(scene.meshes), scene.meshes.frame_rate)
-    row |= {"encode_s": seconds, "decode": _decoding(data)}
+    row |= {"encode_s": seconds, "decode": measure_fresh_decode(data, codec)}
     row |= seams_of(scene, numbers, video)
     return row | _metrics(scene, numbers, [video[number] for number in numbers])
 
@@ -95,13 +94,6 @@ def seams_of(scene: SceneData, numbers: Sequence[int], video: Apart) -> Row:
     labelled = ((number, scene.meshes[number], scene.labels(number)) for number in numbers)
     parts = ((mesh, moves, video.background(number), video.moving(number)) for number, mesh, moves in labelled)
     return finite(scene_means([seam_row(measure_seam(*each)) for each in parts]))
-
-
-def _decoding(data: bytes) -> Row:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "scene.reel"
-        path.write_bytes(data)
-        return run_fresh("decode", str(path))
 
 
 def _rate(size: int, once: int, frames: int, frame_rate: float) -> Row:

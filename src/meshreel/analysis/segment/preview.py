@@ -59,14 +59,14 @@ def look_at_labels(
 
 
 @dataclass(frozen=True, slots=True)
-class SheetRow:
+class FrameViews:
     """What the views see of one frame."""
 
     frame: int
     pictures: Sequence[UInt8[np.ndarray, "H W 3"]]
 
 
-def sheet(rows: Sequence[SheetRow], views: Sequence[int]) -> UInt8[np.ndarray, "Y X 3"]:
+def sheet(rows: Sequence[FrameViews], views: Sequence[int]) -> UInt8[np.ndarray, "Y X 3"]:
     """Pictures of one size, a row a frame and a column a view, with the numbers of both and what the colors mean."""
     from PIL import Image, ImageDraw, ImageFont
 

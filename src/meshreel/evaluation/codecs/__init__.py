@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from importlib.metadata import entry_points
 from typing import Any
 
@@ -24,27 +23,24 @@ CODECS: dict[str, Callable[..., Codec]] = {
 }
 
 
-def known_codecs() -> dict[str, Callable[[], Callable[..., Codec]]]:
-    """What makes each codec, by name, found when it is asked for: those here, and those of other packages.
-
-    A package of anybody's has its own by an entry point of the group `meshreel.codecs`; names of ours stay ours.
-    """
-    others = {entry.name: entry.load for entry in entry_points(group=ENTRY_POINTS)}
-    return others | {name: partial(_itself, make) for name, make in CODECS.items()}
-
-
-def _itself(make: Callable[..., Codec]) -> Callable[..., Codec]:
-    return make
-
-
 def make_codec(kind: str, options: dict[str, Any]) -> Codec:
-    """The codec of that kind at the operating point `options`. Raises InputError for a kind or option it lacks."""
-    known = known_codecs()
-    if kind not in known:
-        raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted(known))}")
+    """The codec of that kind at the operating point `options`. Raises InputError for a kind or option it lacks.
+
+    Other packages have theirs by an entry point of the group `meshreel.codecs`; names of ours stay ours.
+    """
+    make = CODECS.get(kind) or _of_another_package(kind)
     try:
-        return known[kind]()(**options)
-    except ImportError as error:
-        raise InputError(f"codec {kind!r} cannot be loaded ({error}); install what its package needs") from error
+        return make(**options)
     except TypeError as error:
         raise InputError(f"codec {kind!r} does not take {options}: {error}") from error
+
+
+def _of_another_package(kind: str) -> Callable[..., Codec]:
+    others = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+    if kind not in others:
+        raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted({*CODECS, *others}))}")
+    try:
+        make: Callable[..., Codec] = others[kind].load()
+    except ImportError as error:
+        raise InputError(f"codec {kind!r} cannot be loaded ({error}); install what its package needs") from error
+    return make
