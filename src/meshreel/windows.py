@@ -185,9 +185,7 @@ def analyze(
     return coded, fit
 
 
-def _spans(
-    frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, depth: int, stages: Stages
-) -> list[Span]:
+def _spans(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, depth: int, stages: Stages) -> list[Span]:
     """As `find_spans`, from tracked centers; cut `depth` times at most."""
     if len(frames) == 1:
         return [Span(frames, None)]

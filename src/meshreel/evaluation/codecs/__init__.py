@@ -10,6 +10,7 @@ from ..codec import Codec
 from .draco import DecimatedDracoCodec, DracoCodec
 from .meshreel import MeshreelCodec
 from .scenes import BackgroundDracoCodec, SceneDracoCodec
+from .tvmc import TvmcCodec
 
 CODECS: dict[str, Callable[..., Codec]] = {
     "draco": DracoCodec,
@@ -18,6 +19,7 @@ CODECS: dict[str, Callable[..., Codec]] = {
     "scene_draco": SceneDracoCodec,
     "background_draco": BackgroundDracoCodec,
     "labelled_draco": BackgroundDracoCodec,  # the same by labels that somebody else has found
+    "tvmc": TvmcCodec,
 }
 
 
