@@ -9,7 +9,8 @@ Differs from the publication:
 - Points follow the reference's surface, face by face, so that Draco predicts each from a neighbour: fewer bytes.
 - One lattice for all groups and frames: `qp` bits for the widest frame, a step in metres. There each frame has its own.
 - Vertices are fitted to the surface with a smooth field; there each jumps to the nearest vertex of the frame.
-- Groups are cut where no reference follows, and frames that none follows are Draco meshes, as in preset `paper`.
+- Groups are cut where no reference follows, and frames that none follows are Draco meshes, as in preset `paper`, at the
+  quality that goes with the reference's vertices, whatever `qp`. No group is Draco's because that were cheaper.
 - In a scene each body has references of its own, as in preset `paper`, so that curves differ by the coding alone and
   a body that comes or goes cuts no other's groups; the paper has one reference of all that moves.
 """
