@@ -4,8 +4,8 @@ The baseline of the TSMC paper (section 4.2) after "TVMC: Time-Varying Mesh Comp
 Meshes" (Chen, Hácha, Váša and Dasari, MMSys 2025). Reference and displacements are those of preset `paper`.
 
 Differs from the publication:
-- It decodes. There a frame's displacements are a Draco cloud of points in k-d order, and the evaluation looks each of
-  them up among the originals; here they are in sequential order, which costs bytes, and the bytes alone give them back.
+- It decodes. In the code published with TVMC a frame's displacements are a Draco cloud in the order of a k-d tree, and
+  the evaluation looks each up among the originals; here they keep their order, which costs bytes, and need no original.
 - Points follow the reference's surface, face by face, so that Draco predicts each from a neighbour: fewer bytes.
 - One lattice for all groups and frames: `qp` bits for the widest frame, a step in metres. There each frame has its own.
 - Vertices are fitted to the surface with a smooth field; there each jumps to the nearest vertex of the frame.
