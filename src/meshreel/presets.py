@@ -6,6 +6,7 @@ dancer; what they give is in docs/results.md.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from .analysis.fit import FitOptions
@@ -95,3 +96,8 @@ def displacement_step(quality: float) -> float:
 def reference_vertices(quality: float) -> int:
     """Vertices of the reference mesh: 800 at 0, 2000 at 50, 5000 at 100."""
     return round(2000 * 2.5 ** ((quality - 50) / 50))
+
+
+def quality_of_vertices(vertices: int) -> float:
+    """The quality, 0 to 100, at which a reference mesh has nearest to so many vertices."""
+    return min(max(50 + 50 * math.log(max(vertices, 1) / 2000, 2.5), 0.0), 100.0)

@@ -57,6 +57,15 @@ class TrackGroup:
 
 
 @dataclass(frozen=True, slots=True)
+class BodyRun:
+    """Frames of one track that are coded together."""
+
+    track: int
+    first_frame: int
+    frames: list[Mesh]  # normalised, all with surface or all without
+
+
+@dataclass(frozen=True, slots=True)
 class CodedBodies:
     """What moves, as coded."""
 
@@ -125,23 +134,29 @@ def encode_bodies(
     options = replace(options, noise=noise)
     tracks, found = Tracks(parts.segmentation.cell, options), list[TrackGroup]()
     for frames in segments(sequence, parts.segmentation, options):
-        moving = [_moving(sequence[number], parts, number) for number in frames]
-        jobs = []
-        for track, meshes in tracks.of(moving):
-            normalised = [parts.seen.normalise(mesh) for mesh in meshes]
-            for run in _runs(normalised, frames, parts.seen, options):
-                jobs.append((track, frames.start + run.start, normalised[run.start : run.stop]))
-        tasks = [(job[2], options) for job in jobs]
+        runs = body_runs(sequence, parts, frames, tracks)
+        tasks = [(run.frames, options) for run in runs]
         coded = map(_groups, tasks) if executor is None else executor.map(_encoded, tasks)
-        done, count = 0, sum(len(job[2]) for job in jobs)
-        for (track, first, _), groups in zip(jobs, coded, strict=True):
+        done, count = 0, sum(len(run.frames) for run in runs)
+        for run, groups in zip(runs, coded, strict=True):
+            first = run.first_frame
             for group in groups:
-                found.append(TrackGroup(track, first, group))
+                found.append(TrackGroup(run.track, first, group))
                 first += group.frame_count
                 before, done = done, done + group.frame_count  # frames of all tracks are told as frames of the scene
                 stages.add("code", done * len(frames) // count - before * len(frames) // count)
         found += tracks.late(frames)
     return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
+
+
+def body_runs(sequence: MeshSequence, parts: Parts, frames: range, tracks: Tracks) -> list[BodyRun]:
+    """What moves in the next segment, apart in tracks and in runs of frames that can be coded together."""
+    moving, found = [_moving(sequence[number], parts, number) for number in frames], list[BodyRun]()
+    for track, meshes in tracks.of(moving):
+        normalised = [parts.seen.normalise(mesh) for mesh in meshes]
+        for run in _runs(normalised, frames, parts.seen, tracks.options):
+            found.append(BodyRun(track, frames.start + run.start, normalised[run.start : run.stop]))
+    return found
 
 
 def _groups(task: tuple[list[Mesh], EncoderOptions]) -> Iterable[EncodedGroup]:
@@ -182,16 +197,16 @@ class Tracks:
     """Which track each body of a segment is coded in: its own from before, or one that is free."""
 
     def __init__(self, cell: float, options: EncoderOptions) -> None:
-        self._cell, self._options = cell, options
+        self._cell, self.options = cell, options
         self._last: list[Mesh] = []  # of each track, in the last frame so far
         self._frames = 0
         self.dropped = 0  # faces that are in no track
 
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
         """Each track's mesh in each frame of the next segment."""
-        apart = find_bodies(moving, self._cell, self._options.bodies)
+        apart = find_bodies(moving, self._cell, self.options.bodies)
         bodies, self.dropped = at_most(apart.meshes, MOST_TRACKS), self.dropped + apart.dropped
-        before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self._options.bodies)
+        before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self.options.bodies)
         free = [number for number in range(len(self._last) + len(bodies) + 1) if number not in before]
         numbers = [free.pop(0) if old < 0 else old for old in before]
         count = max([len(self._last), 1, *(number + 1 for number in numbers)])

@@ -106,6 +106,22 @@ class EncodedGroup:
     key: int | None = None  # the frame, counted in the group, whose surface the others follow
 
 
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A reference that follows a run of frames, and where it is in each."""
+
+    reference: CodedReference
+    positions: Float64[np.ndarray, "T V 3"]  # of its base's vertices, normalised
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A run of frames that become one group."""
+
+    frames: Sequence[Mesh]
+    fitted: Fitted | None  # None: no reference follows them
+
+
 class Stages:
     """Counts frames through the stages for a progress callback."""
 
@@ -130,14 +146,23 @@ def encode_window(frames: Frames, options: EncoderOptions, stages: Stages | None
     stages, frames = stages or Stages(None, len(frames)), list(frames)
     if frames[0].is_empty:
         groups = [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
-    elif len(frames) == 1:
-        groups = [intra_only(frames, options)]
     else:
-        centers = track_centers(frames, options.track)
-        stages.add("track", len(frames))
-        groups = _encode_span(frames, centers, options, options.groups.depth, stages)
+        groups = [_encode_span(span, options) for span in find_spans(frames, options, stages)]
     stages.add("code", len(frames))
     return groups
+
+
+def find_spans(frames: Frames, options: EncoderOptions, stages: Stages | None = None) -> list[Span]:
+    """The runs of a window that one reference follows each, or none; every frame has a surface.
+
+    The window is cut where the fit fails, `options.groups.depth` times at most.
+    """
+    stages, frames = stages or Stages(None, len(frames)), list(frames)
+    if len(frames) == 1:
+        return [Span(frames, None)]
+    centers = track_centers(frames, options.track)
+    stages.add("track", len(frames))
+    return _spans(frames, centers, options, options.groups.depth, stages)
 
 
 def analyze(
@@ -160,33 +185,35 @@ def analyze(
     return coded, fit
 
 
-def _encode_span(
-    frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, depth: int, stages: Stages
-) -> list[EncodedGroup]:
-    """Groups of a run of frames: cut where the fit fails, `depth` times at most, then the cheaper of both forms."""
+def _spans(frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, depth: int, stages: Stages) -> list[Span]:
+    """As `find_spans`, from tracked centers; cut `depth` times at most."""
     if len(frames) == 1:
-        return [intra_only(frames, options)]
+        return [Span(frames, None)]
     try:
         reference, fit = analyze(frames, centers, options, stages)
     except NoReferenceError:
-        return [intra_only(frames, options)]
+        return [Span(frames, None)]
     residuals = np.array([residual.rms for residual in fit.residuals])
     target = target_of(frames, options)
     cut = cut_at(residuals / target.distance, options.groups)
-    if cut is not None:
-        if depth == 0:
-            return [intra_only(frames, options)]
-        head, tail = frames[:cut], frames[cut:]
-        known = replace(centers, positions=centers.positions[:cut])
-        anew = track_centers(tail, options.track)  # centers that were lost before the cut would spoil what follows
-        quick = replace(options, reference=options.reference.fewer_trials())
-        again = Stages(None, len(frames))  # these frames have been through the stages once
-        return [
-            *_encode_span(head, known, quick, depth - 1, again),
-            *_encode_span(tail, anew, quick, depth - 1, again),
-        ]
-    group = laplacian(frames, reference, fit.positions, options.displacements)
-    return [group if options.displacements.basis_size is not None else cheaper(frames, group, options)]
+    if cut is None:
+        return [Span(frames, Fitted(reference, fit.positions))]
+    if depth == 0:
+        return [Span(frames, None)]
+    head, tail = frames[:cut], frames[cut:]
+    known = replace(centers, positions=centers.positions[:cut])
+    anew = track_centers(tail, options.track)  # centers that were lost before the cut would spoil what follows
+    quick = replace(options, reference=options.reference.fewer_trials())
+    again = Stages(None, len(frames))  # these frames have been through the stages once
+    return [*_spans(head, known, quick, depth - 1, again), *_spans(tail, anew, quick, depth - 1, again)]
+
+
+def _encode_span(span: Span, options: EncoderOptions) -> EncodedGroup:
+    """The cheaper of both forms, or the only one."""
+    if span.fitted is None:
+        return intra_only(span.frames, options)
+    group = laplacian(span.frames, span.fitted.reference, span.fitted.positions, options.displacements)
+    return group if options.displacements.basis_size is not None else cheaper(span.frames, group, options)
 
 
 def laplacian(
@@ -196,10 +223,16 @@ def laplacian(
     options: DisplacementOptions,
 ) -> EncodedGroup:
     """The `laplacian` form of a group."""
-    field = np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])
-    payload, layers = encode_group(reference, field, options)
+    payload, layers = encode_group(reference, displacement_field(reference, positions), options)
     quality = measure(frames, decode_group(payload, len(frames)))
     return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, quality)
+
+
+def displacement_field(
+    reference: CodedReference, positions: Float64[np.ndarray, "T V 3"]
+) -> Float64[np.ndarray, "V T 3"]:
+    """From the vertices of a reference's base to where they are in each frame (paper, section 3.3.2)."""
+    return np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])
 
 
 def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions) -> EncodedGroup:

@@ -49,7 +49,7 @@ def test_every_codec_follows_the_protocol_and_tells_its_options():
 @pytest.mark.parametrize(
     ("kind", "options", "words"),
     [
-        ("tvmc", {}, "known: background_draco, decimated_draco"),
+        ("mpeg", {}, "known: background_draco, decimated_draco"),
         ("draco", {"bits": 3}, "bits"),
         ("draco", {"qp": 1}, "qp 1"),
         ("decimated_draco", {"fraction": 0.0}, "fraction 0"),

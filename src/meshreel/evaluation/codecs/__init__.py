@@ -11,6 +11,7 @@ from ..codec import Codec
 from .draco import DecimatedDracoCodec, DracoCodec
 from .meshreel import MeshreelCodec
 from .scenes import BackgroundDracoCodec, SceneDracoCodec
+from .tvmc import TvmcCodec
 
 ENTRY_POINTS = "meshreel.codecs"
 CODECS: dict[str, Callable[..., Codec]] = {
@@ -20,6 +21,7 @@ CODECS: dict[str, Callable[..., Codec]] = {
     "scene_draco": SceneDracoCodec,
     "background_draco": BackgroundDracoCodec,
     "labelled_draco": BackgroundDracoCodec,  # the same by labels that somebody else has found
+    "tvmc": TvmcCodec,
 }
 
 
