@@ -1,0 +1,113 @@
+"""The decoder's distances and their zero level. In -> out: blocks and symbols -> a mesh in voxel units.
+
+Blocks are first made to agree on the voxels they share, each weight within what its symbol leaves open: the variational
+deblocking of Tang et al. 2018. Then their mean is taken there, and marching cubes run over the cells of these blocks
+alone. All up to the signs is in integers, so encoder and decoder see the same cells crossed on every platform.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64
+
+from ....geometry.topology import drop_unreferenced
+from ....geometry.tsdf import extract, fill_grid
+from ....geometry.voxels import distinct
+from ....types import Mesh
+from .basis import ONE, Basis
+from .grid import POINTS, SIDE, VOLUME, block_keys, places_of, voxel_index
+from .weights import LARGEST, STEP_ONE, distances
+
+ROUNDS = 8  # of the deblocking
+_DOWN = 1 << 10  # distances in it are in units of 2^-14 voxels
+_GRADIENT = 1 << 23  # 729 x 2^14, and a step of 1.4 beyond the descent's
+_CLAMP = 1 << 24
+_SHARED = (np.indices((POINTS,) * 3) % SIDE == 0).any(axis=0).reshape(-1)
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """Distances at the voxels of a frame's blocks, never 0."""
+
+    places: Int64[np.ndarray, "B 3"]
+    keys: Int64[np.ndarray, " U"]  # of the voxels, sorted
+    index: Int64[np.ndarray, "B N"]
+    values: Float64[np.ndarray, " U"]  # whole multiples of 1 / (ONE STEP_ONE) voxels; that many
+
+
+def field_of(places: Int64[np.ndarray, "B 3"], symbols: Int32[np.ndarray, "B M"], basis: Basis, step: int) -> Field:
+    """The distances that the symbols of some blocks stand for."""
+    keys, index = voxel_index(places)
+    weights = np.clip(symbols.astype(np.float64) * step, -LARGEST, LARGEST)
+    for _ in range(ROUNDS if len(places) else 0):
+        weights = _agreed(weights, symbols, index, basis, step)
+    values = _mean(distances(weights, basis), index, len(keys))
+    return Field(places, keys, index, np.where(values == 0, 1.0, values))
+
+
+def _agreed(
+    weights: Float64[np.ndarray, "B M"],
+    symbols: Int32[np.ndarray, "B M"],
+    index: Int64[np.ndarray, "B N"],
+    basis: Basis,
+    step: int,
+) -> Float64[np.ndarray, "B M"]:
+    """The weights a step of gradient descent nearer to agreement, within half a step of their symbols."""
+    values = distances(weights, basis)
+    means = _mean(values, index, int(index.max()) + 1)
+    apart = np.where(_SHARED, np.floor((values - means[index]) / _DOWN), 0.0)
+    gradient = np.clip(apart, -_CLAMP, _CLAMP) @ basis.vectors
+    middle = np.clip(symbols.astype(np.float64) * step, -LARGEST, LARGEST)
+    return np.clip(weights - np.floor(gradient / _GRADIENT + 0.5), middle - step // 2, middle + step // 2)
+
+
+def _mean(values: Float64[np.ndarray, "B N"], index: Int64[np.ndarray, "B N"], count: int) -> Float64[np.ndarray, " U"]:
+    """The mean of each voxel's values, rounded down."""
+    flat = index.reshape(-1)
+    return np.floor(np.bincount(flat, values.reshape(-1), count) / np.maximum(np.bincount(flat, minlength=count), 1))
+
+
+def crossed(field: Field, chosen: Bool[np.ndarray, " B"]) -> Int64[np.ndarray, "C 3"]:
+    """The cells of the chosen blocks that the zero level passes through, sorted."""
+    inside = (field.values < 0)[field.index[chosen]].reshape(-1, POINTS, POINTS, POINTS)
+    count = np.zeros((len(inside), SIDE, SIDE, SIDE), np.int8)
+    for x, y, z in np.indices((2, 2, 2)).reshape(3, -1).T:
+        count += inside[:, x : x + SIDE, y : y + SIDE, z : z + SIDE]
+    block, *cell = np.nonzero((count > 0) & (count < 8))
+    cells = SIDE * field.places[chosen][block] + np.stack(cell, axis=1)
+    return cells[np.argsort(block_keys(cells))]
+
+
+def polygonize(field: Field) -> Mesh:
+    """The zero level inside the blocks, in voxel units."""
+    if len(field.places) == 0:
+        return Mesh.empty()
+    origin = SIDE * field.places.min(axis=0)  # float32 inside: near 0
+    voxels = places_of(field.keys) - origin
+    inside, owners = voxels % SIDE, block_keys(voxels // SIDE)
+    keys = distinct(np.sort(owners))
+    which = np.searchsorted(keys, owners)
+    values = np.zeros((len(keys), SIDE, SIDE, SIDE), np.float32)
+    known = np.zeros_like(values)
+    at = (which, inside[:, 2], inside[:, 1], inside[:, 0])
+    values[at] = field.values / (ONE * STEP_ONE)
+    known[at] = 1.0
+    mesh = extract(fill_grid(1.0, places_of(keys).astype(np.int32), values, known), 0.5)
+    return Mesh(mesh.vertices + origin, mesh.faces)
+
+
+def cells_of(mesh: Mesh) -> Int64[np.ndarray, " F"]:
+    """The key of the cell that each face lies in."""
+    return block_keys(np.floor(mesh.vertices[mesh.faces].mean(axis=1)).astype(np.int64))
+
+
+def without(mesh: Mesh, cells: Int64[np.ndarray, "C 3"]) -> Mesh:
+    """The mesh without the faces in some cells."""
+    if len(cells) == 0:
+        return mesh
+    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[~np.isin(cells_of(mesh), block_keys(cells))]))
+
+
+assert len(_SHARED) == VOLUME
