@@ -13,6 +13,7 @@ import numpy as np
 
 from ..container.reader import ReelReader
 from ..container.sources import BytesSource
+from ..format.layout import MAGIC
 from ..metrics.distance import PSNR_CEILING
 from .rows import Row
 
@@ -21,7 +22,12 @@ KEYS = "key_frames"  # of the file's metadata: numbers of the frames, where an e
 
 
 def group_records(data: bytes) -> list[Row]:
-    """First frame, frames, form, bytes and, where the metadata has `key_frames`, the key frame of every group."""
+    """First frame, frames, form, bytes and, where the metadata has `key_frames`, the key frame of every group.
+
+    None of bytes that are no .reel file: other codecs' streams say nothing of groups.
+    """
+    if data[: len(MAGIC)] != MAGIC:
+        return []
     reader = ReelReader(BytesSource(data))
     keys = {int(key) for key in reader.metadata.get(KEYS, ())}
     records = []

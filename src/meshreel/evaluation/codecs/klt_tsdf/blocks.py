@@ -56,7 +56,9 @@ def encode_places(frames: Sequence[Int64[np.ndarray, "B 3"]]) -> bytes:
         return bytes(out.data)
     low, shape = every.min(axis=0), np.ptp(every, axis=0) + 1
     if fullest > MOST_BLOCKS or shape.prod() * len(frames) > MOST_PLACES or np.abs(every).max() >= FARTHEST:
-        raise InputError(f"{fullest} blocks in a box of {shape.prod()}: over {MOST_BLOCKS} or too far; give fewer cells")
+        raise InputError(
+            f"{fullest} blocks in a box of {shape.prod()}: over {MOST_BLOCKS} or too far; give fewer cells"
+        )
     for axis in range(3):
         out.integer(int(low[axis]))
         out.number(int(shape[axis]))
@@ -95,7 +97,7 @@ def encode_symbols(symbols: Int32[np.ndarray, "B M"], frames: Sequence[Int64[np.
     """The symbols of all blocks of a group, a stream for each component."""
     out = Writer()
     if len(symbols):
-        for stream in encode_weights(symbols, neighbours(frames)):
+        for stream in encode_weights(symbols, neighbours(frames, 1)):
             out.blob(stream)
     return bytes(out.data)
 
@@ -109,7 +111,7 @@ def decode_symbols(data: bytes, frames: Sequence[Int64[np.ndarray, "B 3"]], widt
     read.end()
     if not count:
         return np.zeros((0, width), np.int32)
-    return decode_weights(streams, count, neighbours(frames))
+    return decode_weights(streams, count, neighbours(frames, 1))
 
 
 def encode_bits(bits: Bool[np.ndarray, " C"], places: Int64[np.ndarray, "C 3"]) -> bytes:

@@ -15,15 +15,16 @@ from ....analysis.survey import survey
 from ....errors import FormatError, InputError
 from ....types import Mesh, MeshSequence
 from ...codec import Progress
-from .basis import MOST, Basis, basis_of, decode_basis, encode_basis, learned
+from .basis import MOST, basis_of, decode_basis, encode_basis, learned
 from .frames import Group, decode_frame, decode_group, encode_group
-from .weights import STEP_ONE, TRUNCATION, Quantiser
+from .weights import STEP_ONE, TRUNCATION, Model
 from .wire import Reader, Writer
 
 MAGIC = b"KLTT"
 VERSION = 1
 PLACES = ("stream", "codec")  # where the basis is
 MOST_FRAMES = 1 << 20
+MOST_ROUNDS = 32
 MOST_STEP = STEP_ONE * 3
 
 
@@ -35,6 +36,7 @@ class KltTsdfCodec:
     basis: int = 32  # principal components kept
     step: float = 0.02  # of the weights' quantiser, in truncations (3 voxels) of root mean square over a block
     group: int = 10  # frames that share the entropy coder's adaptive models
+    deblocking: int = 0  # rounds of the decoder's deblocking
     basis_in: str = "stream"  # or "codec": a table of every decoder, and not in the rate
 
     def __post_init__(self) -> None:
@@ -47,6 +49,8 @@ class KltTsdfCodec:
             raise InputError(f"step {self.step:g}: give 0.0005 to 1 truncations")
         if not 1 <= self.group <= 64:
             raise InputError(f"group {self.group}: give 1 to 64 frames")
+        if not 0 <= self.deblocking <= MOST_ROUNDS:
+            raise InputError(f"deblocking {self.deblocking}: give 0 to {MOST_ROUNDS} rounds")
         if self.basis_in not in PLACES:
             raise InputError(f"basis_in {self.basis_in!r}: give one of {', '.join(PLACES)}")
 
@@ -65,10 +69,10 @@ class KltTsdfCodec:
         seen = survey(sequence)
         voxel = seen.diagonal / self.cells
         symbols, energies = learned(self.basis)
-        basis, quantiser = basis_of(symbols), Quantiser(max(round(self.step * TRUNCATION * STEP_ONE), 1), energies)
+        model = Model(basis_of(symbols), max(round(self.step * TRUNCATION * STEP_ONE), 1), self.deblocking)
         out = Writer(bytearray(MAGIC))
         out.number(VERSION)
-        for number in (len(sequence), self.group, self.basis, quantiser.step):
+        for number in (len(sequence), self.group, self.basis, model.step, model.deblocking):
             out.number(number)
         for value in (voxel, *seen.low):
             out.real(float(value))
@@ -76,7 +80,7 @@ class KltTsdfCodec:
         for start in range(0, len(sequence), self.group):
             numbers = range(start, min(start + self.group, len(sequence)))
             meshes = (_reported(_scaled(sequence[n], seen.low, voxel), n, len(sequence), progress) for n in numbers)
-            out.blob(encode_group(meshes, basis, quantiser))
+            out.blob(encode_group(meshes, model, energies))
         if progress is not None:
             progress("code", len(sequence), len(sequence))
         return bytes(out.data) + zlib.crc32(out.data).to_bytes(4, "little")
@@ -103,10 +107,9 @@ class Video(Sequence[Mesh]):
 
     frames: int
     group: int
-    step: int  # in units of 1 / STEP_ONE voxels
     voxel: float  # m
     low: Float64[np.ndarray, " 3"]  # m, where the grid begins
-    basis: Basis
+    model: Model
     groups: list[bytes]
     _last: tuple[int, Group] | None = field(default=None)
 
@@ -119,8 +122,8 @@ class Video(Sequence[Mesh]):
         which, inside = divmod(number, self.group)
         if self._last is None or self._last[0] != which:
             count = min(self.group, self.frames - which * self.group)
-            self._last = which, decode_group(self.groups[which], count, self.basis.vectors.shape[1])
-        mesh = decode_frame(self._last[1], inside, self.basis, self.step)
+            self._last = which, decode_group(self.groups[which], count, self.model.basis.vectors.shape[1])
+        mesh = decode_frame(self._last[1], inside, self.model)
         return Mesh.of(mesh.vertices * self.voxel + self.low, mesh.faces)
 
 
@@ -133,7 +136,8 @@ def open_video(data: bytes) -> Video:
     read = Reader(data[4:-4])
     if (version := read.number(1 << 20)) != VERSION:
         raise FormatError(f"version {version} of klt_tsdf; this one reads {VERSION}")
-    frames, group, width, step = (read.number(most) for most in (MOST_FRAMES, 64, MOST, MOST_STEP))
+    most = (MOST_FRAMES, 64, MOST, MOST_STEP, MOST_ROUNDS)
+    frames, group, width, step, rounds = (read.number(bound) for bound in most)
     voxel, *low = (read.real() for _ in range(4))
     if not (frames and group and width and step and 0 < voxel < np.inf and np.isfinite(low).all()):
         raise FormatError(f"{frames} frames in groups of {group}, {width} components, voxels of {voxel:g} m: damaged")
@@ -141,4 +145,4 @@ def open_video(data: bytes) -> Video:
     symbols = decode_basis(table, width) if table else learned(width)[0]
     groups = [read.blob() for _ in range(-(-frames // group))]
     read.end()
-    return Video(frames, group, step, voxel, np.array(low), basis_of(symbols), groups)
+    return Video(frames, group, voxel, np.array(low), Model(basis_of(symbols), step, rounds), groups)

@@ -11,19 +11,18 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Int32, Int64
+from jaxtyping import Bool, Float64, Int32, Int64
 
 from ....geometry.nearest import Surface, past_border
 from ....types import Mesh
-from .basis import Basis
 from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols
 from .grid import SIDE, block_keys, prepared, sample
 from .surface import Field, cells_of, crossed, field_of, polygonize, without
-from .weights import Quantiser, forward
+from .weights import Model, forward
 from .wire import Reader, Writer
 
 _FAR = 0.75  # voxels from the surface beyond which decoded surface is left out
-_PAST = 0.35  # voxels past a border
+_PAST = 0.5  # voxels past a border
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,16 +34,16 @@ class Group:
     omitted: list[bytes]
 
 
-def encode_group(meshes: Iterable[Mesh], basis: Basis, quantiser: Quantiser) -> bytes:
-    """The bytes of some frames in voxel units."""
+def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndarray, " M"]) -> bytes:
+    """The bytes of some frames in voxel units, and of what mean square weights are expected."""
     group = Group([], [], [])
     for mesh in meshes:
         mesh = prepared(mesh)
         blocks = sample(mesh)
-        symbols = forward(blocks, basis, quantiser)
+        symbols = forward(blocks, model, energies)
         group.places.append(blocks.places)
         group.symbols.append(symbols)
-        group.omitted.append(_encode_omitted(mesh, field_of(blocks.places, symbols, basis, quantiser.step)))
+        group.omitted.append(_encode_omitted(mesh, field_of(blocks.places, symbols, model)))
     out = Writer()
     out.blob(encode_places(group.places))
     out.blob(encode_symbols(np.concatenate(group.symbols), group.places))
@@ -63,9 +62,9 @@ def decode_group(data: bytes, count: int, width: int) -> Group:
     return Group(places, np.split(symbols, np.cumsum([len(p) for p in places])[:-1]), omitted)
 
 
-def decode_frame(group: Group, number: int, basis: Basis, step: int) -> Mesh:
+def decode_frame(group: Group, number: int, model: Model) -> Mesh:
     """A frame of a group, in voxel units. Raises FormatError where its bytes are damaged."""
-    field = field_of(group.places[number], group.symbols[number], basis, step)
+    field = field_of(group.places[number], group.symbols[number], model)
     return without(polygonize(field), _decode_omitted(group.omitted[number], field))
 
 

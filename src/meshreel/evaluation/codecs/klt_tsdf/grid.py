@@ -2,7 +2,8 @@
 
 A block is 8^3 cells with the 9^3 voxels at their corners: a layer is shared by neighbours, so each block holds whole
 cells. The sign is that of the closest feature's pseudonormal (Baerentzen and Aanaes 2005), which is right for every
-closed mesh and needs none; past a mesh's border the distance is that to the plane of the border's face.
+closed mesh and needs no closed one. Past a mesh's border it is that of the border's plane, and soon unknown; unless the
+mesh is closed but for holes, as winding numbers say that agree with the signs near its surface: then they tell.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ _CELLS, _BLOCKS = Lattice(np.zeros(3), 1.0), Lattice(np.zeros(3), float(SIDE))
 _FEATURE = 1e-3  # a barycentric weight below it is on an edge
 _CROSSED = 1.2  # distances at an edge's ends sum up to at most its length where the surface crosses it: 1, and rounding
 _ASIDE = 1.0  # voxels past a border beyond which nothing is known
+_ASKED, _ALIKE = 4000, 0.98  # voxels whose winding numbers are looked at; the share of them that must agree
 _CHUNK = 1 << 20  # voxels whose distances are looked for at once
 
 
@@ -79,7 +81,7 @@ def signed_distances(
 ) -> tuple[Float64[np.ndarray, " N"], Bool[np.ndarray, " N"]]:
     """Distances in the unit of the mesh, positive outside, and whether they mean something."""
     surface, normals = Surface(mesh), _Normals(mesh)
-    values, known = np.empty(len(points)), np.ones(len(points), bool)
+    values, known, past = np.empty(len(points)), np.ones(len(points), bool), np.zeros(len(points), bool)
     for start in range(0, len(points), _CHUNK):
         part = slice(start, start + _CHUNK)
         hits = surface.closest(points[part])
@@ -89,9 +91,26 @@ def signed_distances(
         side = np.einsum("nd,nd->n", away, normals.at(hits))
         beyond = past_border(mesh, hits)
         aside = np.sqrt(np.maximum(distance**2 - along**2, 0))
-        values[part] = np.where(beyond, along, np.copysign(distance, side))
+        values[part] = np.where(beyond, np.copysign(distance, along), np.copysign(distance, side))
         known[part] = ~beyond | (aside <= _ASIDE)
+        past[part] = beyond
+    if past.any() and _is_nearly_closed(mesh, points[~past], values[~past]):
+        values[past] = np.where(_winding(mesh, points[past]) > 0.5, -1.0, 1.0) * np.abs(values[past])
+        known[:] = True
     return values, known
+
+
+def _is_nearly_closed(mesh: Mesh, points: Float64[np.ndarray, "N 3"], values: Float64[np.ndarray, " N"]) -> bool:
+    """Whether winding numbers tell inside from outside as the signs near the surface do."""
+    near = np.flatnonzero(np.abs(values) < 1)
+    some = near[:: max(len(near) // _ASKED, 1)]
+    return bool(len(some)) and np.mean((_winding(mesh, points[some]) > 0.5) == (values[some] < 0)) > _ALIKE
+
+
+def _winding(mesh: Mesh, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+    import igl
+
+    return np.atleast_1d(igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), points))
 
 
 class _Normals:

@@ -1,8 +1,8 @@
 """The decoder's distances and their zero level. In -> out: blocks and symbols -> a mesh in voxel units.
 
-Blocks are first made to agree on the voxels they share, each weight within what its symbol leaves open: the variational
-deblocking of Tang et al. 2018. Then their mean is taken there, and marching cubes run over the cells of these blocks
-alone. All up to the signs is in integers, so encoder and decoder see the same cells crossed on every platform.
+Where blocks share voxels their mean is taken; before, they may be made to agree there, each weight within what its symbol
+leaves open (the variational deblocking of Tang et al. 2018). Marching cubes run over the cells of these blocks alone. All
+up to the signs is in integers, so encoder and decoder see the same cells crossed on every platform.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from ....geometry.topology import drop_unreferenced
 from ....geometry.tsdf import extract, fill_grid
 from ....geometry.voxels import distinct
 from ....types import Mesh
-from .basis import ONE, Basis
+from .basis import ONE
 from .grid import POINTS, SIDE, VOLUME, block_keys, places_of, voxel_index
-from .weights import LARGEST, STEP_ONE, distances
+from .weights import LARGEST, STEP_ONE, Model, distances
 
-ROUNDS = 8  # of the deblocking
-_DOWN = 1 << 10  # distances in it are in units of 2^-14 voxels
+_NEAR = ONE * STEP_ONE  # a voxel: what is farther from the zero level shows nowhere
+_DOWN = 1 << 10  # distances in the deblocking are in units of 2^-14 voxels
 _GRADIENT = 1 << 23  # 729 x 2^14, and a step of 1.4 beyond the descent's
 _CLAMP = 1 << 24
 _SHARED = (np.indices((POINTS,) * 3) % SIDE == 0).any(axis=0).reshape(-1)
@@ -37,30 +37,31 @@ class Field:
     values: Float64[np.ndarray, " U"]  # whole multiples of 1 / (ONE STEP_ONE) voxels; that many
 
 
-def field_of(places: Int64[np.ndarray, "B 3"], symbols: Int32[np.ndarray, "B M"], basis: Basis, step: int) -> Field:
+def field_of(places: Int64[np.ndarray, "B 3"], symbols: Int32[np.ndarray, "B M"], model: Model) -> Field:
     """The distances that the symbols of some blocks stand for."""
     keys, index = voxel_index(places)
-    weights = np.clip(symbols.astype(np.float64) * step, -LARGEST, LARGEST)
-    for _ in range(ROUNDS if len(places) else 0):
-        weights = _agreed(weights, symbols, index, basis, step)
-    values = _mean(distances(weights, basis), index, len(keys))
+    middle = np.clip(symbols.astype(np.float64) * model.step, -LARGEST, LARGEST)
+    weights = middle
+    for _ in range(model.deblocking if len(places) else 0):
+        weights = _agreed(weights, middle, index, model)
+    values = _mean(distances(weights, model.basis), index, len(keys))
     return Field(places, keys, index, np.where(values == 0, 1.0, values))
 
 
 def _agreed(
     weights: Float64[np.ndarray, "B M"],
-    symbols: Int32[np.ndarray, "B M"],
+    middle: Float64[np.ndarray, "B M"],
     index: Int64[np.ndarray, "B N"],
-    basis: Basis,
-    step: int,
+    model: Model,
 ) -> Float64[np.ndarray, "B M"]:
-    """The weights a step of gradient descent nearer to agreement, within half a step of their symbols."""
-    values = distances(weights, basis)
+    """The weights a step of gradient descent nearer to agreement, within half a step of the middle."""
+    values = distances(weights, model.basis)
     means = _mean(values, index, int(index.max()) + 1)
-    apart = np.where(_SHARED, np.floor((values - means[index]) / _DOWN), 0.0)
-    gradient = np.clip(apart, -_CLAMP, _CLAMP) @ basis.vectors
-    middle = np.clip(symbols.astype(np.float64) * step, -LARGEST, LARGEST)
-    return np.clip(weights - np.floor(gradient / _GRADIENT + 0.5), middle - step // 2, middle + step // 2)
+    seen = _SHARED & (np.abs(means) <= _NEAR)[index]
+    apart = np.where(seen, np.floor((values - means[index]) / _DOWN), 0.0)
+    gradient = np.clip(apart, -_CLAMP, _CLAMP) @ model.basis.vectors
+    half = model.step // 2
+    return np.clip(weights - np.floor(gradient / _GRADIENT + 0.5), middle - half, middle + half)
 
 
 def _mean(values: Float64[np.ndarray, "B N"], index: Int64[np.ndarray, "B N"], count: int) -> Float64[np.ndarray, " U"]:

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ....capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
-from ....geometry.topology import subdivide_midpoint
+from ....geometry.topology import subdivide_midpoint, vertex_normals
 from ....types import Mesh
 from .basis import COEFFICIENT, MOST, ONE, BasisSymbols, degrees, members, pack, polynomials
 from .grid import Blocks, prepared, sample
@@ -26,7 +26,7 @@ from .weights import beyond, trust
 SEED = 2018
 ROUNDS = 4
 EACH = 220  # blocks of a mesh, at most
-NOISE = 0.02  # voxels squared, of what the polynomials leave over
+NOISE = 0.005  # voxels squared, of what the polynomials leave over
 _CHUNK = 500
 
 
@@ -43,8 +43,8 @@ def meshes(generator: np.random.Generator) -> Iterator[Mesh]:
     """Surfaces in voxel units."""
     for frame in range(4):
         body = soft_bodies(SoftBodiesOptions(frames=1, spacing=0.016, begin=0.6 * frame, seed=frame))[0]
-        for cells in (64, 128):
-            yield _placed(body, cells, generator)
+        for cells, amplitude in ((64, 0.5), (128, 0.5), (128, 0.0)):
+            yield _wrinkled(_placed(body, cells, generator), amplitude, generator)
     ball = deforming_sphere(1, levels=5)[0]
     for radius in (3.0, 6.0, 12.0, 25.0):
         yield _placed(ball, 2 * np.sqrt(3) * radius, generator)
@@ -59,6 +59,14 @@ def _placed(mesh: Mesh, cells: float, generator: np.random.Generator) -> Mesh:
     turn[:, 0] *= np.sign(np.linalg.det(turn))
     scale = cells / mesh.diagonal if cells else 1.0
     return prepared(Mesh(scale * mesh.vertices @ turn.T + generator.uniform(0, 64, 3), mesh.faces))
+
+
+def _wrinkled(mesh: Mesh, amplitude: float, generator: np.random.Generator) -> Mesh:
+    """The mesh moved along its normals by waves of 5 to 20 voxels, `amplitude` voxels high: bodies wear cloth."""
+    waves = generator.normal(size=(12, 3))
+    waves *= (2 * np.pi / generator.uniform(5, 20, 12) / np.linalg.norm(waves, axis=1))[:, None]
+    heights = np.sin(mesh.vertices @ waves.T + generator.uniform(0, 2 * np.pi, 12)).sum(axis=1) / np.sqrt(6)
+    return Mesh(mesh.vertices + amplitude * heights[:, None] * vertex_normals(mesh), mesh.faces)
 
 
 def _box() -> Mesh:

@@ -17,20 +17,20 @@ from .grid import Blocks
 
 TRUNCATION = 3.0  # voxels
 STEP_ONE = 1 << 12  # what a step of 1 voxel is in the stream
-_FAR = 0.1  # what a voxel counts that no crossed edge ends at
+_FAR = 0.03  # what a voxel counts that no crossed edge ends at
 _ROUNDS = 3  # of the targets beyond truncation
-_NOISE = 0.01  # voxels squared, against which the energies of the components count
-_DEAD_ZONE = 0.6  # of a step, below which a magnitude is rounded down
+_NOISE = 0.001  # voxels squared, against which the energies of the components count
 _CHUNK = 400  # blocks whose systems are in memory at once
 LARGEST = 1 << 20  # of a weight in units of 1 / STEP_ONE: sums stay exact
 
 
 @dataclass(frozen=True, slots=True)
-class Quantiser:
-    """How weights become symbols."""
+class Model:
+    """What encoder and decoder share."""
 
-    step: int  # in units of 1 / STEP_ONE voxels
-    energies: Float64[np.ndarray, " M"]  # mean squares of the weights, voxels squared
+    basis: Basis
+    step: int  # of the weights, in units of 1 / STEP_ONE voxels
+    deblocking: int = 0  # rounds
 
 
 def trust(blocks: Blocks) -> Float64[np.ndarray, "B N"]:
@@ -46,46 +46,47 @@ def beyond(
     return np.where(np.abs(values) > truncation, side * np.maximum(side * fitted, truncation), values)
 
 
-def forward(blocks: Blocks, basis: Basis, quantiser: Quantiser) -> Int32[np.ndarray, "B M"]:
-    """The symbols of the blocks' weights."""
-    symbols = np.zeros((len(blocks.places), basis.vectors.shape[1]), np.int32)
+def forward(blocks: Blocks, model: Model, energies: Float64[np.ndarray, " M"]) -> Int32[np.ndarray, "B M"]:
+    """The symbols of the blocks' weights, whose mean squares (voxels squared) are expected."""
+    symbols = np.zeros((len(blocks.places), len(energies)), np.int32)
     counts = trust(blocks)
     for start in range(0, len(symbols), _CHUNK):
         part = slice(start, start + _CHUNK)
-        symbols[part] = _quantised(*_fit(blocks.values[part], counts[part], basis, quantiser), quantiser)
+        symbols[part] = _quantised(*_fit(blocks.values[part], counts[part], model, energies), model.step)
     return symbols
 
 
 def _fit(
     values: Float64[np.ndarray, "B N"],
     counts: Float64[np.ndarray, "B N"],
-    basis: Basis,
-    quantiser: Quantiser,
+    model: Model,
+    energies: Float64[np.ndarray, " M"],
 ) -> tuple[Float64[np.ndarray, "B M"], Float64[np.ndarray, "B M M"]]:
     """Weights in voxels, and the matrix of the squared error that each leaves."""
-    vectors, mean = basis.vectors / ONE, basis.mean / ONE
-    noise = _NOISE + (quantiser.step / STEP_ONE) ** 2 / 12
-    gram = np.matmul(vectors.T, counts[:, :, None] * vectors) + np.diag(noise / quantiser.energies)
+    vectors, mean = model.basis.vectors / ONE, model.basis.mean / ONE
+    noise = _NOISE + (model.step / STEP_ONE) ** 2 / 12
+    gram = np.matmul(vectors.T, counts[:, :, None] * vectors) + np.diag(noise / energies)
     inverse = np.linalg.inv(gram)
     weights = np.zeros((len(values), vectors.shape[1]))
     for round_ in range(_ROUNDS):
-        target = beyond(values, mean + weights @ vectors.T) if round_ else np.clip(values, -2 * TRUNCATION, 2 * TRUNCATION)
+        target = (
+            beyond(values, mean + weights @ vectors.T) if round_ else np.clip(values, -2 * TRUNCATION, 2 * TRUNCATION)
+        )
         weights = np.einsum("bij,bj->bi", inverse, (counts * (target - mean)) @ vectors)
     return weights, inverse
 
 
 def _quantised(
-    weights: Float64[np.ndarray, "B M"], inverse: Float64[np.ndarray, "B M M"], quantiser: Quantiser
+    weights: Float64[np.ndarray, "B M"], inverse: Float64[np.ndarray, "B M M"], step: int
 ) -> Int32[np.ndarray, "B M"]:
     """The symbols; what rounding a weight costs is spread over those after it, by least squares."""
-    step = quantiser.step / STEP_ONE
+    unit = step / STEP_ONE
     symbols = np.zeros(weights.shape, np.int32)
     upper = np.swapaxes(np.linalg.cholesky(inverse), 1, 2)
     rest = weights.copy()
     for k in range(weights.shape[1]):
-        scaled = rest[:, k] / step
-        symbols[:, k] = np.copysign(np.floor(np.abs(scaled) + 1 - _DEAD_ZONE), scaled)
-        error = (rest[:, k] - symbols[:, k] * step) / upper[:, k, k]
+        symbols[:, k] = np.rint(rest[:, k] / unit)
+        error = (rest[:, k] - symbols[:, k] * unit) / upper[:, k, k]
         rest[:, k:] -= error[:, None] * upper[:, k, k:]
     return symbols
 
