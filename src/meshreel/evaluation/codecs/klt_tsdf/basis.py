@@ -34,7 +34,7 @@ class BasisSymbols:
     """A basis as it travels."""
 
     classes: Int32[np.ndarray, " M"]  # parities of each vector: 4 x odd along x, 2 x along y, 1 x along z
-    coefficients: tuple[Int32[np.ndarray, " K"], ...]  # of the mean, which is even, in voxels; then of each vector
+    coefficients: tuple[Int32[np.ndarray, " _"], ...]  # of the mean, which is even, in voxels; then of each vector
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,13 +16,13 @@ from .grid import block_keys
 from .wire import Reader, Writer
 
 MOST_BLOCKS = 1 << 15  # of a frame
-MOST_PLACES = 1 << 24  # of a group's box
+MOST_PLACES = 1 << 19  # of a group's box: 1024 cells along its diagonal need no more
 MOST_SYMBOLS = 1 << 26  # of a group
 FARTHEST = 1 << 15  # blocks from the origin
 _AROUND = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) < (0, 0, 0)])
 
 
-def neighbours(frames: Sequence[Int64[np.ndarray, "B 3"]], reach: int = 3) -> Neighbours:
+def neighbours(frames: Sequence[Int64[np.ndarray, "_ 3"]], reach: int = 3) -> Neighbours:
     """For the places of all frames, one after the other, those before them in their frame that touch them.
 
     A frame's places are sorted. `reach` 1: by a face; 2: by an edge, too; 3: by a corner, too.
@@ -44,7 +44,7 @@ def neighbours(frames: Sequence[Int64[np.ndarray, "B 3"]], reach: int = 3) -> Ne
     return Neighbours(indptr, u[order].astype(np.int32))
 
 
-def encode_places(frames: Sequence[Int64[np.ndarray, "B 3"]]) -> bytes:
+def encode_places(frames: Sequence[Int64[np.ndarray, "_ 3"]]) -> bytes:
     """A bit for every place of the group's box and frame; a frame's bits are a column, seen by those of the next.
 
     Raises InputError where there are more blocks, or places, than a decoder takes.
@@ -55,7 +55,7 @@ def encode_places(frames: Sequence[Int64[np.ndarray, "B 3"]]) -> bytes:
     if len(every) == 0:
         return bytes(out.data)
     low, shape = every.min(axis=0), np.ptp(every, axis=0) + 1
-    if fullest > MOST_BLOCKS or shape.prod() * len(frames) > MOST_PLACES or np.abs(every).max() >= FARTHEST:
+    if fullest > MOST_BLOCKS or shape.prod() > MOST_PLACES or np.abs(every).max() >= FARTHEST:
         raise InputError(
             f"{fullest} blocks in a box of {shape.prod()}: over {MOST_BLOCKS} or too far; give fewer cells"
         )
@@ -70,7 +70,7 @@ def encode_places(frames: Sequence[Int64[np.ndarray, "B 3"]]) -> bytes:
     return bytes(out.data)
 
 
-def decode_places(data: bytes, count: int) -> list[Int64[np.ndarray, "B 3"]]:
+def decode_places(data: bytes, count: int) -> list[Int64[np.ndarray, "_ 3"]]:
     """The blocks of `count` frames. Raises FormatError where the bytes are damaged."""
     read = Reader(data)
     total = read.number(MOST_BLOCKS * count)
@@ -79,8 +79,8 @@ def decode_places(data: bytes, count: int) -> list[Int64[np.ndarray, "B 3"]]:
         return [np.zeros((0, 3), np.int64)] * count
     pairs = [(read.integer(FARTHEST), read.number(2 * FARTHEST)) for _ in range(3)]
     low, shape = np.array([a for a, _ in pairs]), np.array([b for _, b in pairs])
-    if not 0 < shape.prod() * count <= MOST_PLACES:
-        raise FormatError(f"a box of {shape.tolist()} blocks in {count} frames; the stream is damaged")
+    if not 0 < shape.prod() <= MOST_PLACES:
+        raise FormatError(f"a box of {shape.tolist()} blocks; the stream is damaged")
     streams = [read.blob() for _ in range(count)]
     read.end()
     for stream in streams:
@@ -93,7 +93,7 @@ def decode_places(data: bytes, count: int) -> list[Int64[np.ndarray, "B 3"]]:
     return frames
 
 
-def encode_symbols(symbols: Int32[np.ndarray, "B M"], frames: Sequence[Int64[np.ndarray, "B 3"]]) -> bytes:
+def encode_symbols(symbols: Int32[np.ndarray, "B M"], frames: Sequence[Int64[np.ndarray, "_ 3"]]) -> bytes:
     """The symbols of all blocks of a group, a stream for each component."""
     out = Writer()
     if len(symbols):
@@ -102,7 +102,7 @@ def encode_symbols(symbols: Int32[np.ndarray, "B M"], frames: Sequence[Int64[np.
     return bytes(out.data)
 
 
-def decode_symbols(data: bytes, frames: Sequence[Int64[np.ndarray, "B 3"]], width: int) -> Int32[np.ndarray, "B M"]:
+def decode_symbols(data: bytes, frames: Sequence[Int64[np.ndarray, "_ 3"]], width: int) -> Int32[np.ndarray, "B M"]:
     """The symbols of `width` components. Raises FormatError where the bytes are damaged."""
     read, count = Reader(data), sum(map(len, frames))
     if count * width > MOST_SYMBOLS:

@@ -139,7 +139,7 @@ def open_video(data: bytes) -> Video:
     most = (MOST_FRAMES, 64, MOST, MOST_STEP, MOST_ROUNDS)
     frames, group, width, step, rounds = (read.number(bound) for bound in most)
     voxel, *low = (read.real() for _ in range(4))
-    if not (frames and group and width and step and 0 < voxel < np.inf and np.isfinite(low).all()):
+    if not (frames and group and width and step and 1e-12 < voxel < 1e12 and np.abs(low).max() < 1e18):
         raise FormatError(f"{frames} frames in groups of {group}, {width} components, voxels of {voxel:g} m: damaged")
     table = read.blob()
     symbols = decode_basis(table, width) if table else learned(width)[0]

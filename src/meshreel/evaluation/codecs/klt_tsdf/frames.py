@@ -21,7 +21,7 @@ from .surface import Field, cells_of, crossed, field_of, polygonize, without
 from .weights import Model, forward
 from .wire import Reader, Writer
 
-_FAR = 0.75  # voxels from the surface beyond which decoded surface is left out
+_FAR = 1.5  # voxels from the surface beyond which decoded surface is left out
 _PAST = 0.5  # voxels past a border
 
 
@@ -29,8 +29,8 @@ _PAST = 0.5  # voxels past a border
 class Group:
     """The frames of a group as they travel."""
 
-    places: list[Int64[np.ndarray, "B 3"]]  # of each frame
-    symbols: list[Int32[np.ndarray, "B M"]]
+    places: list[Int64[np.ndarray, "_ 3"]]  # of each frame
+    symbols: list[Int32[np.ndarray, "_ _"]]
     omitted: list[bytes]
 
 

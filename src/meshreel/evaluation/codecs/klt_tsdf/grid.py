@@ -104,7 +104,8 @@ def _is_nearly_closed(mesh: Mesh, points: Float64[np.ndarray, "N 3"], values: Fl
     """Whether winding numbers tell inside from outside as the signs near the surface do."""
     near = np.flatnonzero(np.abs(values) < 1)
     some = near[:: max(len(near) // _ASKED, 1)]
-    return bool(len(some)) and np.mean((_winding(mesh, points[some]) > 0.5) == (values[some] < 0)) > _ALIKE
+    alike = (_winding(mesh, points[some]) > 0.5) == (values[some] < 0)
+    return len(some) > 0 and bool(np.mean(alike) > _ALIKE)
 
 
 def _winding(mesh: Mesh, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
@@ -159,7 +160,7 @@ def _touched(mesh: Mesh) -> Int64[np.ndarray, "B 3"]:
 def _crossings(
     values: Float64[np.ndarray, "B N"], known: Bool[np.ndarray, "B N"]
 ) -> tuple[Bool[np.ndarray, "B N"], Bool[np.ndarray, "B N"]]:
-    """Voxels at edges that the surface crosses; voxels at edges where the sign changes far from it, and at none such."""
+    """Voxels at edges that the surface crosses; and those at none, but at edges where the sign changes far from it."""
     shape = (len(values), POINTS, POINTS, POINTS)
     values, known = values.reshape(shape), known.reshape(shape)
     near, phantom = np.zeros(shape, bool), np.zeros(shape, bool)

@@ -1,8 +1,8 @@
 """The decoder's distances and their zero level. In -> out: blocks and symbols -> a mesh in voxel units.
 
-Where blocks share voxels their mean is taken; before, they may be made to agree there, each weight within what its symbol
-leaves open (the variational deblocking of Tang et al. 2018). Marching cubes run over the cells of these blocks alone. All
-up to the signs is in integers, so encoder and decoder see the same cells crossed on every platform.
+Where blocks share voxels their mean is taken; before, they may be made to agree there, each weight within what its
+symbol leaves open (the variational deblocking of Tang et al. 2018). Marching cubes run over the cells of these blocks
+alone. All up to the signs is in integers, so encoder and decoder see the same cells crossed on every platform.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from .basis import ONE
 from .grid import POINTS, SIDE, VOLUME, block_keys, places_of, voxel_index
 from .weights import LARGEST, STEP_ONE, Model, distances
 
+_SURE = 3 * ONE * STEP_ONE  # three voxels: what is farther has no more of a vote
+_BARELY = ONE * STEP_ONE // 64
 _NEAR = ONE * STEP_ONE  # a voxel: what is farther from the zero level shows nowhere
 _DOWN = 1 << 10  # distances in the deblocking are in units of 2^-14 voxels
 _GRADIENT = 1 << 23  # 729 x 2^14, and a step of 1.4 beyond the descent's
@@ -45,7 +47,7 @@ def field_of(places: Int64[np.ndarray, "B 3"], symbols: Int32[np.ndarray, "B M"]
     for _ in range(model.deblocking if len(places) else 0):
         weights = _agreed(weights, middle, index, model)
     values = _mean(distances(weights, model.basis), index, len(keys))
-    return Field(places, keys, index, np.where(values == 0, 1.0, values))
+    return Field(places, keys, index, _closed(places, keys, np.where(values == 0, 1.0, values)))
 
 
 def _agreed(
@@ -68,6 +70,39 @@ def _mean(values: Float64[np.ndarray, "B N"], index: Int64[np.ndarray, "B N"], c
     """The mean of each voxel's values, rounded down."""
     flat = index.reshape(-1)
     return np.floor(np.bincount(flat, values.reshape(-1), count) / np.maximum(np.bincount(flat, minlength=count), 1))
+
+
+def _closed(
+    places: Int64[np.ndarray, "B 3"], keys: Int64[np.ndarray, " U"], values: Float64[np.ndarray, " U"]
+) -> Float64[np.ndarray, " U"]:
+    """The distances without surface that leaves the blocks by less than a voxel, which would end there in a hole.
+
+    A block that is not there is on one side of the surface, whole: the side that its voxels tell that are known. Those
+    on the other, if near, are put on this one.
+    """
+    voxels, owners = _outsiders(places, keys)
+    if len(voxels) == 0:
+        return values
+    names, which = np.unique(owners, return_inverse=True)
+    side = np.sign(np.bincount(which, np.clip(values[voxels], -_SURE, _SURE), len(names)))
+    wanted = np.bincount(voxels, side[which], len(keys))
+    turned = (wanted * values < 0) & (np.abs(values) < _NEAR)
+    return np.where(turned, np.sign(wanted) * _BARELY, values)
+
+
+def _outsiders(
+    places: Int64[np.ndarray, "B 3"], keys: Int64[np.ndarray, " U"]
+) -> tuple[Int64[np.ndarray, " P"], Int64[np.ndarray, " P"]]:
+    """Each voxel, by number, beside each block without values that it belongs to, by key."""
+    voxels, names = places_of(keys), block_keys(places)
+    first = voxels % SIDE == 0
+    pairs = [(np.zeros(0, np.int64), np.zeros(0, np.int64))]
+    for back in np.indices((2, 2, 2)).reshape(3, -1).T:
+        chosen = np.flatnonzero((first | (back == 0)).all(axis=1) & first.any(axis=1))
+        owners = block_keys(voxels[chosen] // SIDE - back)
+        missing = ~np.isin(owners, names)
+        pairs.append((chosen[missing], owners[missing]))
+    return np.concatenate([a for a, _ in pairs]), np.concatenate([b for _, b in pairs])
 
 
 def crossed(field: Field, chosen: Bool[np.ndarray, " B"]) -> Int64[np.ndarray, "C 3"]:

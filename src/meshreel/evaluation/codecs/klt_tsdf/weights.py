@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int32, Int64
+from jaxtyping import Float64, Int32
 
 from .basis import ONE, Basis
 from .grid import Blocks
@@ -47,8 +47,8 @@ def beyond(
 
 
 def forward(blocks: Blocks, model: Model, energies: Float64[np.ndarray, " M"]) -> Int32[np.ndarray, "B M"]:
-    """The symbols of the blocks' weights, whose mean squares (voxels squared) are expected."""
-    symbols = np.zeros((len(blocks.places), len(energies)), np.int32)
+    """The symbols of the weights; `energies` are the mean squares to expect, voxels squared."""
+    symbols = np.zeros((len(blocks.places), model.basis.vectors.shape[1]), np.int32)
     counts = trust(blocks)
     for start in range(0, len(symbols), _CHUNK):
         part = slice(start, start + _CHUNK)
