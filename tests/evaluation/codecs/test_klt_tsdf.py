@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from jaxtyping import TypeCheckError
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.errors import FormatError, InputError
@@ -50,6 +51,9 @@ def outcome(data: bytes) -> str:
         video = SMALL.decode(data)
         frames = [video[number] for number in range(len(video))]
     except FormatError:
+        return "refused"
+    except TypeCheckError as error:  # the checker of annotations looks at a frame of what is returned
+        assert isinstance(error.__cause__, FormatError)
         return "refused"
     assert all(np.isfinite(mesh.vertices).all() for mesh in frames)
     return "decoded"
@@ -107,8 +111,9 @@ def test_each_option_alone_buys_quality(body):
 
 
 def test_spheres_that_move_and_stretch_stay_closed_in_one_piece():
+    coarse = replace(SMALL, cells=48)
     for sequence in (sliding_sphere(3, step=0.3), deforming_sphere(3)):
-        for original, decoded in zip(sequence, SMALL.decode(SMALL.encode(sequence)), strict=True):
+        for original, decoded in zip(sequence, coarse.decode(coarse.encode(sequence)), strict=True):
             assert len(border_edges(decoded)) == 0
             assert components(decoded.faces, len(decoded.vertices)).max() == 0
             assert surface_errors(original, decoded).symmetric_psnr > 50
@@ -123,7 +128,8 @@ def test_the_same_input_gives_the_same_bytes_and_frames(body, stream):
 
 
 def test_frames_may_be_empty_and_differ_in_everything(body):
-    frames = MeshList((Mesh.empty(), body[0], Mesh.empty(), sliding_sphere(1, levels=2)[0]))
+    ball = sliding_sphere(1, levels=2)[0]
+    frames = MeshList((Mesh.empty(), body[0], Mesh.empty(), Mesh(0.3 * ball.vertices + [0, 1, 0], ball.faces)))
     decoded = replace(SMALL, group=3).encode(frames)
     video = SMALL.decode(decoded)
     assert [mesh.is_empty for mesh in video] == [True, False, True, False]
@@ -285,7 +291,7 @@ def test_every_truncation_and_every_extra_byte_is_refused(stream):
 def test_damaged_bytes_are_refused_or_decode_to_something(stream):
     generator = np.random.default_rng(8)
     outcomes = set()
-    for place in [*range(4, 45), *generator.integers(45, len(stream) - 4, 40)]:
+    for place in [*range(4, 45), *generator.integers(45, len(stream) - 4, 25)]:
         damaged = bytearray(stream)
         damaged[place] ^= int(generator.integers(1, 256))
         assert outcome(bytes(damaged)) == "refused"

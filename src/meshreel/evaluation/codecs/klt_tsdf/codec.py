@@ -34,7 +34,7 @@ class KltTsdfCodec:
 
     cells: float = 128.0  # of the grid along the diagonal of the sequence's bounding box
     basis: int = 32  # principal components kept
-    step: float = 0.02  # of the weights' quantiser, in truncations (3 voxels) of root mean square over a block
+    step: float = 0.05  # of the weights' quantiser, in truncations (3 voxels) of root mean square over a block
     group: int = 10  # frames that share the entropy coder's adaptive models
     deblocking: int = 0  # rounds of the decoder's deblocking
     basis_in: str = "stream"  # or "codec": a table of every decoder, and not in the rate
