@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from ....geometry.inside import winding_inside
 from ....geometry.nearest import Hits, Surface, past_border
 from ....geometry.topology import clean, unique_edges, weld
 from ....geometry.voxels import Lattice, around, distinct, spread
@@ -95,7 +96,7 @@ def signed_distances(
         known[part] = ~beyond | (aside <= _ASIDE)
         past[part] = beyond
     if past.any() and _is_nearly_closed(mesh, points[~past], values[~past]):
-        values[past] = np.where(_winding(mesh, points[past]) > 0.5, -1.0, 1.0) * np.abs(values[past])
+        values[past] = np.where(winding_inside(mesh, points[past]), -1.0, 1.0) * np.abs(values[past])
         known[:] = True
     return values, known
 
@@ -104,14 +105,8 @@ def _is_nearly_closed(mesh: Mesh, points: Float64[np.ndarray, "N 3"], values: Fl
     """Whether winding numbers tell inside from outside as the signs near the surface do."""
     near = np.flatnonzero(np.abs(values) < 1)
     some = near[:: max(len(near) // _ASKED, 1)]
-    alike = (_winding(mesh, points[some]) > 0.5) == (values[some] < 0)
+    alike = winding_inside(mesh, points[some]) == (values[some] < 0)
     return len(some) > 0 and bool(np.mean(alike) > _ALIKE)
-
-
-def _winding(mesh: Mesh, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
-    import igl
-
-    return np.atleast_1d(igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), points))
 
 
 class _Normals:
