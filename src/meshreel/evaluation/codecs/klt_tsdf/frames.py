@@ -21,7 +21,7 @@ from .surface import Field, cells_of, crossed, field_of, polygonize, without
 from .weights import Model, forward
 from .wire import Reader, Writer
 
-_FAR = 1.0  # voxels from the surface beyond which decoded surface is left out
+_FAR = 1.5  # voxels from the surface beyond which decoded surface is left out
 _PAST = 0.5  # voxels past a border
 
 
