@@ -9,6 +9,7 @@ from typing import Any
 from ...errors import InputError
 from ..codec import Codec
 from .draco import DecimatedDracoCodec, DracoCodec
+from .klt_tsdf import KltTsdfCodec
 from .meshreel import MeshreelCodec
 from .scenes import BackgroundDracoCodec, SceneDracoCodec
 from .tvmc import TvmcCodec
@@ -18,6 +19,7 @@ CODECS: dict[str, Callable[..., Codec]] = {
     "draco": DracoCodec,
     "decimated_draco": DecimatedDracoCodec,
     "meshreel": MeshreelCodec,
+    "klt_tsdf": KltTsdfCodec,
     "scene_draco": SceneDracoCodec,
     "background_draco": BackgroundDracoCodec,
     "labelled_draco": BackgroundDracoCodec,  # the same by labels that somebody else has found
