@@ -21,11 +21,16 @@ from .shape import SIDE, Shape, dequantize, quantize
 
 def decode_volumes(features: Tensor, parameters: Sequence[Tensor]) -> Tensor:
     """The B x 4 x K x K x K volumes of B x C x 4 x 4 x 4 features."""
-    *modules, (weights, bias) = zip(parameters[::2], parameters[1::2], strict=True)
+    *modules, last = zip(parameters[::2], parameters[1::2], strict=True)
     values = features
-    for module in modules:
-        values = functional.gelu(_shuffled(functional.conv3d(values, *module, padding=1)))
-    return functional.conv3d(values, weights, bias, padding=1)
+    for weights, bias in modules:
+        values = functional.gelu(_shuffled(_convolved(values, weights, bias)))
+    return _convolved(values, *last)
+
+
+def _convolved(values: Tensor, weights: Tensor, bias: Tensor) -> Tensor:
+    """The convolution; the weights' layout chooses an algorithm that takes two thirds of the time on processors."""
+    return functional.conv3d(values, weights.contiguous(memory_format=torch.channels_last_3d), bias, padding=1)
 
 
 def _shuffled(values: Tensor) -> Tensor:
