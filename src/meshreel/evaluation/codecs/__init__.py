@@ -9,12 +9,14 @@ from ...errors import InputError
 from ..codec import Codec
 from .draco import DecimatedDracoCodec, DracoCodec
 from .meshreel import MeshreelCodec
+from .necgs import NecgsCodec
 from .scenes import BackgroundDracoCodec, SceneDracoCodec
 
 CODECS: dict[str, Callable[..., Codec]] = {
     "draco": DracoCodec,
     "decimated_draco": DecimatedDracoCodec,
     "meshreel": MeshreelCodec,
+    "necgs": NecgsCodec,
     "scene_draco": SceneDracoCodec,
     "background_draco": BackgroundDracoCodec,
     "labelled_draco": BackgroundDracoCodec,  # the same by labels that somebody else has found

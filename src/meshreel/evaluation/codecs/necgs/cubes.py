@@ -1,7 +1,7 @@
 """Deformable marching cubes (NeCGS, section 3.1): the surface of a TSDF-Def volume.
 
-In -> out: signed distances and deformations at the points of a grid -> a mesh in cells. A vertex lies where the distance
-is zero on an edge of the grid between two points that the deformation has moved.
+In -> out: signed distances and deformations at the points of a grid -> a mesh in cells. A vertex lies where the
+distance is zero on an edge of the grid between two points that the deformation has moved.
 
 The 256 cases are derived, not stored. On a face of a cube with four crossings each inside corner is cut off by itself,
 which both cubes of the face say alike: the surface has no holes.

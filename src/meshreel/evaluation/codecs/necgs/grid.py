@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
+from ....errors import InputError
 from ....geometry.inside import winding_inside
 from ....geometry.nearest import Hits, Surface
 from ....geometry.topology import border_edges, face_normals, weld
@@ -21,6 +22,7 @@ from ....types import Mesh
 
 TRUNCATION = 2.0  # cells at which a distance becomes 1, as in the authors' code
 MARGIN = 2  # cells between the largest frame and its grid's sides
+FARTHEST = 1 << 30  # cells that a frame may be away
 SHEETS = 0.05  # share of a mesh's area from which sheets are trimmed
 _BLOCK = 4  # points a side of a block that is decided at once where no surface is near
 _PROBE = 0.02  # cells before and behind a face
@@ -46,25 +48,30 @@ class Placement:
         return np.array(self.anchor) + self.cell * (self.shifts[frame] - (resolution - 1) / 2)
 
 
-def place_grids(frames: Sequence[Mesh], resolution: int) -> Placement:
-    """Grids into which every frame fits; that of an empty frame is where the anchor is."""
-    boxes = [_box(mesh) for mesh in frames]
-    full = [box for box in boxes if box is not None]
-    if not full:
-        return Placement(1.0, (0.0, 0.0, 0.0), np.zeros((len(frames), 3), np.int32))
-    side = max(float((high - low).max()) for low, high in full)
-    cell = max(side, 1e-9) / (resolution - 1 - 2 * MARGIN)
-    anchor = (full[0][0] + full[0][1]) / 2
-    middles = np.array([anchor if box is None else (box[0] + box[1]) / 2 for box in boxes])
-    shifts = np.rint((middles - anchor) / cell).astype(np.int32)
-    return Placement(cell, (float(anchor[0]), float(anchor[1]), float(anchor[2])), shifts)
+Box = tuple[Float64[np.ndarray, " 3"], Float64[np.ndarray, " 3"]]  # lowest and highest corner
 
 
-def _box(mesh: Mesh) -> tuple[Float64[np.ndarray, " 3"], Float64[np.ndarray, " 3"]] | None:
+def box_of(mesh: Mesh) -> Box | None:
+    """The box of a mesh's faces; None where it has none."""
     if mesh.is_empty:
         return None
     used = mesh.vertices[np.unique(mesh.faces)]
     return used.min(axis=0), used.max(axis=0)
+
+
+def place_grids(boxes: Sequence[Box | None], resolution: int) -> Placement:
+    """Grids into which every frame's box fits; that of an empty frame is where the anchor is."""
+    full = [box for box in boxes if box is not None]
+    if not full:
+        return Placement(1.0, (0.0, 0.0, 0.0), np.zeros((len(boxes), 3), np.int32))
+    side = max(float((high - low).max()) for low, high in full)
+    cell = max(side, 1e-9) / (resolution - 1 - 2 * MARGIN)
+    anchor = (full[0][0] + full[0][1]) / 2
+    middles = np.array([anchor if box is None else (box[0] + box[1]) / 2 for box in boxes])
+    shifts = np.rint((middles - anchor) / cell)
+    if np.abs(shifts).max() > FARTHEST:
+        raise InputError(f"frames {np.abs(shifts).max() * cell:g} m apart in cells of {cell:g} m; code them by parts")
+    return Placement(cell, (float(anchor[0]), float(anchor[1]), float(anchor[2])), shifts.astype(np.int32))
 
 
 def truncated_distances(mesh: Mesh, resolution: int) -> tuple[Float32[np.ndarray, "K K K"], bool]:

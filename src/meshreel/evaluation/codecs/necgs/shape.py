@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
-from jaxtyping import Float64, Int32
 import numpy as np
+from jaxtyping import Float64, Int32
 
 SIDE = 4  # K': points a side of an embedded feature
 OUTPUTS = 4  # of a grid point: its distance and three components of its deformation
@@ -41,7 +42,7 @@ class Shape:
         """Channels into and out of each convolution: L modules that make 2 x 2 x 2 points of one, and the last."""
         modules = round(math.log2(self.resolution // SIDE))
         widths = [self.features, *(max(OUTPUTS, round(self.channels * share)) for share in _NARROWING[:modules])]
-        inner = [(a, 8 * b) for a, b in zip(widths[:-1], widths[1:], strict=True)]
+        inner = [(a, 8 * b) for a, b in pairwise(widths)]
         return (*inner, (widths[-1], OUTPUTS))
 
     @property

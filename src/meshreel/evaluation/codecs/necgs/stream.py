@@ -17,13 +17,12 @@ from ....coding.entropy import check_plausible, decode_integers, encode_integers
 from ....errors import FormatError
 from ....format.kinds import F64, U8, U16, U32, Array, Blob, Bytes, List, Rest
 from ....format.records import pack, unpack_all
-from .grid import Placement
+from .grid import FARTHEST, Placement
 from .shape import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Shape
 
 MAGIC = b"NeCGS\r\n\x1a"
 VERSION = 1
 _LARGEST = 1e12  # m
-_FARTHEST = 1 << 30  # cells
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +128,7 @@ def _full(inner: _Inner) -> Bool[np.ndarray, " T"]:
 
 def _shifts(steps: Int32[np.ndarray, "N 3"]) -> Int32[np.ndarray, "N 3"]:
     shifts = np.cumsum(steps.astype(np.int64), axis=0)
-    if len(shifts) and np.abs(shifts).max() > _FARTHEST:
+    if len(shifts) and np.abs(shifts).max() > FARTHEST:
         raise FormatError(f"a grid {int(np.abs(shifts).max())} cells away")
     return shifts.astype(np.int32)
 
