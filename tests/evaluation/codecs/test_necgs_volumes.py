@@ -82,7 +82,7 @@ def test_a_deformation_moves_the_surface_by_half_a_cell_at_most():
 
 
 def test_grids_hold_every_frame_and_shift_by_whole_cells():
-    frames = [mesh for mesh in soft_bodies(SoftBodiesOptions(frames=3, spacing=0.05, people=1))]
+    frames = list(soft_bodies(SoftBodiesOptions(frames=3, spacing=0.05, people=1)))
     placement = place_grids([box_of(mesh) for mesh in (frames[0], Mesh.empty(), *frames[1:])], 32)
     assert placement.shifts.shape == (4, 3)
     for number, mesh in ((0, frames[0]), (2, frames[1]), (3, frames[2])):

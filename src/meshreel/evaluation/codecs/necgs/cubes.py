@@ -21,7 +21,7 @@ from ....geometry.topology import drop_unreferenced
 from ....types import Mesh
 
 REACH = 0.5  # cells that a deformation of 1 moves a point, so that cells do not fold over
-STEEP = 1.0  # a change of truncated distance along an edge that is no surface but a flip of sign far from any
+STEEP = 0.8  # a change along an edge, where a surface has half: no surface but a flip of sign far from any
 
 
 @dataclass(frozen=True, slots=True)
