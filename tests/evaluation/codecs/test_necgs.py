@@ -162,6 +162,13 @@ def test_open_walls_are_trimmed_where_they_end():
 
 
 @torch_only
+def test_devices_that_are_not_there_are_told(balls):
+    for device in ("nothing", "cuda:77"):
+        with pytest.raises(InputError, match="cannot be used"):
+            replace(TINY, device=device).decode(balls)
+
+
+@torch_only
 def test_what_is_no_mesh_is_refused_by_frame():
     broken = Mesh.of([[0, 0, 0], [1, 0, 0], [0, np.nan, 0]], [[0, 1, 2]])
     with pytest.raises(InputError, match="frame 1"):
@@ -178,6 +185,13 @@ def test_without_torch_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(InputError, match=r"meshreel\[necgs\]"):
         HASTY.encode(BALLS)
+
+
+def test_naming_the_codec_does_not_load_torch():
+    code = "import sys; from meshreel.evaluation.codecs import make_codec; make_codec('necgs', {});" + (
+        "sys.exit('torch' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_both_configurations_are_codecs():

@@ -16,6 +16,7 @@ from jaxtyping import Float32
 from torch import Tensor
 from torch.nn import functional
 
+from ....errors import InputError
 from .shape import SIDE, Shape, dequantize, quantize
 
 
@@ -87,10 +88,14 @@ class Network:
 
 
 def choose_device(device: str) -> torch.device:
-    """The device of that name; `auto` is a GPU where torch sees one."""
+    """The device of that name; `auto` is a GPU where torch sees one. InputError where there is none of that name."""
     if device == "auto":
-        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    return torch.device(device)
+        device = "cuda" if torch.cuda.is_available() else "cpu"
+    try:
+        return torch.zeros(1, device=device).device
+    except (RuntimeError, AssertionError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"device {device!r} cannot be used ({reason}); give cpu, cuda or auto") from error
 
 
 @contextmanager
