@@ -22,7 +22,7 @@ from meshreel.evaluation.codecs.necgs.stream import decode_stream, encode_stream
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
 
-TINY = NecgsCodec(resolution=16, features=4, channels=8, epochs=60, fitting=5, device="cpu")
+TINY = NecgsCodec(resolution=16, features=4, channels=8, epochs=60, fitting=5, rate=1e-2, device="cpu")
 HASTY = replace(TINY, epochs=2, fitting=1)
 BALLS = deforming_sphere(4, levels=3)
 
