@@ -11,6 +11,7 @@ from ..codec import Codec
 from .draco import DecimatedDracoCodec, DracoCodec
 from .klt_tsdf import KltTsdfCodec
 from .meshreel import MeshreelCodec
+from .necgs import NecgsCodec
 from .scenes import BackgroundDracoCodec, SceneDracoCodec
 from .tvmc import TvmcCodec
 
@@ -20,6 +21,7 @@ CODECS: dict[str, Callable[..., Codec]] = {
     "decimated_draco": DecimatedDracoCodec,
     "meshreel": MeshreelCodec,
     "klt_tsdf": KltTsdfCodec,
+    "necgs": NecgsCodec,
     "scene_draco": SceneDracoCodec,
     "background_draco": BackgroundDracoCodec,
     "labelled_draco": BackgroundDracoCodec,  # the same by labels that somebody else has found
