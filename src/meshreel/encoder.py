@@ -117,8 +117,12 @@ class Encoder:
         progress: Progress | None = None,
         masker: Masker | None = None,
     ) -> None:
-        """Executor and progress are those of `encode`; with a `masker`, who says what moves, it is a scene."""
-        self._sequence, self._executor, self._progress, self._masker = sequence, executor, progress, masker
+        """Executor and progress are those of `encode`; with a `masker`, who says what moves, it is a scene.
+
+        Who is told of progress may change: `progress` is an attribute.
+        """
+        self._sequence, self._executor, self._masker = sequence, executor, masker
+        self.progress = progress
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
 
     @property
@@ -126,16 +130,29 @@ class Encoder:
         """Of the sequence, 1/s."""
         return self._sequence.frame_rate
 
+    def prepare(self, options: EncoderOptions) -> None:
+        """Takes the sequence apart, where it is a scene, as `encode` with these options would. Raises what it does."""
+        if self._is_scene(options):
+            self._parts(self._work(options))
+
     def encode(self, path: str | Path, options: EncoderOptions) -> Summary:
         """As the function `encode`, which says what is raised."""
-        sequence, masker = self._sequence, self._masker
-        if options.dynamic_only and masker is not None:
+        if options.dynamic_only and self._masker is not None:
             raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
         check_target(Path(path))
-        work = _Work(sequence, options, self._executor, Stages(self._progress, len(sequence)))
-        if not options.dynamic_only and len(sequence) and (masker is not None or is_scene(sequence)):
+        work = self._work(options)
+        if self._is_scene(options):
             return _encode_scene(work, Path(path), self._parts(work))
         return _encode_bodies(work, Path(path))
+
+    def _work(self, options: EncoderOptions) -> _Work:
+        stages = Stages(self.progress, len(self._sequence))
+        return _Work(self._sequence, options, self._executor, stages)
+
+    def _is_scene(self, options: EncoderOptions) -> bool:
+        if options.dynamic_only or not len(self._sequence):
+            return False
+        return self._masker is not None or is_scene(self._sequence)
 
     def _parts(self, work: _Work) -> Parts:
         """What the scene is made of; found anew where other options say otherwise."""

@@ -57,9 +57,7 @@ def test_rows_of_scenes_are_told_in_a_line():
 
 
 def test_what_is_missing_is_told(run, tmp_path):
-    assert failed(
-        run("bench", "run", "nothing", "-o", tmp_path / "r.jsonl"), "known: ablation, layers, scenes, targets"
-    )
+    assert failed(run("bench", "run", "nothing", "-o", tmp_path / "r.jsonl"), "known: ablation_basis, ablation_centers")
     said = run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--data", tmp_path)
     assert failed(said, "dancer", "--data")
     assert failed(run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--jobs", "0"), "--jobs", "0")

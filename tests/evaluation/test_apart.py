@@ -17,8 +17,9 @@ from meshreel.errors import InputError
 from meshreel.evaluation import codecs, provenance
 from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import make_codec
+from meshreel.evaluation.measure import Bench, run_point
 from meshreel.evaluation.rows import FAILED, Point, failed_rows, join_rows, read_rows, select
-from meshreel.evaluation.runner import Bench, run_point, run_points
+from meshreel.evaluation.runner import run_points
 from meshreel.metrics.report import ComparisonOptions
 
 BALLS = sliding_sphere(2, levels=1)

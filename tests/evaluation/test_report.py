@@ -157,5 +157,5 @@ def test_points_are_told_apart_by_their_keys():
 
 
 def test_an_unknown_experiment_is_told():
-    with pytest.raises(InputError, match="known: ablation, layers, scenes, targets"):
+    with pytest.raises(InputError, match="known: ablation_basis, ablation_centers"):
         experiment("all")

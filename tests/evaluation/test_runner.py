@@ -11,15 +11,16 @@ import pytest
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.derived import Backwards
 from meshreel.errors import InputError
-from meshreel.evaluation import runner
+from meshreel.evaluation import measure
 from meshreel.evaluation.bridges import count_bridges
 from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import CODECS, make_codec
 from meshreel.evaluation.datasets import open_dataset
 from meshreel.evaluation.fresh import peak_rss_mb
+from meshreel.evaluation.measure import Bench, run_point
 from meshreel.evaluation.peers import equal_anchor, run_fresh
 from meshreel.evaluation.rows import Point, append_row, read_rows
-from meshreel.evaluation.runner import Bench, run_point, run_points
+from meshreel.evaluation.runner import run_points
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Mesh, MeshList
@@ -49,7 +50,7 @@ def test_every_codec_follows_the_protocol_and_tells_its_options():
 @pytest.mark.parametrize(
     ("kind", "options", "words"),
     [
-        ("mpeg", {}, "known: background_draco, decimated_draco"),
+        ("mpeg", {}, "known: background_draco, background_once_draco"),
         ("draco", {"bits": 3}, "bits"),
         ("draco", {"qp": 1}, "qp 1"),
         ("decimated_draco", {"fraction": 0.0}, "fraction 0"),
@@ -104,7 +105,7 @@ def test_points_that_have_rows_are_not_run_again(folder, tmp_path, monkeypatch):
     rows = run_points(points, tmp_path / "rows.jsonl", bench, lambda _, new: told.append(new))
     assert told == [True, False, True]
     assert rows[0] == json.loads(json.dumps(first[0])) and rows == read_rows(tmp_path / "rows.jsonl")
-    monkeypatch.setattr(runner, "run_point", lambda *_: pytest.fail("measured again"))
+    monkeypatch.setattr(measure, "run_point", lambda *_: pytest.fail("measured again"))
     assert run_points(points, tmp_path / "rows.jsonl", bench, lambda *_: None) == rows
 
 
@@ -139,8 +140,8 @@ def test_a_pair_needs_a_row_of_its_own_and_an_anchor_as_good(folder, tmp_path):
 
 
 def test_a_curve_row_has_rate_groups_and_a_few_metrics_of_each_frame(folder):
-    row = runner.measure_point(Point("ball", "draco", {"qp": 9}, kind="curve"), Bench(folder, comparison=QUICK))
-    assert row["mbps"] > 0 and set(row["per_frame"][0]) < set(runner.CURVE_METRICS)
+    row = measure.measure_point(Point("ball", "draco", {"qp": 9}, kind="curve"), Bench(folder, comparison=QUICK))
+    assert row["mbps"] > 0 and set(row["per_frame"][0]) < set(measure.CURVE_METRICS)
     assert [group["frames"] for group in row["groups"]] == [1, 1] and "decode" not in row
     assert sum(group["bytes"] for group in row["groups"]) < row["bytes"]
 
@@ -149,7 +150,7 @@ def test_a_backwards_row_begins_with_the_last_frame(tmp_path):
     grown = np.stack([BALLS[0].vertices, 1.3 * BALLS[0].vertices])
     np.savez(tmp_path / "ball.npz", vertices=grown, faces=BALLS[0].faces)
     forth, back = (
-        runner.measure_point(Point("ball", "draco", {"qp": 9}, kind=kind), Bench(tmp_path, comparison=QUICK))
+        measure.measure_point(Point("ball", "draco", {"qp": 9}, kind=kind), Bench(tmp_path, comparison=QUICK))
         for kind in ("curve", "backwards")
     )
     assert [frame["d2_psnr"] for frame in back["per_frame"]] == [frame["d2_psnr"] for frame in forth["per_frame"]][::-1]
@@ -163,7 +164,7 @@ def test_a_backwards_row_begins_with_the_last_frame(tmp_path):
 def test_a_floor_row_says_what_draco_would_cost_each_group(folder, monkeypatch):
     monkeypatch.setattr("meshreel.evaluation.peers.IntraOptions", lambda: TRIALS)
     wasteful = Point("ball", "draco", {"qp": 14}, kind="floor")
-    row = runner.measure_point(wasteful, Bench(folder, comparison=QUICK))
+    row = measure.measure_point(wasteful, Bench(folder, comparison=QUICK))
     assert len(row["groups"]) == 2 and all("draco_bytes" in group for group in row["groups"])
     assert all(g["draco_bytes"] is None or g["draco_bytes"] < g["bytes"] for g in row["groups"])
 

@@ -28,7 +28,7 @@ from meshreel.evaluation.codecs.tvmc.tracked import (
 from meshreel.evaluation.codecs.tvmc.tracking import Tracked, track_sequence
 from meshreel.evaluation.codecs.tvmc.video import TvmcVideo
 from meshreel.evaluation.groups import without_keys
-from meshreel.evaluation.runner import run_curve_point
+from meshreel.evaluation.measure import run_curve_point
 from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate

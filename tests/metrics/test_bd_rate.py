@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.errors import InputError
-from meshreel.metrics.bd_rate import Curve, bd_bound, bd_rate, gain_end, hull
+from meshreel.metrics.bd_rate import Curve, bd_bound, bd_rate, beats, gain_end, hull
 
 # The points of VCEG-M33's often reprinted example, and those in the README of FAU's `bjontegaard` package.
 VCEG = (
@@ -172,3 +172,20 @@ def _pchip(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
         + y[k + 1] * t**2 * (3 - 2 * t)
         + h[k] * slopes[k + 1] * t**2 * (t - 1)
     )
+
+
+def test_a_curve_beats_another_only_where_it_needs_less_everywhere():
+    anchor = _curve("a", [1, 2, 4, 8], [50, 53, 56, 59])
+    left, crossing = _curve("b", [0.5, 1, 2, 4], [50, 53, 56, 59]), _curve("c", [0.5, 1.5, 5], [50, 53, 59])
+    assert beats(left, anchor) is True and beats(anchor, left) is False
+    assert beats(crossing, anchor) is True and beats(_curve("d", [0.5, 3, 5], [50, 53, 59]), anchor) is False
+    assert gain_end(anchor, left).share == 1 and gain_end(left, anchor).share == 0
+    assert 0 < gain_end(anchor, _curve("d", [0.5, 3, 5], [50, 53, 59])).share < 1
+
+
+def test_without_a_common_quality_points_that_are_better_and_cheaper_decide():
+    anchor = _curve("a", [1, 2], [40, 45])
+    assert beats(_curve("b", [0.5, 0.7], [50, 55]), anchor) is True
+    assert beats(_curve("b", [1.5, 1.7], [50, 55]), anchor) is False
+    assert beats(_curve("b", [3, 4], [50, 55]), anchor) is None
+    assert beats(_curve("b", [0.1, 0.2], [20, 30]), anchor) is None

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import overload
 
 import numpy as np
@@ -22,8 +23,11 @@ from .figure import Pose, figure
 from .implicit import polygonize
 from .procedural import grid_of_frame
 from .rig import DepthCamera
-from .simulate import SceneFrame, corner_cameras
+from .simulate import SceneFrame, SensorOptions, corner_cameras, simulate_rig
 
+WIDTH = 256  # pixels of a depth picture
+NOISE = 0.3  # of a sensor, as `SensorOptions` has it
+VOXEL = 0.03  # m, of the volume that such pictures are fused in
 SIZE = (3.0, 1.7, 2.6)  # m, of the room; it stands on the middle of its floor
 _FACE = 0.1  # m, about the length of a side of the room's faces
 _LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)  # m, box of the cameras: before the walls, and outside where none is
@@ -103,6 +107,17 @@ def furnished_room(options: RoomOptions | None = None) -> Room:
         _panel((-x, 0, z), (0, 0, -2 * z), (0, y, 0)),  # and that on the left
     ]
     return Room(options or RoomOptions(), concatenate([_joined(panels), *map(_box, FURNITURE)]))
+
+
+def record_room(
+    folder: Path,
+    options: RoomOptions,
+    width: int = WIDTH,
+    tell: Callable[[int], None] = lambda _done: None,
+) -> None:
+    """Writes what four depth cameras measure of the room, and the truth; `tell` hears how many frames are done."""
+    sensor, cameras = SensorOptions(noise=NOISE, seed=options.seed), room_cameras(width)
+    simulate_rig(folder, furnished_room(options), cameras, options.frame_rate, sensor, tell)
 
 
 def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:

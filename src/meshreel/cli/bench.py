@@ -17,15 +17,17 @@ from ..errors import InputError
 from ..evaluation.apart import end_all
 from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
+from ..evaluation.measure import Bench
 from ..evaluation.promises import Promise
 from ..evaluation.report import write_report
 from ..evaluation.rows import FAILED, Row, failed_rows, join_rows, measured_rows, read_rows
-from ..evaluation.runner import Bench, run_points
+from ..evaluation.runner import run_points
 from ..evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
+from ..evaluation.study import Study
 from .console import Common
 
 command = App(name="bench", help="Measure codecs against each other, and make tables and plots of the rows.")
-DATA = Path("../shared/data/performers")
+DATA = Path("../shared/data")
 
 
 @Parameter(name="*")
@@ -69,6 +71,7 @@ def run(
     data: Path = DATA,
     small: bool = False,
     only: tuple[str, ...] = (),
+    on: tuple[str, ...] = (),
     ssim: bool = True,
     running: Running = Running(),
     common: Common = Common(),
@@ -81,24 +84,28 @@ def run(
     Parameters
     ----------
     experiment
-        Which one: `layers`, `ablation`, `targets` or `scenes`.
+        Which one: the paper's `figure6`, `table1`, `table2`, `ablation_centers`, `ablation_gof`, `ablation_basis` and
+        `ablation_stages`, which share the rows of points that they have in common; or `scenes`, `layers`, `targets`.
     output
         A JSON-lines file.
     data
         The folder of the sequences.
     small
-        A few points on a few frames only: minutes.
+        A few points on a few frames only, of the paper's experiments on procedural ones: minutes.
     only
-        Only the points of these codecs, as `scene_draco`; the others keep the rows they have.
+        Only the points of these codecs, as `tvmc`; the others keep the rows they have.
+    on
+        Only the points on these sequences, as `synthetic4`.
     ssim
         Render and compare pictures too (slower).
     """
     chosen = find_experiment(experiment)
-    points = [point for point in chosen.points(small) if not only or point.codec in only]
+    points = [p for p in chosen.points(small) if (not only or p.codec in only) and (not on or p.sequence in on)]
     if not points:
-        raise InputError(f"--only {' '.join(only)}: {experiment} has no such points")
+        raise InputError(f"--only {' '.join(only)} --on {' '.join(on)}: {experiment} has no such points")
     comparison, cache = replace(chosen.COMPARISON, ssim=ssim), output.with_suffix(".cache")
-    bench = Bench(data, experiment, comparison, cache, running.limit, running.retry)
+    alike = [name for name, other in EXPERIMENTS.items() if isinstance(other, Study) and isinstance(chosen, Study)]
+    bench = Bench(data, experiment, comparison, cache, running.limit, running.retry, tuple(alike))
     with common.stages(len(points)) as progress, side_by_side(running.jobs) as executor:
 
         def tell(row: Row, new: bool) -> None:

@@ -13,8 +13,8 @@ from cyclopts import Parameter
 from ..capture.fusion import FusionOptions
 from ..capture.record import Recording, open_recording
 from ..capture.rig import RIG, read_cameras
-from ..capture.room import RoomOptions, furnished_room, room_cameras
-from ..capture.simulate import TRUTH, SensorOptions, simulate_rig
+from ..capture.room import VOXEL, WIDTH, RoomOptions, record_room, room_cameras
+from ..capture.simulate import TRUTH
 from ..capture.truth import read_truth
 from ..decoder import Video
 from ..decoder import open as open_video
@@ -30,9 +30,6 @@ from .encode import describe, summary_row, workers
 from .info import describe_file, rate_table
 
 _QUALITY = preset_options().quality
-WIDTH = 256  # pixels of a depth picture
-_NOISE = 0.3  # of a sensor, as `SensorOptions` has it
-VOXEL = 0.03  # m
 _JUDGED = 4  # frames, at most, that are compared with the truth
 
 
@@ -92,10 +89,8 @@ def command(
 
 def _captured(folder: Path, room: RoomOptions, progress: StageBars) -> Recording:
     """The room as its cameras see it, fused."""
-    sensor = SensorOptions(noise=_NOISE, seed=room.seed)
-    scenes, cameras = furnished_room(room), room_cameras(WIDTH)
-    _forget(folder, [camera.name for camera in cameras])
-    simulate_rig(folder, scenes, cameras, room.frame_rate, sensor, lambda k: progress("simulate", k, room.frames))
+    _forget(folder, [camera.name for camera in room_cameras(WIDTH)])
+    record_room(folder, room, WIDTH, lambda k: progress("simulate", k, room.frames))
     recording, _ = open_recording(folder, FusionOptions(VOXEL))
     for number, _ in enumerate(recording):  # which keeps them
         progress("fuse", number + 1, len(recording))

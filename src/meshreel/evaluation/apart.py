@@ -1,6 +1,8 @@
 """Points measured in processes of their own: who crashes, hangs or returns nonsense costs a row, and not the sweep.
 
-In: a point, where its sequence is, a limit. Out: its row, or one that says why there is none (`FAILED`).
+In: points, where their sequence is, a limit. Out: their rows, or some that say why there is none (`FAILED`). Points of
+one call have one process, which may share work between them; the one that ends it fails, and the others go on in
+another.
 """
 
 from __future__ import annotations
@@ -13,47 +15,86 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+import threading
+from collections.abc import Iterator, Sequence
+from typing import IO, TYPE_CHECKING
 
+from .provenance import made_by
 from .rows import FAILED, Point, Row
 
-if TYPE_CHECKING:  # the runner calls what is here
-    from .runner import Bench
+if TYPE_CHECKING:  # measure.py needs all codecs, and this process none
+    from .measure import Bench
 
 _LAST = 300  # characters of what a process said last
 _RUNNING: set[subprocess.Popen[bytes]] = set()
 
 
-def measure_apart(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
-    """The row of a point, measured in a fresh process that may take `bench.limit_s`; `rows` are those before it."""
-    head: Row = {"point": point.key, "kind": point.kind, "experiment": bench.experiment}
-    head |= {"sequence": point.sequence, "codec": point.codec, "options": point.options}
-    with tempfile.TemporaryDirectory(prefix="meshreel-") as folder:
-        answer = Path(folder) / "row.json"
-        task = pickle.dumps((point, bench, list(rows), answer))
-        process = subprocess.Popen(
-            [sys.executable, "-m", "meshreel.evaluation.apart"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            start_new_session=True,  # with all that it starts it is ended by one signal
-        )
-        _RUNNING.add(process)
-        try:
-            said = process.communicate(task, timeout=bench.limit_s)[1]
-        except subprocess.TimeoutExpired:
-            _end(process)
-            return head | {FAILED: f"took longer than {bench.limit_s:g} s of wall time"}
-        except BaseException:
-            _end(process)
-            raise
-        finally:
-            _RUNNING.discard(process)
-        if process.returncode != 0 or not answer.exists():
-            return head | {FAILED: _reason(process.returncode, said)}
-        return dict(json.loads(answer.read_text(encoding="utf-8")))
+def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = ()) -> Iterator[Row]:
+    """The rows of some points, each as it is there; a point may take `bench.limit_s`. `rows` are those before them."""
+    left = list(points)
+    while left:
+        with tempfile.TemporaryFile() as said:
+            process = _started((left, bench, list(rows)), said)
+            limit = _Limit(process, bench.limit_s)
+            try:
+                assert process.stdout is not None
+                for line in process.stdout:
+                    limit.again()
+                    row = dict(json.loads(line))
+                    yield row if FAILED not in row else _failed(left[0], bench, row[FAILED])
+                    left.pop(0)
+            except BaseException:
+                _end(process)
+                raise
+            finally:
+                limit.stop()
+                process.wait()
+                _RUNNING.discard(process)
+            if left:
+                yield _failed(left.pop(0), bench, limit.reached or _reason(process.returncode, said))
+
+
+def _started(task: object, said: IO[bytes]) -> subprocess.Popen[bytes]:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "meshreel.evaluation.apart"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=said,
+        start_new_session=True,  # with all that it starts it is ended by one signal
+    )
+    _RUNNING.add(process)
+    assert process.stdin is not None
+    with contextlib.suppress(BrokenPipeError):  # it has ended, and said why
+        process.stdin.write(pickle.dumps(task))
+        process.stdin.close()
+    return process
+
+
+class _Limit:
+    """Ends a process that gives no row for so long."""
+
+    def __init__(self, process: subprocess.Popen[bytes], seconds: float | None) -> None:
+        self.reached: str | None = None
+        self._process, self._seconds = process, seconds
+        self._timer: threading.Timer | None = None
+        self.again()
+
+    def again(self) -> None:
+        """A row has come."""
+        self.stop()
+        if self._seconds is not None:
+            self._timer = threading.Timer(self._seconds, self._over)
+            self._timer.daemon = True
+            self._timer.start()
+
+    def stop(self) -> None:
+        """No more rows are waited for."""
+        if self._timer is not None:
+            self._timer.cancel()
+
+    def _over(self) -> None:
+        self.reached = f"took longer than {self._seconds:g} s of wall time"
+        _end(self._process)
 
 
 def end_all() -> None:
@@ -72,19 +113,35 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     process.wait()
 
 
-def _reason(code: int, said: bytes) -> str:
-    lines = said.decode(errors="replace").strip().splitlines()
+def _failed(point: Point, bench: Bench, reason: str) -> Row:
+    head: Row = {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | made_by()
+    return head | {"sequence": point.sequence, "codec": point.codec, "options": point.options, FAILED: reason}
+
+
+def _reason(code: int, said: IO[bytes]) -> str:
+    said.seek(0)
+    lines = said.read().decode(errors="replace").strip().splitlines()
     ended = f"ended by signal {-code}" if code < 0 else f"exit code {code}"
     return f"{ended}: {lines[-1][:_LAST]}" if lines else ended
 
 
 def main() -> None:
-    """In the fresh process: a task from standard input, pickled by whoever started it; the row into its file."""
-    from .runner import measure_point
+    """In the fresh process: a task from standard input, pickled by whoever started it; rows to standard output.
 
-    point, bench, rows, answer = pickle.load(sys.stdin.buffer)
-    row = measure_point(point, bench, rows)
-    answer.write_text(json.dumps(row, allow_nan=False), encoding="utf-8")
+    What libraries print goes where errors go.
+    """
+    rows = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    from .measure import measure_point
+
+    points, bench, before = pickle.load(sys.stdin.buffer)
+    for point in points:
+        try:
+            row = json.dumps(measure_point(point, bench, before), allow_nan=False)
+        except Exception as error:  # whatever a codec raises is its row
+            row = json.dumps({FAILED: f"{type(error).__name__}: {error}"[:_LAST]})
+        rows.write(row + "\n")
+        rows.flush()
 
 
 if __name__ == "__main__":

@@ -31,3 +31,24 @@ class Codec(Protocol):
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, from the bytes alone; may decode lazily, frame by frame."""
         ...
+
+
+@runtime_checkable
+class TwoStepCodec(Codec, Protocol):
+    """A codec whose encoder first finds out what does not depend on the rate: a sweep does that once for its points.
+
+    `encode` is `code` of what `analyse` gives.
+    """
+
+    @property
+    def analysis_key(self) -> str:
+        """Equal for operating points that share an analysis."""
+        ...
+
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Any:
+        """What several operating points share."""
+        ...
+
+    def code(self, analysis: Any, progress: Progress | None = None) -> bytes:
+        """The bytes; the analysis stays as it was."""
+        ...

@@ -15,6 +15,7 @@ from .rows import Row
 ANCHOR = "decimated_draco_subdivided"
 ANCHORS = ("draco", "decimated_draco", ANCHOR)  # their hull is the strongest per-frame anchor
 HULL = "hull of the anchors"
+USUAL = {"centers": 2000, "group_size": 10}  # the paper's own
 SSIM_WITHOUT_KEYS = "ssim_masked_without_keys"
 
 
@@ -70,10 +71,14 @@ def curve(rows: Sequence[Row], name: str, measure: Measure) -> Curve:
 
 
 def curve_of(row: Row) -> str:
-    """The curve that a point belongs to: a codec, and where the basis is fixed, the quality of the rest."""
-    options = row["options"]
-    name = str(row["codec"])
-    return name if options.get("basis_size") is None else f"{name}, quality {options['quality']:g}"
+    """The curve that a point belongs to: a codec, and where the basis is fixed, what else is not the preset's own."""
+    options, name = row["options"], str(row["codec"])
+    if options.get("basis_size") is None:
+        return name
+    told = [f"quality {options['quality']:g}"]
+    for key, usual in USUAL.items():
+        told += [f"{key} {options[key]}"] if options.get(key) not in (None, usual) else []
+    return ", ".join([name, *told])
 
 
 def anchor_hull(rows: Sequence[Row], measure: Measure) -> Curve:

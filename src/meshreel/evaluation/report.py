@@ -6,12 +6,12 @@ a row is not shown, but for reference curves, which are named as such.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
 
 from ..io.write import replacing
 from .curves import SSIM_WITHOUT_KEYS, curve_of, value
+from .experiments import Experiment
 from .promises import Promise
 from .provenance import makers
 from .rows import CURVE_KINDS, Row, curve_rows
@@ -31,7 +31,7 @@ WIDEST = 5  # panels in a row
 RATES = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20)  # Mbps, where the plots have ticks
 
 
-def write_report(rows: Sequence[Row], experiments: dict[str, ModuleType], folder: Path) -> list[Path]:
+def write_report(rows: Sequence[Row], experiments: Mapping[str, Experiment], folder: Path) -> list[Path]:
     """Writes `results.md` and a plot per experiment and sequence into `folder`; the paths.
 
     `experiments` are those that the rows may be of, by name, in the order of the page.
@@ -52,7 +52,7 @@ def write_report(rows: Sequence[Row], experiments: dict[str, ModuleType], folder
     return [page, *plots]
 
 
-def plot_curves(measured: Sequence[Row], sequence: str, chosen: ModuleType, path: Path) -> Path:
+def plot_curves(measured: Sequence[Row], sequence: str, chosen: Experiment, path: Path) -> Path:
     """Quality against rate of every codec on one sequence, one panel a metric; the noise floor is a line.
 
     An experiment may have METRICS of its own, and `floors`: what the noisy input reaches, by metric.
@@ -115,7 +115,7 @@ def point_table(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
-def _page(rows: Sequence[Row], name: str, chosen: ModuleType) -> Iterator[str]:
+def _page(rows: Sequence[Row], name: str, chosen: Experiment) -> Iterator[str]:
     yield from (f"# Results of `{name}`", "")
     yield from (f"Made by `meshreel bench run {name} -o ROWS.jsonl` and `meshreel bench report ROWS.jsonl`.", "")
     promises = chosen.promises(rows)

@@ -1,57 +1,29 @@
-"""What is measured (and in peers.py, beside a peer): one JSON-ready row for a codec at an operating point.
+"""Sweeps: points of an experiment become rows of a file, in this process or in others, one after the other or not.
 
-Rate is the length of the bytes; decoding happens in a fresh process from a file; times are processor time, and a row
-carries DracoPy's decoding time of the same body from the same run, so that machines can be compared by ratio.
+In: points, the file that their rows belong in. Out: rows, each in the file as soon as it is there. What a row has is
+in measure.py.
 """
 
 from __future__ import annotations
 
-import json
-import tempfile
-import time
+import itertools
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, as_completed
-from dataclasses import dataclass, field
+from concurrent.futures import Executor, Future
 from pathlib import Path
+from queue import SimpleQueue
 
-import numpy as np
-
-from ..coding.mesh import encode_mesh
-from ..decoder import open as open_video
-from ..derived import Backwards, DerivedSequence
 from ..errors import InputError
-from ..metrics.report import ComparisonOptions, compare_sequences
-from ..types import Frames, Mesh, MeshSequence
 from .apart import measure_apart
-from .bridges import count_bridges, count_degenerate
-from .codec import Codec
+from .codec import TwoStepCodec
 from .codecs import make_codec
-from .codecs.draco import lattice_step
 from .datasets import open_dataset
-from .fresh import peak_rss_mb
-from .groups import group_records
-from .peers import cheapest_forms, measure_fresh_decode, measure_pair, run_fresh
-from .provenance import made_by
-from .rows import FAILED, Point, Row, append_row, read_rows
+from .measure import Bench, measure_point
+from .rd_rows import KINDS as RATED_KINDS
+from .rows import FAILED, Point, Row, append_row, measured_rows, read_rows
 from .scene_rows import KINDS as SCENE_KINDS
-from .scene_rows import measure_scene
 
-PEER_QP = 9  # bits of the Draco meshes whose decoding is the yardstick
 AFTER = ("decode",)  # kinds of points that compare with rows measured before
-CURVE_METRICS = ("d2_psnr_paper", "d2_psnr", "symmetric_psnr", "normal_error_deg", "ssim_masked")  # kept of each frame
 Tell = Callable[[Row, bool], None]  # a row, and whether it is new
-
-
-@dataclass(frozen=True, slots=True)
-class Bench:
-    """Where a run finds its sequences, and what it compares."""
-
-    data: Path  # the folder of the sequences
-    experiment: str = "targets"  # rows of other experiments in the same file are left alone
-    comparison: ComparisonOptions = field(default_factory=ComparisonOptions)
-    cache: Path | None = None  # sequences that take long to make are kept here
-    limit_s: float | None = None  # wall time of a point, which then has a process of its own; None: measured in this
-    retry: bool = False  # points that failed before are measured again
 
 
 def run_points(
@@ -63,13 +35,17 @@ def run_points(
 ) -> list[Row]:
     """Rows of all points, each appended to `file` as soon as it is there; `tell` hears each and whether it is new.
 
-    Points that have a row in the file already are not run again, so an interrupted sweep goes on where it was. With an
-    executor points are measured side by side, but for those that compare with other rows (`AFTER`): they come last.
+    Points that have a row in the file already are not run again, so an interrupted sweep goes on where it was; a row
+    of an experiment that measures alike (`bench.alike`) is written again as one of this. With an executor points are
+    measured side by side, but for those that compare with other rows (`AFTER`): they come last.
     """
     stored = read_rows(file) if file.exists() else []
-    own = [row for row in stored if row.get("experiment", "targets") == bench.experiment]
-    known = {row["point"]: row for row in own if not (bench.retry and FAILED in row)}
+    known = {row["point"]: row for row in _of(stored, bench.experiment) if not (bench.retry and FAILED in row)}
+    others = {row["point"]: row for name in bench.alike for row in measured_rows(_of(stored, name))}
     for point in points:
+        if point.key not in known and point.key in others:
+            known[point.key] = others[point.key] | {"experiment": bench.experiment}
+            append_row(file, known[point.key])
         if point.key in known:
             tell(known[point.key], False)
     missing = [point for point in points if point.key not in known]
@@ -81,19 +57,61 @@ def run_points(
     return [known[point.key] for point in points]
 
 
+def _of(rows: Sequence[Row], experiment: str) -> list[Row]:
+    return [row for row in rows if row.get("experiment", "targets") == experiment]
+
+
 def _measured(points: Sequence[Point], rows: list[Row], bench: Bench, executor: Executor | None) -> Iterator[Row]:
     """A row a point, as each is there."""
-    first = [point for point in points if point.kind not in AFTER]
-    if executor is None:
-        found = (_row_of(point, bench) for point in first)
-    else:
-        found = (task.result() for task in as_completed([executor.submit(_row_of, p, bench) for p in first]))
+    runs = runs_of([point for point in points if point.kind not in AFTER])
+    found = _side_by_side(runs, bench, executor) if executor else (row for run in runs for row in _rows_of(run, bench))
     for row in found:
         rows.append(row)
         yield row
     for point in points:
         if point.kind in AFTER:
-            yield _row_of(point, bench, tuple(rows))
+            yield from _rows_of([point], bench, tuple(rows))
+
+
+def runs_of(points: Sequence[Point]) -> list[list[Point]]:
+    """The points in runs of those that share an analysis (`TwoStepCodec`), in the order of each run's first."""
+    runs: dict[object, list[Point]] = {}
+    for point in points:
+        runs.setdefault(_shared(point), []).append(point)
+    return list(runs.values())
+
+
+def _shared(point: Point) -> object:
+    """Equal for points that share an analysis."""
+    if point.kind in RATED_KINDS:
+        try:
+            codec = make_codec(point.codec, point.options)
+        except InputError:  # told when the point is measured
+            return point.key
+        if isinstance(codec, TwoStepCodec):
+            return point.sequence, point.frames, point.kind, point.codec, codec.analysis_key
+    return point.key
+
+
+def _side_by_side(runs: Sequence[list[Point]], bench: Bench, executor: Executor) -> Iterator[Row]:
+    """The rows of all runs as they come."""
+    arrived: SimpleQueue[Row | Future[None]] = SimpleQueue()
+
+    def measure(run: list[Point]) -> None:
+        for row in _rows_of(run, bench):
+            arrived.put(row)
+
+    waiting = [executor.submit(measure, run) for run in runs]
+    for task in waiting:
+        task.add_done_callback(arrived.put)
+    done = itertools.count(1)
+    while waiting:
+        if isinstance(came := arrived.get(), Future):
+            came.result()  # raises what went wrong
+            if next(done) == len(waiting):
+                return
+        else:
+            yield came
 
 
 def _check_sequences(points: Sequence[Point], bench: Bench) -> None:
@@ -102,142 +120,8 @@ def _check_sequences(points: Sequence[Point], bench: Bench) -> None:
         open_dataset(sequence, bench.data, frames, bench.cache)
 
 
-def _row_of(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
-    """As `measure_point`; where there is a limit, in a process of its own."""
-    return measure_point(point, bench, rows) if bench.limit_s is None else measure_apart(point, bench, rows)
-
-
-def run_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
-    """Encodes, decodes and compares; the row has rate, times by stage, memory and every metric."""
-    return _measured_codec(name, sequence, codec, options)[0]
-
-
-def _measured_codec(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> tuple[Row, bytes]:
-    """The row of `run_point` and the bytes it is about."""
-    timer = StageTimer()
-    data = codec.encode(sequence, timer)
-    encode_s = timer.stop() / len(sequence)
-    video = Checked(codec.decode(data), codec.name, sequence)
-    decode = measure_fresh_decode(data, codec)
-    peer = measure_peer(video)
-    row = _rate(name, sequence, codec, data) | {
-        "encode_s": encode_s,
-        "encode_stages_s": {stage: seconds / len(sequence) for stage, seconds in timer.seconds.items()},
-        "encode_peak_rss_mb": peak_rss_mb(),  # of this process and all points before it
-        "decode": decode,
-        "peer": peer,
-        "decode_over_peer": decode["frame_ms"] / peer["frame_ms"] if peer else None,
-    }
-    row |= compare_sequences(sequence, video, options).to_row() | {"groups": group_records(data)}
-    row |= {"bridges": [count_bridges(a, b) for a, b in zip(sequence, video, strict=True)]}
-    return row | {"degenerate_faces": [count_degenerate(mesh) for mesh in video]}, data
-
-
-def run_curve_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
-    """Rate, groups and metrics only: a point of an anchor's sweep, or of an ablation."""
-    start = time.process_time()
-    data = codec.encode(sequence)
-    row = _rate(name, sequence, codec, data) | {"encode_s": (time.process_time() - start) / len(sequence)}
-    video = Checked(codec.decode(data), codec.name, sequence)
-    measured = compare_sequences(sequence, video, options).to_row()
-    frames = [{key: frame[key] for key in CURVE_METRICS if key in frame} for frame in measured["per_frame"]]
-    return row | measured | {"per_frame": frames, "groups": group_records(data)}
-
-
-def run_floor_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
-    """A row of `run_point` whose groups know the bytes of the cheapest per-frame Draco form that is as good.
-
-    None there: no such form costs less than the group.
-    """
-    row, data = _measured_codec(name, sequence, codec, options)
-    cheapest = cheapest_forms(sequence, open_video(data))
-    return row | {"groups": [g | {"draco_bytes": b} for g, b in zip(row["groups"], cheapest, strict=True)]}
-
-
-def _rate(name: str, sequence: MeshSequence, codec: Codec, data: bytes) -> Row:
-    return {
-        "sequence": name,
-        "codec": codec.name,
-        "options": codec.options,
-        "frames": len(sequence),
-        "frame_rate": sequence.frame_rate,
-        "bytes": len(data),
-        "mbps": len(data) * 8 * sequence.frame_rate / len(sequence) / 1e6,
-    }
-
-
-class Checked(DerivedSequence):
-    """What a codec has decoded, a frame at a time: as many frames as there were, and coordinates that are finite."""
-
-    def __init__(self, decoded: Sequence[Mesh], codec: str, source: MeshSequence) -> None:
-        """Raises InputError where the number of frames is another."""
-        super().__init__(source)
-        if len(decoded) != len(source):
-            raise InputError(f"{codec} decodes {len(decoded)} frames of {len(source)}")
-        self._decoded, self._codec = decoded, codec
-
-    def __getitem__(self, index: int) -> Mesh:
-        mesh = self._decoded[index]
-        if not np.isfinite(mesh.vertices).all():
-            raise InputError(f"{self._codec} decodes coordinates that are not finite in frame {index}")
-        return mesh
-
-
-def measure_peer(video: Frames) -> Row:
-    """The same of DracoPy on the same decoded frames at qp 9, in a fresh process; empty where there is no surface."""
-    frames = []
-    for mesh in video:
-        if not mesh.is_empty:
-            extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
-            data = encode_mesh(mesh, lattice_step(extent, PEER_QP))
-            frames.append(np.frombuffer(data, dtype=np.uint8))
-    if not frames:
-        return {}
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "frames.npz"
-        np.savez(path, *frames)
-        return run_fresh("draco", str(path)) | {"qp": PEER_QP}
-
-
-class StageTimer:
-    """A progress callback that charges processor time to the stage that reports."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._start = self._last = time.process_time()
-
-    def __call__(self, stage: str, _done: int, _total: int) -> None:
-        """The time since the last report belongs to `stage`."""
-        now = time.process_time()
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
-        self._last = now
-
-    def stop(self) -> float:
-        """Processor time since the start, s."""
-        return time.process_time() - self._start
-
-
-def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
-    """The row of a point, by its kind; `rows` are those measured before, for the kinds of `AFTER`."""
-    head = {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | made_by()
-    if point.kind in SCENE_KINDS:
-        return head | measure_scene(point, bench.data, bench.cache)
-    sequence = open_dataset(point.sequence, bench.data, point.frames, bench.cache)
-    if point.kind == "backwards":
-        sequence = Backwards(sequence)
-    row: Row
-    if point.kind == "memory":
-        row = _memory(point, str(bench.data), len(sequence))
-    elif point.kind == "decode":
-        row = measure_pair(point, sequence, rows)
-    else:
-        codec = make_codec(point.codec, point.options)
-        by_kind = {"quality": run_point, "floor": run_floor_point}
-        measure = by_kind.get(point.kind, run_curve_point)
-        row = measure(point.sequence, sequence, codec, bench.comparison)
-    return head | row
-
-
-def _memory(point: Point, data: str, frames: int) -> Row:
-    row = run_fresh("encode", point.sequence, data, str(frames), json.dumps(point.options))
-    return row | {"sequence": point.sequence, "codec": point.codec, "options": point.options}
+def _rows_of(run: Sequence[Point], bench: Bench, rows: Sequence[Row] = ()) -> Iterator[Row]:
+    """As `measure_point`, of each; where there is a limit, in a process of their own."""
+    if bench.limit_s is None:
+        return (measure_point(point, bench, rows) for point in run)
+    return measure_apart(run, bench, rows)

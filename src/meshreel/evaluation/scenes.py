@@ -22,24 +22,26 @@ from ..analysis import segment as segmenter
 from ..analysis.background import BackgroundOptions
 from ..analysis.background_depth import fuse_still_depth
 from ..analysis.segment.scene import SegmentOptions, segment
+from ..capture import room as procedural
 from ..capture.fusion import FusionOptions
-from ..capture.record import Recording, open_recording
+from ..capture.record import open_recording
 from ..capture.rig import RIG
 from ..capture.simulate import TRUTH
 from ..capture.truth import Truth, read_truth
 from ..derived import Chosen
 from ..errors import InputError
 from ..geometry.decimate import decimate_faces
-from ..geometry.depth import DepthPicture
 from ..io.meshes import read_mesh
-from ..io.sequence import open_sequence
-from ..io.write import frame_names, make_folder, replacing, write_mesh
-from ..types import Frames, Mesh, MeshSequence, evenly
+from ..io.write import make_folder, replacing, write_mesh
+from ..types import Mesh, MeshSequence, evenly
+from .captured import Captured
 from .rooms import SPEEDS, RoomOptions, simulate_room
 
 SCENES = tuple(SPEEDS)
 TRUE = "truth"  # labels: those of the nearest clean faces
 FOUND = "found"  # labels: those that the encoder finds
+PROCEDURAL = "procedural_room"  # the room of `meshreel demo`: needs no benchmark data
+PROCEDURAL_FRAMES = 60
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,24 +92,6 @@ class SceneData:
         return fuse_still_depth(moments, FusionOptions().voxel, options)
 
 
-class Captured(Frames):
-    """A rig's frames, fused once and kept as files; what its cameras measured comes from the rig itself."""
-
-    def __init__(self, recording: Recording, meshes: MeshSequence) -> None:
-        self._recording, self._meshes = recording, meshes
-        self.frame_rate = meshes.frame_rate
-
-    def __len__(self) -> int:
-        return len(self._meshes)
-
-    def __getitem__(self, index: int) -> Mesh:
-        return self._meshes[index]
-
-    def pictures(self, index: int) -> list[DepthPicture | None]:
-        """What each camera measured in a frame."""
-        return self._recording.pictures(index)
-
-
 class SceneFrames(Chosen):
     """Some frames of a captured scene, which anchors may ask for its labels."""
 
@@ -121,22 +105,22 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
 
     Raises InputError for an unknown name and where the benchmark data are missing.
     """
-    options = RoomOptions(name) if frames is None else RoomOptions(name, frames)
     folder = cache / (name if frames is None else f"{name}-{frames}")
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
-        simulate_room(rig, data, options)
-    recording, _ = open_recording(rig, keep=False)
-    _capture(recording, meshes)
-    return SceneData(name, folder, Captured(recording, open_sequence(meshes)), read_truth(rig / TRUTH))
+        _simulate(name, rig, data, frames)
+    fusion = FusionOptions(procedural.VOXEL) if name == PROCEDURAL else FusionOptions()
+    recording, _ = open_recording(rig, fusion, keep=False)
+    return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH))
 
 
-def _capture(recording: Recording, meshes: Path) -> None:
-    """Fuses the frames that are not there yet, as `meshreel capture` does."""
-    make_folder(meshes)
-    for number, name in enumerate(frame_names(len(recording), "ply")):
-        if not (meshes / name).exists():
-            write_mesh(recording[number], meshes / name)
+def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
+    """Writes the rig and the truth of a scene."""
+    if name == PROCEDURAL:
+        room = procedural.RoomOptions(PROCEDURAL_FRAMES if frames is None else frames)
+        procedural.record_room(rig, room)
+    else:
+        simulate_room(rig, data, RoomOptions(name) if frames is None else RoomOptions(name, frames))
 
 
 @cache

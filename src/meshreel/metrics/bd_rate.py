@@ -101,6 +101,7 @@ class GainEnd:
     reached: bool  # False: at the end of the overlap the gain goes on, and `quality` is that end
     anchor_best: float  # best quality of the anchor; over it there is nothing to gain against
     test_best: float
+    share: float = 0.0  # of the overlap, in quality, where there is a gain
 
     @property
     def where(self) -> str:
@@ -141,7 +142,20 @@ def gain_end(anchor: Curve, test: Curve) -> GainEnd:
     gains = np.flatnonzero(_log_rate(b, at) < _log_rate(a, at))
     if len(gains) == 0:
         return GainEnd(None, False, *best)
-    return GainEnd(float(at[gains[-1]]), bool(gains[-1] < _GRID - 1), *best)
+    return GainEnd(float(at[gains[-1]]), bool(gains[-1] < _GRID - 1), best[0], best[1], len(gains) / _GRID)
+
+
+def beats(test: Curve, anchor: Curve) -> bool | None:
+    """Whether `test` needs less rate wherever both reach a quality; None where nothing decides.
+
+    Without an overlap it does where each of the anchor's points has one of its own that is better and cheaper.
+    """
+    end = gain_end(anchor, test)
+    if end.share > 0 or bd_rate(anchor, test).percent is not None:
+        return end.share == 1.0
+    a, b = _front(anchor), _front(test)
+    better = [bool(((b[:, 0] >= quality) & (b[:, 1] < rate)).any()) for quality, rate in a]
+    return all(better) if any(better) else None
 
 
 def _front(curve: Curve) -> Float64[np.ndarray, "N 2"]:

@@ -43,7 +43,7 @@ _PSNRS = _LARGER_IS_BETTER[:4]
 class ComparisonOptions:
     """What is measured."""
 
-    cameras: Path | None = None  # Open3D pinhole JSON; None: four views around the originals
+    cameras: Path | Sequence[PinholeCamera] | None = None  # Open3D pinhole JSON; None: four views around the originals
     views: ViewOptions | ParallelViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
     ssim: bool = True  # rendering and SSIM cost some 2 s a frame at 1920 x 1080
     keys: Sequence[int] = ()  # key frames: aggregates are also given without them
@@ -148,7 +148,7 @@ def _distance_row(errors: SurfaceErrors) -> Row:
 
 def _cameras(originals: Iterable[Mesh], options: ComparisonOptions) -> Cameras:
     if options.cameras is not None:
-        return read_cameras(options.cameras)
+        return read_cameras(options.cameras) if isinstance(options.cameras, Path) else options.cameras
     if isinstance(options.views, ParallelViewOptions):
         return parallel_views_around(Box.of(originals), options.views.size, options.views.up)
     return views_around(Box.of(originals), options.views)

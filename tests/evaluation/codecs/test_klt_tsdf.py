@@ -19,7 +19,7 @@ from meshreel.evaluation.codecs.klt_tsdf.grid import VOLUME, prepared, sample, v
 from meshreel.evaluation.codecs.klt_tsdf.surface import Field, crossed, field_of, polygonize
 from meshreel.evaluation.codecs.klt_tsdf.weights import Model, forward
 from meshreel.evaluation.codecs.klt_tsdf.wire import Reader, Writer
-from meshreel.evaluation.runner import run_curve_point
+from meshreel.evaluation.measure import run_curve_point
 from meshreel.geometry.topology import border_edges, components, part_of
 from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.report import ComparisonOptions

@@ -8,6 +8,7 @@ from typing import Any
 
 from ...errors import InputError
 from ..codec import Codec
+from .background_once import BackgroundOnceDracoCodec
 from .draco import DecimatedDracoCodec, DracoCodec
 from .klt_tsdf import KltTsdfCodec
 from .meshreel import MeshreelCodec
@@ -17,6 +18,7 @@ from .tvmc import TvmcCodec
 
 ENTRY_POINTS = "meshreel.codecs"
 CODECS: dict[str, Callable[..., Codec]] = {
+    "background_once_draco": BackgroundOnceDracoCodec,
     "draco": DracoCodec,
     "decimated_draco": DecimatedDracoCodec,
     "meshreel": MeshreelCodec,

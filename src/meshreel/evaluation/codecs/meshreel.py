@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ...decoder import open as open_video
-from ...encoder import encode
+from ...encoder import Encoder
 from ...presets import preset_options
 from ...types import Mesh, MeshSequence
 from ...windows import EncoderOptions
@@ -53,9 +53,25 @@ class MeshreelCodec:
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """The .reel file."""
+        return self.code(self.analyse(sequence, progress), progress)
+
+    @property
+    def analysis_key(self) -> str:
+        """All options but those that choose a rate."""
+        return repr(replace(self, quality=0.0, basis_size=None))
+
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
+        """An encoder that has taken a scene apart."""
+        encoder = Encoder(sequence, progress=progress)
+        encoder.prepare(self.encoder_options)
+        return encoder
+
+    def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
+        """The .reel file."""
+        analysis.progress = progress
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "video.reel"
-            encode(sequence, path, self.encoder_options, progress=progress)
+            analysis.encode(path, self.encoder_options)
             return path.read_bytes()
 
     def decode(self, data: bytes) -> Sequence[Mesh]:

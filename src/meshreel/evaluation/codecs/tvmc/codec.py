@@ -39,7 +39,7 @@ class TvmcCodec:
     @property
     def name(self) -> str:
         """What rows and plots call it."""
-        return "TVMC*"
+        return "tvmc"
 
     @property
     def options(self) -> dict[str, Any]:
@@ -55,13 +55,25 @@ class TvmcCodec:
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """The stream. Raises InputError for frames that cannot be used."""
-        stages = Stages(progress, len(sequence))
-        data = self.code(track_sequence(sequence, self.encoder_options, stages))
-        stages.add("code", len(sequence))
+        return self.code(self.analyse(sequence, progress), progress)
+
+    @property
+    def analysis_key(self) -> str:
+        """All options but `qp`."""
+        return repr(replace(self, qp=LEAST_QP))
+
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Tracking:
+        """The tracking. Raises InputError for frames that cannot be used."""
+        return track_sequence(sequence, self.encoder_options, Stages(progress, len(sequence)))
+
+    def code(self, analysis: Tracking, progress: Progress | None = None) -> bytes:
+        """The stream of what was tracked."""
+        tracking, count = analysis, len(analysis.seen.diagonals)
+        data = self._packed(tracking)
+        Stages(progress, count).add("code", count)
         return data
 
-    def code(self, tracking: Tracking) -> bytes:
-        """The stream of what was tracked."""
+    def _packed(self, tracking: Tracking) -> bytes:
         seen, step = tracking.seen, self.step(tracking)
         bare = np.array([seen.is_bare(frame) for frame in range(len(seen.diagonals))])
         return pack_stream(

@@ -1,0 +1,114 @@
+"""Background once, then decimated Draco per frame: the strongest anchor that needs no tracking. A sequence <-> .reel.
+
+What stands still is what the product finds, coded once as the product codes it; what moves of every frame is decimated
+and coded by Draco on its own. A sequence that is no scene is decimated Draco per frame.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ...analysis.segment.probe import is_scene
+from ...analysis.survey import Survey, survey
+from ...container.writer import ReelWriter
+from ...decoder import open as open_video
+from ...encoder import make_header
+from ...errors import InputError
+from ...geometry.topology import part_of
+from ...parts import Parts, take_apart
+from ...presets import preset_options
+from ...scene import Static, encode_static
+from ...types import Mesh, MeshSequence
+from ...windows import Stages
+from ..codec import Progress
+from .draco import check_qp, encode_frame
+
+
+@dataclass(frozen=True, slots=True)
+class Still:
+    """What stands still, and what is left of a frame."""
+
+    sequence: MeshSequence
+    seen: Survey
+    parts: Parts | None  # None: everything may move
+    states: Sequence[Static]  # of the background
+
+    def moving(self, number: int) -> Mesh:
+        """What moves in a frame, normalised."""
+        mesh = self.sequence[number]
+        if self.parts is None:
+            return self.seen.normalise(mesh)
+        return self.seen.normalise(part_of(mesh, self.parts.segmentation.moving(number, mesh)))
+
+
+@dataclass(frozen=True, slots=True)
+class BackgroundOnceDracoCodec:
+    """A background once, and `fraction` of the vertices of what moves, Draco at `qp` bits, in every frame."""
+
+    fraction: float = 0.25
+    qp: int = 10
+    levels: int = 0  # midpoint subdivisions in the decoder, of what moves
+
+    def __post_init__(self) -> None:
+        check_qp(self.qp)
+        if not 0 < self.fraction <= 1 or not 0 <= self.levels <= 4:
+            raise InputError(f"fraction {self.fraction:g}, levels {self.levels}: give 0 < fraction <= 1, levels 0 to 4")
+
+    @property
+    def name(self) -> str:
+        """What rows and plots call it."""
+        return "background_once_draco" + ("_subdivided" if self.levels else "")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The operating point, ready for JSON."""
+        return asdict(self)
+
+    @property
+    def analysis_key(self) -> str:
+        """The same for all operating points."""
+        return ""
+
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Still:
+        """What stands still. Raises InputError for frames that cannot be used."""
+        stages, options = Stages(progress, len(sequence)), preset_options("best")
+        if not (len(sequence) and is_scene(sequence)):
+            return Still(sequence, survey(sequence, stages), None, ())
+        parts = take_apart(sequence, survey(sequence, stages, cleaned=False), options, stages)
+        states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
+        return Still(sequence, parts.seen, parts, states)
+
+    def code(self, analysis: Still, progress: Progress | None = None) -> bytes:
+        """A .reel file of single frames behind a background."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "anchor.reel"
+            sequence = analysis.sequence
+            with ReelWriter(path, make_header(sequence.frame_rate, analysis.seen, {})) as writer:
+                for number, static in enumerate(_written(writer, analysis)):
+                    data = encode_frame(analysis.moving(number), self.qp, self.fraction, self.levels)
+                    writer.add_group(number, 1, data, (), static)
+                    if progress is not None:
+                        progress("code", number + 1, len(sequence))
+            return path.read_bytes()
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+        """A .reel file of single frames behind a background. Raises InputError for frames that cannot be used."""
+        return self.code(self.analyse(sequence, progress), progress)
+
+    def decode(self, data: bytes) -> Sequence[Mesh]:
+        """The frames, from the bytes alone."""
+        return open_video(data)
+
+
+def _written(writer: ReelWriter, still: Still) -> Iterator[tuple[int, ...]]:
+    """The numbers of the chunks that each frame is shown with; each state is written before its first frame."""
+    states, static = list(still.states), tuple[int, ...]()
+    for number in range(len(still.sequence)):
+        while states and states[0].frame <= number:
+            state = states.pop(0)
+            static = (writer.add_static(state.payload, depends_on=list(static) if state.is_patch else ()),)
+        yield () if still.seen.is_bare(number) else static

@@ -1,0 +1,138 @@
+"""A study: an experiment of the paper's kind, declared as sweeps of codecs over sequences.
+
+A declaration says what is run; points, what is promised of the rows, comparisons and tables follow from it. Rows are
+those of `rd_rows`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..metrics.bd_rate import Curve, beats
+from ..metrics.report import ComparisonOptions
+from .curves import Measure, against, curve, curve_of, value
+from .promises import Promise
+from .rd_rows import FLOOR, RATED, SAMPLED
+from .rows import Point, Row, select
+
+SMALL_SEQUENCE, SMALL_FRAMES = "demo", 3  # procedural: `--small` needs no data
+D2 = Measure("d2_psnr_paper", "D2, paper form", " dB")
+MASKED = Measure("ssim_masked", "masked SSIM", "")
+MEASURES = (D2, MASKED, Measure("ssim", "SSIM", ""), Measure("normal_error_deg", "normal error", " degrees", -1))
+JUDGED = (D2, MASKED)  # what is promised
+Values = Mapping[str, Sequence[Any]]  # options that are varied together, by name
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """A codec over operating points: one for each of the values."""
+
+    codec: str
+    values: Values
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    on: Mapping[str, Values] = field(default_factory=dict)  # other values on these sequences
+    only: Sequence[str] = ()  # sequences; none: on all
+    small: Mapping[str, Any] = field(default_factory=dict)  # what `--small` changes of its one point
+    sampled: Sequence[str] = ()  # sequences of which it is given the frames that are measured
+
+    def points(self, sequence: str, frames: int | None) -> Iterator[Point]:
+        """Its points on a sequence."""
+        if self.only and sequence not in self.only:
+            return
+        values = self.on.get(sequence, self.values)
+        kind = SAMPLED if sequence in self.sampled else RATED
+        for point in zip(*values.values(), strict=True):
+            options = {**self.fixed, **dict(zip(values, point, strict=True))}
+            yield Point(sequence, self.codec, options, frames, kind)
+
+    def small_point(self) -> Point:
+        """The point in the middle, as `--small` has it."""
+        first = {name: several[len(several) // 2] for name, several in self.values.items()}
+        return Point(SMALL_SEQUENCE, self.codec, {**self.fixed, **first, **self.small}, SMALL_FRAMES, RATED)
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """The declaration. `best` is the name, as rows have it, of the codec that is to beat all others; None: none is."""
+
+    sequences: Sequence[str]
+    sweeps: Sequence[Sweep]
+    best: str | None = None
+    anchor: str | None = None  # the codec that all others are compared with; None: `best` is, with all others
+    truths: Sequence[str] = ()  # sequences with a truth
+    frames: Mapping[str, int] = field(default_factory=dict)  # the first so many of a sequence; none said: all
+    common: tuple[str, float] | None = None  # a table of each codec's point nearest to this, by the key of a row
+    notes: Sequence[str] = ()  # Markdown, before the tables
+    METRICS: Sequence[tuple[str, str]] = tuple((measure.key, measure.name) for measure in MEASURES)
+    COMPARISON: ComparisonOptions = field(default_factory=ComparisonOptions)
+
+    def points(self, small: bool) -> Iterator[Point]:
+        """All points, sequence by sequence; where `small`, one of each sweep on a few procedural frames."""
+        if small:
+            yield from (sweep.small_point() for sweep in self.sweeps)
+            return
+        for sequence in self.sequences:
+            frames = self.frames.get(sequence)
+            if sequence in self.truths:
+                yield Point(sequence, "captured", {}, frames, FLOOR)
+            for sweep in self.sweeps:
+                yield from sweep.points(sequence, frames)
+
+    def references(self, _sequence: str) -> dict[str, list[tuple[float, float]]]:
+        """Curves that were not measured here: none."""
+        return {}
+
+    def floors(self, rows: Sequence[Row]) -> dict[str, float]:
+        """What the truth reaches against the input, by metric, on the sequence of the rows."""
+        found = [row for row in rows if row["kind"] == FLOOR]
+        return {key: number for row in found for key, _ in self.METRICS if (number := value(row, key)) is not None}
+
+    def promises(self, rows: Sequence[Row]) -> list[Promise]:
+        """That `best` needs less rate than every other codec at every quality that both reach, a line a sequence."""
+        if self.best is None:
+            return []
+        return [self._left_of_all(rows, sequence) for sequence in _sequences(rows)]
+
+    def comparisons(self, rows: Sequence[Row]) -> Iterator[str]:
+        """BD-rates on the rows of one sequence."""
+        names = list(dict.fromkeys(map(curve_of, rows)))
+        one = self.anchor or self.best
+        for name in names if one in names else ():
+            if name != one:
+                pair = (str(one), name) if self.anchor else (name, str(one))
+                for measure in MEASURES:
+                    found = against(_curve(rows, pair[0], measure), _curve(rows, pair[1], measure), measure)
+                    yield f"- BD-rate of {pair[1]} against {pair[0]}: {found}"
+
+    def shown(self, rows: Sequence[Row]) -> list[Row]:
+        """The rows of one sequence that its table has: all."""
+        return list(rows)
+
+    def sections(self, _rows: Sequence[Row]) -> Iterator[str]:
+        """What must be known of the numbers."""
+        yield from ("", *self.notes) if self.notes else ()
+
+    def _left_of_all(self, rows: Sequence[Row], sequence: str) -> Promise:
+        own = [row for kind in (RATED, SAMPLED) for row in select(rows, sequence, kind=kind)]
+        text = f"{sequence}: {self.best} needs less rate than every other codec wherever both reach a quality"
+        told, met = list[str](), list[bool]()
+        for name in dict.fromkeys(map(curve_of, own)):
+            for measure in JUDGED if name != self.best else ():
+                best, other = _curve(own, str(self.best), measure), _curve(own, name, measure)
+                if (left := beats(best, other)) is not None:
+                    met.append(left)
+                    told += [] if left else [f"{name}: {against(other, best, measure)}"]
+        if not met:
+            return Promise(text, "in D2 and masked SSIM")
+        found = f"in {sum(met)} of {len(met)} comparisons"
+        return Promise(text, "in D2 and masked SSIM", "; not ".join([found, *told]), all(met))
+
+
+def _curve(rows: Sequence[Row], name: str, measure: Measure) -> Curve:
+    return curve([row for row in rows if curve_of(row) == name], name, measure)
+
+
+def _sequences(rows: Sequence[Row]) -> list[str]:
+    return list(dict.fromkeys(row["sequence"] for row in rows))

@@ -1,0 +1,143 @@
+"""Rows alike for every codec: rates of all bytes, analyses that points share, sampled scenes, pictures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.derived import Chosen
+from meshreel.encoder import encode
+from meshreel.errors import InputError
+from meshreel.evaluation import rd_rows
+from meshreel.evaluation.codec import TwoStepCodec
+from meshreel.evaluation.codecs import CODECS, make_codec
+from meshreel.evaluation.datasets import open_known
+from meshreel.evaluation.measure import Bench, measure_point
+from meshreel.evaluation.rd_rows import FLOOR, RATED, SAMPLED
+from meshreel.evaluation.rows import FAILED, Point
+from meshreel.evaluation.runner import run_points, runs_of
+from meshreel.metrics.cameras import ViewOptions
+from meshreel.metrics.report import ComparisonOptions
+
+BALLS = sliding_sphere(3, levels=2)
+QUICK = ComparisonOptions(views=ViewOptions(96, 64))
+ROOM = "procedural_room"
+FRAMES = 12  # of it: more than are measured
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """A folder with `ball`, and another to keep things in."""
+    folder = tmp_path_factory.mktemp("rated")
+    np.savez(folder / "ball.npz", vertices=np.stack([mesh.vertices for mesh in BALLS]), faces=BALLS[0].faces)
+    return Bench(folder, "figure6", QUICK, folder / "rows.cache")
+
+
+@pytest.fixture(scope="module")
+def room(bench):
+    """The procedural room, captured."""
+    return open_known(ROOM, bench.data, FRAMES, bench.cache)
+
+
+def test_a_body_is_judged_by_all_frames_and_drawn(bench):
+    row = measure_point(Point("ball", "draco", {"qp": 9}, kind=RATED), bench)
+    data = make_codec("draco", {"qp": 9}).encode(BALLS)
+    assert row["bytes"] == len(data) and row["mbps"] == pytest.approx(len(data) * 8 * 30 / 3 / 1e6)
+    assert row["measured_frames"] == [0, 1, 2] and row["frames_compared"] == 3 and len(row["per_frame"]) == 3
+    assert 0 < row["ssim_masked"] <= row["ssim"] <= 1 and row["decode"]["frames"] == 3 and "truth_ssim" not in row
+    folder, named = bench.cache.with_suffix(".pictures"), row["pictures"]
+    sizes = {Image.open(folder / name).size for name in ("ball-original.png", named["normals"], named["errors"])}
+    assert named["frame"] == 1 and sizes == {(900, 900)}
+    errors = np.asarray(Image.open(folder / named["errors"]))
+    seen = (np.asarray(Image.open(folder / "ball-original.png")) < 255).any(axis=2)
+    assert (errors[~seen] == 255).all() and (errors[seen] < 255).any(axis=1).all()
+
+
+@pytest.mark.slow
+def test_a_scene_is_judged_by_some_frames_from_where_its_cameras_stood(bench, room):
+    whole = measure_point(Point(ROOM, "draco", {"qp": 9}, FRAMES, RATED), bench)
+    some = measure_point(Point(ROOM, "draco", {"qp": 9}, FRAMES, SAMPLED), bench)
+    numbers = whole["measured_frames"]
+    assert numbers == some["measured_frames"] and len(numbers) == 10 and numbers[-1] == FRAMES - 1
+    assert (whole["coded_frames"], some["coded_frames"]) == (FRAMES, 10)
+    data = make_codec("draco", {"qp": 9}).encode(Chosen(room.sequence, numbers))
+    assert some["mbps"] == pytest.approx(len(data) * 8 * 30 / 10 / 1e6)
+    assert some["mbps"] == pytest.approx(whole["mbps"], rel=0.05)
+    for name in ("d2_psnr_paper", "ssim_masked", "truth_ssim_masked"):
+        assert some[name] == pytest.approx(whole[name], rel=0.02)
+    floor = measure_point(Point(ROOM, "captured", {}, FRAMES, FLOOR), bench)
+    assert floor["codec"] == rd_rows.NOISE_FLOOR and "mbps" not in floor
+    assert some["truth_ssim_masked"] < floor["truth_ssim_masked"]  # what is coded is no better than what it is made of
+    assert floor["ssim_masked"] < some["ssim_masked"]  # and nearer to it than the truth
+
+
+def test_a_floor_needs_a_truth(bench):
+    with pytest.raises(InputError, match="needs the truth"):
+        measure_point(Point("ball", "captured", {}, kind=FLOOR), bench)
+
+
+TWO_STEPS = {
+    "meshreel": {"preset": "best", "quality": 20.0},
+    "background_once_draco": {"fraction": 0.2, "qp": 9},
+    "tvmc": {"qp": 7, "vertices": 300, "centers": 60},
+}
+
+
+def test_codecs_in_two_steps_are_those_that_say_so():
+    assert {kind for kind in CODECS if isinstance(make_codec(kind, {}), TwoStepCodec)} == set(TWO_STEPS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", TWO_STEPS)
+def test_two_steps_give_the_bytes_of_one_and_leave_the_analysis_as_it_was(kind, room):
+    codec = make_codec(kind, TWO_STEPS[kind])
+    some = Chosen(room.sequence, range(0, FRAMES, 2))
+    analysis = codec.analyse(some)
+    data = codec.code(analysis)
+    assert data == codec.code(analysis) == codec.encode(some)
+    assert len(codec.decode(data)) == len(some)
+
+
+@pytest.mark.slow
+def test_meshreel_in_two_steps_writes_what_its_encoder_writes(room, tmp_path):
+    codec = make_codec("meshreel", TWO_STEPS["meshreel"])
+    some = Chosen(room.sequence, range(0, FRAMES, 2))
+    encode(some, tmp_path / "a.reel", codec.encoder_options)
+    assert codec.encode(some) == (tmp_path / "a.reel").read_bytes()
+
+
+def test_points_of_one_analysis_are_measured_together_and_analysed_once(bench, monkeypatch, tmp_path):
+    points = [
+        Point("ball", "tvmc", TWO_STEPS["tvmc"] | changed, kind=RATED)
+        for changed in ({"qp": 6}, {"vertices": 200}, {"qp": 8})
+    ]
+    draco = Point("ball", "draco", {}, kind=RATED)
+    assert runs_of([points[0], draco, *points[1:]]) == [[points[0], points[2]], [draco], [points[1]]]
+    assert runs_of([Point("ball", "draco", {"qp": -1}, kind=RATED)]) != []  # told when it is measured
+    calls = []
+    track = CODECS["tvmc"].analyse
+    monkeypatch.setattr(CODECS["tvmc"], "analyse", lambda *a: calls.append(a) or track(*a))
+    rows = run_points(points, tmp_path / "rows.jsonl", bench, lambda *_: None)
+    assert len(calls) == 2 and [row["options"]["qp"] for row in rows] == [6, 7, 8]
+    assert rows[0]["bytes"] < rows[2]["bytes"]
+    for row in rows:  # each has paid for the tracking
+        assert row["encode_stages_s"]["track"] > 0 and row["encode_s"] >= row["encode_stages_s"]["track"]
+    assert rows[0]["encode_stages_s"]["track"] == rows[2]["encode_stages_s"]["track"]
+
+
+def test_rows_of_an_experiment_that_measures_alike_count(bench, monkeypatch, tmp_path):
+    point, file = Point("ball", "draco", {"qp": 7}, kind=RATED), tmp_path / "rows.jsonl"
+    [row] = run_points([point], file, bench, lambda *_: None)
+    monkeypatch.setattr(rd_rows, "measure_rated", lambda *_: pytest.fail("measured again"))
+    other = Bench(bench.data, "table2", QUICK, bench.cache, alike=("figure6", "table2"))
+    [again] = run_points([point], file, other, lambda *_: None)
+    assert again == row | {"experiment": "table2"} and len(file.read_text().splitlines()) == 2
+
+
+def test_who_fails_ends_neither_its_run_nor_the_sweep(bench, tmp_path):
+    limited = Bench(bench.data, "figure6", ComparisonOptions(ssim=False), None, limit_s=120)
+    points = [Point("ball", "draco", {"qp": qp}, kind=RATED) for qp in (9, 99, 8)]
+    rows = run_points(points, tmp_path / "rows.jsonl", limited, lambda *_: None)
+    assert [FAILED in row for row in rows] == [False, True, False] and "qp 99" in rows[1][FAILED]

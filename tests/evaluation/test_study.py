@@ -1,0 +1,89 @@
+"""Studies: points follow from a declaration, and promises from rows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from meshreel.evaluation import experiments
+from meshreel.evaluation.experiments import EXPERIMENTS
+from meshreel.evaluation.rd_rows import FLOOR, RATED, SAMPLED
+from meshreel.evaluation.rows import Point
+from meshreel.evaluation.study import SMALL_SEQUENCE, Study, Sweep
+
+STUDIES = {name: study for name, study in EXPERIMENTS.items() if isinstance(study, Study)}
+STUDY = Study(
+    sequences=("room", "body"),
+    sweeps=(
+        Sweep("meshreel", {"quality": (1.0, 2.0, 3.0)}, {"preset": "best"}, {"room": {"quality": (5.0,)}}),
+        Sweep("draco", {"qp": (7, 8)}, sampled=("room",), small={"qp": 4}),
+        Sweep("background_once_draco", {"fraction": (0.1,), "qp": (9,)}, only=("room",)),
+    ),
+    best="best",
+    truths=("room",),
+    frames={"room": 20},
+)
+
+
+def row(codec, mbps, db, sequence="body", kind=RATED, **changed):
+    base = {"sequence": sequence, "codec": codec, "kind": kind, "mbps": mbps, "d2_psnr_paper": db, "options": {}}
+    return base | {"ssim_masked": db / 100} | changed
+
+
+def test_points_follow_from_the_declaration():
+    found = list(STUDY.points(False))
+    assert found[0] == Point("room", "captured", {}, 20, FLOOR)
+    assert found[1] == Point("room", "meshreel", {"preset": "best", "quality": 5.0}, 20, RATED)
+    assert [p.options for p in found if p.codec == "draco"] == [{"qp": 7}, {"qp": 8}] * 2
+    assert {p.kind for p in found if p.codec == "draco" and p.sequence == "room"} == {SAMPLED}
+    assert [p.sequence for p in found if p.codec == "background_once_draco"] == ["room"]
+    assert sum(p.codec == "meshreel" for p in found) == 4 and all(p.frames is None for p in found[5:])
+
+
+def test_the_small_form_has_one_point_of_every_sweep_on_procedural_frames():
+    assert [p.options for p in STUDY.points(True)] == [
+        {"preset": "best", "quality": 2.0},
+        {"qp": 4},
+        {"fraction": 0.1, "qp": 9},
+    ]
+    assert {p.sequence for p in STUDY.points(True)} == {SMALL_SEQUENCE}
+
+
+@pytest.mark.parametrize("name", STUDIES)
+def test_declarations_are_short_and_every_codec_of_the_paper_is_in_the_small_form(name):
+    assert STUDIES[name].COMPARISON.ssim
+    path = Path(experiments.__file__).with_name(f"{name}.py")
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 60
+    if name in ("figure6", "table1", "table2"):
+        small = {point.codec for point in STUDIES[name].points(True)}
+        assert small >= {"meshreel", "draco", "tvmc", "klt_tsdf", "necgs", "decimated_draco", "background_once_draco"}
+
+
+def test_the_promise_is_kept_only_where_the_best_is_left_of_all():
+    best = [row("best", 0.5, 60), row("best", 1.0, 65)]
+    other = [row("other", 1.0, 60), row("other", 2.0, 65)]
+    [promise] = STUDY.promises([*best, *other])
+    assert promise.met and "in 2 of 2 comparisons" in promise.value
+    crossing = [row("third", 0.4, 60), row("third", 2.0, 65)]
+    [promise] = STUDY.promises([*best, *other, *crossing])
+    assert promise.met is False and promise.value.startswith("in 2 of 4 comparisons; not third: D2, paper form")
+    [promise] = STUDY.promises(best)
+    assert promise.met is None
+    assert list(STUDY.comparisons([*best, *other]))[0].startswith(
+        "- BD-rate of best against other: D2, paper form -50.0"
+    )
+
+
+def test_an_anchor_is_what_others_are_compared_with():
+    study = Study(sequences=("body",), sweeps=(), anchor="whole", notes=("A note.",))
+    rows = [row("whole", 0.5, 60), row("whole", 1.0, 65), row("part", 1.0, 60), row("part", 2.0, 65)]
+    assert study.promises(rows) == []
+    assert list(study.comparisons(rows))[0].startswith("- BD-rate of part against whole: D2, paper form +100.0 %")
+    assert "A note." in list(study.sections(rows))
+
+
+def test_the_floor_is_what_the_truth_reaches():
+    floor = row("noise floor", 0.0, 57.5, "room", FLOOR)
+    assert STUDY.floors([floor, row("best", 1.0, 60, "room")]) == {"d2_psnr_paper": 57.5, "ssim_masked": 0.575}
+    assert STUDY.floors([row("best", 1.0, 60, "room")]) == {}
