@@ -1,4 +1,4 @@
-"""The promises of `layers` and the table of `ablation_stages`, on rows made up: kept by good ones, missed by bad ones."""
+"""The promises of `layers` and what `ablation_stages` tells, on rows made up: kept by good ones, missed by bad ones."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def test_the_promise_is_kept_only_where_the_best_is_left_of_all():
     assert promise.met is False and promise.value.startswith("in 2 of 4 comparisons; not third: D2, paper form")
     [promise] = STUDY.promises(best)
     assert promise.met is None
-    assert list(STUDY.comparisons([*best, *other]))[0].startswith(
+    assert next(iter(STUDY.comparisons([*best, *other]))).startswith(
         "- BD-rate of best against other: D2, paper form -50.0"
     )
 
@@ -79,7 +79,7 @@ def test_an_anchor_is_what_others_are_compared_with():
     study = Study(sequences=("body",), sweeps=(), anchor="whole", notes=("A note.",))
     rows = [row("whole", 0.5, 60), row("whole", 1.0, 65), row("part", 1.0, 60), row("part", 2.0, 65)]
     assert study.promises(rows) == []
-    assert list(study.comparisons(rows))[0].startswith("- BD-rate of part against whole: D2, paper form +100.0 %")
+    assert next(iter(study.comparisons(rows))).startswith("- BD-rate of part against whole: D2, paper form +100.0 %")
     assert "A note." in list(study.sections(rows))
 
 

@@ -12,7 +12,7 @@ from ..errors import InputError
 
 Row = dict[str, Any]
 FAILED = "failed"  # of a row: why nothing was measured
-CURVE_KINDS = ("quality", "curve", "floor", "scene")  # rows that have a rate and metrics
+CURVE_KINDS = ("quality", "curve", "floor", "scene", "rated", "sampled")  # rows that have a rate and metrics
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,8 @@ class Point:
     frames: int | None = None  # the first so many; None: all
     # "quality": rate, times, metrics; "curve": rate and metrics only; "floor": quality, and each group against Draco;
     # "backwards": "curve" of the frames in reverse; "memory": peak memory of an encode in a fresh process;
-    # "decode": decoding beside the anchor of equal quality; those of `scene_rows.KINDS` are about scenes
+    # "decode": decoding beside the anchor of equal quality; those of `scene_rows.KINDS` are about scenes, and those of
+    # `rd_rows.KINDS` alike for all sequences
     kind: str = "quality"
 
     @property

@@ -43,7 +43,7 @@ def test_the_background_is_sent_once_and_what_moves_in_every_frame(room):
         codec.decode(data[: len(data) // 2])[FRAMES - 1]
 
 
-def test_what_is_no_scene_is_decimated_draco(tmp_path):
+def test_what_is_no_scene_is_decimated_draco():
     balls = sliding_sphere(2, levels=3)
     found = BackgroundOnceDracoCodec(0.3, 9).decode(BackgroundOnceDracoCodec(0.3, 9).encode(balls))
     plain = DecimatedDracoCodec(0.3, 9).decode(DecimatedDracoCodec(0.3, 9).encode(balls))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ...errors import InputError
 from ...metrics.report import ComparisonOptions
@@ -23,6 +23,7 @@ from . import (
 )
 
 
+@runtime_checkable
 class Experiment(Protocol):
     """What an experiment says of itself: a module of this package, or a `Study`.
 
