@@ -8,6 +8,8 @@ import pytest
 
 from meshreel.evaluation import experiments
 from meshreel.evaluation.experiments import EXPERIMENTS
+from meshreel.evaluation.experiments.figure6_goals import goals
+from meshreel.evaluation.published import DANCER_DRACO
 from meshreel.evaluation.rd_rows import FLOOR, RATED, SAMPLED
 from meshreel.evaluation.rows import Point
 from meshreel.evaluation.study import SMALL_SEQUENCE, Study, Sweep
@@ -87,3 +89,17 @@ def test_the_floor_is_what_the_truth_reaches():
     floor = row("noise floor", 0.0, 57.5, "room", FLOOR)
     assert STUDY.floors([floor, row("best", 1.0, 60, "room")]) == {"d2_psnr_paper": 57.5, "ssim_masked": 0.575}
     assert STUDY.floors([row("best", 1.0, 60, "room")]) == {}
+
+
+def test_the_goals_of_figure_6_say_what_falls_short():
+    draco = [row("draco", mbps, 60, "dancer", options={"qp": qp}) for qp, mbps in DANCER_DRACO.items()]
+    tvmc = [row("tvmc", 10.0, 66, "synthetic4"), row("tvmc", 20.0, 69, "synthetic4")]
+    kept = goals([*draco, *tvmc])
+    assert [p.met for p in kept] == [True, True, True, None]
+    assert kept[1].value == "20.00 Mbps at 69.00 dB"
+    draco[0] = draco[0] | {"mbps": 1.03 * draco[0]["mbps"]}
+    missed = goals([*draco, *[r | {"mbps": 26.0 + r["mbps"]} for r in tvmc]])
+    assert [p.met for p in missed] == [False, False, True, None] and "qp 7: +3.0 %" in missed[0].value
+    falling = goals([row("klt_tsdf", 1.0, 60), row("klt_tsdf", 2.0, 59)])[3]
+    assert falling.met is False and falling.value == "body: 60.00 and 59.00 dB"
+    assert all(p.met is None for p in goals([]))

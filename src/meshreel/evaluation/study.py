@@ -6,7 +6,7 @@ those of `rd_rows`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -61,6 +61,7 @@ class Study:
     sweeps: Sequence[Sweep]
     best: str | None = None
     anchor: str | None = None  # the codec that all others are compared with; None: `best` is, with all others
+    goals: Callable[[Sequence[Row]], list[Promise]] | None = None  # what else is promised
     truths: Sequence[str] = ()  # sequences with a truth
     frames: Mapping[str, int] = field(default_factory=dict)  # the first so many of a sequence; none said: all
     common: tuple[str, float] | None = None  # a table of each codec's point nearest to this, by the key of a row
@@ -90,10 +91,9 @@ class Study:
         return {key: number for row in found for key, _ in self.METRICS if (number := value(row, key)) is not None}
 
     def promises(self, rows: Sequence[Row]) -> list[Promise]:
-        """That `best` needs less rate than every other codec at every quality that both reach, a line a sequence."""
-        if self.best is None:
-            return []
-        return [self._left_of_all(rows, sequence) for sequence in _sequences(rows)]
+        """That `best` needs less rate than every other codec at every quality that both reach; then the goals."""
+        left = [self._left_of_all(rows, sequence) for sequence in _sequences(rows)] if self.best else []
+        return [*left, *(self.goals(rows) if self.goals else ())]
 
     def comparisons(self, rows: Sequence[Row]) -> Iterator[str]:
         """BD-rates on the rows of one sequence."""

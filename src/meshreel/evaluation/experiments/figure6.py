@@ -6,6 +6,7 @@ SYSTEMS are the paper's, at operating points of their own kinds, and the anchors
 from __future__ import annotations
 
 from ..study import Study, Sweep
+from .figure6_goals import goals
 
 SCENES = ("room2", "living_room", "procedural_room")
 BODIES = ("dancer", "basketball_player", "mitch", "demo")
@@ -41,6 +42,7 @@ STUDY = Study(
     sequences=("synthetic4", *SCENES, *BODIES),
     sweeps=SYSTEMS,
     best="meshreel best",
+    goals=goals,
     truths=(ROOM, "procedural_room"),
     notes=NOTES,
 )
