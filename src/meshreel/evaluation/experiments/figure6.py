@@ -27,7 +27,7 @@ SYSTEMS = (
     ),
     Sweep("tvmc", {"qp": (5, 7, 9, 11)}, on={ROOM: {"qp": (5, 7, 9)}}, small=FEW | {"vertices": 600}),
     Sweep("draco", {"qp": (6, 7, 8, 9, 10)}, sampled=SCENES),
-    Sweep("klt_tsdf", VOXELS, on=dict.fromkeys(SCENES, FINER), small={"cells": 96}),
+    Sweep("klt_tsdf", VOXELS, on=dict.fromkeys(SCENES, FINER), sampled=(ROOM,), small={"cells": 96}),
     Sweep("necgs", {"channels": (8, 16, 24)}, sampled=SCENES, small=QUICK),
     Sweep("decimated_draco", FRACTIONS, on=OF_SCENES, sampled=SCENES),
     Sweep("decimated_draco", FRACTIONS, {"levels": 1}, on=OF_SCENES, sampled=SCENES),
