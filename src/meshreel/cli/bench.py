@@ -135,7 +135,8 @@ def report(
     joined = join_rows([read_rows(path) for path in rows])
     measured = measured_rows(joined)
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
-    written = [str(path) for path in write_report(measured, EXPERIMENTS, output)]
+    pictures = [path.with_suffix(".pictures") for path in rows]
+    written = [str(path) for path in write_report(joined, EXPERIMENTS, output, pictures)]
     reached = [
         promise
         for name, chosen in EXPERIMENTS.items()
