@@ -1,4 +1,4 @@
-"""`meshreel bench run|report`: codecs swept over sequences into JSON rows, and tables and plots made from rows."""
+"""`meshreel bench run|report`: codecs swept over sequences into JSON rows, and pages made from rows."""
 
 from __future__ import annotations
 
@@ -123,12 +123,16 @@ def report(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     common: Common = Common(),
 ) -> None:
-    """Write results.md and plots from rows, and from nothing else.
+    """Write pages, plots and tables from rows, and from nothing else.
+
+    `index.html` has all in one file; `results.md` is the same with the plots beside it, as PNG and SVG, in `results/`.
+    Points that failed are listed with their reasons. Same rows, same bytes.
 
     Parameters
     ----------
     rows
-        JSON-lines files that `run` wrote, of any experiments; of a point that several have, the first counts.
+        JSON-lines files that `run` wrote, of any experiments; of a point that several have, the first counts. The
+        pictures that rows name are in a folder beside their file, whose name ends in `.pictures`: they make sheets.
     output
         The folder to write into.
     """

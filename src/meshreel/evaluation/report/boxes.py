@@ -53,8 +53,8 @@ def is_covered(picture: UInt8[np.ndarray, "H W 3"]) -> Bool[np.ndarray, "H W"]:
 def detail_box(picture: UInt8[np.ndarray, "H W 3"]) -> Window | None:
     """The window with the largest variance of color among those that the surface covers; the first of equal ones.
 
-    A fifth of the picture's size, or half of that and so on where no such window is covered enough. Only covered
-    pixels count: else the outline would always be the most detailed.
+    A fifth of the picture's size, or half of that and so on where no such window is covered enough. White is no
+    color: else the outline would always be the most detailed.
     """
     height, width = (max(side // SHARE, 1) for side in picture.shape[:2])
     smallest = min(_SMALLEST, height, width)
@@ -82,13 +82,11 @@ def cut_out(picture: UInt8[np.ndarray, "H W 3"], window: Window) -> UInt8[np.nda
 
 
 def _variance(colors: np.ndarray, count: np.ndarray, height: int, width: int) -> Float64[np.ndarray, "h w"]:
-    """Of the covered pixels of every window, all channels together."""
-    number = np.maximum(count, 1).astype(np.float64)
+    """Of every window, all channels together; what is not covered counts as the mean of the rest."""
     total = np.zeros(count.shape)
     for channel in np.moveaxis(colors, 2, 0):
-        mean = _sums(channel, height, width) / number
-        total += _sums(channel**2, height, width) / number - mean**2
-    return total
+        total += _sums(channel**2, height, width) - _sums(channel, height, width) ** 2 / np.maximum(count, 1)
+    return total / (height * width)
 
 
 def _sums(values: Shaped[np.ndarray, "H W"], height: int, width: int) -> Shaped[np.ndarray, "h w"]:
@@ -112,13 +110,14 @@ def _place_inset(covered: Bool[np.ndarray, "H W"], cut: Window, box: Window) -> 
     """What is shown, the box and the inset: in the corner where it hides least, with white added beside the surface
     where that hides less. The box itself is never hidden."""
     longer = max(cut.shape)
+    gap = max(1, round(_MARGIN * longer))
     times = min(_INSET * covered.shape[0], _INSET_OF_CUT * longer) / box.shape[0]
     size = round(times * box.shape[0]), round(times * box.shape[1])
     inside = covered[cut.top : cut.bottom, cut.left : cut.right]
     dense = inside.mean() > _DENSE
     found = []
-    for wider, inset in _candidates(cut, size):
-        if _apart(inset, box):
+    for wider, inset in _candidates(cut, size, gap):
+        if _apart(inset, box, gap):
             added = wider.shape[1] - cut.shape[1] + wider.shape[0] - cut.shape[0]
             hidden = (cut_out(covered[..., None].repeat(3, 2).astype(np.uint8), inset) == 1).mean()
             found.append((_PADDING * added / longer + float(hidden), added > 0 and dense, wider, inset))
@@ -126,7 +125,7 @@ def _place_inset(covered: Bool[np.ndarray, "H W"], cut: Window, box: Window) -> 
     return wider, box, inset
 
 
-def _candidates(cut: Window, size: tuple[int, int]) -> Iterator[tuple[Window, Window]]:
+def _candidates(cut: Window, size: tuple[int, int], gap: int) -> Iterator[tuple[Window, Window]]:
     """What is shown, wider by more and more white to one side, and the inset in its two corners there.
 
     The last ones have the inset beside all that was shown. What is lower than the inset is higher by the difference.
@@ -134,7 +133,7 @@ def _candidates(cut: Window, size: tuple[int, int]) -> Iterator[tuple[Window, Wi
     high, wide = size
     bottom = max(cut.bottom, cut.top + high)
     for step in range(_STEPS + 1):
-        white = -(-wide * step // _STEPS)
+        white = -(-(wide + gap) * step // _STEPS)
         for left, right in ((cut.left, cut.right + white), (cut.left - white, cut.right)):
             shown = Window(cut.top, bottom, left, max(right, left + wide))
             for edge in (shown.left, shown.right - wide):
@@ -142,5 +141,5 @@ def _candidates(cut: Window, size: tuple[int, int]) -> Iterator[tuple[Window, Wi
                 yield shown, Window(shown.bottom - high, shown.bottom, edge, edge + wide)
 
 
-def _apart(a: Window, b: Window) -> bool:
-    return a.bottom <= b.top or b.bottom <= a.top or a.right <= b.left or b.right <= a.left
+def _apart(a: Window, b: Window, gap: int) -> bool:
+    return max(b.top - a.bottom, a.top - b.bottom, b.left - a.right, a.left - b.right) >= gap

@@ -43,15 +43,14 @@ th { border-bottom-width: 2px; background: var(--faint); }
   :root { color-scheme: light; --text: #000; --page: #fff; --line: #999; --faint: #fff; --quiet: #333; }
   body { max-width: none; padding: 0; font-size: 10pt; }
   nav { display: none; }
-  h1 { break-before: page; }
-  h1:first-of-type { break-before: auto; }
   h1, h2, h3 { break-after: avoid; }
   img, tr { break-inside: avoid; }
   img.plot { width: 17cm; }
   .wide { overflow: visible; }
-  table { font-size: 6.5pt; }
-  th, td { padding: 1.5pt 2.5pt; overflow-wrap: anywhere; }
+  table { font-size: 6pt; line-height: 1.25; }
+  th, td { padding: 1.5pt 2pt; overflow-wrap: break-word; }
 }
+@page { margin: 1.5cm; }
 """
 
 
@@ -68,6 +67,7 @@ def html_page(title: str, lines: Sequence[str], pictures: Mapping[str, bytes]) -
     for token in tokens:
         if token.children:
             token.children = _within(token.children, pictures)
+    reader.add_render_rule("text", _breakable)
     body = reader.renderer.render(tokens, reader.options, {})
     body = body.replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")
     return (
@@ -76,6 +76,11 @@ def html_page(title: str, lines: Sequence[str], pictures: Mapping[str, bytes]) -
         f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
         f"<nav>\n{_contents(heads)}</nav>\n{body}</body>\n</html>\n"
     )
+
+
+def _breakable(_renderer: object, tokens: Sequence[Token], place: int, _options: object, _env: object) -> str:
+    """Text that may go on in the next line behind an underscore: names of codecs are long and columns narrow."""
+    return escape(tokens[place].content).replace("_", "_<wbr>")
 
 
 def _name_heads(tokens: Sequence[Token]) -> list[tuple[str, str, str]]:

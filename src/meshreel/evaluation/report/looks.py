@@ -41,10 +41,10 @@ KNOWN: dict[str, Look] = {
 }
 # For all others, by their place among the sorted names: 8 colors and 5 markers make 40 pairs.
 _COLORS = ("#882255", "#6699CC", "#999933", "#332288", "#AA4499", "#661100", "#777777", "#66A61E")
-_MARKERS = ("p", "h", ">", "8", "s")
+_MARKERS = (">", "p", "<", "H", "d")
 
-_HIGHER = ("psnr", "ssim", "iou", "covered", "fps")
-_LOWER = ("error", "rms", "hausdorff", "median", "mbps", "bytes", "rss", "called_dynamic", "encode", "decode", "seam")
+_HIGHER = ("psnr", "ssim", "iou", "covered")
+_LOWER = ("error", "rms", "hausdorff", "median", "mbps", "bytes", "rss", "called_dynamic", "encode", "decode", "seam_")
 _LOWER_UNITS = ("_deg", "_m", "_mm", "_ms", "_s", "_percent")
 
 
@@ -66,9 +66,9 @@ def looks_of(names: Iterable[str]) -> dict[str, Look]:
 
 def direction(key: str) -> int:
     """1 where more of a metric is better, -1 where less is, 0 where its name does not tell."""
-    if any(word in key for word in _HIGHER):
-        return 1
-    return -1 if any(word in key for word in _LOWER) or key.endswith(_LOWER_UNITS) else 0
+    if any(word in key for word in _LOWER) or key.endswith(_LOWER_UNITS):
+        return -1
+    return 1 if any(word in key for word in _HIGHER) else 0
 
 
 def arrow(sign: int) -> str:

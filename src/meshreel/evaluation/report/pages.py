@@ -23,8 +23,6 @@ from .plots import plot_curves
 from .sheets import Shots, draw_sheet, find_shots
 from .tables import (
     FIRST,
-    common_rate,
-    comparable_table,
     failure_table,
     maker_table,
     point_table,
@@ -35,7 +33,6 @@ from .tables import (
 
 FOLDER = "results"  # of plots and sheets, beside the pages
 TITLE = "meshreel: results"
-RANKS = "The best is **bold**, the second best *italic*."
 SHEET = "-sheet"  # ends the names of sheets
 
 
@@ -77,7 +74,9 @@ def write_report(
             files += _draw(part, looks, {sequence: found for sequence, found in shots.items() if found})
             lines += [*([""] if lines else []), *_part(part, shots)]
     lines += [*_failures(failed_rows(rows)), *_origin(rows, experiments)]
-    inlined = {f"{FOLDER}/{path.with_suffix('.png').name}": path.read_bytes() for path in files}  # SVG comes last
+    # The page has the PNG of each plot; its SVG twin comes after it, and takes its place in HTML.
+    inlined = {f"{FOLDER}/{path.with_suffix('.png').name}": path.read_bytes() for path in files}
+    lines = [line for line, last in zip(lines, ["", *lines], strict=False) if line or last]  # no two empty ones
     pages = {"results.md": "\n".join(lines) + "\n", "index.html": html_page(TITLE, lines, inlined)}
     for page, content in pages.items():
         with replacing(folder / page) as file:
@@ -116,29 +115,9 @@ def _part(part: Part, shots: Mapping[str, Shots | None]) -> Iterator[str]:
             yield from (f"Rows of more than one version: {', '.join(made)}.", "")
         shown = part.chosen.shown(own)
         yield from (*(point_table(shown) if shown else ()), "", *part.chosen.comparisons(own))
-        yield from _at_one_rate(part, own)
         if (found := shots[sequence]) is not None:
             yield from ("", *_sheet(part, found))
     yield from part.chosen.sections(part.rows)
-
-
-def _at_one_rate(part: Part, rows: Sequence[Row]) -> Iterator[str]:
-    """The codecs of one sequence at a common rate; nothing where there is but one, or where the experiment has tables
-    of its own (`OWN_TABLES`)."""
-    if getattr(part.chosen, "OWN_TABLES", False) or len(set(map(curve_of, rows))) < 2:
-        return
-    mbps = common_rate(rows)
-    lines = comparable_table(rows, mbps)
-    if lines:
-        told = f"Each codec at its point nearest to {mbps:.3g} Mbps, the median over codecs of the median of each one's"
-        yield from (
-            "",
-            f"### {text(rows[0]['sequence'])} at comparable rates",
-            "",
-            f"{told} rates. {RANKS}",
-            "",
-            *lines,
-        )
 
 
 def _sheet(part: Part, shots: Shots) -> Iterator[str]:

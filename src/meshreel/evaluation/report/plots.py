@@ -35,6 +35,7 @@ DPI = 200  # of the PNG
 WIDEST = 3  # panels in a row
 _HEIGHT = 2.15  # inches, of a row of panels
 _LETTER = 0.052  # inches, of the legend's, at most on average
+_LINE = 0.155  # inches, of the legend, from one to the next
 _SAMPLE = 0.42  # inches, of the piece of line before a name, with the gaps around it
 _SETTINGS: dict[Any, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib
@@ -68,7 +69,7 @@ class Legend:
 
     def fits(self, wide: float, high: float) -> bool:
         """Whether all of it, one below the other, needs no more than so many inches."""
-        return self._widest <= wide and 0.14 * len(self.lines) <= high
+        return self._widest <= wide and _LINE * len(self.lines) <= high
 
     @property
     def _widest(self) -> float:
@@ -182,18 +183,20 @@ def _draw_curves(panel: Any, rows: Sequence[Row], key: str, looks: Mapping[str, 
 
 
 def _add_legend(figure: Any, panels: Any, used: int, down: int) -> None:
-    """In an empty panel where it fits, else below all."""
+    """In the empty panels where it fits, else below all."""
     found = [panel.get_legend_handles_labels() for panel in panels[:used]]
     legend = Legend({name: line for lines, names in found for line, name in zip(lines, names, strict=True)})
     for panel in panels[used:]:
         panel.set_axis_off()
     shown = list(legend.lines.values()), list(legend.lines)
-    if used < len(panels) and legend.fits(WIDTH / WIDEST, _HEIGHT):
-        drawn = panels[used].legend(*shown, loc="center", frameon=False)
+    free = len(panels) - used
+    if free and legend.fits(free * WIDTH / WIDEST - 0.1 * free, _HEIGHT - 0.5):
+        drawn = panels[used].legend(*shown, loc="center" if free == 1 else "center left", frameon=False)
+        drawn.set_in_layout(False)  # it may reach into the next empty panel
     else:
         columns = legend.columns(WIDTH)
         lines = -(-len(legend.lines) // columns)
-        figure.set_size_inches(WIDTH, _HEIGHT * down + 0.3 + 0.15 * lines)
+        figure.set_size_inches(WIDTH, _HEIGHT * down + 0.3 + _LINE * lines)
         drawn = figure.legend(*shown, loc="outside lower center", ncols=columns, frameon=False)
     for text in drawn.get_texts():
         if text.get_text() == SYSTEM:

@@ -30,10 +30,11 @@ ORIGINAL = "{}-original.png"  # of a sequence
 _DPI = 300
 _WIDEST = 1.7  # inches of a column
 _GAP = 0.05  # inches
+_EDGE = 0.01  # of the longer side, around each picture
 _LETTER = 0.55  # of the size of letters: how wide they are on average
 _RED = "#E00000"
 _D2 = (("d2_psnr_paper", "D2 {:.2f} dB"), ("input_d2_psnr_forward", "D2 to input {:.2f} dB"))
-_SSIM = (("ssim_masked", "SSIM {:.3f}"), ("input_ssim_masked", "SSIM to input {:.3f}"))
+_SSIM = (("ssim_masked", "masked SSIM {:.3f}"), ("input_ssim_masked", "SSIM to input {:.3f}"))
 
 Picture = UInt8[np.ndarray, "H W 3"]
 
@@ -242,9 +243,10 @@ def _show(panel: Any, picture: Picture, layout: Layout) -> None:
         for window, style in ((box, ":"), (inset, "-")):
             corner = (window.left, window.top)
             height, width = window.shape
-            edge = Rectangle(corner, width, height, fill=False, edgecolor=_RED, linestyle=style, lw=0.8, zorder=3)
-            panel.add_patch(edge)
-    panel.set(xlim=(cut.left, cut.right), ylim=(cut.bottom, cut.top))
+            frame = Rectangle(corner, width, height, fill=False, edgecolor=_RED, linestyle=style, lw=0.8, zorder=3)
+            panel.add_patch(frame)
+    edge = _EDGE * max(cut.shape)  # else a frame at the border is half as thick
+    panel.set(xlim=(cut.left - edge, cut.right + edge), ylim=(cut.bottom + edge, cut.top - edge))
 
 
 def _extent(window: Window) -> tuple[float, float, float, float]:
