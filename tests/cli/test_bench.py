@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from types import ModuleType
 
@@ -14,6 +15,8 @@ from meshreel.evaluation.experiments import targets
 from meshreel.evaluation.rows import Point
 from meshreel.evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from tests.cli.conftest import failed
+from tests.evaluation.report_rows import failed as failed_row
+from tests.evaluation.report_rows import pictured, row
 
 
 @pytest.fixture
@@ -48,6 +51,19 @@ def test_a_run_writes_rows_and_goes_on_where_it_was(run, tiny):
 def test_only_some_codecs_may_be_run(run, tiny):
     said = run("bench", "run", "tiny", "-o", tiny / "r.jsonl", "--data", tiny, "--no-ssim", "--json", "--only", "draco")
     assert said.row["rows"] == 1
+
+
+def test_a_report_has_what_failed_and_the_pictures_beside_the_rows(run, tiny):
+    rows = tiny / "some.jsonl"
+    made = [
+        pictured(tiny / "some.pictures", row("dancer", "draco", 1.0, 60.0)),
+        failed_row("dancer", "necgs", "too slow"),
+    ]
+    rows.write_text("".join(json.dumps(each | {"experiment": "tiny"}) + "\n" for each in made))
+    said = run("bench", "report", rows, "-o", tiny / "out", "--json")
+    assert said.code == 0 and "dancer necgs qp 9: failed: too slow" in said.err
+    assert "tiny-dancer-sheet.png" in [Path(path).name for path in said.row["files"]]
+    assert "| too slow |" in (tiny / "out" / "results.md").read_text()
 
 
 def test_rows_of_scenes_are_told_in_a_line():

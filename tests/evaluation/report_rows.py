@@ -70,7 +70,7 @@ def pictured(folder, made, picture=None, limit=0.5, frame=5):
     """The row with pictures, which are written into the folder, and the original of its sequence."""
     name = f"{made['codec']}-{made['mbps']}".replace(" ", "_")
     picture = body() if picture is None else picture
-    save(folder / f"{made['sequence']}-original.png", body(size=len(picture)))
+    save(folder / f"{made['sequence']}-original.png", body() if picture.shape == body().shape else picture)
     save(folder / f"{name}.png", picture)
     save(folder / f"{name}-errors.png", np.where(picture == 255, 255, 40).astype(np.uint8))
     named = {"normals": f"{name}.png", "errors": f"{name}-errors.png", "frame": frame, "limit_percent": limit}

@@ -6,7 +6,6 @@ row without pictures, or whose files are missing, has no place.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,8 +18,9 @@ from ...metrics.render import Window
 from ..curves import curve_of, value
 from ..rows import Row
 from .boxes import Layout, cut_out, layout_of
+from .grids import LETTERS, Grid, Place
 from .looks import SYSTEM, in_order
-from .plots import WIDTH, matplotlib_settings, new_figure, write_figure
+from .plots import matplotlib_settings, new_figure, write_figure
 from .tables import common_rate, nearest
 
 PICTURES = "pictures"  # of a row: the names of its files, the frame, and where the scale of errors ends
@@ -28,10 +28,7 @@ _KEYS = {"normals", "errors", "frame", "limit_percent"}
 SCALE = "viridis"  # of the maps, from 0 to the limit
 ORIGINAL = "{}-original.png"  # of a sequence
 _DPI = 300
-_WIDEST = 1.7  # inches of a column
-_GAP = 0.05  # inches
 _EDGE = 0.01  # of the longer side, around each picture
-_LETTER = 0.55  # of the size of letters: how wide they are on average
 _RED = "#E00000"
 _D2 = (("d2_psnr_paper", "D2 {:.2f} dB"), ("input_d2_psnr_forward", "D2 to input {:.2f} dB"))
 _SSIM = (("ssim_masked", "masked SSIM {:.3f}"), ("input_ssim_masked", "SSIM to input {:.3f}"))
@@ -95,74 +92,21 @@ def sheet_figure(shots: Shots) -> Any:
     layout = layout_of(original, normals)
     names = ["original", *(curve_of(files.row) for files in shots.columns)]
     told = [[f"frame {shots.frame}"], *(_qualities(files.row) for files in shots.columns)]
-    grid = Grid.of(names, layout.cut, max(map(len, told)))
+    grid = Grid.of(names, layout.cut.shape, max(map(len, told)))
     figure = new_figure(*grid.size, None)
     for column, picture in enumerate([original, *normals]):
-        _show(grid.axes(figure, column, 0), picture, layout)
+        _show(figure.add_axes(grid.picture(column, 0), label=f"{column} 0"), picture, layout)
     for column, picture in enumerate(errors, 1):
-        _show(grid.axes(figure, column, 1), picture, Layout(layout.cut, None, None))
-    _scale(figure, grid, shots.limit_percent)
-    for column, name in enumerate(names):
-        weight = "bold" if name == SYSTEM else "normal"
-        for first, lines, bold in ((0, grid.names[column], weight), (grid.name_lines, told[column], "normal")):
-            for place, line in enumerate(lines, first):
-                at = grid.line(column, place)
-                figure.text(*at, line, ha="center", va="top", fontsize=grid.letters, fontweight=bold)
+        bare = Layout(layout.cut, None, None)
+        _show(figure.add_axes(grid.picture(column, 1), label=f"{column} 1"), picture, bare)
+    for column, lines in enumerate(told):
+        row, first = (1, grid.name_lines) if column else (0, 1)  # the original has no map: its caption is in its place
+        for place, line in [*enumerate(grid.names[column]), *enumerate(lines, first)]:
+            weight = "bold" if names[column] == SYSTEM and place < first else "normal"
+            at = grid.line(column, place, row)
+            figure.text(*at, line, ha="center", va="top", fontsize=LETTERS, fontweight=weight)
+    _scale(figure, grid.bar(1 + len(told[0])), shots.limit_percent)
     return figure
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """Where the pictures and captions of a sheet are, in inches from the top left."""
-
-    names: tuple[list[str], ...]  # of the columns, in lines
-    width: float  # of a picture
-    height: float
-    lines: int  # of a caption, below the name
-
-    @classmethod
-    def of(cls, names: Sequence[str], cut: Window, lines: int) -> Grid:
-        """As wide as a page, or less where there are few columns."""
-        width = min(_WIDEST, (WIDTH - (len(names) - 1) * _GAP) / len(names))
-        letters = int(width / (_LETTER * _letters(width) / 72))
-        return cls(tuple(_wrapped(name, letters) for name in names), width, width * cut.shape[0] / cut.shape[1], lines)
-
-    @property
-    def columns(self) -> int:
-        return len(self.names)
-
-    @property
-    def name_lines(self) -> int:
-        """Of the longest name: qualities of all columns are below it."""
-        return max(map(len, self.names))
-
-    @property
-    def letters(self) -> float:
-        """Size of the captions, points."""
-        return _letters(self.width)
-
-    @property
-    def size(self) -> tuple[float, float]:
-        """Of all, inches."""
-        below = (self.name_lines + self.lines + 0.8) * self._line
-        return self.columns * self.width + (self.columns - 1) * _GAP, 2 * self.height + 2 * _GAP + below
-
-    def axes(self, figure: Any, column: int, row: int) -> Any:
-        """Those of a picture."""
-        wide, high = self.size
-        left, top = column * (self.width + _GAP), row * (self.height + _GAP)
-        place = (left / wide, 1 - (top + self.height) / high, self.width / wide, self.height / high)
-        return figure.add_axes(place, label=f"{column} {row}")
-
-    def line(self, column: int, place: int) -> tuple[float, float]:
-        """The top middle of a line of a caption, as shares of the figure."""
-        wide, high = self.size
-        middle = column * (self.width + _GAP) + self.width / 2
-        return middle / wide, 1 - (2 * (self.height + _GAP) + place * self._line) / high
-
-    @property
-    def _line(self) -> float:
-        return 1.3 * self.letters / 72
 
 
 def _files(row: Row, folders: Sequence[Path]) -> Files | None:
@@ -207,21 +151,6 @@ def _pixels(path: Path) -> Picture:
         return np.asarray(picture.convert("RGB"), dtype=np.uint8)
 
 
-def _letters(width: float) -> float:
-    """Size of letters below a picture of so many inches, points."""
-    return min(6.5, max(4.5, 6 * width))
-
-
-def _wrapped(name: str, letters: int) -> list[str]:
-    """A name in lines of so many letters, broken behind spaces and underscores where it can be."""
-    lines = [""]
-    for part in re.findall(r"[^ _]*[ _]?", name)[:-1]:
-        if lines[-1] and len(lines[-1]) + len(part.rstrip()) > letters:
-            lines.append("")
-        lines[-1] += part
-    return lines
-
-
 def _qualities(row: Row) -> list[str]:
     """Rate and qualities, a line each."""
     lines = [f"{row['mbps']:.3g} Mbps"]
@@ -253,15 +182,13 @@ def _extent(window: Window) -> tuple[float, float, float, float]:
     return window.left, window.right, window.bottom, window.top
 
 
-def _scale(figure: Any, grid: Grid, limit: float) -> None:
-    """The color bar of the maps, in their row below the original."""
+def _scale(figure: Any, place: Place, limit: float) -> None:
+    """The color bar of the maps."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    place = grid.axes(figure, 0, 1)
-    place.set_axis_off()
-    bar = place.inset_axes((0.12, 0.5, 0.76, 0.08 / grid.height))
+    bar = figure.add_axes(place, label="scale")
     drawn = figure.colorbar(ScalarMappable(Normalize(0, limit), SCALE), cax=bar, orientation="horizontal")
-    ticks = (0, limit / 2, limit) if grid.width > 0.9 else (0, limit)
-    drawn.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks], fontsize=grid.letters)
-    drawn.set_label("error (% of\nthe diagonal)", fontsize=grid.letters)
+    ticks = (0, limit / 2, limit)
+    drawn.set_ticks(ticks, labels=[f"{tick:g}" for tick in ticks], fontsize=LETTERS)
+    drawn.set_label("error (% of\nthe diagonal)", fontsize=LETTERS)
