@@ -16,7 +16,7 @@ _COLUMNS = 6  # side by side at most: more are in bands, one below the other
 _WIDEST = 1.7  # inches of a column
 _GAP = 0.05  # inches
 _LINE = 1.3 * LETTERS / 72  # inches from one line to the next
-_LETTER = 0.6 * LETTERS / 72  # inches that a letter is wide, on average
+_LETTER = 0.65 * LETTERS / 72  # inches that a letter is wide, at most on average
 _SCALE = 0.5  # inches that the scale is high, with its numbers and words
 _BAR = 0.08  # inches that it is high without
 
