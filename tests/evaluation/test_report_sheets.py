@@ -159,7 +159,11 @@ def test_without_pictures_there_is_no_sheet(shots, tmp_path):
 
 @pytest.mark.parametrize(
     "named",
-    [None, {}, {"normals": "a.png"}, {"normals": "../x.png", "errors": "e.png", "frame": 5, "limit_percent": 0.5}],
+    [None, {}, {"normals": "e.png"}]
+    + [
+        {"normals": "e.png", "errors": "e.png", "frame": 5, "limit_percent": 0.5} | wrong
+        for wrong in ({"normals": "../x.png"}, {"frame": "5"}, {"limit_percent": "0.5"}, {"limit_percent": 0})
+    ],
 )
 def test_a_row_that_names_no_pictures_of_the_folder_has_no_place(shots, named):
     folder, rows = shots

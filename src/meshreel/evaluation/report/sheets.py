@@ -112,7 +112,10 @@ def sheet_figure(shots: Shots) -> Any:
 def _files(row: Row, folders: Sequence[Path]) -> Files | None:
     """The pictures of a row in the first folder that has all of them."""
     named = row.get(PICTURES)
-    if not isinstance(named, dict) or not named.keys() >= _KEYS or not named["limit_percent"] > 0:
+    if not isinstance(named, dict) or not named.keys() >= _KEYS:
+        return None
+    frame, limit = named["frame"], named["limit_percent"]
+    if not isinstance(frame, int) or not isinstance(limit, (int, float)) or not limit > 0:
         return None
     names = (ORIGINAL.format(row["sequence"]), str(named["normals"]), str(named["errors"]))
     if any(Path(name).name != name for name in names):  # of these folders only
@@ -121,8 +124,7 @@ def _files(row: Row, folders: Sequence[Path]) -> Files | None:
         original, normals, errors = (folder / name for name in names)
         sizes = {_size(path) for path in (original, normals, errors)}
         if len(sizes) == 1 and (size := sizes.pop()) is not None:
-            scale = int(named["frame"]), float(named["limit_percent"]), size
-            return Files(row, original, normals, errors, scale)
+            return Files(row, original, normals, errors, (frame, float(limit), size))
     return None
 
 
