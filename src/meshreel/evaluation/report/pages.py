@@ -142,7 +142,8 @@ def _origin(rows: Sequence[Row], experiments: Mapping[str, ModuleType]) -> Itera
     if not names:
         return
     yield from ("", "# How this was made", "")
-    yield from ("Of rows, and of nothing else:", "", "```")
+    told = "Of rows, of the pictures that these name, and of nothing else; the names of their files are free:"
+    yield from (told, "", "```")
     yield from (f"meshreel bench run {name} -o {name}.jsonl" for name in names)
     yield from (f"meshreel bench report {' '.join(f'{name}.jsonl' for name in names)} -o FOLDER", "```", "")
     yield "Lines of plots join a codec's points in the order of their rates."
