@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -13,6 +15,8 @@ from meshreel.evaluation.experiments import targets
 from meshreel.evaluation.rows import Point
 from meshreel.evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from tests.cli.conftest import failed
+from tests.evaluation.report_rows import failed as failed_row
+from tests.evaluation.report_rows import pictured, row
 
 
 @pytest.fixture
@@ -39,13 +43,27 @@ def test_a_run_writes_rows_and_goes_on_where_it_was(run, tiny):
     assert second.row["rows"] == 2 and len(second.row["promises"]) == 14
     assert len(rows.read_text().splitlines()) == 2
     said = run("bench", "report", rows, "-o", tiny / "out", "--json")
-    assert [path.rsplit("/", 1)[1] for path in said.row["files"]] == ["results.md", "tiny-dancer.png"]
+    names = ["results.md", "index.html", "tiny-dancer.png", "tiny-dancer.svg"]
+    assert [Path(path).name for path in said.row["files"]] == names
     assert run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--quiet").err == ""
 
 
 def test_only_some_codecs_may_be_run(run, tiny):
     said = run("bench", "run", "tiny", "-o", tiny / "r.jsonl", "--data", tiny, "--no-ssim", "--json", "--only", "draco")
     assert said.row["rows"] == 1
+
+
+def test_a_report_has_what_failed_and_the_pictures_beside_the_rows(run, tiny):
+    rows = tiny / "some.jsonl"
+    made = [
+        pictured(tiny / "some.pictures", row("dancer", "draco", 1.0, 60.0)),
+        failed_row("dancer", "necgs", "too slow"),
+    ]
+    rows.write_text("".join(json.dumps(each | {"experiment": "tiny"}) + "\n" for each in made))
+    said = run("bench", "report", rows, "-o", tiny / "out", "--json")
+    assert said.code == 0 and "dancer necgs qp 9: failed: too slow" in said.err
+    assert "tiny-dancer-sheet.png" in [Path(path).name for path in said.row["files"]]
+    assert "| too slow |" in (tiny / "out" / "results.md").read_text()
 
 
 def test_rows_of_scenes_are_told_in_a_line():

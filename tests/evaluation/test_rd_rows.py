@@ -46,7 +46,12 @@ def test_a_body_is_judged_by_all_frames_and_drawn(bench):
     data = make_codec("draco", {"qp": 9}).encode(BALLS)
     assert row["bytes"] == len(data) and row["mbps"] == pytest.approx(len(data) * 8 * 30 / 3 / 1e6)
     assert row["measured_frames"] == [0, 1, 2] and row["frames_compared"] == 3 and len(row["per_frame"]) == 3
-    assert 0.9 < row["ssim_masked"] <= 1 and 0.9 < row["ssim"] <= 1 and row["decode"]["frames"] == 3 and "truth_ssim" not in row
+    assert (
+        0.9 < row["ssim_masked"] <= 1
+        and 0.9 < row["ssim"] <= 1
+        and row["decode"]["frames"] == 3
+        and "truth_ssim" not in row
+    )
     folder, named = bench.cache.with_suffix(".pictures"), row["pictures"]
     sizes = {Image.open(folder / name).size for name in ("ball-original.png", named["normals"], named["errors"])}
     assert named["frame"] == 1 and sizes == {(900, 900)}

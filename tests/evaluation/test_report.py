@@ -118,10 +118,9 @@ def test_a_row_that_falls_short_is_missed(name, bad):
 
 def test_the_report_is_made_of_the_rows(tmp_path):
     written = write_report(GOOD, {"targets": TARGETS}, tmp_path)
-    assert {path.name for path in written} == {
-        "results.md",
-        *(f"targets-{name}.png" for name in ("dancer", "mitch", "basketball_player", "collision")),
-    }
+    bodies = ("dancer", "mitch", "basketball_player", "collision")
+    plots = {f"targets-{name}.{kind}" for name in bodies for kind in ("png", "svg")}
+    assert {path.name for path in written} == {"results.md", "index.html", *plots}
     page = (tmp_path / "results.md").read_text()
     assert "meshreel bench run targets" in page
     assert page.count("| met |") == 14 and "MISSED" not in page

@@ -322,7 +322,7 @@ def test_rates_are_compared_below_the_noise_floor_only():
 
 def test_the_report_has_the_noise_floor_and_every_row(tmp_path):
     written = write_report(GOOD, {"scenes": scenes}, tmp_path)
-    assert {path.name for path in written} == {"results.md", "scenes-room2.png"}
+    assert {path.name for path in written} == {"results.md", "index.html", "scenes-room2.png", "scenes-room2.svg"}
     page = (tmp_path / "results.md").read_text()
     assert "noise floor (the input against the truth)" in page and "nan" not in page
     assert page.count("| room2 | ") == 13 and "| room2 | meshreel best | quality 50.0 | 0.400 | 50.0 | 2.00 |" in page

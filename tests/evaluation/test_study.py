@@ -72,9 +72,9 @@ def test_the_promise_is_kept_only_where_the_best_is_left_of_all():
     assert promise.met is False and promise.value.startswith("in 2 of 4 comparisons; not third: D2, paper form")
     [promise] = STUDY.promises(best)
     assert promise.met is None
-    assert next(iter(STUDY.comparisons([*best, *other]))).startswith(
-        "- BD-rate of best against other: D2, paper form -50.0"
-    )
+    table = "\n".join(STUDY.comparisons([*best, *other]))
+    assert "| best against | rate at equal D2, paper form ↓" in table
+    assert "| other | -50.0 % (60 dB to 65 dB) | -50.0 % (0.6 to 0.65) |" in table
 
 
 def test_an_anchor_is_what_others_are_compared_with():
@@ -103,3 +103,14 @@ def test_the_goals_of_figure_6_say_what_falls_short():
     falling = goals([row("klt_tsdf", 1.0, 60), row("klt_tsdf", 2.0, 59)])[3]
     assert falling.met is False and falling.value == "body: 60.00 and 59.00 dB"
     assert all(p.met is None for p in goals([]))
+
+
+def test_a_table_has_each_codec_near_the_common_point():
+    rows = [row("best", 1.0, 63), row("best", 2.0, 66), row("draco", 9.0, 64), row("other", 0.5, 40)]
+    by_rate, by_quality = (
+        "\n".join(Study(sequences=("body",), sweeps=(), common=common).sections(rows))
+        for common in (("mbps", 1.0), ("d2_psnr_paper", 63.5))
+    )
+    assert "## Near 1 Mbps" in by_rate and "| draco † | 9 |" in by_rate
+    assert "## Near 63.5 dB" in by_quality and "| best | **1** |" in by_quality and "| draco | *9* |" in by_quality
+    assert "| other † | 0.5 |" in by_quality and "within 1.5 dB" in by_quality

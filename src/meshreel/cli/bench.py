@@ -1,4 +1,4 @@
-"""`meshreel bench run|report`: codecs swept over sequences into JSON rows, and tables and plots made from rows."""
+"""`meshreel bench run|report`: codecs swept over sequences into JSON rows, and pages made from rows."""
 
 from __future__ import annotations
 
@@ -70,8 +70,8 @@ def run(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     data: Path = DATA,
     small: bool = False,
-    only: tuple[str, ...] = (),
-    on: tuple[str, ...] = (),
+    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
+    on: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
     ssim: bool = True,
     running: Running = Running(),
     common: Common = Common(),
@@ -130,19 +130,24 @@ def report(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     common: Common = Common(),
 ) -> None:
-    """Write results.md and plots from rows, and from nothing else.
+    """Write pages, plots and tables from rows, and from nothing else.
+
+    `index.html` has all in one file; `results.md` is the same with the plots beside it, as PNG and SVG, in `results/`.
+    Points that failed are listed with their reasons. Same rows, same bytes.
 
     Parameters
     ----------
     rows
-        JSON-lines files that `run` wrote, of any experiments; of a point that several have, the first counts.
+        JSON-lines files that `run` wrote, of any experiments; of a point that several have, the first counts. The
+        pictures that rows name are in a folder beside their file, whose name ends in `.pictures`: they make sheets.
     output
         The folder to write into.
     """
     joined = join_rows([read_rows(path) for path in rows])
     measured = measured_rows(joined)
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
-    written = [str(path) for path in write_report(measured, EXPERIMENTS, output)]
+    pictures = [path.with_suffix(".pictures") for path in rows]
+    written = [str(path) for path in write_report(joined, EXPERIMENTS, output, pictures)]
     reached = [
         promise
         for name, chosen in EXPERIMENTS.items()

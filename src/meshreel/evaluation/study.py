@@ -15,6 +15,7 @@ from ..metrics.report import ComparisonOptions
 from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
 from .rd_rows import FLOOR, RATED, SAMPLED
+from .report.tables import bd_table, comparable_table
 from .rows import Point, Row, select
 
 SMALL_SEQUENCE, SMALL_FRAMES = "demo", 3  # procedural: `--small` needs no data
@@ -22,6 +23,7 @@ D2 = Measure("d2_psnr_paper", "D2, paper form", " dB")
 MASKED = Measure("ssim_masked", "masked SSIM", "")
 MEASURES = (D2, MASKED, Measure("ssim", "SSIM", ""), Measure("normal_error_deg", "normal error", " degrees", -1))
 JUDGED = (D2, MASKED)  # what is promised
+UNITS = {"mbps": "Mbps", "d2_psnr_paper": "dB"}
 Values = Mapping[str, Sequence[Any]]  # options that are varied together, by name
 
 
@@ -60,7 +62,7 @@ class Study:
     sequences: Sequence[str]
     sweeps: Sequence[Sweep]
     best: str | None = None
-    anchor: str | None = None  # the codec that all others are compared with; None: `best` is, with all others
+    anchor: str | None = None  # the codec that all others are compared with
     goals: Callable[[Sequence[Row]], list[Promise]] | None = None  # what else is promised
     truths: Sequence[str] = ()  # sequences with a truth
     frames: Mapping[str, int] = field(default_factory=dict)  # the first so many of a sequence; none said: all
@@ -97,22 +99,23 @@ class Study:
 
     def comparisons(self, rows: Sequence[Row]) -> Iterator[str]:
         """BD-rates on the rows of one sequence."""
-        names = list(dict.fromkeys(map(curve_of, rows)))
-        one = self.anchor or self.best
-        for name in names if one in names else ():
-            if name != one:
-                pair = (str(one), name) if self.anchor else (name, str(one))
+        yield from bd_table(rows, self.best, MEASURES) if self.best else ()
+        for name in dict.fromkeys(map(curve_of, rows)) if self.anchor else ():
+            if name != self.anchor:
                 for measure in MEASURES:
-                    found = against(_curve(rows, pair[0], measure), _curve(rows, pair[1], measure), measure)
-                    yield f"- BD-rate of {pair[1]} against {pair[0]}: {found}"
+                    pair = _curve(rows, str(self.anchor), measure), _curve(rows, name, measure)
+                    yield f"- BD-rate of {name} against {self.anchor}: {against(*pair, measure)}"
 
     def shown(self, rows: Sequence[Row]) -> list[Row]:
         """The rows of one sequence that its table has: all."""
         return list(rows)
 
-    def sections(self, _rows: Sequence[Row]) -> Iterator[str]:
-        """What must be known of the numbers."""
+    def sections(self, rows: Sequence[Row]) -> Iterator[str]:
+        """What must be known of the numbers, and each codec at the point that can be compared."""
         yield from ("", *self.notes) if self.notes else ()
+        if self.common is not None:
+            key, wanted = self.common
+            yield from ("", f"## Near {wanted:g} {UNITS[key]}", "", *comparable_table(rows, wanted, key))
 
     def _left_of_all(self, rows: Sequence[Row], sequence: str) -> Promise:
         own = [row for kind in (RATED, SAMPLED) for row in select(rows, sequence, kind=kind)]

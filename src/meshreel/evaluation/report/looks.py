@@ -1,0 +1,78 @@
+"""What a codec looks like in every plot, in which order codecs are told, and which way a metric is better.
+
+In -> out: names of curves -> a color, a marker and a line for each; the key of a metric -> a sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+SYSTEM = "meshreel best"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a curve is drawn."""
+
+    color: str
+    marker: str
+    width: float = 1.1  # points, of the line
+    size: float = 3.4  # points, of the marker
+
+
+# In the order of legends and sheets. Colors that the color-blind tell apart (Okabe and Ito) come first; codecs that are
+# never in one plot may share one.
+KNOWN: dict[str, Look] = {
+    SYSTEM: Look("#D55E00", "o", 2.2, 4.4),
+    "meshreel paper": Look("#E69F00", "s"),
+    "meshreel paper m, quality 50": Look("#A6761D", "d"),
+    "tvmc": Look("#009E73", "P", size=4.2),
+    "klt_tsdf": Look("#CC79A7", "X", size=4.2),
+    "necgs": Look("#7B4EA3", "*", size=5.5),
+    "draco": Look("#0072B2", "^"),
+    "decimated_draco": Look("#56B4E9", "v"),
+    "decimated_draco_subdivided": Look("#1B3A5C", "D", size=2.8),
+    "background_once_draco": Look("#44AA99", "<"),
+    "background_once_draco_subdivided": Look("#117733", "H"),
+    "a: decimated Draco": Look("#56B4E9", "v"),
+    "a: decimated Draco, subdivided": Look("#1B3A5C", "D", size=2.8),
+    "b: background once, decimated Draco": Look("#44AA99", "<"),
+    "b: background once, decimated Draco, subdivided": Look("#117733", "H"),
+    "b: background once, decimated Draco, labels found": Look("#8F8F1F", "x", size=4.2),
+}
+# For all others, by their place among the sorted names: 8 colors and 5 markers make 40 pairs.
+_COLORS = ("#882255", "#6699CC", "#999933", "#332288", "#AA4499", "#661100", "#777777", "#66A61E")
+_MARKERS = (">", "p", "<", "H", "d")
+
+_HIGHER = ("psnr", "ssim", "iou", "covered")
+_LOWER = ("error", "rms", "hausdorff", "median", "mbps", "bytes", "rss", "called_dynamic", "encode", "decode", "seam_")
+_LOWER_UNITS = ("_deg", "_m", "_mm", "_ms", "_s", "_percent")
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Each name once: those that are known in their order, then the others sorted."""
+    found = set(names)
+    return [name for name in KNOWN if name in found] + sorted(found - set(KNOWN))
+
+
+def looks_of(names: Iterable[str]) -> dict[str, Look]:
+    """A look for each name, in order. Give the names of a whole report: others are told apart among themselves."""
+    ordered = in_order(names)
+    others = [name for name in ordered if name not in KNOWN]
+    rest = {
+        name: Look(_COLORS[place % len(_COLORS)], _MARKERS[place % len(_MARKERS)]) for place, name in enumerate(others)
+    }
+    return {name: KNOWN.get(name) or rest[name] for name in ordered}
+
+
+def direction(key: str) -> int:
+    """1 where more of a metric is better, -1 where less is, 0 where its name does not tell."""
+    if any(word in key for word in _LOWER) or key.endswith(_LOWER_UNITS):
+        return -1
+    return 1 if any(word in key for word in _HIGHER) else 0
+
+
+def arrow(sign: int) -> str:
+    """The direction in a table's head; empty for 0."""
+    return {1: " ↑", -1: " ↓"}.get(sign, "")

@@ -1,0 +1,241 @@
+"""Tables in Markdown, made from rows: operating points, the best in bold, codecs at one rate, BD-rates, failures.
+
+In -> out: rows -> lines of Markdown. Names and reasons are escaped: what a row says is text, and never markup.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable, Sequence
+from math import exp, log
+from statistics import median
+
+from ..curves import Measure, against, curve, curve_of, value
+from ..promises import Promise
+from ..provenance import MADE_BY
+from ..rows import CURVE_KINDS, FAILED, Row, curve_rows
+from .looks import arrow, in_order
+from .plots import METRICS
+
+FIRST = "targets"  # the experiment of rows that do not name theirs
+NEAR = 1.5  # factor of a rate within which points are compared
+NEAR_DB = 1.5  # of a PSNR
+DAGGER = "†"
+DECODE = "decode"  # the key of a row whose times count
+Cell = str | float | None
+_UNKNOWN = "not recorded"
+
+
+def text(found: object) -> str:
+    """Anything as text of one line, that Markdown shows as it is."""
+    line = " ".join(str(found).split())
+    line = re.sub(r"([\\`*|\[\]~])", r"\\\1", line)
+    line = re.sub(r"<(?=[A-Za-z/!?])", r"\\<", line)
+    line = re.sub(r"&(?=#?\w+;)", r"\\&", line)
+    return re.sub(r"(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])", r"\\_", line)
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table; the cells are Markdown."""
+    lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
+    return lines + [f"| {' | '.join(row)} |" for row in rows]
+
+
+def ranked_table(
+    heads: Sequence[str],
+    rows: Sequence[Sequence[Cell]],
+    directions: Sequence[int],
+    groups: Sequence[Hashable] | None = None,
+) -> list[str]:
+    """A table in whose columns the best number is bold and the second best is italic.
+
+    `directions`, one a column: 1 where more is better, -1 where less is (the head has an arrow), 0 where nothing is
+    ranked. Rows are ranked among those of an equal group, all of them where no groups are given, and not at all where
+    the group is None. Equal as printed is equal: who ties for the best is bold, and the next is italic. One number
+    alone has no rank. Texts are Markdown; None is an empty cell.
+    """
+    groups = groups if groups is not None else [True] * len(rows)
+    cells = [[_shown(cell) for cell in row] for row in rows]
+    for column, sign in enumerate(directions):
+        for group in dict.fromkeys(groups) if sign else ():
+            own = [i for i, g in enumerate(groups) if g == group and g is not None and _is_number(rows[i][column])]
+            printed = {i: float(cells[i][column]) for i in own}
+            best = sorted(set(printed.values()), reverse=sign > 0)
+            for i, number in printed.items() if len(own) > 1 else ():
+                mark = {0: "**", 1: "*"}.get(best.index(number), "")
+                cells[i][column] = f"{mark}{cells[i][column]}{mark}"
+    return table([head + arrow(sign) for head, sign in zip(heads, directions, strict=True)], cells)
+
+
+def sequences(rows: Sequence[Row]) -> list[str]:
+    """The sequences of which rows have a rate and metrics."""
+    return list(dict.fromkeys(row["sequence"] for row in rows if row["kind"] in CURVE_KINDS and FAILED not in row))
+
+
+def common_rate(rows: Sequence[Row]) -> float:
+    """Mbps: the median over codecs of each one's median, of logarithms; a codec with many points counts once."""
+    rates: dict[str, list[float]] = {}
+    for row in rows:
+        rates.setdefault(curve_of(row), []).append(log(row["mbps"]))
+    return exp(median(map(median, rates.values())))
+
+
+def nearest(rows: Sequence[Row], wanted: float, key: str = "mbps") -> dict[str, Row]:
+    """Of each codec, in order, the row nearest to a rate by factor, or to a quality; of two, the cheaper one."""
+    found = {}
+    for name in in_order(map(curve_of, rows)):
+        own = [row for row in rows if curve_of(row) == name and value(row, key) is not None]
+        if own:
+            found[name] = min(own, key=lambda row: (_apart(row, wanted, key), row["mbps"]))
+    return found
+
+
+def _apart(row: Row, wanted: float, key: str) -> float:
+    """How far a row is from what is wanted, in units of what is near."""
+    found = value(row, key) or 0.0
+    return abs(log(found / wanted)) / log(NEAR) if key == "mbps" else abs(found - wanted) / NEAR_DB
+
+
+def comparable_table(rows: Sequence[Row], wanted: float, key: str = "mbps") -> list[str]:
+    """Each codec at its point nearest to a rate or a PSNR, ranked among those of a sequence.
+
+    A codec whose nearest point is not within a factor of `NEAR`, or within `NEAR_DB`, has a dagger, and is not ranked.
+    No lines where there is no quality.
+    """
+    lines, groups = list[list[Cell]](), list[Hashable]()
+    names = sequences(rows)
+    told = [
+        (sequence, found) for sequence in names for found in nearest(curve_rows(rows, sequence), wanted, key).items()
+    ]
+    columns = [(head, 0 if at == key else sign, at) for head, sign, at in _COMPARED]
+    if key != "mbps":  # then it is the rate that is compared
+        columns = [(head, -1 if at == "mbps" else sign, at) for head, sign, at in columns]
+    kept = [column for column in columns if any(_read(row, column[2]) is not None for _, (_, row) in told)]
+    if not any(sign for _, sign, _ in kept):
+        return []
+    for sequence, (name, row) in told:
+        near = _apart(row, wanted, key) <= 1 + 1e-9
+        first = [text(sequence)] if len(names) > 1 else []
+        lines.append([*first, text(name) + ("" if near else f" {DAGGER}"), *(_read(row, at) for _, _, at in kept)])
+        groups.append(sequence if near else None)
+    first_heads = ["sequence", "codec"] if len(names) > 1 else ["codec"]
+    heads, signs = [head for head, _, _ in kept], [sign for _, sign, _ in kept]
+    made = ranked_table([*first_heads, *heads], lines, [0] * len(first_heads) + signs, groups)
+    if None in groups:
+        limit = f"a factor of {NEAR:g} of {wanted:.3g} Mbps" if key == "mbps" else f"{NEAR_DB:g} dB of {wanted:g} dB"
+        made += ["", f"{DAGGER} No point within {limit}: the nearest is shown, and is not ranked."]
+    return made
+
+
+def bd_table(rows: Sequence[Row], test: str, measures: Sequence[Measure]) -> list[str]:
+    """BD-rate of the curve `test` against every other one of each sequence, with the qualities that both reach.
+
+    Negative: `test` needs less rate for equal quality. No lines where it has no curve, or no other has one.
+    """
+    lines, names = [], sequences(rows)
+    for sequence in names:
+        own = curve_rows(rows, sequence)
+        others = in_order(map(curve_of, own))
+        for other in others if test in others else ():
+            if other != test:
+                first = [text(sequence)] if len(names) > 1 else []
+                cells = [_bd_cell(own, test, other, measure) for measure in measures]
+                lines.append([*first, text(other), *cells])
+    heads = [f"rate at equal {measure.name} ↓" for measure in measures]
+    return table([*(["sequence"] if len(names) > 1 else []), f"{text(test)} against", *heads], lines) if lines else []
+
+
+def promise_table(promises: Sequence[Promise]) -> list[str]:
+    """Targets."""
+    lines = [[p.text, p.bound, p.value or "", p.verdict] for p in promises]  # Markdown already
+    return ["| target | bound | measured | |", *table(["", "", "", ""], lines)[1:]]
+
+
+def point_table(rows: Sequence[Row]) -> list[str]:
+    """Operating points: rate, every metric, groups, encode and decode times."""
+    heads = ["codec", "operating point", "Mbps", *(key for key, _ in METRICS), "worst frame dB", "groups"]
+    heads += ["encode s/frame", "by stage", "decode ms/frame", "/ DracoPy", "decode peak MB"]
+    lines = []
+    for row in rows:
+        stages = ", ".join(f"{k} {v:.2g}" for k, v in row.get("encode_stages_s", {}).items())
+        decode = row.get("decode", {})
+        qualities = [_shown(value(row, key)) for key, _ in METRICS]
+        cells = [text(row["codec"]), text(_point(row)), _shown(row["mbps"]), *qualities]
+        cells += [_shown(row.get("d2_psnr_paper_worst")), _group_sizes(row), _shown(row.get("encode_s")), text(stages)]
+        times = (decode.get("frame_ms"), row.get("decode_over_peer"), decode.get("peak_rss_mb"))
+        lines.append([*cells, *map(_shown, times)])
+    return table(heads, lines)
+
+
+def failure_table(rows: Sequence[Row]) -> list[str]:
+    """Points of which nothing was measured, and why."""
+    heads = ["experiment", "sequence", "codec", "operating point", "kind", "reason"]
+    lines = []
+    for row in rows:
+        cells = [row.get("experiment", FIRST), row["sequence"], row["codec"], _point(row), row["kind"], row[FAILED]]
+        lines.append([text(cell) for cell in cells])
+    return table(heads, lines)
+
+
+def maker_table(rows: Sequence[Row]) -> list[str]:
+    """What made the rows of each experiment: version, commit and machine, and how many rows."""
+    counts: dict[tuple[str, ...], int] = {}
+    for row in rows:
+        made = row.get(MADE_BY) or row.get("machine") or {}  # older rows have a machine without a commit
+        commit = made.get("commit", _UNKNOWN) or "none: installed"
+        told = [made.get(key) or _UNKNOWN for key in ("platform", "python", "cores")]
+        key = (row.get("experiment", FIRST), made.get("meshreel") or _UNKNOWN, commit, *told)
+        counts[tuple(map(text, key))] = counts.get(tuple(map(text, key)), 0) + 1
+    heads = ["experiment", "meshreel", "commit", "platform", "Python", "cores", "rows"]
+    return table(heads, [[*key, str(count)] for key, count in counts.items()])
+
+
+def _read(row: Row, key: str) -> float | None:
+    found = row.get("decode", {}).get("frame_ms") if key == DECODE else value(row, key)
+    return None if found is None else float(found)
+
+
+# Head, direction, and the key of a row.
+_COMPARED = (
+    ("Mbps", 0, "mbps"),
+    ("D2, paper form (dB)", 1, "d2_psnr_paper"),
+    ("SSIM", 1, "ssim"),
+    ("masked SSIM", 1, "ssim_masked"),
+    ("normal error (degrees)", -1, "normal_error_deg"),
+    ("decode (ms/frame)", -1, DECODE),
+)
+
+
+def _bd_cell(rows: Sequence[Row], test: str, other: str, measure: Measure) -> str:
+    """One BD-rate and its overlap, or why there is none."""
+    pair = [curve([row for row in rows if curve_of(row) == name], name, measure) for name in (other, test)]
+    missing = [each.name for each in pair if not each.rates]
+    if missing:
+        return f"not measured of {text(' and '.join(missing))}"
+    found = against(pair[0], pair[1], measure).rate
+    if min(found.points) < 2:
+        few = [name for name, points in zip((other, test), found.points, strict=True) if points < 2]
+        return f"one usable point of {text(' and '.join(few))}"
+    if found.percent is None:
+        return "no overlap"
+    return f"{found.percent:+.1f} % ({measure.shown(found.low)} to {measure.shown(found.high)})"
+
+
+def _point(row: Row) -> str:
+    return ", ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
+
+
+def _group_sizes(row: Row) -> str:
+    """Frames of each group, as 5+5; how many where they are many."""
+    sizes = [str(group["frames"]) for group in row.get("groups", ())]
+    return "+".join(sizes) if len(sizes) < 8 else f"{len(sizes)} groups"
+
+
+def _is_number(cell: Cell) -> bool:
+    return isinstance(cell, (int, float))
+
+
+def _shown(cell: Cell) -> str:
+    if cell is None or isinstance(cell, str):
+        return cell or ""
+    return f"{cell:.4g}"

@@ -1,0 +1,158 @@
+"""The pages: one HTML file that needs no other, of the same text as the Markdown; failures; how it was made."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from meshreel.evaluation.report import write_report
+from meshreel.evaluation.report.html import html_page
+from meshreel.evaluation.report.looks import SYSTEM, looks_of
+from meshreel.evaluation.report.pages import file_name
+from tests.evaluation.report_rows import experiment, failed, pictured, row
+
+BAD = '<script>alert("x")</script>'
+LINK = "[there](http://example.org/a) ![seen](http://example.org/b.png) <http://example.org/c>"
+
+
+class Page(HTMLParser):
+    """What a page refers to, its tags and ids, and its text."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.found, self.tags, self.ids, self.text = [], [], [], ""
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        names = ("src", "href", "xlink:href", "srcset", "data", "action", "poster", "background")
+        self.found += [value for name, value in attrs if name in names]
+        self.ids += [value for name, value in attrs if name == "id"]
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def is_within(page, html):
+    """Whether all that a page refers to is in it."""
+    known = {f"#{name}" for name in page.ids}
+    styled = re.findall(r"url\(|@import", html)
+    return not styled and all(link in known or link.startswith("data:image/") for link in page.found)
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    """A report with pictures, names that are markup, and a failure; its folder."""
+    folder = tmp_path_factory.mktemp("report")
+    shots = folder / "rows.pictures"
+    rows = [
+        pictured(shots, row("dancer", SYSTEM, 1.0, 60.0)),
+        pictured(shots, row("dancer", "draco", 2.0, 70.0)),
+        row("dancer", BAD, 3.0, 75.0),
+        row(f"{BAD}/..", "draco", 3.0, 75.0),
+        failed("dancer", LINK, f"it {BAD} broke"),
+    ]
+    write_report(rows, experiment(["", f"## {LINK}", "", "text & more"]), folder, [folder / "none", shots])
+    return folder
+
+
+def test_the_page_needs_no_other_file(report):
+    html = (report / "index.html").read_text()
+    page = Page(html)
+    assert is_within(page, html)
+    assert page.tags.count("img") == 3  # two plots, one sheet
+    assert sum(link.startswith("data:image/svg+xml") for link in page.found) == 2
+    assert sum(link.startswith("data:image/png") for link in page.found) == 1
+    assert not {"script", "link", "iframe", "object", "video"} & set(page.tags)
+
+
+def test_a_page_that_refers_to_others_is_noticed():
+    for html in ('<a href="http://x">', '<img src="a.png">', '<a href="#none">', "<style>a{background:url(x)}</style>"):
+        assert not is_within(Page(html), html)
+
+
+def test_names_are_text_in_the_page(report):
+    html = (report / "index.html").read_text()
+    assert "<script" not in html and "example.org/a" in Page(html).text
+    assert BAD in Page(html).text and f"it {BAD} broke" in Page(html).text
+
+
+def test_the_contents_name_every_part_once(report):
+    html = (report / "index.html").read_text()
+    page = Page(html)
+    nav = html[html.index("<nav>") : html.index("</nav>")]
+    linked = re.findall('href="#([^"]+)"', nav)
+    assert len(linked) == len(set(page.ids) & set(linked)) == 6 and len(set(page.ids)) == len(page.ids)
+    assert linked[:2] == ["results-of-made-up", "dancer-10-frames"] and linked[-1] == "how-this-was-made"
+    assert nav.count("<ul>") == nav.count("</ul>")
+
+
+def test_heads_of_one_text_have_ids_of_their_own():
+    page = Page(html_page("x", ["# a", "", "## a", "", "# a", "", "# ***"], {}))
+    assert page.ids == ["a", "a-2", "a-3", "part"] and page.found == ["#a", "#a-2", "#a-3", "#part"]
+
+
+def test_the_markdown_has_the_same_pictures_and_they_are_there(report):
+    linked = re.findall(r"\]\((results/[^)]+)\)", (report / "results.md").read_text())
+    name = file_name("made up-dancer")
+    assert linked[:2] == [f"results/{name}.png", f"results/{name}-sheet.png"]
+    assert len(linked) == 3 and all((report / link).is_file() for link in linked)
+
+
+def test_a_failure_is_listed_with_its_reason_and_is_in_no_plot(report):
+    text = (report / "results.md").read_text()
+    assert text.index("# What failed") < text.index("# How this was made")
+    assert "| made up | dancer | " in text and "broke |" in text
+    assert "quality 50.0" in text and text.count("qp 9") == 1
+
+
+def test_without_failures_there_is_no_section_of_them(tmp_path):
+    write_report([row("dancer", "draco", 1.0, 60.0)], experiment(), tmp_path)
+    assert "failed" not in (tmp_path / "results.md").read_text()
+
+
+def test_failures_alone_are_a_report(tmp_path):
+    written = write_report([failed("dancer", "draco", "took longer")], experiment(), tmp_path)
+    assert [path.name for path in written] == ["results.md", "index.html"]
+    text = (tmp_path / "results.md").read_text()
+    assert "took longer" in text and "meshreel bench run made up" in text
+
+
+def test_a_report_without_rows_is_empty(tmp_path):
+    assert len(write_report([], experiment(), tmp_path)) == 2
+    assert (tmp_path / "results.md").read_text() == "\n"
+
+
+def test_it_says_how_it_was_made(tmp_path):
+    made = {"meshreel": "0.1.0", "commit": "abc", "platform": "P", "python": "3.12", "cores": 2}
+    write_report([row("dancer", "draco", 1.0, 60.0, made_by=made)], experiment(), tmp_path)
+    text = (tmp_path / "results.md").read_text()
+    assert "meshreel bench report made up.jsonl -o FOLDER" in text
+    assert "| made up | 0.1.0 | abc | P | 3.12 | 2 | 1 |" in text
+
+
+def test_a_codec_has_one_color_in_all_sequences(tmp_path):
+    rows = [row("dancer", codec, 1.0, 60.0) for codec in ("alpha", "zeta")] + [row("mitch", "zeta", 1.0, 60.0)]
+    written = write_report(rows, experiment(), tmp_path)
+    plots = [path.read_text().lower() for path in written if path.suffix == ".svg"]
+    colors = {name: look.color.lower() for name, look in looks_of(["alpha", "zeta"]).items()}
+    assert colors["alpha"] in plots[0] and colors["alpha"] not in plots[1]
+    assert all(colors["zeta"] in plot for plot in plots)
+
+
+def test_same_rows_are_same_bytes(tmp_path):
+    shots = tmp_path / "rows.pictures"
+    rows = [pictured(shots, row("dancer", codec, 1.0, 60.0)) for codec in (SYSTEM, "b", "a")] + [failed("x", "y", "z")]
+    pages = []
+    for folder in (tmp_path / "one", tmp_path / "two"):
+        written = write_report(rows, experiment(), folder, [shots])
+        pages.append({path.relative_to(folder): path.read_bytes() for path in written})
+    assert pages[0] == pages[1] and len(pages[0]) == 5
+
+
+def test_names_of_files_are_plain_and_never_meet():
+    assert file_name("layers-dancer") == "layers-dancer"
+    names = [file_name(name) for name in ("a/b", "a b", "a_b", "../a", "a\\b", "é")]
+    assert len(set(names)) == len(names) and all(re.fullmatch(r"[\w.-]+", name, re.ASCII) for name in names)
