@@ -54,7 +54,7 @@ def report(tmp_path_factory):
         row(f"{BAD}/..", "draco", 3.0, 75.0),
         failed("dancer", LINK, f"it {BAD} broke"),
     ]
-    write_report(rows, experiment(["", f"## {LINK}", "", "text & more"]), folder, [folder / "none", shots])
+    write_report(rows, experiment(["", f"## {LINK}", "", f"text & {BAD}"]), folder, [folder / "none", shots])
     return folder
 
 
