@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image
 
 from meshreel.evaluation.rows import FAILED
+from meshreel.metrics.report import ComparisonOptions
 
 SIZE = 100  # pixels of a side
 
@@ -44,6 +45,8 @@ def failed(sequence, codec, reason):
 def experiment(sections=()):
     """One that promises nothing; its sections are given."""
     chosen = ModuleType("made_up")
+    chosen.COMPARISON = ComparisonOptions()
+    chosen.points = lambda _small: iter(())
     chosen.references = lambda _sequence: {}
     chosen.promises = lambda _rows: []
     chosen.comparisons = lambda _rows: iter(())
