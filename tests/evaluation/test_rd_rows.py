@@ -20,11 +20,14 @@ from meshreel.evaluation.rows import FAILED, Point
 from meshreel.evaluation.runner import run_points, runs_of
 from meshreel.metrics.cameras import ViewOptions
 from meshreel.metrics.report import ComparisonOptions
+from tests.small_options import quick
+from tests.small_scene import scene
 
 BALLS = sliding_sphere(3, levels=2)
 QUICK = ComparisonOptions(views=ViewOptions(96, 64))
 ROOM = "procedural_room"
-FRAMES = 12  # of it: more than are measured
+FRAMES = 3  # of it
+SCENE = scene(4)
 
 
 @pytest.fixture(scope="module")
@@ -60,15 +63,15 @@ def test_a_body_is_judged_by_all_frames_and_drawn(bench):
     assert (errors[~seen] == 255).all() and (errors[seen] < 255).any(axis=1).all()
 
 
-@pytest.mark.slow
-def test_a_scene_is_judged_by_some_frames_from_where_its_cameras_stood(bench, room):
+def test_a_scene_is_judged_by_some_frames_from_where_its_cameras_stood(bench, room, monkeypatch):
+    monkeypatch.setattr(rd_rows, "MEASURED", 2)
     whole = measure_point(Point(ROOM, "draco", {"qp": 9}, FRAMES, RATED), bench)
     some = measure_point(Point(ROOM, "draco", {"qp": 9}, FRAMES, SAMPLED), bench)
     numbers = whole["measured_frames"]
-    assert numbers == some["measured_frames"] and len(numbers) == 10 and numbers[-1] == FRAMES - 1
-    assert (whole["coded_frames"], some["coded_frames"]) == (FRAMES, 10)
+    assert numbers == some["measured_frames"] and numbers == [0, 2]
+    assert (whole["coded_frames"], some["coded_frames"]) == (FRAMES, 2)
     data = make_codec("draco", {"qp": 9}).encode(Chosen(room.sequence, numbers))
-    assert some["mbps"] == pytest.approx(len(data) * 8 * 30 / 10 / 1e6)
+    assert some["mbps"] == pytest.approx(len(data) * 8 * 30 / 2 / 1e6)
     assert some["mbps"] == pytest.approx(whole["mbps"], rel=0.05)
     for name in ("d2_psnr_paper", "ssim_masked", "truth_ssim_masked"):
         assert some[name] == pytest.approx(whole[name], rel=0.02)
@@ -94,25 +97,28 @@ def test_codecs_in_two_steps_are_those_that_say_so():
     assert {kind for kind in CODECS if isinstance(make_codec(kind, {}), TwoStepCodec)} == set(TWO_STEPS)
 
 
-@pytest.mark.slow
+@pytest.fixture
+def small(monkeypatch):
+    """Encoders that are quick."""
+    for name in ("meshreel", "background_once", "tvmc.codec"):
+        monkeypatch.setattr(f"meshreel.evaluation.codecs.{name}.preset_options", quick)
+
+
+@pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("kind", TWO_STEPS)
-def test_two_steps_give_the_bytes_of_one_and_leave_the_analysis_as_it_was(kind, room):
+def test_two_steps_give_the_bytes_of_one_and_leave_the_analysis_as_it_was(kind, tmp_path):
     codec = make_codec(kind, TWO_STEPS[kind])
-    some = Chosen(room.sequence, range(0, FRAMES, 2))
-    analysis = codec.analyse(some)
+    analysis = codec.analyse(SCENE)
     data = codec.code(analysis)
-    assert data == codec.code(analysis) == codec.encode(some)
-    assert len(codec.decode(data)) == len(some)
+    assert data == codec.code(analysis) and len(codec.decode(data)) == len(SCENE)
+    if kind == "meshreel":
+        encode(SCENE, tmp_path / "a.reel", codec.encoder_options)
+        assert data == (tmp_path / "a.reel").read_bytes()
+    else:
+        assert data == codec.encode(SCENE)
 
 
-@pytest.mark.slow
-def test_meshreel_in_two_steps_writes_what_its_encoder_writes(room, tmp_path):
-    codec = make_codec("meshreel", TWO_STEPS["meshreel"])
-    some = Chosen(room.sequence, range(0, FRAMES, 2))
-    encode(some, tmp_path / "a.reel", codec.encoder_options)
-    assert codec.encode(some) == (tmp_path / "a.reel").read_bytes()
-
-
+@pytest.mark.usefixtures("small")
 def test_points_of_one_analysis_are_measured_together_and_analysed_once(bench, monkeypatch, tmp_path):
     points = [
         Point("ball", "tvmc", TWO_STEPS["tvmc"] | changed, kind=RATED)

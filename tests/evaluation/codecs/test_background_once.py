@@ -11,36 +11,37 @@ from meshreel.errors import FormatError, InputError
 from meshreel.evaluation.codecs import make_codec
 from meshreel.evaluation.codecs.background_once import BackgroundOnceDracoCodec
 from meshreel.evaluation.codecs.draco import DecimatedDracoCodec
-from meshreel.evaluation.datasets import open_known
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.nearest import Surface, distances
 from meshreel.types import Mesh, MeshList
+from tests.small_options import quick
+from tests.small_scene import balls, scene
 
-FRAMES = 8
-
-
-@pytest.fixture(scope="module")
-def room(tmp_path_factory):
-    """Every third frame of the procedural room, captured."""
-    return open_known("procedural_room", tmp_path_factory.mktemp("none"), FRAMES, tmp_path_factory.mktemp("cache"))
+SCENE = scene()
 
 
-@pytest.mark.slow
-def test_the_background_is_sent_once_and_what_moves_in_every_frame(room):
+def test_the_background_is_sent_once_and_what_moves_in_every_frame(monkeypatch):
+    monkeypatch.setattr("meshreel.evaluation.codecs.background_once.preset_options", quick)
     codec = BackgroundOnceDracoCodec(0.5, 11)
-    data = codec.encode(room.sequence)
+    data = codec.encode(SCENE)
     video = open_video(data)
     static = [chunk for chunk in video.reader.chunks if chunk.kind == ChunkKind.STATIC]
-    assert len(static) == 1 and len(video.reader.groups) == FRAMES == len(codec.decode(data))
-    diagonal = room.sequence[0].diagonal
-    for number in (0, FRAMES - 1):
-        gaps = distances(room.sequence[number].vertices, codec.decode(data)[number])
-        assert np.quantile(gaps, 0.95) < 0.01 * diagonal
-    assert data == codec.encode(room.sequence)
-    smaller = BackgroundOnceDracoCodec(0.1, 8).encode(room.sequence)
-    assert len(smaller) - static[0].size < 0.4 * (len(data) - static[0].size)
+    assert len(static) == 1 and len(video.reader.groups) == len(SCENE) == len(codec.decode(data))
+    for number in (0, len(SCENE) - 1):
+        gaps = distances(SCENE[number].vertices, codec.decode(data)[number])
+        assert np.quantile(gaps, 0.95) < 0.01 * SCENE[number].diagonal
+        shown = video.moving(number)
+        assert np.abs(shown.vertices.mean(axis=0) - balls_of(number)).max() < 0.05
+    assert data == codec.encode(SCENE)
+    smaller = BackgroundOnceDracoCodec(0.1, 8).encode(SCENE)
+    assert len(smaller) - static[0].size < 0.8 * (len(data) - static[0].size)
     with pytest.raises(FormatError):
-        codec.decode(data[: len(data) // 2])[FRAMES - 1]
+        codec.decode(data[: len(data) // 2])[len(SCENE) - 1]
+
+
+def balls_of(number):
+    """The middle of both balls."""
+    return np.concatenate([ball.vertices for ball in balls(number)]).mean(axis=0)
 
 
 def test_what_is_no_scene_is_decimated_draco():
