@@ -23,7 +23,7 @@ from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
 
 TINY = NecgsCodec(resolution=16, features=4, channels=8, epochs=60, fitting=5, rate=1e-2, device="cpu")
-HASTY = replace(TINY, epochs=2, fitting=1)
+HASTY = replace(TINY, epochs=10, fitting=1)
 BALLS = deforming_sphere(4, levels=3)
 
 torch_only = pytest.mark.skipif(
@@ -148,6 +148,28 @@ def test_frames_that_share_nothing_and_lie_far_away_are_coded():
     frames = MeshList((*moved, line))
     decoded = TINY.decode(TINY.encode(frames))
     assert quality(frames.meshes[:2], decoded[:2]) > 30
+
+
+@torch_only
+def test_a_set_whose_training_lost_a_frame_is_refused_by_its_number():
+    frames = MeshList((Mesh.empty(), *BALLS.meshes[:2]))
+    for absurd in (replace(HASTY, epochs=1), replace(HASTY, rate=1e-9), replace(HASTY, rate=1.0)):
+        with pytest.raises(InputError, match=r"frame 1: .* more epochs than .* another rate .* seed"):
+            absurd.encode(frames)
+
+
+@torch_only
+def test_a_frame_that_became_another_body_is_refused(monkeypatch):
+    from meshreel.evaluation.codecs.necgs import train
+
+    def other(volumes, shape, options, device, told):
+        turned = [np.ascontiguousarray(-volume) for volume in volumes]
+        return trained(turned, shape, options, device, told)
+
+    trained = train.train
+    monkeypatch.setattr(train, "train", other)
+    with pytest.raises(InputError, match=r"frame 0: training ended with \d% of its body"):
+        HASTY.encode(MeshList(BALLS.meshes[:1]))
 
 
 @torch_only

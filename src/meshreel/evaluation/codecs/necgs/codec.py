@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, overload
 
 import numpy as np
+from jaxtyping import Float32
 
 from ....errors import InputError
 from ....types import Mesh, MeshSequence
@@ -34,6 +35,7 @@ FULL: dict[str, Any] = {  # the publication's (section 4.1), for a GPU; its fit 
     "batch": 4,
     "rate": 1e-3,
 }
+KEPT = 0.1  # share of a frame's inside and of what is decoded as inside; with less in common training has failed
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,10 @@ class NecgsCodec:
         return Shape(self.resolution, self.features, self.channels, self.bits)
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """The network and a feature a frame. InputError without the extra, or for frames that are not finite."""
+        """The network and a feature a frame.
+
+        InputError without the extra, for frames that are not finite, and where training ends without a frame's surface.
+        """
         _need_torch()
         from .fit import fit_volume
         from .train import Training, train
@@ -105,7 +110,21 @@ class NecgsCodec:
         if volumes:
             trained = train(volumes, self.shape, options, self.device, partial(tell, "train"))
             features, parameters = trained.features, trained.parameters
-        return encode_stream(Coded(self.shape, trimmed, full, placement, features, parameters))
+        coded = Coded(self.shape, trimmed, full, placement, features, parameters)
+        self._check_surfaces(coded, volumes)
+        return encode_stream(coded)
+
+    def _check_surfaces(self, coded: Coded, volumes: Sequence[np.ndarray]) -> None:
+        """Refuses a set of which a frame has lost its surface, or has another one: training has failed."""
+        frames = _Decoded(coded, self.device)
+        for row, number in enumerate(np.flatnonzero(coded.full).tolist()):
+            wanted, made = volumes[row].astype(np.float32), frames.volume(row)
+            kept = 0.0 if extract(made, coded.trimmed).is_empty else _shared_inside(wanted, made)
+            if kept < KEPT and not extract(wanted, coded.trimmed).is_empty:
+                raise InputError(
+                    f"frame {number}: training ended with {kept:.0%} of its body; "
+                    f"give more epochs than {self.epochs}, another rate than {self.rate:g} or another seed"
+                )
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, each made when asked for. FormatError for bytes that are none of `encode`'s."""
@@ -137,11 +156,21 @@ class _Decoded(Sequence[Mesh]):
         if isinstance(index, slice):
             return [self[number] for number in range(*index.indices(len(self)))]
         number = range(len(self))[index]
-        if self._network is None or not self._coded.full[number]:
+        if not self._coded.full[number]:
             return Mesh.empty()
-        volume = self._network.volume(self._coded.features[self._rows[number]])
-        mesh = extract(volume, self._coded.trimmed)
+        mesh = extract(self.volume(int(self._rows[number])), self._coded.trimmed)
         return self._coded.placement.forward(mesh, number, self._coded.shape.resolution)
+
+    def volume(self, row: int) -> Float32[np.ndarray, "K K K 4"]:
+        """The TSDF-Def volume of a frame that is not empty, the first of which has row 0."""
+        assert self._network is not None, "a frame that is not empty has a network"
+        return self._network.volume(self._coded.features[row])
+
+
+def _shared_inside(a: Float32[np.ndarray, "K K K 4"], b: Float32[np.ndarray, "K K K 4"]) -> float:
+    """The points inside both volumes, as a share of those inside any."""
+    either = ((a[..., 0] < 0) | (b[..., 0] < 0)).sum()
+    return float(((a[..., 0] < 0) & (b[..., 0] < 0)).sum() / max(either, 1))
 
 
 def _checked(mesh: Mesh, number: int) -> Mesh:

@@ -101,12 +101,11 @@ def _loss(made: Tensor, truth: Tensor, window: Tensor) -> Tensor:
 def _similarity(a: Tensor, b: Tensor, window: Tensor) -> Tensor:
     """The structural similarity at every point, channel by channel."""
     mean_a, mean_b = _blurred(a, window), _blurred(b, window)
-    spread_a = _blurred(a * a, window) - mean_a * mean_a
-    spread_b = _blurred(b * b, window) - mean_b * mean_b
+    means = mean_a * mean_a + mean_b * mean_b
+    spreads = _blurred(a * a + b * b, window) - means
     shared = _blurred(a * b, window) - mean_a * mean_b
     c1, c2 = _STABLE
-    above = (2 * mean_a * mean_b + c1) * (2 * shared + c2)
-    return above / ((mean_a * mean_a + mean_b * mean_b + c1) * (spread_a + spread_b + c2))
+    return (2 * mean_a * mean_b + c1) * (2 * shared + c2) / ((means + c1) * (spreads + c2))
 
 
 def _blurred(values: Tensor, window: Tensor) -> Tensor:
