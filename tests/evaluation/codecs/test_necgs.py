@@ -15,7 +15,7 @@ import pytest
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.evaluation.codecs import make_codec
-from meshreel.evaluation.codecs.necgs import FULL, SMALL, NecgsCodec
+from meshreel.evaluation.codecs.necgs import FULL, QUICK, SMALL, NecgsCodec
 from meshreel.evaluation.codecs.necgs.cubes import extract
 from meshreel.evaluation.codecs.necgs.grid import box_of, place_grids, truncated_distances
 from meshreel.evaluation.codecs.necgs.stream import decode_stream, encode_stream
@@ -151,6 +151,13 @@ def test_frames_that_share_nothing_and_lie_far_away_are_coded():
 
 
 @torch_only
+def test_the_quick_configuration_has_people_s_shapes():
+    people = list(soft_bodies(SoftBodiesOptions(frames=2, spacing=0.05)))
+    codec = NecgsCodec(**QUICK, device="cpu")
+    assert quality(people, codec.decode(codec.encode(MeshList(tuple(people))))) > 33
+
+
+@torch_only
 def test_a_set_whose_training_lost_a_frame_is_refused_by_its_number():
     frames = MeshList((Mesh.empty(), *BALLS.meshes[:2]))
     for absurd in (replace(HASTY, epochs=1), replace(HASTY, rate=1e-9), replace(HASTY, rate=1.0)):
@@ -169,7 +176,7 @@ def test_a_frame_that_became_another_body_is_refused(monkeypatch):
     trained = train.train
     monkeypatch.setattr(train, "train", other)
     with pytest.raises(InputError, match=r"frame 0: training ended with \d% of its body"):
-        HASTY.encode(MeshList(BALLS.meshes[:1]))
+        TINY.encode(MeshList(BALLS.meshes[:1]))
 
 
 @torch_only
@@ -216,8 +223,9 @@ def test_naming_the_codec_does_not_load_torch():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_both_configurations_are_codecs():
+def test_every_configuration_is_a_codec():
     assert make_codec("necgs", SMALL) == make_codec("necgs", {}) == NecgsCodec()
+    assert make_codec("necgs", QUICK).shape.layers == ((16, 64), (8, 48), (6, 32), (4, 4))
     assert make_codec("necgs", FULL).shape.layers[0] == (16, 512)
 
 
@@ -233,6 +241,8 @@ def test_both_configurations_are_codecs():
         ({"batch": 0}, "batch 0"),
         ({"seed": -1}, "seed -1"),
         ({"rate": float("nan")}, "rate nan"),
+        ({"structure": -1.0}, "structure -1.0: give a weight of 0 to 1000"),
+        ({"structure": float("inf")}, "structure inf"),
         ({"blocks": 8}, "does not take"),
     ],
 )

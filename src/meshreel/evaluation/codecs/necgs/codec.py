@@ -19,13 +19,20 @@ from .grid import box_of, place_grids, truncated_distances
 from .shape import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Shape
 from .stream import Coded, decode_stream, encode_stream
 
+QUICK: dict[str, Any] = {  # seconds for a few frames, for tests and for a first look: limbs and heads, no faces
+    "resolution": 32,
+    "channels": 8,
+    "epochs": 60,
+    "fitting": 10,
+}
 SMALL: dict[str, Any] = {  # the defaults: minutes on a core for ten frames
     "resolution": 64,
     "channels": 16,
     "epochs": 100,
-    "fitting": 60,
+    "fitting": 20,
     "batch": 1,
-    "rate": 3e-3,
+    "rate": 6e-3,
+    "structure": 1.0,
 }
 FULL: dict[str, Any] = {  # the publication's (section 4.1), for a GPU; its fit of other errors takes 500 steps
     "resolution": 128,
@@ -34,7 +41,9 @@ FULL: dict[str, Any] = {  # the publication's (section 4.1), for a GPU; its fit 
     "fitting": 100,
     "batch": 4,
     "rate": 1e-3,
+    "structure": 10.0,
 }
+MOST_STRUCTURE = 1000.0
 KEPT = 0.1  # share of a frame's inside and of what is decoded as inside; with less in common training has failed
 
 
@@ -47,9 +56,10 @@ class NecgsCodec:
     channels: int = 16  # of the first of the network's modules; sets the rate
     epochs: int = 100
     bits: int = 8  # N: the network's numbers are multiples of 2 / 2^N
-    fitting: int = 60  # steps in which a volume is fitted to its mesh; 0: plain TSDF
+    fitting: int = 20  # steps in which a volume is fitted to its mesh; 0: plain TSDF
     batch: int = 1  # frames a step of training
-    rate: float = 3e-3  # the highest learning rate; at 1e-2 a grid of 64 stayed without a surface
+    rate: float = 6e-3  # the highest learning rate
+    structure: float = 1.0  # weight of the structural similarities in the loss
     seed: int = 0
     device: str = "auto"  # as torch names it; auto: a GPU where there is one
 
@@ -70,6 +80,8 @@ class NecgsCodec:
                 raise InputError(f"{name} {value}: give {least} to {most}")
         if not (math.isfinite(self.rate) and 0 < self.rate <= 1):
             raise InputError(f"rate {self.rate}: give a learning rate above 0, at most 1")
+        if not 0 <= self.structure <= MOST_STRUCTURE:
+            raise InputError(f"structure {self.structure}: give a weight of 0 to {MOST_STRUCTURE:g}")
 
     @property
     def name(self) -> str:
@@ -105,7 +117,7 @@ class NecgsCodec:
             trimmed |= sheets
             volumes.append(fit_volume(distances, mesh, self.fitting).astype(np.float16))  # half the memory
             tell("volumes", number + 1, len(boxes))
-        options = Training(self.epochs, self.batch, self.rate, self.seed)
+        options = Training(self.epochs, self.batch, self.rate, self.structure, self.seed)
         features, parameters = np.zeros((0, self.shape.feature_size), np.int32), list[np.ndarray]()
         if volumes:
             trained = train(volumes, self.shape, options, self.device, partial(tell, "train"))

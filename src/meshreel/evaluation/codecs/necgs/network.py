@@ -61,18 +61,20 @@ def rounded(values: Tensor, bits: int) -> Tensor:
 
 
 def initial_parameters(shape: Shape, seed: int) -> list[Tensor]:
-    """Weights and biases evenly spread within 1 / sqrt(inputs), PyTorch's own rule for convolutions.
+    """Weights that keep the size of values from module to module (He et al. 2015), biases of zero.
 
-    But for the last convolution, whose volume is empty at first: far from any surface, and without deformation.
+    The last convolution's volume is empty at first: far from any surface, and without deformation.
     """
     generator = torch.Generator().manual_seed(seed)
     found = []
     for inputs, outputs in shape.layers:
-        bound = (27 * inputs) ** -0.5
-        for size in ((outputs, inputs, 3, 3, 3), (outputs,)):
-            found.append((2 * torch.rand(size, generator=generator) - 1) * bound)
+        bound = (6 / (27 * inputs)) ** 0.5
+        found.append((2 * torch.rand((outputs, inputs, 3, 3, 3), generator=generator) - 1) * bound)
+        found.append(torch.zeros(outputs))
     weights, bias = found[-2:]
-    weights[1:], bias[1:], bias[0] = 0, 0, EMPTY
+    weights[0] /= 6**0.5  # what follows is no GELU
+    weights[1:] = 0
+    bias[0] = EMPTY
     return found
 
 
