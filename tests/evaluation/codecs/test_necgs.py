@@ -115,15 +115,20 @@ def test_the_same_frames_give_the_same_bytes_and_these_the_same_meshes_in_any_pr
     assert fresh == fingerprint(TINY.decode(balls)) == fingerprint(TINY.decode(balls)[::-1][::-1])
 
 
+def _settings_of(torch):
+    strict = torch.are_deterministic_algorithms_enabled(), torch.utils.deterministic.fill_uninitialized_memory
+    return torch.get_num_threads(), *strict, torch.get_rng_state()
+
+
 @torch_only
 def test_coding_leaves_torch_as_it_was():
     import torch
 
     torch.manual_seed(5)
-    before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), torch.get_rng_state())
+    before = _settings_of(torch)
     list(HASTY.decode(HASTY.encode(MeshList(BALLS.meshes[:1]))))
-    after = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), torch.get_rng_state())
-    assert before[:2] == after[:2] and torch.equal(before[2], after[2])
+    after = _settings_of(torch)
+    assert before[:3] == after[:3] and torch.equal(before[3], after[3])
 
 
 @torch_only
