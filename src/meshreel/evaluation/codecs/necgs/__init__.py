@@ -15,7 +15,7 @@ Differs from the publication:
   where the sign flips far from any surface (`grid`).
 - Training starts from weights that keep the size of values from module to module, and from an empty volume: the last
   convolution makes the distance of a point far outside, and no deformation. With PyTorch's own rule, the authors',
-  values fade on their way, and the few hundred steps that a core affords go into unlearning the noise of deformations.
+  values fade on their way, and the thousand steps that a core affords go into unlearning the noise of deformations.
   `encode` refuses a set of which a frame has lost its body in training.
 - Sizes: the network narrows as the authors' does (64, 48, 32, 24, 16), all in proportion to `channels`, without the
   head layer that their configuration leaves out, and without their grids of 256. `SMALL`, the default, is a quarter as
