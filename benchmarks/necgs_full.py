@@ -1,7 +1,7 @@
 """NeCGS as it was published, at several sizes of its network: rates, quality and times, as rows.
 
 python benchmarks/necgs_full.py -o necgs.jsonl --data ../shared/data/performers dancer   # hours, on a GPU
-python benchmarks/necgs_full.py -o necgs.jsonl --data ... dancer --frames 10 --small     # minutes a point, on a core
+python benchmarks/necgs_full.py -o necgs.jsonl --data ... dancer --frames 10 --size small  # minutes a point, on a core
 
 In: sequences below --data. Out: a row a point (kind `curve`), appended; points that have one are not run again. The
 authors vary the rate by the network's size; --channels says which sizes.
@@ -15,13 +15,14 @@ import time
 from pathlib import Path
 from typing import Any
 
-from meshreel.evaluation.codecs.necgs import FULL, SMALL, NecgsCodec
+from meshreel.evaluation.codecs.necgs import FULL, QUICK, SMALL, NecgsCodec
 from meshreel.evaluation.datasets import open_dataset
 from meshreel.evaluation.rows import Point, append_row, read_rows
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
 from meshreel.types import MeshSequence
 
 EXPERIMENT = "necgs"
+SIZES = {"full": FULL, "small": SMALL, "quick": QUICK}
 
 
 def main() -> int:
@@ -31,7 +32,7 @@ def main() -> int:
     for name in given.sequences:
         sequence = open_dataset(name, given.data, given.frames)
         for channels in given.channels:
-            options = NecgsCodec(**(SMALL if given.small else FULL) | {"channels": channels}).options
+            options = NecgsCodec(**SIZES[given.size] | {"channels": channels}).options
             point = Point(name, "necgs", options, given.frames, "curve")
             if point.key not in known:
                 row = {"point": point.key, "kind": point.kind, "experiment": EXPERIMENT} | measure(
@@ -69,7 +70,9 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--data", type=Path, required=True, help="the folder of the sequences")
     parser.add_argument("--frames", type=int, help="the first so many; all without")
     parser.add_argument("--channels", type=int, nargs="+", default=[64], help="of the first module")
-    parser.add_argument("--small", action="store_true", help="the small configuration in the place of the published")
+    parser.add_argument(
+        "--size", choices=SIZES, default="full", help="of the codec: the published one, or smaller ones"
+    )
     return parser.parse_args()
 
 

@@ -15,7 +15,7 @@ import pytest
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.evaluation.codecs import make_codec
-from meshreel.evaluation.codecs.necgs import FULL, SMALL, NecgsCodec
+from meshreel.evaluation.codecs.necgs import FULL, QUICK, SMALL, NecgsCodec
 from meshreel.evaluation.codecs.necgs.cubes import extract
 from meshreel.evaluation.codecs.necgs.grid import box_of, place_grids, truncated_distances
 from meshreel.evaluation.codecs.necgs.stream import decode_stream, encode_stream
@@ -23,7 +23,7 @@ from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
 
 TINY = NecgsCodec(resolution=16, features=4, channels=8, epochs=60, fitting=5, rate=1e-2, device="cpu")
-HASTY = replace(TINY, epochs=2, fitting=1)
+HASTY = replace(TINY, epochs=10, fitting=1)
 BALLS = deforming_sphere(4, levels=3)
 
 torch_only = pytest.mark.skipif(
@@ -115,15 +115,20 @@ def test_the_same_frames_give_the_same_bytes_and_these_the_same_meshes_in_any_pr
     assert fresh == fingerprint(TINY.decode(balls)) == fingerprint(TINY.decode(balls)[::-1][::-1])
 
 
+def _settings_of(torch):
+    strict = torch.are_deterministic_algorithms_enabled(), torch.utils.deterministic.fill_uninitialized_memory
+    return torch.get_num_threads(), *strict, torch.get_rng_state()
+
+
 @torch_only
 def test_coding_leaves_torch_as_it_was():
     import torch
 
     torch.manual_seed(5)
-    before = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), torch.get_rng_state())
+    before = _settings_of(torch)
     list(HASTY.decode(HASTY.encode(MeshList(BALLS.meshes[:1]))))
-    after = (torch.get_num_threads(), torch.are_deterministic_algorithms_enabled(), torch.get_rng_state())
-    assert before[:2] == after[:2] and torch.equal(before[2], after[2])
+    after = _settings_of(torch)
+    assert before[:3] == after[:3] and torch.equal(before[3], after[3])
 
 
 @torch_only
@@ -148,6 +153,35 @@ def test_frames_that_share_nothing_and_lie_far_away_are_coded():
     frames = MeshList((*moved, line))
     decoded = TINY.decode(TINY.encode(frames))
     assert quality(frames.meshes[:2], decoded[:2]) > 30
+
+
+@torch_only
+def test_the_quick_configuration_has_a_person_s_shape():
+    person = list(soft_bodies(SoftBodiesOptions(frames=1, spacing=0.05, people=1)))
+    codec = NecgsCodec(**QUICK, device="cpu")
+    assert quality(person, codec.decode(codec.encode(MeshList(tuple(person))))) > 36
+
+
+@torch_only
+def test_a_set_whose_training_lost_a_frame_is_refused_by_its_number():
+    frames = MeshList((Mesh.empty(), *BALLS.meshes[:2]))
+    for absurd in (replace(HASTY, epochs=1), replace(HASTY, rate=1e-9), replace(HASTY, rate=1.0)):
+        with pytest.raises(InputError, match=r"frame 1: .* more epochs than .* another rate .* seed"):
+            absurd.encode(frames)
+
+
+@torch_only
+def test_a_frame_that_became_another_body_is_refused(monkeypatch):
+    from meshreel.evaluation.codecs.necgs import train
+
+    def other(volumes, shape, options, device, told):
+        turned = [np.ascontiguousarray(-volume) for volume in volumes]
+        return trained(turned, shape, options, device, told)
+
+    trained = train.train
+    monkeypatch.setattr(train, "train", other)
+    with pytest.raises(InputError, match=r"frame 0: training ended with \d% of its body"):
+        TINY.encode(MeshList(BALLS.meshes[:1]))
 
 
 @torch_only
@@ -194,8 +228,9 @@ def test_naming_the_codec_does_not_load_torch():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-def test_both_configurations_are_codecs():
+def test_every_configuration_is_a_codec():
     assert make_codec("necgs", SMALL) == make_codec("necgs", {}) == NecgsCodec()
+    assert make_codec("necgs", QUICK).shape.layers == ((16, 64), (8, 48), (6, 32), (4, 4))
     assert make_codec("necgs", FULL).shape.layers[0] == (16, 512)
 
 
@@ -211,6 +246,8 @@ def test_both_configurations_are_codecs():
         ({"batch": 0}, "batch 0"),
         ({"seed": -1}, "seed -1"),
         ({"rate": float("nan")}, "rate nan"),
+        ({"structure": -1.0}, "structure -1.0: give a weight of 0 to 1000"),
+        ({"structure": float("inf")}, "structure inf"),
         ({"blocks": 8}, "does not take"),
     ],
 )

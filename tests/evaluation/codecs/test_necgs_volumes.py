@@ -129,6 +129,17 @@ def test_an_open_sheet_is_trimmed_where_it_ends():
     assert len(found.faces) < len(extract(volume, trimmed=False).faces)
 
 
+def test_a_loose_face_of_a_body_makes_nothing_inside_behind_it():
+    ball = deforming_sphere(1)[0]
+    corner = np.array([[1.1, 0, 0.1], [1.1, 0.1, 0], [1.1, 0, 0]])
+    loose = Mesh.of(np.concatenate([ball.vertices, corner]), [*ball.faces, len(ball.vertices) + np.arange(3)])
+    for faces in (loose.faces, loose.faces[:, ::-1]):
+        volume, placement, sheets = volume_of(Mesh.of(loose.vertices, faces), 32)
+        found = placement.forward(extract(volume, sheets), 0, 32)
+        assert not sheets
+        assert np.abs(np.linalg.norm(found.vertices, axis=1) - 1).max() < placement.cell
+
+
 def test_a_mesh_without_area_has_no_surface():
     line = Mesh.of([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     volume, _, _ = volume_of(line, 16)

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, overload
 
 import numpy as np
+from jaxtyping import Float32
 
 from ....errors import InputError
 from ....types import Mesh, MeshSequence
@@ -18,13 +19,20 @@ from .grid import box_of, place_grids, truncated_distances
 from .shape import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Shape
 from .stream import Coded, decode_stream, encode_stream
 
+QUICK: dict[str, Any] = {  # seconds for a few frames, for tests and for a first look: limbs and heads, no faces
+    "resolution": 32,
+    "channels": 8,
+    "epochs": 60,
+    "fitting": 10,
+}
 SMALL: dict[str, Any] = {  # the defaults: minutes on a core for ten frames
     "resolution": 64,
     "channels": 16,
     "epochs": 100,
-    "fitting": 60,
+    "fitting": 20,
     "batch": 1,
-    "rate": 3e-3,
+    "rate": 6e-3,
+    "structure": 1.0,
 }
 FULL: dict[str, Any] = {  # the publication's (section 4.1), for a GPU; its fit of other errors takes 500 steps
     "resolution": 128,
@@ -33,7 +41,10 @@ FULL: dict[str, Any] = {  # the publication's (section 4.1), for a GPU; its fit 
     "fitting": 100,
     "batch": 4,
     "rate": 1e-3,
+    "structure": 10.0,
 }
+MOST_STRUCTURE = 1000.0
+KEPT = 0.1  # share of a frame's inside and of what is decoded as inside; with less in common training has failed
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +56,10 @@ class NecgsCodec:
     channels: int = 16  # of the first of the network's modules; sets the rate
     epochs: int = 100
     bits: int = 8  # N: the network's numbers are multiples of 2 / 2^N
-    fitting: int = 60  # steps in which a volume is fitted to its mesh; 0: plain TSDF
+    fitting: int = 20  # steps in which a volume is fitted to its mesh; 0: plain TSDF
     batch: int = 1  # frames a step of training
-    rate: float = 3e-3  # the highest learning rate; at 1e-2 a grid of 64 stayed without a surface
+    rate: float = 6e-3  # the highest learning rate
+    structure: float = 1.0  # weight of the structural similarities in the loss
     seed: int = 0
     device: str = "auto"  # as torch names it; auto: a GPU where there is one
 
@@ -68,6 +80,8 @@ class NecgsCodec:
                 raise InputError(f"{name} {value}: give {least} to {most}")
         if not (math.isfinite(self.rate) and 0 < self.rate <= 1):
             raise InputError(f"rate {self.rate}: give a learning rate above 0, at most 1")
+        if not 0 <= self.structure <= MOST_STRUCTURE:
+            raise InputError(f"structure {self.structure}: give a weight of 0 to {MOST_STRUCTURE:g}")
 
     @property
     def name(self) -> str:
@@ -85,7 +99,10 @@ class NecgsCodec:
         return Shape(self.resolution, self.features, self.channels, self.bits)
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """The network and a feature a frame. InputError without the extra, or for frames that are not finite."""
+        """The network and a feature a frame.
+
+        InputError without the extra, for frames that are not finite, and where training ends without a frame's surface.
+        """
         _need_torch()
         from .fit import fit_volume
         from .train import Training, train
@@ -100,12 +117,26 @@ class NecgsCodec:
             trimmed |= sheets
             volumes.append(fit_volume(distances, mesh, self.fitting).astype(np.float16))  # half the memory
             tell("volumes", number + 1, len(boxes))
-        options = Training(self.epochs, self.batch, self.rate, self.seed)
+        options = Training(self.epochs, self.batch, self.rate, self.structure, self.seed)
         features, parameters = np.zeros((0, self.shape.feature_size), np.int32), list[np.ndarray]()
         if volumes:
             trained = train(volumes, self.shape, options, self.device, partial(tell, "train"))
             features, parameters = trained.features, trained.parameters
-        return encode_stream(Coded(self.shape, trimmed, full, placement, features, parameters))
+        coded = Coded(self.shape, trimmed, full, placement, features, parameters)
+        self._check_surfaces(coded, volumes)
+        return encode_stream(coded)
+
+    def _check_surfaces(self, coded: Coded, volumes: Sequence[np.ndarray]) -> None:
+        """Refuses a set of which a frame has lost its surface, or has another one: training has failed."""
+        frames = _Decoded(coded, self.device)
+        for row, number in enumerate(np.flatnonzero(coded.full).tolist()):
+            wanted, made = volumes[row].astype(np.float32), frames.volume(row)
+            kept = 0.0 if extract(made, coded.trimmed).is_empty else _shared_inside(wanted, made)
+            if kept < KEPT and not extract(wanted, coded.trimmed).is_empty:
+                raise InputError(
+                    f"frame {number}: training ended with {kept:.0%} of its body; "
+                    f"give more epochs than {self.epochs}, another rate than {self.rate:g} or another seed"
+                )
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, each made when asked for. FormatError for bytes that are none of `encode`'s."""
@@ -137,11 +168,21 @@ class _Decoded(Sequence[Mesh]):
         if isinstance(index, slice):
             return [self[number] for number in range(*index.indices(len(self)))]
         number = range(len(self))[index]
-        if self._network is None or not self._coded.full[number]:
+        if not self._coded.full[number]:
             return Mesh.empty()
-        volume = self._network.volume(self._coded.features[self._rows[number]])
-        mesh = extract(volume, self._coded.trimmed)
+        mesh = extract(self.volume(int(self._rows[number])), self._coded.trimmed)
         return self._coded.placement.forward(mesh, number, self._coded.shape.resolution)
+
+    def volume(self, row: int) -> Float32[np.ndarray, "K K K 4"]:
+        """The TSDF-Def volume of a frame that is not empty, the first of which has row 0."""
+        assert self._network is not None, "a frame that is not empty has a network"
+        return self._network.volume(self._coded.features[row])
+
+
+def _shared_inside(a: Float32[np.ndarray, "K K K 4"], b: Float32[np.ndarray, "K K K 4"]) -> float:
+    """The points inside both volumes, as a share of those inside any."""
+    either = ((a[..., 0] < 0) | (b[..., 0] < 0)).sum()
+    return float(((a[..., 0] < 0) & (b[..., 0] < 0)).sum() / max(either, 1))
 
 
 def _checked(mesh: Mesh, number: int) -> Mesh:

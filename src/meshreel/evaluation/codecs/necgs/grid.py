@@ -23,7 +23,7 @@ from ....types import Mesh
 TRUNCATION = 2.0  # cells at which a distance becomes 1, as in the authors' code
 MARGIN = 2  # cells between the largest frame and its grid's sides
 FARTHEST = 1 << 30  # cells that a frame may be away
-SHEETS = 0.05  # share of a mesh's area from which sheets are trimmed
+SHEETS = 0.05  # share of a mesh's area from which sheets are kept and trimmed; less of them is left out
 _BLOCK = 4  # points a side of a block that is decided at once where no surface is near
 _PROBE = 0.02  # cells before and behind a face
 
@@ -93,7 +93,7 @@ def truncated_distances(mesh: Mesh, resolution: int) -> tuple[Float32[np.ndarray
     values[near] = np.clip(distances / TRUNCATION, -1, 1).reshape(-1, _BLOCK**3)
     count = resolution // _BLOCK
     grid = values.reshape((count,) * 3 + (_BLOCK,) * 3).transpose(0, 3, 1, 4, 2, 5)
-    return grid.reshape((resolution,) * 3).astype(np.float32), signs.sheet_share > SHEETS
+    return grid.reshape((resolution,) * 3).astype(np.float32), signs.has_sheets
 
 
 class _Signs:
@@ -101,8 +101,9 @@ class _Signs:
 
     def __init__(self, mesh: Mesh) -> None:
         self.surface = Surface(mesh)
-        self._sheet = _sheet_faces(self.surface)
-        self.sheet_share = float(self.surface.areas[self._sheet].sum() / self.surface.areas.sum())
+        sheet = _sheet_faces(self.surface)
+        self.has_sheets = bool(self.surface.areas[sheet].sum() > SHEETS * self.surface.areas.sum())
+        self._sheet = sheet & self.has_sheets  # untrimmed, one loose face would have all that is behind it inside
 
     def inside(self, points: Float64[np.ndarray, "N 3"], hits: Hits) -> Bool[np.ndarray, " N"]:
         """Whether points are inside a body, or behind the sheet that is closest to them."""

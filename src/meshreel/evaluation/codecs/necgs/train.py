@@ -1,8 +1,8 @@
 """Training of the auto-decoder (NeCGS, section 3.2): volumes -> symbols of the embedded features and of the network.
 
 Features and parameters are rounded in every step, so that they are fit for it. The loss is eq. 3: the mean absolute
-error, that of points near the surface 5 times, and 10 times what two structural similarities lack of 1. The extra
-`necgs`.
+error, that of points near the surface 5 times, and `structure` times what two structural similarities lack of 1. The
+extra `necgs`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from .network import choose_device, decode_volumes, initial_parameters, repeatab
 from .shape import SIDE, Shape
 
 NEAR = 5.0  # lambda 1
-STRUCTURE = 10.0  # lambda 2
 SMALL_FEATURES = 0.1  # weight of the features' mean size, as in the authors' code
 _WARM = 0.2  # share of the epochs in which the learning rate rises
 _WINDOW, _SIGMA = 11, 1.5  # points, of the structural similarity
@@ -36,6 +35,7 @@ class Training:
     epochs: int = 400
     batch: int = 4  # frames a step
     rate: float = 1e-3  # of Adam, at its highest
+    structure: float = 10.0  # lambda 2, weight of the structural similarities
     seed: int = 0
 
 
@@ -75,7 +75,8 @@ def _train(volumes: Volumes, shape: Shape, options: Training, target: _Target) -
             chosen = rounded(features[numbers.to(place)], shape.bits)
             made = decode_volumes(chosen, [rounded(p, shape.bits) for p in parameters])
             adam.zero_grad()
-            (_loss(made, truth.contiguous(), window) + SMALL_FEATURES * chosen.abs().mean()).backward()
+            errors, lacking = _loss(made, truth.contiguous(), window)
+            (errors + options.structure * lacking + SMALL_FEATURES * chosen.abs().mean()).backward()
             adam.step()
         target.told(epoch + 1, options.epochs)
     symbols = to_symbols(features, shape.bits).reshape(len(volumes), -1)
@@ -89,24 +90,23 @@ def _pace(done: float) -> float:
     return 0.5 * (math.cos(math.pi * (done - _WARM) / (1 - _WARM)) + 1)
 
 
-def _loss(made: Tensor, truth: Tensor, window: Tensor) -> Tensor:
-    """Eq. 3."""
+def _loss(made: Tensor, truth: Tensor, window: Tensor) -> tuple[Tensor, Tensor]:
+    """The two parts of eq. 3: errors, and what the similarities lack."""
     errors = (made - truth).abs()
     near = (truth[:, :1].abs() < 1).float()
     likeness = _similarity(made, truth, window)
     lacking = 1 - likeness[:, 0].mean() + 1 - likeness[:, 1:].mean()
-    return errors.mean() + NEAR * (near * errors).sum() / near.sum().clamp(min=1) + STRUCTURE * lacking
+    return errors.mean() + NEAR * (near * errors).sum() / near.sum().clamp(min=1), lacking
 
 
 def _similarity(a: Tensor, b: Tensor, window: Tensor) -> Tensor:
     """The structural similarity at every point, channel by channel."""
     mean_a, mean_b = _blurred(a, window), _blurred(b, window)
-    spread_a = _blurred(a * a, window) - mean_a * mean_a
-    spread_b = _blurred(b * b, window) - mean_b * mean_b
+    means = mean_a * mean_a + mean_b * mean_b
+    spreads = _blurred(a * a + b * b, window) - means
     shared = _blurred(a * b, window) - mean_a * mean_b
     c1, c2 = _STABLE
-    above = (2 * mean_a * mean_b + c1) * (2 * shared + c2)
-    return above / ((mean_a * mean_a + mean_b * mean_b + c1) * (spread_a + spread_b + c2))
+    return (2 * mean_a * mean_b + c1) * (2 * shared + c2) / ((means + c1) * (spreads + c2))
 
 
 def _blurred(values: Tensor, window: Tensor) -> Tensor:
