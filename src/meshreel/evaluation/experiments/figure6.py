@@ -5,6 +5,7 @@ SYSTEMS are the paper's, at operating points of their own kinds, and the anchors
 
 from __future__ import annotations
 
+from ..codecs.necgs import QUICK
 from ..study import Study, Sweep
 from .figure6_goals import goals
 
@@ -17,7 +18,7 @@ SMALLER = {"fraction": (0.01, 0.03, 0.1), "qp": (9, 10, 11)}
 OF_SCENES = dict.fromkeys(SCENES, SMALLER)
 VOXELS = {"cells": (64, 96, 128, 192), "basis": (16, 24, 32, 32), "step": (0.1, 0.08, 0.06, 0.04)}
 FINER = {"cells": (128, 192, 288), "basis": (16, 24, 32), "step": (0.1, 0.08, 0.06)}
-FEW, QUICK = {"centers": 200}, {"resolution": 32, "epochs": 30}  # for `--small`
+FEW = {"centers": 200}  # for `--small`
 SYSTEMS = (
     Sweep(
         "meshreel", {"quality": (10.0, 35.0, 60.0, 85.0)}, {"preset": "best"}, {ROOM: {"quality": (0.0, 35.0, 80.0)}}
@@ -28,7 +29,7 @@ SYSTEMS = (
     Sweep("tvmc", {"qp": (5, 7, 9, 11)}, on={ROOM: {"qp": (5, 7, 9)}}, small=FEW | {"vertices": 600}),
     Sweep("draco", {"qp": (6, 7, 8, 9, 10)}, sampled=SCENES),
     Sweep("klt_tsdf", VOXELS, on=dict.fromkeys(SCENES, FINER), sampled=(ROOM,), small={"cells": 96}),
-    Sweep("necgs", {"channels": (8, 16, 24)}, sampled=SCENES, small=QUICK),
+    Sweep("necgs", {"channels": (8, 16)}, sampled=SCENES, small=QUICK),
     Sweep("decimated_draco", FRACTIONS, on=OF_SCENES, sampled=SCENES),
     Sweep("decimated_draco", FRACTIONS, {"levels": 1}, on=OF_SCENES, sampled=SCENES),
     Sweep("background_once_draco", FRACTIONS, only=SCENES),
