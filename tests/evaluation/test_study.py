@@ -81,7 +81,8 @@ def test_an_anchor_is_what_others_are_compared_with():
     study = Study(sequences=("body",), sweeps=(), anchor="whole", notes=("A note.",))
     rows = [row("whole", 0.5, 60), row("whole", 1.0, 65), row("part", 1.0, 60), row("part", 2.0, 65)]
     assert study.promises(rows) == []
-    assert next(iter(study.comparisons(rows))).startswith("- BD-rate of part against whole: D2, paper form +100.0 %")
+    table = "\n".join(study.comparisons(rows))
+    assert "| against whole | rate at equal D2" in table and "| part | +100.0 % (60 dB to 65 dB) |" in table
     assert "A note." in list(study.sections(rows))
 
 

@@ -100,11 +100,7 @@ class Study:
     def comparisons(self, rows: Sequence[Row]) -> Iterator[str]:
         """BD-rates on the rows of one sequence."""
         yield from bd_table(rows, self.best, MEASURES) if self.best else ()
-        for name in dict.fromkeys(map(curve_of, rows)) if self.anchor else ():
-            if name != self.anchor:
-                for measure in MEASURES:
-                    pair = _curve(rows, str(self.anchor), measure), _curve(rows, name, measure)
-                    yield f"- BD-rate of {name} against {self.anchor}: {against(*pair, measure)}"
+        yield from bd_table(rows, self.anchor, MEASURES, is_anchor=True) if self.anchor else ()
 
     def shown(self, rows: Sequence[Row]) -> list[Row]:
         """The rows of one sequence that its table has: all."""

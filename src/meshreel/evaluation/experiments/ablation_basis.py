@@ -8,4 +8,5 @@ M = {"basis_size": (1, 2, 3, 5, 8, 10)}
 STUDY = Study(
     sequences=("dancer",),
     sweeps=[Sweep("meshreel", M, {"preset": "paper", "quality": quality}) for quality in (20.0, 50.0, 80.0)],
+    anchor="meshreel paper m, quality 50",
 )

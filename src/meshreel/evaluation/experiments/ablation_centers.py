@@ -9,4 +9,5 @@ M = {"basis_size": (2, 5, 10)}
 STUDY = Study(
     sequences=("dancer",),
     sweeps=[Sweep("meshreel", M, {"preset": "paper", "centers": k, "group_size": 10}) for k in CENTERS],
+    anchor="meshreel paper m, quality 50",
 )

@@ -10,4 +10,5 @@ STUDY = Study(
     sequences=("crane60",),
     sweeps=[Sweep("meshreel", M, {"preset": "paper", "centers": 2000, "group_size": size}) for size in SIZES],
     frames={"crane60": 30},
+    anchor="meshreel paper m, quality 50",
 )

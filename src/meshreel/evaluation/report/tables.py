@@ -127,22 +127,24 @@ def comparable_table(rows: Sequence[Row], wanted: float, key: str = "mbps") -> l
     return made
 
 
-def bd_table(rows: Sequence[Row], test: str, measures: Sequence[Measure]) -> list[str]:
-    """BD-rate of the curve `test` against every other one of each sequence, with the qualities that both reach.
+def bd_table(rows: Sequence[Row], one: str, measures: Sequence[Measure], is_anchor: bool = False) -> list[str]:
+    """BD-rate of the curve `one` against every other one of each sequence, with the qualities that both reach.
 
-    Negative: `test` needs less rate for equal quality. No lines where it has no curve, or no other has one.
+    Negative: `one` needs less rate for equal quality. With `is_anchor` it is that of every other one against it. No
+    lines where it has no curve, or no other has one.
     """
     lines, names = [], sequences(rows)
     for sequence in names:
         own = curve_rows(rows, sequence)
         others = in_order(map(curve_of, own))
-        for other in others if test in others else ():
-            if other != test:
+        for other in others if one in others else ():
+            if other != one:
                 first = [text(sequence)] if len(names) > 1 else []
-                cells = [_bd_cell(own, test, other, measure) for measure in measures]
-                lines.append([*first, text(other), *cells])
+                pair = (other, one) if is_anchor else (one, other)
+                lines.append([*first, text(other), *(_bd_cell(own, *pair, measure) for measure in measures)])
     heads = [f"rate at equal {measure.name} ↓" for measure in measures]
-    return table([*(["sequence"] if len(names) > 1 else []), f"{text(test)} against", *heads], lines) if lines else []
+    head = f"against {text(one)}" if is_anchor else f"{text(one)} against"
+    return table([*(["sequence"] if len(names) > 1 else []), head, *heads], lines) if lines else []
 
 
 def promise_table(promises: Sequence[Promise]) -> list[str]:
