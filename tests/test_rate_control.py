@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.choice import Quality
-from meshreel.encoder import Encoder, GroupSummary, SceneSummary, Summary
+from meshreel.encoder import Encoder
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
 from meshreel.rate_control import TRIALS, Goal, Search, encode_to
+from meshreel.summary import GroupSummary, SceneSummary, Summary
 from meshreel.types import MeshList
 from tests.small_options import quick
 

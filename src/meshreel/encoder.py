@@ -22,7 +22,6 @@ from .analysis.segment.masks import Masker
 from .analysis.segment.probe import is_scene
 from .analysis.segment.scene import SegmentOptions
 from .analysis.survey import Survey, survey
-from .choice import Quality
 from .coding.background import decode_background
 from .container.writer import ReelWriter, check_target
 from .decoder import open as open_video
@@ -35,58 +34,12 @@ from .metrics.distance import PSNR_CEILING, psnr
 from .parts import Parts, take_apart
 from .presets import preset_options
 from .scene import Static, TrackGroup, encode_bodies, encode_static
+from .summary import GroupSummary, SceneSummary, Summary
 from .types import Frames, Mesh, MeshSequence, evenly
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
 
 MEASURED = 4  # frames of a scene that are compared with what is decoded
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less
-
-
-@dataclass(frozen=True, slots=True)
-class GroupSummary:
-    """What is left of a group once it is written; distances in metres."""
-
-    form: Form
-    frame_count: int
-    size: int  # bytes
-    quality: Quality
-    predicted: bool = False  # from the group before
-    key: int | None = None  # the frame of the sequence whose surface the others follow
-    track: int = 0  # the body of a scene
-
-
-@dataclass(frozen=True, slots=True)
-class SceneSummary:
-    """What is left of a scene's parts."""
-
-    background: int  # bytes, of all its states
-    faces: int  # of the first of them, as decoded
-    noise: float  # m, RMS distance of a frame's still surface from the background
-    psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
-    measured: tuple[int, ...]  # these frames
-    tracks: int
-
-
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """What an encode made."""
-
-    size: int  # bytes of the file
-    groups: tuple[GroupSummary, ...]
-    warnings: tuple[str, ...] = ()  # what a user must know of frames that were not kept, a line each
-    scene: SceneSummary | None = None  # of a scene with a background
-
-    @property
-    def frame_count(self) -> int:
-        """Frames of the sequence."""
-        return sum(group.frame_count for group in self.groups if group.track == 0)
-
-    @property
-    def psnr(self) -> float:
-        """d2_psnr_paper, mean over the frames, dB; of a scene, over those that were measured."""
-        if self.scene is not None:
-            return self.scene.psnr
-        return sum(group.frame_count * group.quality.psnr for group in self.groups) / self.frame_count
 
 
 def encode(

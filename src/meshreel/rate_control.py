@@ -12,8 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from .encoder import Encoder, Summary
+from .encoder import Encoder
 from .errors import InputError
+from .summary import Summary
 from .windows import EncoderOptions
 
 TRIALS = 8  # whole encodes, at most

@@ -10,7 +10,7 @@ import pytest
 
 import meshreel
 from meshreel.capture.record import open_recording
-from meshreel.capture.room import RoomOptions
+from meshreel.capture.room import RoomOptions, record_room
 from meshreel.capture.truth import read_truth
 from meshreel.cli.console import called_as
 from tests.capture.depth_scenes import camera, record
@@ -72,8 +72,9 @@ def test_the_rig_of_somebody_else_is_not_overwritten(run, tmp_path):
 
 @pytest.mark.usefixtures("coarse")
 def test_the_same_seed_gives_the_same_bytes_and_another_one_other_noise(run, tmp_path):
-    for name, seed in (("a", "0"), ("b", "0"), ("c", "1")):
-        assert run("demo", "-o", tmp_path / name, "--frames", "2", "--seed", seed, "--quiet").code == 0
+    for name in ("a", "b"):
+        assert run("demo", "-o", tmp_path / name, "--frames", "2", "--seed", "0", "--quiet").code == 0
+    record_room(tmp_path / "c" / "rig", RoomOptions(frames=2, seed=1), 128)
     picture = "rig/corner0/depth/depth_00001.png"
     for file, same in (("demo.reel", "b"), (picture, "b")):
         assert (tmp_path / "a" / file).read_bytes() == (tmp_path / same / file).read_bytes()

@@ -18,8 +18,9 @@ from meshreel.evaluation import codecs, provenance
 from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import make_codec
 from meshreel.evaluation.measure import Bench, run_point
+from meshreel.evaluation.rd_rows import RATED
 from meshreel.evaluation.rows import FAILED, Point, failed_rows, join_rows, read_rows, select
-from meshreel.evaluation.runner import run_points
+from meshreel.evaluation.runner import run_points, runs_of
 from meshreel.metrics.report import ComparisonOptions
 
 BALLS = sliding_sphere(2, levels=1)
@@ -34,10 +35,17 @@ from meshreel.types import Mesh
 class Raw:
     how: str = "right"
     name = "raw"
+    analysis_key = ""  # all points are one run
 
     @property
     def options(self):
         return asdict(self)
+
+    def analyse(self, sequence, progress=None):
+        return sequence
+
+    def code(self, analysis, progress=None):
+        return self.encode(analysis)
 
     def encode(self, sequence, progress=None):
         if self.how == "crash":
@@ -129,6 +137,16 @@ def test_what_fails_is_a_row_and_the_others_are_measured(installed, tmp_path):
     assert sorted(map(json.dumps, read_rows(file))) == sorted(map(json.dumps, rows))
 
 
+@pytest.mark.parametrize("how", ["crash", "raise"])
+def test_who_fails_ends_neither_its_run_nor_the_sweep(installed, tmp_path, how):
+    """Points that share an analysis share a process, too; one that ends it fails alone."""
+    points = [Point("ball", "raw", {"how": each}, kind=RATED) for each in ("right", how, "some")]
+    assert len(runs_of(points)) == 1
+    bench = Bench(installed, comparison=QUICK, limit_s=60)
+    rows = run_points(points, tmp_path / "rows.jsonl", bench, lambda *_: None)
+    assert [FAILED in row for row in rows] == [False, True, False]
+
+
 def test_who_hangs_is_ended_at_the_limit_and_asked_again_only_if_told(installed, tmp_path):
     point, file = Point("ball", "raw", {"how": "hang"}, kind="curve"), tmp_path / "rows.jsonl"
     bench = Bench(installed, comparison=QUICK, limit_s=4)
@@ -161,11 +179,17 @@ def test_rows_say_what_made_them():
 def test_the_interrupt_of_a_sweep_ends_what_runs(installed, tmp_path):
     from meshreel.cli.bench import side_by_side
 
-    points = [Point("ball", "raw", {"how": "hang"}, kind="curve"), Point("ball", "raw", {"how": "hang"}, 2, "curve")]
+    runs = [
+        [Point("ball", "raw", {"how": "hang"}, frames, RATED), Point("ball", "raw", {}, frames, RATED)]
+        for frames in (1, 2)
+    ]
     bench, start = Bench(installed, comparison=QUICK, limit_s=600), time.monotonic()
     with pytest.raises(KeyboardInterrupt), side_by_side(2) as executor:
-        for point in points:
-            executor.submit(run_points, [point], tmp_path / "rows.jsonl", bench, lambda *_: None)
+        for run in runs:  # none of them goes on with its second point
+            executor.submit(run_points, run, tmp_path / "rows.jsonl", bench, lambda *_: None)
         time.sleep(3)
         raise KeyboardInterrupt
-    assert time.monotonic() - start < 60
+    assert time.monotonic() - start < 60 and not (tmp_path / "rows.jsonl").exists()
+    with side_by_side(2) as executor:  # another sweep may begin
+        [row] = run_points(runs[0][1:], tmp_path / "rows.jsonl", bench, lambda *_: None, executor)
+    assert row["mbps"] > 0

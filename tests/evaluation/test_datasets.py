@@ -112,3 +112,7 @@ def test_living_room_is_captured_once(tmp_path):
     known = open_known("living_room", ROOT, 2, tmp_path)
     assert len(known.sequence) == 2 and known.sequence.frame_rate == 8.0 and known.truth is None
     assert (known.cameras[0].width, known.cameras[0].height) == (320, 240)
+    file = tmp_path / "living_room" / "meshes" / "frame_00001.ply"
+    made = file.stat().st_mtime_ns
+    again = open_known("living_room", ROOT, 3, tmp_path)
+    assert len(again.sequence) == 3 and file.stat().st_mtime_ns == made

@@ -186,6 +186,13 @@ def test_a_curve_beats_another_only_where_it_needs_less_everywhere():
 def test_without_a_common_quality_points_that_are_better_and_cheaper_decide():
     anchor = _curve("a", [1, 2], [40, 45])
     assert beats(_curve("b", [0.5, 0.7], [50, 55]), anchor) is True
-    assert beats(_curve("b", [1.5, 1.7], [50, 55]), anchor) is False
+    assert beats(_curve("b", [1.5, 1.7], [50, 55]), anchor) is None  # better, and dearer than its cheapest
     assert beats(_curve("b", [3, 4], [50, 55]), anchor) is None
     assert beats(_curve("b", [0.1, 0.2], [20, 30]), anchor) is None
+    assert beats(anchor, _curve("b", [0.5, 0.7], [50, 55])) is False  # each of its points is beaten
+
+
+def test_an_overlap_that_is_too_small_decides_nothing_by_itself():
+    flat, anchor = _curve("flat", [0.2, 0.4], [55.08, 55.09]), _curve("a", [2, 4], [50, 60])
+    assert beats(flat, anchor) is True and beats(flat, anchor, least=0.5) is True  # at 50, for less
+    assert beats(_curve("b", [3, 3.5], [55.08, 55.09]), _curve("a", [2, 4], [54, 60]), least=0.5) is None

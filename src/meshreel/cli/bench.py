@@ -14,11 +14,12 @@ from cyclopts import App, Parameter
 from rich.table import Table
 
 from ..errors import InputError
-from ..evaluation.apart import end_all
+from ..evaluation.apart import begin, end_all
 from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
 from ..evaluation.measure import Bench
 from ..evaluation.promises import Promise
+from ..evaluation.rd_rows import FLOOR as RATED_FLOOR
 from ..evaluation.report import write_report
 from ..evaluation.rows import FAILED, Row, failed_rows, join_rows, measured_rows, read_rows
 from ..evaluation.runner import run_points
@@ -53,6 +54,7 @@ def side_by_side(jobs: int) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
+    begin()
     with ThreadPoolExecutor(jobs) as executor:
         try:
             yield executor
@@ -170,6 +172,8 @@ def describe(row: Row) -> str:
         return f"{head} {row['frames']} frames, peak {row['peak_rss_mb']:.0f} MB"
     if row["kind"] == SEGMENTATION:
         return f"{head} IoU {row['iou_mean']:.3f}, worst frame {row['iou_worst']:.3f}"
+    if row["kind"] == RATED_FLOOR:
+        return f"{head} {row['d2_psnr_paper']:.2f} dB to the input"
     if row["kind"] in (FLOOR, SCENE):
         rate = f"{row['mbps']:.3f} Mbps, " if "mbps" in row else ""
         return f"{head} {rate}to the truth {row['truth_d2_psnr_backward']:.2f} dB, SSIM {row['truth_ssim_masked']:.3f}"

@@ -15,10 +15,11 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..analysis.segment.scene import SegmentOptions
-from ..encoder import Encoder, SceneSummary, Summary
+from ..encoder import Encoder
 from ..errors import InputError
 from ..presets import preset_options
 from ..rate_control import Goal, encode_to
+from ..summary import SceneSummary, Summary
 from ..windows import EncoderOptions
 from .console import Common
 from .reading import Reading

@@ -8,6 +8,7 @@ another.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
 import pickle
@@ -27,6 +28,7 @@ if TYPE_CHECKING:  # measure.py needs all codecs, and this process none
 
 _LAST = 300  # characters of what a process said last
 _RUNNING: set[subprocess.Popen[bytes]] = set()
+_STARTING, _ENDED = threading.Lock(), threading.Event()
 
 
 def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = ()) -> Iterator[Row]:
@@ -34,11 +36,10 @@ def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = (
     left = list(points)
     while left:
         with tempfile.TemporaryFile() as said:
-            process = _started((left, bench, list(rows)), said)
+            process = _started(said)
             limit = _Limit(process, bench.limit_s)
             try:
-                assert process.stdout is not None
-                for line in process.stdout:
+                for line in _lines(process, (left, bench, list(rows))):
                     limit.again()
                     row = dict(json.loads(line))
                     yield row if FAILED not in row else _failed(left[0], bench, row[FAILED])
@@ -47,27 +48,39 @@ def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = (
                 _end(process)
                 raise
             finally:
-                limit.stop()
                 process.wait()
+                limit.stop()
                 _RUNNING.discard(process)
+            if left and _ENDED.is_set():
+                raise InterruptedError("the sweep has been ended")
             if left:
                 yield _failed(left.pop(0), bench, limit.reached or _reason(process.returncode, said))
 
 
-def _started(task: object, said: IO[bytes]) -> subprocess.Popen[bytes]:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "meshreel.evaluation.apart"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=said,
-        start_new_session=True,  # with all that it starts it is ended by one signal
-    )
-    _RUNNING.add(process)
-    assert process.stdin is not None
+def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
+    """A process that waits for its task. Raises InterruptedError where the sweep has been ended."""
+    with _STARTING:
+        if _ENDED.is_set():
+            raise InterruptedError("the sweep has been ended")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "meshreel.evaluation.apart"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=said,
+            start_new_session=True,  # with all that it starts it is ended by one signal
+            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},  # processor time is compared
+        )
+        _RUNNING.add(process)
+    return process
+
+
+def _lines(process: subprocess.Popen[bytes], task: object) -> Iterator[bytes]:
+    """What a process answers to its task, line by line; not one that it was ended in."""
+    assert process.stdin is not None and process.stdout is not None
     with contextlib.suppress(BrokenPipeError):  # it has ended, and said why
         process.stdin.write(pickle.dumps(task))
         process.stdin.close()
-    return process
+    yield from itertools.takewhile(lambda line: line.endswith(b"\n"), process.stdout)
 
 
 class _Limit:
@@ -93,12 +106,21 @@ class _Limit:
             self._timer.cancel()
 
     def _over(self) -> None:
+        if self._process.poll() is not None:
+            return
         self.reached = f"took longer than {self._seconds:g} s of wall time"
         _end(self._process)
 
 
+def begin() -> None:
+    """A new sweep may start processes, also where one before was ended."""
+    _ENDED.clear()
+
+
 def end_all() -> None:
-    """Ends what other threads wait for; their rows say so, and are to be thrown away."""
+    """Ends what other threads wait for, and lets them start no more: they raise InterruptedError."""
+    with _STARTING:
+        _ENDED.set()
     for process in list(_RUNNING):
         _end(process)
 

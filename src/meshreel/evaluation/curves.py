@@ -27,6 +27,7 @@ class Measure:
     name: str
     unit: str
     sign: int = 1  # -1 where smaller is better
+    least: float = 0.0  # an overlap of two curves below which nothing is said of them
 
     def shown(self, quality: float) -> str:
         """A quality of a curve, with its unit and its own sign."""

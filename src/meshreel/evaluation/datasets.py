@@ -13,7 +13,6 @@ from pathlib import Path
 from ..capture.procedural import SoftBodiesOptions, soft_bodies
 from ..capture.record import open_recording
 from ..capture.truth import Truth
-from ..derived import Chosen
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..geometry.topology import weld
@@ -89,10 +88,9 @@ def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dat
 def _recording(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:
     source = Path(RECORDED, name)
     check_source(data / source, source)
-    recording, _ = open_recording(data / source, keep=False)
+    recording, _ = open_recording(data / source, frames=":" if frames is None else f":{frames}", keep=False)
     captured = Captured(recording, _kept(name, cache) / name / "meshes")
-    sequence = captured if frames is None else Chosen(captured, range(min(frames, len(captured))))
-    return Dataset(sequence, captured.cameras)
+    return Dataset(captured, captured.cameras)
 
 
 def _kept(name: str, cache: Path | None) -> Path:
@@ -105,7 +103,7 @@ def _open_files(name: str, data: Path, frames: int | None) -> FileSequence:
     path = next((p for p in _places(name, data) if p.exists()), None)
     if path is None:
         raise InputError(f"no sequence {name!r} below {data}; give the folder of the benchmark data with --data")
-    if path.parent == data / PERFORMERS or path.parent == data:
+    if path.parent == data / PERFORMERS:
         check_source(path, Path(PERFORMERS, path.name))
     chosen = ":" if frames is None else f":{frames}"
     return open_sequence(path, SequenceOptions(frames=chosen, scale=SCALES.get(name, 1.0), weld=weld))

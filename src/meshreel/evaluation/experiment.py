@@ -14,7 +14,8 @@ from .rows import Point, Row
 class Experiment(Protocol):
     """What an experiment says of itself: a module of `experiments`, or a `Study`.
 
-    Besides, it may have METRICS, pairs of a row's key and its label, and `floors`, what the noisy input reaches.
+    Besides, it may have METRICS, pairs of a row's key and its label, and `floors`, lines in the
+    plots by metric, that FLOOR_NAME names.
     """
 
     @property

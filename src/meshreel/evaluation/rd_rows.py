@@ -23,11 +23,11 @@ from .checked import Checked
 from .codec import Codec, TwoStepCodec
 from .codecs import make_codec
 from .datasets import Dataset, open_known
+from .fresh import FIRST_FRAME, digest, peak_rss_mb
 from .groups import group_records
 from .peers import measure_fresh_decode
 from .pictures import draw_decoded, draw_original
 from .rows import Point, Row
-from .scene_rows import NOISE_FLOOR
 from .timer import StageTimer
 from .truth import finite, true_scene
 
@@ -35,6 +35,7 @@ RATED = "rated"  # the codec is given the whole sequence
 SAMPLED = (
     "sampled"  # a codec of single frames, or a slow one, is given the frames that are measured; its rate is theirs
 )
+TRUTH_ITSELF = "the truth itself"  # beyond what it reaches against the input, noise is coded
 FLOOR = "rated floor"  # no codec: what the truth itself reaches against the input
 KINDS = (RATED, SAMPLED, FLOOR)
 MEASURED = 10  # frames of a scene
@@ -59,15 +60,17 @@ def measure_rated(point: Point, place: Place) -> Row:
     head: Row = {"sequence": point.sequence, "frames": count, "frame_rate": known.sequence.frame_rate}
     head |= {"measured_frames": numbers}
     if point.kind == FLOOR:
-        return head | {"codec": NOISE_FLOOR, "options": point.options} | _floor(known, numbers, place)
+        return head | {"codec": TRUTH_ITSELF, "options": point.options} | _floor(known, numbers, place)
     codec = make_codec(point.codec, point.options)
     sampled = point.kind == SAMPLED
     source = Chosen(known.sequence, numbers) if sampled else known.sequence
     data, times = _encoded(codec, source, (point.sequence, point.frames, sampled))
     rate = len(data) * 8 * source.frame_rate / len(source) / 1e6
     head |= {"codec": codec.name, "options": codec.options, "bytes": len(data), "coded_frames": len(source)}
-    head |= {"mbps": rate} | times | {"groups": group_records(data), "decode": measure_fresh_decode(data, codec)}
+    head |= {"mbps": rate} | times | {"encode_peak_rss_mb": peak_rss_mb()}
+    head |= {"groups": group_records(data) if len(numbers) == count else []}  # which count in frames, as metrics do
     decoded = Checked(codec.decode(data), codec.name, source)
+    head["decode"] = _decoding(data, codec, decoded)
     shown = decoded if sampled else Chosen(decoded, numbers)
     return head | _metrics(known, numbers, shown, place) | _pictures(point, known, numbers, (shown, place))
 
@@ -91,7 +94,7 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, R
     if isinstance(codec, TwoStepCodec):
         key = (what, type(codec), codec.analysis_key)
         if _LAST.key != key:
-            _LAST.key = None
+            _LAST.key = _LAST.analysis = None  # one in memory is enough
             _LAST.analysis = codec.analyse(source, timer)
             _LAST.seconds, _LAST.stages, _LAST.key = timer.stop(), dict(timer.seconds), key
             timer = StageTimer()
@@ -104,6 +107,14 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, R
         stages[stage] = stages.get(stage, 0.0) + spent
     count = len(source)
     return data, {"encode_s": seconds / count, "encode_stages_s": {k: v / count for k, v in stages.items()}}
+
+
+def _decoding(data: bytes, codec: Codec, decoded: Frames) -> Row:
+    """Times of a fresh process. Raises InputError where its first frame is another than the one decoded here."""
+    row = measure_fresh_decode(data, codec)
+    if row.pop(FIRST_FRAME) != digest(decoded[0]):
+        raise InputError(f"{codec.name} decodes another first frame in a fresh process; bytes alone must decide")
+    return row
 
 
 def _metrics(known: Dataset, numbers: Sequence[int], shown: Frames, place: Place) -> Row:
@@ -125,7 +136,8 @@ def _floor(known: Dataset, numbers: Sequence[int], place: Place) -> Row:
         raise InputError("a noise floor needs the truth, which only simulated scenes have")
     clean = [known.truth[number].mesh for number in numbers]
     row = _metrics(known, numbers, clean, place)
-    means = scene_means([scene_row(a, a.labelled(known.sequence[n])) for n in numbers if (a := _true(known, n))])
+    truths = [(_true(known, number), known.sequence[number]) for number in numbers]
+    means = scene_means([scene_row(true, true.labelled(mesh)) for true, mesh in truths])
     return row | {f"truth_{name}": value for name, value in finite(means).items() if name in TRUTH}
 
 
@@ -137,9 +149,13 @@ def _pictures(point: Point, known: Dataset, numbers: Sequence[int], shown: tuple
     folder = place.cache.with_suffix(".pictures")
     index = len(numbers) // 2
     original = known.sequence[numbers[index]]
-    camera = draw_original(folder / f"{point.sequence}-original.png", original, known.cameras)
+    file = f"{point.sequence}-{numbers[index]}-{len(known.sequence)}-original.png"
+    camera = draw_original(folder / file, original, known.cameras)
     name = hashlib.sha256(point.key.encode()).hexdigest()[:16]
-    return {"pictures": {"frame": numbers[index]} | draw_decoded(folder, name, (original, meshes[index]), camera)}
+    return {
+        "pictures": {"frame": numbers[index], "original": file}
+        | draw_decoded(folder, name, (original, meshes[index]), camera)
+    }
 
 
 @lru_cache(maxsize=1)

@@ -41,9 +41,11 @@ def run_points(
     """
     stored = read_rows(file) if file.exists() else []
     known = {row["point"]: row for row in _of(stored, bench.experiment) if not (bench.retry and FAILED in row)}
-    others = {row["point"]: row for name in bench.alike for row in measured_rows(_of(stored, name))}
+    others = {
+        row["point"]: row for name in bench.alike for row in measured_rows(_of(stored, name)) if _alike(row, bench)
+    }
     for point in points:
-        if point.key not in known and point.key in others:
+        if FAILED in known.get(point.key, {FAILED: "not there"}) and point.key in others:
             known[point.key] = others[point.key] | {"experiment": bench.experiment}
             append_row(file, known[point.key])
         if point.key in known:
@@ -59,6 +61,11 @@ def run_points(
 
 def _of(rows: Sequence[Row], experiment: str) -> list[Row]:
     return [row for row in rows if row.get("experiment", "targets") == experiment]
+
+
+def _alike(row: Row, bench: Bench) -> bool:
+    """Whether a row of another experiment has what one of this would have."""
+    return ("ssim" in row) == bench.comparison.ssim
 
 
 def _measured(points: Sequence[Point], rows: list[Row], bench: Bench, executor: Executor | None) -> Iterator[Row]:

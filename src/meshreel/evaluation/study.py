@@ -14,15 +14,22 @@ from ..metrics.bd_rate import Curve, beats
 from ..metrics.report import ComparisonOptions
 from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
-from .rd_rows import FLOOR, RATED, SAMPLED
+from .rd_rows import FLOOR, RATED, SAMPLED, TRUTH_ITSELF
 from .report.tables import bd_table, comparable_table
 from .rows import Point, Row, select
 
 SMALL_SEQUENCE, SMALL_FRAMES = "demo", 3  # procedural: `--small` needs no data
-D2 = Measure("d2_psnr_paper", "D2, paper form", " dB")
-MASKED = Measure("ssim_masked", "masked SSIM", "")
-MEASURES = (D2, MASKED, Measure("ssim", "SSIM", ""), Measure("normal_error_deg", "normal error", " degrees", -1))
-JUDGED = (D2, MASKED)  # what is promised
+D2 = Measure("d2_psnr_paper", "D2, paper form", " dB", least=0.5)
+MASKED = Measure("ssim_masked", "masked SSIM", "", least=0.01)
+MEASURES = (
+    D2,
+    MASKED,
+    Measure("ssim", "SSIM", "", least=0.005),
+    Measure("normal_error_deg", "normal error", " degrees", -1, least=0.3),
+    Measure("truth_d2_psnr_backward", "D2 to the truth", " dB", least=0.5),  # where there is one
+    Measure("truth_ssim_masked", "masked SSIM to the truth", "", least=0.01),
+)
+PROMISED = (D2, MASKED)
 UNITS = {"mbps": "Mbps", "d2_psnr_paper": "dB"}
 Values = Mapping[str, Sequence[Any]]  # options that are varied together, by name
 
@@ -69,6 +76,7 @@ class Study:
     common: tuple[str, float] | None = None  # a table of each codec's point nearest to this, by the key of a row
     notes: Sequence[str] = ()  # Markdown, before the tables
     METRICS: Sequence[tuple[str, str]] = tuple((measure.key, measure.name) for measure in MEASURES)
+    FLOOR_NAME: str = TRUTH_ITSELF  # what a line in the plots is
     COMPARISON: ComparisonOptions = field(default_factory=ComparisonOptions)
 
     def points(self, small: bool) -> Iterator[Point]:
@@ -99,8 +107,9 @@ class Study:
 
     def comparisons(self, rows: Sequence[Row]) -> Iterator[str]:
         """BD-rates on the rows of one sequence."""
-        yield from bd_table(rows, self.best, MEASURES) if self.best else ()
-        yield from bd_table(rows, self.anchor, MEASURES, is_anchor=True) if self.anchor else ()
+        measures = [each for each in MEASURES if any(value(row, each.key) is not None for row in rows)]
+        yield from bd_table(rows, self.best, measures) if self.best else ()
+        yield from bd_table(rows, self.anchor, measures, is_anchor=True) if self.anchor else ()
 
     def shown(self, rows: Sequence[Row]) -> list[Row]:
         """The rows of one sequence that its table has: all."""
@@ -116,17 +125,18 @@ class Study:
     def _left_of_all(self, rows: Sequence[Row], sequence: str) -> Promise:
         own = [row for kind in (RATED, SAMPLED) for row in select(rows, sequence, kind=kind)]
         text = f"{sequence}: {self.best} needs less rate than every other codec wherever both reach a quality"
-        told, met = list[str](), list[bool]()
+        told, met = list[str](), list[bool | None]()
         for name in dict.fromkeys(map(curve_of, own)):
-            for measure in JUDGED if name != self.best else ():
+            for measure in PROMISED if name != self.best else ():
                 best, other = _curve(own, str(self.best), measure), _curve(own, name, measure)
-                if (left := beats(best, other)) is not None:
-                    met.append(left)
-                    told += [] if left else [f"{name}: {against(other, best, measure)}"]
-        if not met:
+                left = beats(best, other, measure.least)
+                met.append(left)
+                told += [f"not {name}: {against(other, best, measure)}"] if left is False else []
+        decided = [left for left in met if left is not None]
+        if not decided:
             return Promise(text, "in D2 and masked SSIM")
-        found = f"in {sum(met)} of {len(met)} comparisons"
-        return Promise(text, "in D2 and masked SSIM", "; not ".join([found, *told]), all(met))
+        found = f"in {sum(decided)} of {len(met)} comparisons, {len(met) - len(decided)} undecided"
+        return Promise(text, "in D2 and masked SSIM", "; ".join([found, *told]), all(decided))
 
 
 def _curve(rows: Sequence[Row], name: str, measure: Measure) -> Curve:

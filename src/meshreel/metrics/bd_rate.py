@@ -145,17 +145,24 @@ def gain_end(anchor: Curve, test: Curve) -> GainEnd:
     return GainEnd(float(at[gains[-1]]), bool(gains[-1] < _GRID - 1), best[0], best[1], len(gains) / _GRID)
 
 
-def beats(test: Curve, anchor: Curve) -> bool | None:
+def beats(test: Curve, anchor: Curve, least: float = 0.0) -> bool | None:
     """Whether `test` needs less rate wherever both reach a quality; None where nothing decides.
 
-    Without an overlap it does where each of the anchor's points has one of its own that is better and cheaper.
+    Where their overlap is not above `least`, points decide: whose are better and cheaper than all that the other has in
+    its reach.
     """
-    end = gain_end(anchor, test)
-    if end.share > 0 or bd_rate(anchor, test).percent is not None:
-        return end.share == 1.0
+    found = bd_rate(anchor, test)
+    if found.percent is not None and found.high - found.low > least:
+        return gain_end(anchor, test).share == 1.0
     a, b = _front(anchor), _front(test)
-    better = [bool(((b[:, 0] >= quality) & (b[:, 1] < rate)).any()) for quality, rate in a]
-    return all(better) if any(better) else None
+    won, lost = _dominates(b, a), _dominates(a, b)
+    return won if won != lost else None
+
+
+def _dominates(b: Float64[np.ndarray, "N 2"], a: Float64[np.ndarray, "M 2"]) -> bool:
+    """Whether each point of `a` up to the best of `b`, at least one, has one of `b` that is better and cheaper."""
+    reached = [point for point in a if len(b) and point[0] <= b[-1, 0]]
+    return bool(reached) and all(((b[:, 0] >= quality) & (b[:, 1] < rate)).any() for quality, rate in reached)
 
 
 def _front(curve: Curve) -> Float64[np.ndarray, "N 2"]:

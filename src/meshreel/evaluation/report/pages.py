@@ -130,7 +130,7 @@ def _sheet(part: Part, shots: Shots) -> Iterator[str]:
     yield from (f"### {text(shots.sequence)} in pictures", "", part.link(shots.sequence, "pictures", SHEET), "")
     yield f"Frame {shots.frame} of the original and of each codec's point nearest to {shots.mbps:.3g} Mbps. Colors are"
     yield "normals; the solid red box magnifies the dotted one. Below: the error, in % of the diagonal."
-    yield "Rates and qualities are those of all frames."
+    yield "Rates and qualities are those of all frames that were coded, and of those that were measured."
     if shots.left_out:
         yield f"Not shown, as their pictures are of another frame, scale or size: {text(', '.join(shots.left_out))}."
 

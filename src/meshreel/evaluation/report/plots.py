@@ -79,8 +79,8 @@ class Legend:
 def plot_curves(measured: Sequence[Row], chosen: Experiment, looks: Mapping[str, Look], path: Path) -> list[Path]:
     """Quality against rate of every codec, one panel a metric, as `path`, a PNG, and its SVG twin; the paths.
 
-    The noise floor is a line. `measured` are rows of one sequence. An experiment may have METRICS of its own, and
-    `floors`: what the noisy input reaches, by metric. `looks` has every curve.
+    `measured` are rows of one sequence. An experiment may have METRICS of its own, and `floors`: where by metric a line
+    is drawn, which FLOOR_NAME names, or the noise floor. `looks` has every curve.
     """
     with matplotlib_settings():
         figure = curves_figure(measured, chosen, looks)
@@ -104,7 +104,9 @@ def curves_figure(measured: Sequence[Row], chosen: Experiment, looks: Mapping[st
             panel.plot([p[0] for p in curve], [p[1] for p in curve], "k--", marker="x", lw=1, ms=4, label=_shown(name))
             rates += [p[0] for p in curve]
         if key in floors:
-            panel.axhline(floors[key], color="gray", linestyle=":", lw=1.2, label=NOISE_FLOOR)
+            panel.axhline(
+                floors[key], color="gray", linestyle=":", lw=1.2, label=getattr(chosen, "FLOOR_NAME", NOISE_FLOOR)
+            )
         panel.set(xlabel="rate (Mbps)", ylabel=label, xscale="log")
         panel.set_title(_TOLD[direction(key)], loc="right", color="dimgray", fontsize=6.5, pad=3)
         panel.grid()

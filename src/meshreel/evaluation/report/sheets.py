@@ -26,7 +26,7 @@ from .tables import common_rate, nearest
 PICTURES = "pictures"  # of a row: the names of its files, the frame, and where the scale of errors ends
 _KEYS = {"normals", "errors", "frame", "limit_percent"}
 SCALE = "viridis"  # of the maps, from 0 to the limit
-ORIGINAL = "{}-original.png"  # of a sequence
+ORIGINAL = "{}-original.png"  # of a sequence, where a row does not say
 _DPI = 300
 _EDGE = 0.01  # of the longer side, around each picture
 _RED = "#E00000"
@@ -117,7 +117,8 @@ def _files(row: Row, folders: Sequence[Path]) -> Files | None:
     frame, limit = named["frame"], named["limit_percent"]
     if not isinstance(frame, int) or not isinstance(limit, (int, float)) or not limit > 0:
         return None
-    names = (ORIGINAL.format(row["sequence"]), str(named["normals"]), str(named["errors"]))
+    first = str(named.get("original", ORIGINAL.format(row["sequence"])))
+    names = (first, str(named["normals"]), str(named["errors"]))
     if any(Path(name).name != name for name in names):  # of these folders only
         return None
     for folder in folders:

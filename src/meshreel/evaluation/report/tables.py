@@ -18,8 +18,8 @@ from .looks import arrow, in_order
 from .plots import METRICS
 
 FIRST = "targets"  # the experiment of rows that do not name theirs
-NEAR = 1.5  # factor of a rate within which points are compared
-NEAR_DB = 1.5  # of a PSNR
+NEAR = 1.25  # factor of a rate within which points are compared
+NEAR_DB = 1.0  # of a PSNR
 DAGGER = "†"
 DECODE = "decode"  # the key of a row whose times count
 Cell = str | float | None
@@ -220,11 +220,15 @@ def _bd_cell(rows: Sequence[Row], test: str, other: str, measure: Measure) -> st
         return f"one usable point of {text(' and '.join(few))}"
     if found.percent is None:
         return "no overlap"
+    if found.high - found.low < measure.least:
+        return f"overlap too small ({measure.shown(found.low)} to {measure.shown(found.high)})"
     return f"{found.percent:+.1f} % ({measure.shown(found.low)} to {measure.shown(found.high)})"
 
 
 def _point(row: Row) -> str:
-    return ", ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
+    told = ", ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
+    coded = row.get("coded_frames", row.get("frames"))
+    return told if coded == row.get("frames") else f"{told}; {coded} of {row['frames']} frames coded"
 
 
 def _group_sizes(row: Row) -> str:

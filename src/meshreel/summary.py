@@ -1,0 +1,55 @@
+"""What is told of an encode once its file is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .choice import Quality
+from .format.layout import Form
+
+
+@dataclass(frozen=True, slots=True)
+class GroupSummary:
+    """What is left of a group once it is written; distances in metres."""
+
+    form: Form
+    frame_count: int
+    size: int  # bytes
+    quality: Quality
+    predicted: bool = False  # from the group before
+    key: int | None = None  # the frame of the sequence whose surface the others follow
+    track: int = 0  # the body of a scene
+
+
+@dataclass(frozen=True, slots=True)
+class SceneSummary:
+    """What is left of a scene's parts."""
+
+    background: int  # bytes, of all its states
+    faces: int  # of the first of them, as decoded
+    noise: float  # m, RMS distance of a frame's still surface from the background
+    psnr: float  # d2_psnr_paper of some frames, the scene's diagonal as peak, dB
+    measured: tuple[int, ...]  # these frames
+    tracks: int
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What an encode made."""
+
+    size: int  # bytes of the file
+    groups: tuple[GroupSummary, ...]
+    warnings: tuple[str, ...] = ()  # what a user must know of frames that were not kept, a line each
+    scene: SceneSummary | None = None  # of a scene with a background
+
+    @property
+    def frame_count(self) -> int:
+        """Frames of the sequence."""
+        return sum(group.frame_count for group in self.groups if group.track == 0)
+
+    @property
+    def psnr(self) -> float:
+        """d2_psnr_paper, mean over the frames, dB; of a scene, over those that were measured."""
+        if self.scene is not None:
+            return self.scene.psnr
+        return sum(group.frame_count * group.quality.psnr for group in self.groups) / self.frame_count
