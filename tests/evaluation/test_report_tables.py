@@ -8,7 +8,7 @@ from markdown_it import MarkdownIt
 from meshreel.evaluation.curves import D2_PAPER, NORMALS, SSIM, SYMMETRIC
 from meshreel.evaluation.report import bd_table, comparable_table, ranked_table
 from meshreel.evaluation.report.looks import KNOWN, SYSTEM, direction, in_order, looks_of
-from meshreel.evaluation.report.tables import DAGGER, common_rate, failure_table, maker_table, nearest, text
+from meshreel.evaluation.report.tables import DAGGER, NEAR, common_rate, failure_table, maker_table, nearest, text
 from tests.evaluation.report_rows import failed, row
 
 
@@ -52,13 +52,14 @@ def test_codecs_at_a_rate_are_shown_by_their_nearest_point_and_far_ones_are_not_
     assert cells(lines[2])[:3] == [SYSTEM, "1.2", "**66**"]
     assert cells(lines[3])[:3] == ["tvmc", "0.9", "*64*"]
     assert cells(lines[4])[:3] == [f"draco {DAGGER}", "4", "80"]
-    assert lines[-1].startswith(DAGGER) and "1.5 of 1 Mbps" in lines[-1] and len(lines) == 7
+    assert lines[-1].startswith(DAGGER) and f"{NEAR:g} of 1 Mbps" in lines[-1] and len(lines) == 7
     assert "decode (ms/frame) ↓" in lines[0] and "normal error (degrees) ↓" in lines[0] and "Mbps |" in lines[0]
     assert cells(lines[3])[-1] == "**1.9**"
 
 
-def test_a_factor_of_one_and_a_half_is_near_and_more_is_not():
-    rows = [row("dancer", "draco", 1.5, 60.0), row("dancer", "necgs", 1 / 1.5, 60.0), row("dancer", "x", 1.51, 60.0)]
+def test_what_is_near_is_ranked_and_more_is_not():
+    rates = {"draco": NEAR, "necgs": 1 / NEAR, "x": NEAR + 0.01}
+    rows = [row("dancer", name, mbps, 60.0) for name, mbps in rates.items()]
     assert [DAGGER in line for line in comparable_table(rows, 1.0)[2:5]] == [False, False, True]
 
 

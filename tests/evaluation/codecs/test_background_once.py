@@ -36,7 +36,7 @@ def test_the_background_is_sent_once_and_what_moves_in_every_frame(monkeypatch):
     smaller = BackgroundOnceDracoCodec(0.1, 8).encode(SCENE)
     assert len(smaller) - static[0].size < 0.8 * (len(data) - static[0].size)
     with pytest.raises(FormatError):
-        codec.decode(data[: len(data) // 2])[len(SCENE) - 1]
+        open_video(data[: len(data) // 2])[len(SCENE) - 1]
 
 
 def balls_of(number):
