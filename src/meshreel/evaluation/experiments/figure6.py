@@ -17,7 +17,8 @@ FRACTIONS = {"fraction": (0.03, 0.08, 0.2, 0.5), "qp": (8, 9, 10, 11)}
 SMALLER = {"fraction": (0.01, 0.03, 0.1), "qp": (9, 10, 11)}
 OF_SCENES = dict.fromkeys(SCENES, SMALLER)
 VOXELS = {"cells": (64, 96, 128, 192), "basis": (16, 24, 32, 32), "step": (0.1, 0.08, 0.06, 0.04)}
-FINER = {"cells": (128, 192, 288), "basis": (16, 24, 32), "step": (0.1, 0.08, 0.06)}
+FINER = {"cells": (128, 192, 288), "basis": (16, 24, 32), "step": (0.1, 0.08, 0.06)}  # for what is larger
+LARGE = dict.fromkeys(("synthetic4", *SCENES), FINER)
 FEW = {"centers": 200}  # for `--small`
 SYSTEMS = (
     Sweep(
@@ -28,7 +29,7 @@ SYSTEMS = (
     ),
     Sweep("tvmc", {"qp": (5, 7, 9, 11)}, on={ROOM: {"qp": (5, 7, 9)}}, small=FEW | {"vertices": 600}),
     Sweep("draco", {"qp": (6, 7, 8, 9, 10)}, sampled=SCENES),
-    Sweep("klt_tsdf", VOXELS, on=dict.fromkeys(SCENES, FINER), sampled=(ROOM,), small={"cells": 96}),
+    Sweep("klt_tsdf", VOXELS, on=LARGE, sampled=(ROOM,), small={"cells": 96}),
     Sweep("necgs", {"channels": (8, 16)}, {"device": "cpu"}, sampled=SCENES, small=QUICK),
     Sweep("decimated_draco", FRACTIONS, on=OF_SCENES, sampled=SCENES),
     Sweep("decimated_draco", FRACTIONS, {"levels": 1}, on=OF_SCENES, sampled=SCENES),
