@@ -77,6 +77,7 @@ class Encoder:
         self._sequence, self._executor, self._masker = sequence, executor, masker
         self.progress = progress
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
+        self._stands: bool | None = masker is not None or None  # whether most of it stands still; None: not looked at
 
     @property
     def frame_rate(self) -> float:
@@ -105,7 +106,9 @@ class Encoder:
     def _is_scene(self, options: EncoderOptions) -> bool:
         if options.dynamic_only or not len(self._sequence):
             return False
-        return self._masker is not None or is_scene(self._sequence)
+        if self._stands is None:
+            self._stands = is_scene(self._sequence)
+        return self._stands
 
     def _parts(self, work: _Work) -> Parts:
         """What the scene is made of; found anew where other options say otherwise."""
