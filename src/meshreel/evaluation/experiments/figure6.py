@@ -49,5 +49,6 @@ STUDY = Study(
     best="meshreel best",
     goals=goals,
     truths=(ROOM, "procedural_room"),
+    frames={"demo": 10, "procedural_room": 30},
     notes=NOTES,
 )
