@@ -15,6 +15,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from meshreel.evaluation.codec import coded_row
 from meshreel.evaluation.codecs.necgs import FULL, QUICK, SMALL, NecgsCodec
 from meshreel.evaluation.datasets import open_dataset
 from meshreel.evaluation.rows import Point, append_row, read_rows
@@ -52,12 +53,8 @@ def measure(name: str, sequence: MeshSequence, options: dict[str, Any]) -> dict[
     seconds = {"encode_s": encoded - start, "decode_s": time.perf_counter() - encoded}
     return {
         "sequence": name,
-        "codec": codec.name,
-        "options": codec.options,
         "frames": len(sequence),
-        "frame_rate": sequence.frame_rate,
-        "bytes": len(data),
-        "mbps": len(data) * 8 * sequence.frame_rate / len(sequence) / 1e6,
+        **coded_row(codec, sequence, data),
         **{key: value / len(sequence) for key, value in seconds.items()},
         **compare_sequences(sequence, decoded, ComparisonOptions()).to_row(),
     }

@@ -15,9 +15,10 @@ import pytest
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.evaluation import codecs, provenance
+from meshreel.evaluation.bench import Bench
 from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import make_codec
-from meshreel.evaluation.measure import Bench, run_point
+from meshreel.evaluation.measure import run_point
 from meshreel.evaluation.rd_rows import RATED
 from meshreel.evaluation.rows import FAILED, Point, failed_rows, join_rows, read_rows, select
 from meshreel.evaluation.runner import run_points, runs_of

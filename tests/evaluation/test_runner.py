@@ -12,12 +12,13 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.derived import Backwards
 from meshreel.errors import InputError
 from meshreel.evaluation import measure
+from meshreel.evaluation.bench import Bench
 from meshreel.evaluation.bridges import count_bridges
 from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import CODECS, make_codec
 from meshreel.evaluation.datasets import open_dataset
 from meshreel.evaluation.fresh import peak_rss_mb
-from meshreel.evaluation.measure import Bench, run_point
+from meshreel.evaluation.measure import run_point
 from meshreel.evaluation.peers import equal_anchor, run_fresh
 from meshreel.evaluation.rows import Point, append_row, read_rows
 from meshreel.evaluation.runner import run_points

@@ -15,9 +15,9 @@ from rich.table import Table
 
 from ..errors import InputError
 from ..evaluation.apart import begin, end_all
+from ..evaluation.bench import Bench
 from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
-from ..evaluation.measure import Bench
 from ..evaluation.promises import Promise
 from ..evaluation.rd_rows import FLOOR as RATED_FLOOR
 from ..evaluation.report import write_report

@@ -18,13 +18,12 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
+from .bench import Bench
 from .provenance import made_by
 from .rows import FAILED, Point, Row
-
-if TYPE_CHECKING:  # measure.py needs all codecs, and this process none
-    from .measure import Bench
+from .timer import ONE_THREAD
 
 _LAST = 300  # characters of what a process said last
 _RUNNING: set[subprocess.Popen[bytes]] = set()
@@ -68,7 +67,7 @@ def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
             stdout=subprocess.PIPE,
             stderr=said,
             start_new_session=True,  # with all that it starts it is ended by one signal
-            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},  # processor time is compared
+            env=os.environ | ONE_THREAD,
         )
         _RUNNING.add(process)
     return process

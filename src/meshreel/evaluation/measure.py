@@ -10,7 +10,6 @@ import json
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +19,10 @@ from ..decoder import open as open_video
 from ..derived import Backwards
 from ..metrics.report import ComparisonOptions, compare_sequences
 from ..types import Frames, MeshSequence
+from .bench import Bench
 from .bridges import count_bridges, count_degenerate
 from .checked import Checked
-from .codec import Codec
+from .codec import Codec, coded_row
 from .codecs import make_codec
 from .codecs.draco import lattice_step
 from .datasets import open_dataset
@@ -31,7 +31,7 @@ from .groups import group_records
 from .peers import cheapest_forms, measure_fresh_decode, measure_pair, run_fresh
 from .provenance import made_by
 from .rd_rows import KINDS as RATED_KINDS
-from .rd_rows import Place, measure_rated
+from .rd_rows import measure_rated
 from .rows import Point, Row
 from .scene_rows import KINDS as SCENE_KINDS
 from .scene_rows import measure_scene
@@ -39,19 +39,6 @@ from .timer import StageTimer
 
 PEER_QP = 9  # bits of the Draco meshes whose decoding is the yardstick
 CURVE_METRICS = ("d2_psnr_paper", "d2_psnr", "symmetric_psnr", "normal_error_deg", "ssim_masked")  # kept of each frame
-
-
-@dataclass(frozen=True, slots=True)
-class Bench:
-    """Where a run finds its sequences, and what it compares."""
-
-    data: Path  # the folder of the sequences
-    experiment: str = "targets"  # rows of other experiments in the same file are left alone
-    comparison: ComparisonOptions = field(default_factory=ComparisonOptions)
-    cache: Path | None = None  # sequences that take long to make are kept here
-    limit_s: float | None = None  # wall time of a point, which then has a process of its own; None: measured in this
-    retry: bool = False  # points that failed before are measured again
-    alike: tuple[str, ...] = ()  # experiments that measure in the same way: their rows count, too
 
 
 def run_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
@@ -65,7 +52,7 @@ def _measured_codec(name: str, sequence: MeshSequence, codec: Codec, options: Co
     data = codec.encode(sequence, timer)
     encode_s = timer.stop() / len(sequence)
     video = Checked(codec.decode(data), codec.name, sequence)
-    decode = measure_fresh_decode(data, codec)
+    decode = measure_fresh_decode(data, codec, video[0])
     peer = measure_peer(video)
     row = _rate(name, sequence, codec, data) | {
         "encode_s": encode_s,
@@ -102,15 +89,7 @@ def run_floor_point(name: str, sequence: MeshSequence, codec: Codec, options: Co
 
 
 def _rate(name: str, sequence: MeshSequence, codec: Codec, data: bytes) -> Row:
-    return {
-        "sequence": name,
-        "codec": codec.name,
-        "options": codec.options,
-        "frames": len(sequence),
-        "frame_rate": sequence.frame_rate,
-        "bytes": len(data),
-        "mbps": len(data) * 8 * sequence.frame_rate / len(sequence) / 1e6,
-    }
+    return {"sequence": name, "frames": len(sequence)} | coded_row(codec, sequence, data)
 
 
 def measure_peer(video: Frames) -> Row:
@@ -133,7 +112,7 @@ def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
     """The row of a point, by its kind; `rows` are those measured before, for the kinds of `AFTER`."""
     head = {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | made_by()
     if point.kind in RATED_KINDS:
-        return head | measure_rated(point, Place(bench.data, bench.cache, bench.comparison))
+        return head | measure_rated(point, bench)
     if point.kind in SCENE_KINDS:
         return head | measure_scene(point, bench.data, bench.cache)
     sequence = open_dataset(point.sequence, bench.data, point.frames, bench.cache)

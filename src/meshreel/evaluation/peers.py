@@ -24,7 +24,9 @@ from ..errors import InputError
 from ..types import Mesh, MeshSequence
 from .codec import Codec
 from .codecs import make_codec
+from .fresh import FIRST_FRAME, digest
 from .rows import Point, Row
+from .timer import ONE_THREAD
 
 ANCHOR = "decimated_draco_subdivided"  # A2s
 EQUAL = "d2_psnr_paper"  # quality that is to be equal
@@ -86,20 +88,25 @@ def cheapest_forms(sequence: MeshSequence, video: Video) -> list[int | None]:
 def run_fresh(task: str, *arguments: str) -> Row:
     """What `evaluation.fresh` measures, on one thread."""
     command = [sys.executable, "-m", "meshreel.evaluation.fresh", task, *arguments]
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    answer = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    answer = subprocess.run(command, capture_output=True, text=True, env=os.environ | ONE_THREAD, check=False)
     if answer.returncode != 0:
         raise RuntimeError(f"measuring `{task}` in a fresh process failed: {answer.stderr.strip().splitlines()[-1:]}")
     return dict(json.loads(answer.stdout))
 
 
-def measure_fresh_decode(data: bytes, codec: Codec) -> Row:
-    """First frame and steady state, ms, and peak memory of decoding these bytes from a file in a fresh process."""
+def measure_fresh_decode(data: bytes, codec: Codec, first: Mesh) -> Row:
+    """First frame and steady state, ms, and peak memory of decoding these bytes from a file in a fresh process.
+
+    Raises InputError where its first frame is another than `first`, the one decoded here.
+    """
     with tempfile.TemporaryDirectory() as folder:
         path, decoder = Path(folder) / "video", Path(folder) / "codec"
         path.write_bytes(data)
         decoder.write_bytes(pickle.dumps(codec))
-        return run_fresh("decode", str(path), str(decoder))
+        row = run_fresh("decode", str(path), str(decoder))
+    if row.pop(FIRST_FRAME) != digest(first):
+        raise InputError(f"{codec.name} decodes another first frame in a fresh process; bytes alone must decide")
+    return row
 
 
 def _own_row(name: str, options: Row, point: Point, rows: Sequence[Row]) -> Row:

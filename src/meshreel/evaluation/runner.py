@@ -14,10 +14,11 @@ from queue import SimpleQueue
 
 from ..errors import InputError
 from .apart import measure_apart
+from .bench import Bench
 from .codec import TwoStepCodec
 from .codecs import make_codec
 from .datasets import open_dataset
-from .measure import Bench, measure_point
+from .measure import measure_point
 from .rd_rows import KINDS as RATED_KINDS
 from .rows import FAILED, Point, Row, append_row, measured_rows, read_rows
 from .scene_rows import KINDS as SCENE_KINDS

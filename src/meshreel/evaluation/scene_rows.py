@@ -84,7 +84,7 @@ def _stream(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
     video = open_video(data)
     once = sum(chunk.size for chunk in video.reader.chunks if chunk.kind == ChunkKind.STATIC)
     row = _rate(len(data), once, len(scene.meshes), scene.meshes.frame_rate)
-    row |= {"encode_s": seconds, "decode": measure_fresh_decode(data, codec)}
+    row |= {"encode_s": seconds, "decode": measure_fresh_decode(data, codec, video[0])}
     row |= seams_of(scene, numbers, video)
     return row | _metrics(scene, numbers, [video[number] for number in numbers])
 

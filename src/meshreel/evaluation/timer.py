@@ -1,8 +1,10 @@
-"""Processor time by stage."""
+"""Processor time by stage, and what keeps a process to one thread, so that such times can be compared."""
 
 from __future__ import annotations
 
 import time
+
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # environment of a process that is timed
 
 
 class StageTimer:

@@ -17,7 +17,6 @@ from ...analysis.survey import Survey, survey
 from ...container.writer import ReelWriter
 from ...decoder import open as open_video
 from ...encoder import make_header
-from ...errors import InputError
 from ...geometry.topology import part_of
 from ...parts import Parts, take_apart
 from ...presets import preset_options
@@ -25,7 +24,7 @@ from ...scene import Static, encode_static
 from ...types import Mesh, MeshSequence
 from ...windows import Stages
 from ..codec import Progress
-from .draco import check_qp, encode_frame
+from .draco import check_point, encode_frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +53,7 @@ class BackgroundOnceDracoCodec:
     levels: int = 0  # midpoint subdivisions in the decoder, of what moves
 
     def __post_init__(self) -> None:
-        check_qp(self.qp)
-        if not 0 < self.fraction <= 1 or not 0 <= self.levels <= 4:
-            raise InputError(f"fraction {self.fraction:g}, levels {self.levels}: give 0 < fraction <= 1, levels 0 to 4")
+        check_point(self.fraction, self.qp, self.levels)
 
     @property
     def name(self) -> str:

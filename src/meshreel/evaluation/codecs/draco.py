@@ -62,9 +62,7 @@ class DecimatedDracoCodec:
     levels: int = 0
 
     def __post_init__(self) -> None:
-        check_qp(self.qp)
-        if not 0 < self.fraction <= 1 or not 0 <= self.levels <= 4:
-            raise InputError(f"fraction {self.fraction:g}, levels {self.levels}: give 0 < fraction <= 1, levels 0 to 4")
+        check_point(self.fraction, self.qp, self.levels)
 
     @property
     def name(self) -> str:
@@ -83,6 +81,12 @@ class DecimatedDracoCodec:
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, from the bytes alone."""
         return open_video(data)
+
+
+def check_point(fraction: float, qp: int, levels: int) -> None:
+    check_qp(qp)
+    if not 0 < fraction <= 1 or not 0 <= levels <= 4:
+        raise InputError(f"fraction {fraction:g}, levels {levels}: give 0 < fraction <= 1, levels 0 to 4")
 
 
 def check_qp(qp: int) -> None:

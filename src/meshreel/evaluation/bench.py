@@ -1,0 +1,21 @@
+"""What a run of points is about: its sequences, what it compares, and for how long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..metrics.report import ComparisonOptions
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """Where a run finds its sequences, and what it compares."""
+
+    data: Path  # the folder of the sequences
+    experiment: str = "targets"  # rows of other experiments in the same file are left alone
+    comparison: ComparisonOptions = field(default_factory=ComparisonOptions)
+    cache: Path | None = None  # sequences that take long to make are kept here
+    limit_s: float | None = None  # wall time of a point, which then has a process of its own; None: measured in this
+    retry: bool = False  # points that failed before are measured again
+    alike: tuple[str, ...] = ()  # experiments that measure in the same way: their rows count, too
