@@ -21,7 +21,7 @@ from meshreel.types import MeshList
 from meshreel.windows import EncoderOptions
 from tests.shared_data import performer
 
-QUALITIES = (0, 25, 50, 75, 100)
+QUALITIES = (0, 20, 40, 60, 80, 100)
 BETTER = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "ssim_masked")
 WORSE = ("normal_error_deg", "normal_error_at_vertices_deg")
 LOOK = ComparisonOptions(views=ParallelViewOptions())  # of 128 x 128 pixels, SSIM is noise above .99
