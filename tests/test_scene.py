@@ -28,6 +28,7 @@ from meshreel.parts import Parts, take_apart
 from meshreel.scene import TrackGroup, encode_bodies, encode_static
 from meshreel.types import Mesh, MeshList, Placement
 from meshreel.windows import EncodedGroup, Stages
+from meshreel.work import Work
 from tests import small_scene
 from tests.metrics.shapes import moved, plane, sphere
 from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, of_body, quick_scene, room, with_room
@@ -258,7 +259,7 @@ def tracks(frames: list[Mesh], segment: int = 2) -> list[str]:
     seen = replace(survey(sequence), scale=1.0)
     parts = Parts(seen, ALL, NONE, [], 0.0, 0.0)
     options = replace(OPTIONS, key_interval=float(segment))
-    coded = encode_bodies(sequence, parts, options, None, Stages(None, len(frames)))
+    coded = encode_bodies(Work(sequence, options, None, Stages(None, len(frames))), parts)
     assert coded.dropped == 0
     assert coded.groups == sorted(coded.groups, key=lambda each: (each.first_frame, each.track))
     count = max(each.track for each in coded.groups) + 1
@@ -334,7 +335,7 @@ def test_more_bodies_than_a_file_has_tracks_share_some():
     many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
     sequence = MeshList((many, many), 1.0)
     seen = replace(survey(sequence), scale=1.0)
-    coded = encode_bodies(sequence, Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0), OPTIONS, None, Stages(None, 2))
+    coded = encode_bodies(Work(sequence, OPTIONS, None, Stages(None, 2)), Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0))
     assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
     faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
     assert sum(faces) == len(many.faces)

@@ -11,7 +11,6 @@ import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +32,11 @@ from .layered import encode_segment
 from .metrics.distance import PSNR_CEILING, psnr
 from .parts import Parts, take_apart
 from .presets import preset_options
-from .scene import Static, TrackGroup, encode_bodies, encode_static
+from .scene import Static, TrackGroup, all_windows, encode_bodies, encode_static
 from .summary import GroupSummary, SceneSummary, Summary
 from .types import Frames, Mesh, MeshSequence, evenly
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
+from .work import SpanStore, Work
 
 MEASURED = 4  # frames of a scene that are compared with what is decoded
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less
@@ -61,7 +61,7 @@ def encode(
 
 
 class Encoder:
-    """A sequence that is encoded once, or at several qualities: it is taken apart once."""
+    """A sequence that is encoded once, or at several rates: what these share is found once."""
 
     def __init__(
         self,
@@ -74,43 +74,58 @@ class Encoder:
 
         Who is told of progress may change: `progress` is an attribute.
         """
-        self._sequence, self._executor, self._masker = sequence, executor, masker
+        self.sequence, self._executor, self._masker = sequence, executor, masker
         self.progress = progress
+        self.spans = SpanStore()  # those that `prepare` found
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
         self._stands: bool | None = masker is not None or None  # whether most of it stands still; None: not looked at
 
     @property
     def frame_rate(self) -> float:
         """Of the sequence, 1/s."""
-        return self._sequence.frame_rate
+        return self.sequence.frame_rate
 
     def prepare(self, options: EncoderOptions) -> None:
-        """Takes the sequence apart, where it is a scene, as `encode` with these options would. Raises what it does."""
-        if self._is_scene(options):
-            self._parts(self._work(options))
+        """Finds what `encode` finds before a rate is chosen. Raises what it does.
+
+        The parts of a scene; and the spans of form LAPLACIAN, for as many sizes of its basis as are wanted, unless
+        there is an executor. They take a few hundred kB a frame, as long as this object lives.
+        """
+        work, parts = self._work(options), self.parts(options)
+        if options.form == Form.LAPLACIAN and self._executor is None:
+            self._keep_spans(work, parts)
+
+    def _keep_spans(self, work: Work, parts: Parts | None) -> None:
+        options, stages, count = work.options, work.stages, len(work.sequence)
+        seen = survey(work.sequence, stages) if parts is None else parts.seen
+        for run in all_windows(work.sequence, seen, parts, options):
+            self.spans.keep(run.frames, options, stages if parts is None else None)
+            stages.reach("fit", (run.first_frame + len(run.frames)) / count)
+
+    def parts(self, options: EncoderOptions) -> Parts | None:
+        """What the sequence is made of; None where it is no scene, or is not to be taken for one."""
+        return self._parts(self._work(options)) if self._is_scene(options) else None
 
     def encode(self, path: str | Path, options: EncoderOptions) -> Summary:
         """As the function `encode`, which says what is raised."""
         if options.dynamic_only and self._masker is not None:
             raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
         check_target(Path(path))
-        work = self._work(options)
-        if self._is_scene(options):
-            return _encode_scene(work, Path(path), self._parts(work))
-        return _encode_bodies(work, Path(path))
+        work, parts = self._work(options), self.parts(options)
+        return _encode_bodies(work, Path(path)) if parts is None else _encode_scene(work, Path(path), parts)
 
-    def _work(self, options: EncoderOptions) -> _Work:
-        stages = Stages(self.progress, len(self._sequence))
-        return _Work(self._sequence, options, self._executor, stages)
+    def _work(self, options: EncoderOptions) -> Work:
+        stages = Stages(self.progress, len(self.sequence))
+        return Work(self.sequence, options, self._executor, stages, self.spans)
 
     def _is_scene(self, options: EncoderOptions) -> bool:
-        if options.dynamic_only or not len(self._sequence):
+        if options.dynamic_only or not len(self.sequence):
             return False
         if self._stands is None:
-            self._stands = is_scene(self._sequence)
+            self._stands = is_scene(self.sequence)
         return self._stands
 
-    def _parts(self, work: _Work) -> Parts:
+    def _parts(self, work: Work) -> Parts:
         """What the scene is made of; found anew where other options say otherwise."""
         how = (work.options.segment, work.options.background)
         if self._scene is None or self._scene[:2] != how:
@@ -119,17 +134,7 @@ class Encoder:
         return self._scene[2]
 
 
-@dataclass(frozen=True, slots=True)
-class _Work:
-    """What is to be encoded, and how."""
-
-    sequence: MeshSequence
-    options: EncoderOptions
-    executor: Executor | None
-    stages: Stages
-
-
-def _encode_bodies(work: _Work, path: Path) -> Summary:
+def _encode_bodies(work: Work, path: Path) -> Summary:
     """As `encode`, for a sequence in which everything may move."""
     sequence, options = work.sequence, work.options
     seen = survey(sequence, work.stages)
@@ -143,12 +148,12 @@ def _encode_bodies(work: _Work, path: Path) -> Summary:
     return Summary(path.stat().st_size, tuple(groups), _warnings(seen))
 
 
-def _encode_scene(work: _Work, path: Path, parts: Parts) -> Summary:
+def _encode_scene(work: Work, path: Path, parts: Parts) -> Summary:
     """As `encode`, for a scene with a background."""
-    sequence, options, stages, seen = work.sequence, work.options, work.stages, parts.seen
+    sequence, options, seen = work.sequence, work.options, parts.seen
     states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        coded = encode_bodies(sequence, parts, options, work.executor, stages)
+        coded = encode_bodies(work, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
         writer.header = make_header(sequence.frame_rate, seen, metadata)
@@ -247,16 +252,16 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
     )
 
 
-def _encoded_windows(work: _Work, seen: Survey) -> Iterator[Iterable[EncodedGroup]]:
+def _encoded_windows(work: Work, seen: Survey) -> Iterator[Iterable[EncodedGroup]]:
     """The groups of each run of frames that needs no other, in order; with an executor, a run a worker ahead."""
     sequence, options, executor, stages = work.sequence, work.options, work.executor, work.stages
     layered = options.form == Form.LAYERS
     size = max(1, round(options.key_interval * sequence.frame_rate)) if layered else options.group_size
     windows = (_Normalised(sequence, seen, window) for window in seen.windows(size))
-    encode_one = encode_segment if layered else encode_window
     if executor is None:
         for frames in windows:
-            yield encode_one(frames, options, stages)
+            alone = encode_segment(frames, options, stages) if layered else None
+            yield alone or encode_window(frames, options, stages, work.spans.find)
         return
     ahead = getattr(executor, "_max_workers", 8)
     waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()

@@ -10,7 +10,6 @@ quality means the same for a person in a room as for one alone.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -31,7 +30,8 @@ from .geometry.nearest import distances
 from .layered import MOST_EMPTY, encode_segment
 from .parts import Change, Parts
 from .types import Mesh, MeshSequence, Placement
-from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, Stages, encode_window
+from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, FindSpans, encode_window, find_spans
+from .work import Work
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 HALFWAY = 0.3  # of the vertices: what has fewer than half as many is decimated from there, a third of the time
@@ -126,17 +126,15 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
     return Mesh((mesh.vertices - seen.center) / seen.unit, mesh.faces)
 
 
-def encode_bodies(
-    sequence: MeshSequence, parts: Parts, options: EncoderOptions, executor: Executor | None, stages: Stages
-) -> CodedBodies:
+def encode_bodies(work: Work, parts: Parts) -> CodedBodies:
     """The groups of all tracks; each track has all frames, and no group has frames with surface and without."""
-    noise = min(parts.noise / parts.seen.unit, MOST_NOISE) if options.form == Form.LAYERS else 0.0
-    options = replace(options, noise=noise)
+    sequence, stages = work.sequence, work.stages
+    noise = min(parts.noise / parts.seen.unit, MOST_NOISE) if work.options.form == Form.LAYERS else 0.0
+    options = replace(work.options, noise=noise)
     tracks, found = Tracks(parts.segmentation.cell, options), list[TrackGroup]()
     for frames in segments(sequence, parts.segmentation, options):
         runs = body_runs(sequence, parts, frames, tracks)
-        tasks = [(run.frames, options) for run in runs]
-        coded = map(_groups, tasks) if executor is None else executor.map(_encoded, tasks)
+        coded = _coded_runs([run.frames for run in runs], replace(work, options=options))
         done, count = 0, sum(len(run.frames) for run in runs)
         for run, groups in zip(runs, coded, strict=True):
             first = run.first_frame
@@ -159,14 +157,35 @@ def body_runs(sequence: MeshSequence, parts: Parts, frames: range, tracks: Track
     return found
 
 
-def _groups(task: tuple[list[Mesh], EncoderOptions]) -> Iterable[EncodedGroup]:
-    frames, options = task
-    return (encode_segment if options.form == Form.LAYERS else encode_window)(frames, options)
+def all_windows(
+    sequence: MeshSequence, seen: Survey, parts: Parts | None, options: EncoderOptions
+) -> Iterator[BodyRun]:
+    """The windows of form LAPLACIAN: of a scene, or where there are no `parts` of a sequence that may all move."""
+    if parts is None:
+        for window in seen.windows(options.group_size):
+            yield BodyRun(0, window.start, [seen.normalise(sequence[number]) for number in window])
+        return
+    tracks = Tracks(parts.segmentation.cell, options)
+    for frames in segments(sequence, parts.segmentation, options):
+        yield from body_runs(sequence, parts, frames, tracks)
+
+
+def _coded_runs(runs: Sequence[list[Mesh]], work: Work) -> Iterator[Iterable[EncodedGroup]]:
+    """The groups of each run, in order."""
+    if work.executor is None:
+        return (_groups(frames, work.options, work.spans.find) for frames in runs)
+    return work.executor.map(_encoded, [(frames, work.options) for frames in runs])
+
+
+def _groups(frames: list[Mesh], options: EncoderOptions, find: FindSpans) -> Iterable[EncodedGroup]:
+    if options.form == Form.LAYERS:
+        return encode_segment(frames, options)
+    return encode_window(frames, options, None, find)
 
 
 def _encoded(task: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
     """In a worker."""
-    return list(_groups(task))
+    return list(_groups(*task, find_spans))
 
 
 def segments(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:

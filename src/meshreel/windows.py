@@ -122,6 +122,9 @@ class Span:
     fitted: Fitted | None  # None: no reference follows them
 
 
+FindSpans = Callable[[Sequence[Mesh], EncoderOptions, "Stages | None"], list[Span]]
+
+
 class Stages:
     """Counts frames through the stages for a progress callback."""
 
@@ -141,13 +144,18 @@ class Stages:
             self._progress(stage, self._done[stage], self._total)
 
 
-def encode_window(frames: Frames, options: EncoderOptions, stages: Stages | None = None) -> list[EncodedGroup]:
-    """The groups of a window: one, or more where one reference cannot follow. Frames are all empty or none is."""
+def encode_window(
+    frames: Frames, options: EncoderOptions, stages: Stages | None = None, find: FindSpans | None = None
+) -> list[EncodedGroup]:
+    """The groups of a window: one, or more where one reference cannot follow. Frames are all empty or none is.
+
+    `find` is `find_spans`, or who knows its answer.
+    """
     stages, frames = stages or Stages(None, len(frames)), list(frames)
     if frames[0].is_empty:
         groups = [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
     else:
-        groups = [_encode_span(span, options) for span in find_spans(frames, options, stages)]
+        groups = [_encode_span(span, options) for span in (find or find_spans)(frames, options, stages)]
     stages.add("code", len(frames))
     return groups
 

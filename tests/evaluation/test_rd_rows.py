@@ -121,6 +121,17 @@ def test_two_steps_give_the_bytes_of_one_and_leave_the_analysis_as_it_was(kind, 
         assert data == codec.code(analysis) == codec.encode(SCENE)
 
 
+def test_tsmc_as_the_paper_has_it_and_tvmc_are_tracked_together():
+    paper = [Point("ball", "meshreel", {"preset": "paper", "basis_size": size}, kind=RATED) for size in (2, 4)]
+    best = [Point("ball", "meshreel", {"quality": quality}, kind=RATED) for quality in (20.0, 60.0)]
+    tvmc = [Point("ball", "tvmc", {"qp": qp}, kind=RATED) for qp in (5, 9)]
+    finer = Point("ball", "tvmc", {"vertices": 3000}, kind=RATED)
+    assert runs_of([*paper, finer, *tvmc]) == [[*paper, *tvmc], [finer]]
+    assert runs_of([replace(point, options=point.options | {"preset": "best"}) for point in best]) == [
+        [replace(point, options=point.options | {"preset": "best"}) for point in best]
+    ]
+
+
 @pytest.mark.usefixtures("small")
 def test_points_of_one_analysis_are_measured_together_and_analysed_once(bench, monkeypatch, tmp_path):
     points = [

@@ -62,6 +62,12 @@ def test_declarations_are_short_and_every_codec_of_the_paper_is_in_the_small_for
         assert small >= {"meshreel", "draco", "tvmc", "klt_tsdf", "necgs", "decimated_draco", "background_once_draco"}
 
 
+def test_the_tables_have_no_points_but_those_of_the_figure():
+    figure = {point.key for point in STUDIES["figure6"].points(False)}
+    for name in ("table1", "table2"):
+        assert {point.key for point in STUDIES[name].points(False)} <= figure
+
+
 def test_the_promise_is_kept_only_where_the_best_is_left_of_all():
     best = [row("best", 0.5, 60), row("best", 1.0, 65)]
     other = [row("other", 1.0, 60), row("other", 2.0, 65)]

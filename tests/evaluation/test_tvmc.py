@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.intra import encode_intra
 from meshreel.coding.reference import code_reference
+from meshreel.encoder import Encoder
 from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.evaluation.codecs import make_codec
 from meshreel.evaluation.codecs.tvmc import TvmcCodec
@@ -36,7 +37,6 @@ from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.presets import quality_of_vertices, reference_vertices
 from meshreel.types import Mesh, MeshList
-from meshreel.windows import Stages
 from tests.scenes import CELL, NOISE, ball, of_body, quick_scene, room, with_room
 from tests.small_options import quick
 
@@ -59,13 +59,13 @@ def tracking():
 
 @pytest.fixture(scope="module")
 def stream(tracking):
-    return SMALL.code(tracking)
+    return SMALL.pack(tracking)
 
 
 def tracked(sequence, codec=SMALL, make=quick):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(f"{CODEC}.preset_options", make)
-        return track_sequence(sequence, codec.encoder_options, Stages(None, len(sequence)))
+        return track_sequence(Encoder(sequence), codec.encoder_options)
 
 
 def percent(original, found):
@@ -151,7 +151,7 @@ def test_a_moving_body_comes_back(stream):
 def test_quality_rises_with_the_rate(tracking):
     found = []
     for qp in (3, 5, 7, 9):
-        data = replace(SMALL, qp=qp).code(tracking)
+        data = replace(SMALL, qp=qp).pack(tracking)
         errors = [percent(a, b) for a, b in zip(BODY, SMALL.decode(data), strict=True)]
         found.append((len(data), float(np.mean(errors))))
     sizes, errors = zip(*found, strict=True)
@@ -163,7 +163,7 @@ def test_no_frame_takes_more_than_its_bits_and_all_have_one_step(tracking):
     groups = [group for group in tracking.groups if isinstance(group, Tracked)]
     step = SMALL.step(tracking)
     widths = [np.ptp(np.rint(group.field / step), axis=0).max() for group in groups]
-    assert 2**7 < max(widths) <= 2**8 and unpack_stream(SMALL.code(tracking)).step == step
+    assert 2**7 < max(widths) <= 2**8 and unpack_stream(SMALL.pack(tracking)).step == step
 
 
 def test_the_same_input_gives_the_same_bytes_and_tells_its_stages():
@@ -259,7 +259,7 @@ def rolling():
 
 
 def test_a_scene_has_its_background_once_and_its_body_tracked(rolling):
-    data = SMALL.code(rolling)
+    data = SMALL.pack(rolling)
     stream = unpack_stream(data)
     assert len(stream.states) == 1 and kinds(data) == [(1, 4, Kind.TRACKED)]
     assert stream.scale == pytest.approx(2 * np.sqrt(3) * 0.3, rel=0.1)  # m, the ball's diagonal

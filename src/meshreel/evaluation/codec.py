@@ -49,7 +49,7 @@ class TwoStepCodec(Codec, Protocol):
 
     @property
     def analysis_key(self) -> str:
-        """Equal for operating points that share an analysis."""
+        """Equal for operating points that share an analysis, of one codec or of several."""
         ...
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Any:

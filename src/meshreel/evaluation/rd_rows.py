@@ -81,7 +81,7 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, R
     """The bytes, and encode times, s a frame; those of an analysis that several points share count in each."""
     timer, seconds = StageTimer(), 0.0
     if isinstance(codec, TwoStepCodec):
-        key = (what, type(codec), codec.analysis_key)
+        key = (what, codec.analysis_key)
         if _LAST.key != key:
             _LAST.key = _LAST.analysis = None  # one in memory is enough
             _LAST.analysis = codec.analyse(source, timer)

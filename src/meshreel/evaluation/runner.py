@@ -97,7 +97,7 @@ def _shared(point: Point) -> object:
         except InputError:  # told when the point is measured
             return point.key
         if isinstance(codec, TwoStepCodec):
-            return point.sequence, point.frames, point.kind, point.codec, codec.analysis_key
+            return point.sequence, point.frames, point.kind, codec.analysis_key
     return point.key
 
 

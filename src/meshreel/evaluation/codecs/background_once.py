@@ -68,7 +68,7 @@ class BackgroundOnceDracoCodec:
     @property
     def analysis_key(self) -> str:
         """The same for all operating points."""
-        return ""
+        return "background once"
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Still:
         """What stands still. Raises InputError for frames that cannot be used."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from ...encoder import Encoder
 from ...presets import preset_options
 from ...types import Mesh, MeshSequence
 from ...windows import EncoderOptions
+from ...work import shared_options
 from ..codec import Progress
 from ..variants import find_variant
 
@@ -57,14 +58,12 @@ class MeshreelCodec:
 
     @property
     def analysis_key(self) -> str:
-        """All options but those that choose a rate."""
-        return repr(replace(self, quality=0.0, basis_size=None))
+        """Of all options that decide what `Encoder.prepare` finds."""
+        return analysis_key(self.encoder_options)
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
-        """An encoder that has taken a scene apart."""
-        encoder = Encoder(sequence, progress=progress)
-        encoder.prepare(self.encoder_options)
-        return encoder
+        """An encoder that has found what does not depend on the rate."""
+        return prepared(sequence, self.encoder_options, progress)
 
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
         """The .reel file."""
@@ -77,3 +76,15 @@ class MeshreelCodec:
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, from the bytes alone."""
         return open_video(data)
+
+
+def prepared(sequence: MeshSequence, options: EncoderOptions, progress: Progress | None = None) -> Encoder:
+    """An encoder that has found what operating points share."""
+    encoder = Encoder(sequence, progress=progress)
+    encoder.prepare(options)
+    return encoder
+
+
+def analysis_key(options: EncoderOptions) -> str:
+    """Equal for options with which `Encoder.prepare` finds the same."""
+    return repr(shared_options(options))

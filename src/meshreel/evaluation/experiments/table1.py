@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..study import Study
-from .figure6 import SCENES, STUDY, SYSTEMS
+from . import figure6
 
-STUDY = Study(sequences=SCENES, sweeps=SYSTEMS, truths=STUDY.truths, common=("mbps", 1.0))
+ALL = figure6.STUDY
+STUDY = Study(sequences=figure6.SCENES, sweeps=ALL.sweeps, truths=ALL.truths, frames=ALL.frames, common=("mbps", 1.0))

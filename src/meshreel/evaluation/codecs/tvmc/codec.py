@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from ....coding.patches import run_lengths
+from ....encoder import Encoder
 from ....errors import InputError
 from ....presets import preset_options, quality_of_vertices
 from ....types import Mesh, MeshSequence
 from ....windows import EncoderOptions, Stages
 from ...codec import Progress
+from ..meshreel import analysis_key, prepared
 from .layout import MAGIC, VERSION, Group, Kind, State, Stream, pack_stream
 from .tracked import MOST_CELLS, encode_tracked
 from .tracking import Tracked, Tracking, Untracked, track_sequence
@@ -59,21 +61,21 @@ class TvmcCodec:
 
     @property
     def analysis_key(self) -> str:
-        """All options but `qp`."""
-        return repr(replace(self, qp=LEAST_QP))
+        """Of preset `paper`, which shares it: all options but `qp`."""
+        return analysis_key(self.encoder_options)
 
-    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Tracking:
-        """The tracking. Raises InputError for frames that cannot be used."""
-        return track_sequence(sequence, self.encoder_options, Stages(progress, len(sequence)))
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
+        """An encoder that has found what is tracked. Raises InputError for frames that cannot be used."""
+        return prepared(sequence, self.encoder_options, progress)
 
-    def code(self, analysis: Tracking, progress: Progress | None = None) -> bytes:
+    def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
         """The stream of what was tracked."""
-        tracking, count = analysis, len(analysis.seen.diagonals)
-        data = self._packed(tracking)
+        data, count = self.pack(track_sequence(analysis, self.encoder_options)), len(analysis.sequence)
         Stages(progress, count).add("code", count)
         return data
 
-    def _packed(self, tracking: Tracking) -> bytes:
+    def pack(self, tracking: Tracking) -> bytes:
+        """The stream of references and displacements that are known."""
         seen, step = tracking.seen, self.step(tracking)
         bare = np.array([seen.is_bare(frame) for frame in range(len(seen.diagonals))])
         return pack_stream(

@@ -1,24 +1,21 @@
 """What a TVMC* stream is made of, before a step is chosen: references, displacements, the background.
 
-In: a sequence, the options of preset `paper`. Out: Tracking; it does not depend on the rate, so that points of one
-curve may share it.
+In: an encoder that found the spans, the options of preset `paper`. Out: Tracking; it does not depend on the rate.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
 
-from ....analysis.segment.probe import is_scene
 from ....analysis.survey import Survey, survey
 from ....coding.reference import CodedReference
-from ....parts import take_apart
-from ....scene import Static, Tracks, body_runs, encode_static, segments
-from ....types import Mesh, MeshSequence
-from ....windows import EncoderOptions, Stages, displacement_field, find_spans, intra_only
+from ....encoder import Encoder
+from ....scene import BodyRun, Static, all_windows, encode_static
+from ....windows import EncoderOptions, Span, displacement_field, intra_only
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,33 +55,24 @@ class Tracking:
     groups: list[Tracked | Untracked]  # of frames with surface
 
 
-def track_sequence(sequence: MeshSequence, options: EncoderOptions, stages: Stages) -> Tracking:
-    """The groups of a sequence, of each body of a scene. Raises InputError for frames that cannot be used."""
-    if len(sequence) and is_scene(sequence):
-        return _track_scene(sequence, options, stages)
-    seen, groups = survey(sequence, stages), list[Tracked | Untracked]()
-    for window in seen.windows(options.group_size):
-        frames = [seen.normalise(sequence[number]) for number in window]
-        groups += _groups(window.start, frames, options, stages)
-    return Tracking(seen, [], groups)
+def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
+    """The groups of a sequence, of each body of a scene. Raises InputError for frames that cannot be used.
+
+    Spans that the encoder prepared are not looked for again.
+    """
+    sequence, parts, groups = encoder.sequence, encoder.parts(options), list[Tracked | Untracked]()
+    seen = survey(sequence) if parts is None else parts.seen
+    for run in all_windows(sequence, seen, parts, options):
+        if not run.frames[0].is_empty:
+            groups += _groups(run, encoder.spans.find(run.frames, options), options)
+    states = [] if parts is None else encode_static(parts, len(sequence), sequence.frame_rate, options.background)
+    return Tracking(seen, states, sorted(groups, key=lambda group: group.first_frame))
 
 
-def _track_scene(sequence: MeshSequence, options: EncoderOptions, stages: Stages) -> Tracking:
-    parts = take_apart(sequence, survey(sequence, stages, cleaned=False), options, stages)
-    states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
-    tracks, groups = Tracks(parts.segmentation.cell, options), list[Tracked | Untracked]()
-    for frames in segments(sequence, parts.segmentation, options):
-        for run in body_runs(sequence, parts, frames, tracks):
-            groups += _groups(run.first_frame, run.frames, options, Stages(None, len(run.frames)))
-        stages.add("fit", len(frames))
-    return Tracking(parts.seen, states, sorted(groups, key=lambda group: group.first_frame))
-
-
-def _groups(first: int, frames: list[Mesh], options: EncoderOptions, stages: Stages) -> Iterator[Tracked | Untracked]:
-    """The groups of a window; none where its frames are empty."""
-    if frames[0].is_empty:
-        return
-    for span in find_spans(frames, options, stages):
+def _groups(run: BodyRun, spans: Sequence[Span], options: EncoderOptions) -> Iterator[Tracked | Untracked]:
+    """The groups of a window."""
+    first = run.first_frame
+    for span in spans:
         if span.fitted is None:
             yield Untracked(first, len(span.frames), intra_only(span.frames, options).payload)
         else:

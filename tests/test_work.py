@@ -1,0 +1,81 @@
+"""What encodes at several rates share: spans are found once, and found only for what they were found for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from meshreel import encoder as encoding
+from meshreel import windows, work
+from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
+from meshreel.choice import Quality
+from meshreel.encoder import Encoder, encode
+from meshreel.format.layout import Form
+from meshreel.types import Mesh, MeshList
+from meshreel.work import SpanStore, shared_options
+from tests.small_options import quick
+
+BODY = tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.04)))
+PAPER = replace(quick(), form=Form.LAPLACIAN, group_size=2)
+
+
+def with_basis(size: int) -> windows.EncoderOptions:
+    return replace(PAPER, displacements=replace(PAPER.displacements, basis_size=size))
+
+
+@pytest.fixture
+def looked(monkeypatch):
+    """The windows that were looked at, by number of frames."""
+    seen, find = list[int](), windows.find_spans
+    monkeypatch.setattr(work, "find_spans", lambda frames, *rest: seen.append(len(frames)) or find(frames, *rest))
+    return seen
+
+
+def test_a_prepared_encoder_looks_at_each_window_once_and_writes_the_bytes_of_one_that_is_not(looked, tmp_path):
+    sequence = MeshList((*BODY, Mesh.empty()))
+    prepared = Encoder(sequence)
+    prepared.prepare(with_basis(1))
+    assert looked == [2, 2]  # the empty frame is no window to look at
+    for size in (1, 2):
+        prepared.encode(tmp_path / "prepared.reel", with_basis(size))
+        assert looked == [2, 2]
+        encode(sequence, tmp_path / "alone.reel", with_basis(size))
+        assert (tmp_path / "prepared.reel").read_bytes() == (tmp_path / "alone.reel").read_bytes()
+        looked[2:] = []
+
+
+def test_an_encoder_that_was_prepared_for_other_options_looks_again(looked, tmp_path):
+    prepared = Encoder(MeshList(BODY))
+    prepared.prepare(PAPER)
+    prepared.encode(tmp_path / "a.reel", replace(PAPER, group_size=4))
+    assert looked == [2, 2, 4]
+
+
+def test_with_workers_nothing_is_looked_at_ahead(looked):
+    class Elsewhere(encoding.Executor):
+        pass
+
+    Encoder(MeshList(BODY), Elsewhere()).prepare(PAPER)
+    assert looked == []
+
+
+def test_spans_that_are_kept_are_those_that_are_found():
+    store, ball = SpanStore(), list(deforming_sphere(3, levels=2))
+    options = replace(PAPER, target=Quality(1e-7, 1.0, 1e-7), groups=replace(PAPER.groups, depth=1))  # never reached
+    store.keep(ball, options)
+    kept, found = store.find(ball, options), windows.find_spans(ball, options)
+    assert [len(span.frames) for span in kept] == [len(span.frames) for span in found] and len(kept) > 1
+    for ours, theirs in zip(kept, found, strict=True):
+        assert all(a is b for a, b in zip(ours.frames, theirs.frames, strict=True))
+        assert (ours.fitted is None) == (theirs.fitted is None)
+
+
+@pytest.mark.parametrize("form", [Form.LAPLACIAN, Form.LAYERS])
+def test_what_decides_about_a_rate_alone_is_not_shared(form):
+    options = replace(PAPER, form=form)
+    rates = replace(options, quality=3.0, displacements=replace(options.displacements, step=0.5, basis_size=2))
+    assert shared_options(rates) == shared_options(options)
+    assert shared_options(replace(options, dynamic_only=True)) != shared_options(options)
+    track = replace(options, track=replace(options.track, centers=7))
+    assert (shared_options(track) == shared_options(options)) == (form == Form.LAYERS)
