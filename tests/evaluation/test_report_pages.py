@@ -7,9 +7,10 @@ from html.parser import HTMLParser
 
 import pytest
 
+from meshreel.evaluation.names import BEST
 from meshreel.evaluation.report import write_report
 from meshreel.evaluation.report.html import html_page
-from meshreel.evaluation.report.looks import SYSTEM, looks_of
+from meshreel.evaluation.report.looks import looks_of
 from meshreel.evaluation.report.pages import file_name
 from tests.evaluation.report_rows import experiment, failed, pictured, row
 
@@ -48,7 +49,7 @@ def report(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     shots = folder / "rows.pictures"
     rows = [
-        pictured(shots, row("dancer", SYSTEM, 1.0, 60.0)),
+        pictured(shots, row("dancer", BEST, 1.0, 60.0)),
         pictured(shots, row("dancer", "draco", 2.0, 70.0)),
         row("dancer", BAD, 3.0, 75.0),
         row(f"{BAD}/..", "draco", 3.0, 75.0),
@@ -144,7 +145,7 @@ def test_a_codec_has_one_color_in_all_sequences(tmp_path):
 
 def test_same_rows_are_same_bytes(tmp_path):
     shots = tmp_path / "rows.pictures"
-    rows = [pictured(shots, row("dancer", codec, 1.0, 60.0)) for codec in (SYSTEM, "b", "a")] + [failed("x", "y", "z")]
+    rows = [pictured(shots, row("dancer", codec, 1.0, 60.0)) for codec in (BEST, "b", "a")] + [failed("x", "y", "z")]
     pages = []
     for folder in (tmp_path / "one", tmp_path / "two"):
         written = write_report(rows, experiment(), folder, [shots])

@@ -6,14 +6,15 @@ import matplotlib
 import pytest
 
 from meshreel.evaluation.curves import curve_of
-from meshreel.evaluation.report.looks import SYSTEM, looks_of
+from meshreel.evaluation.names import BEST
+from meshreel.evaluation.report.looks import looks_of
 from meshreel.evaluation.report.plots import WIDTH, curves_figure, matplotlib_settings, plot_curves
 from meshreel.evaluation.scene_rows import NOISE_FLOOR
 from tests.evaluation.report_rows import experiment, row
 
 LONG = "b: background once, decimated Draco, labels found"
 CHOSEN = experiment()["made up"]
-ROWS = [row("dancer", codec, mbps, 60 + 4 * mbps) for codec in (SYSTEM, "draco", LONG) for mbps in (0.5, 1.0, 4.0)]
+ROWS = [row("dancer", codec, mbps, 60 + 4 * mbps) for codec in (BEST, "draco", LONG) for mbps in (0.5, 1.0, 4.0)]
 
 
 def drawn(rows, chosen=CHOSEN):
@@ -29,7 +30,7 @@ def legend_of(figure):
     return legend
 
 
-@pytest.mark.parametrize("codecs", [["draco"], [SYSTEM, LONG], [f"{LONG} {i}" for i in range(14)]])
+@pytest.mark.parametrize("codecs", [["draco"], [BEST, LONG], [f"{LONG} {i}" for i in range(14)]])
 @pytest.mark.parametrize("metrics", [1, 3, 4, 5, 7])
 def test_the_legend_is_in_the_page_and_covers_no_panel(codecs, metrics):
     rows = [row("dancer", codec, mbps, 60.0) for codec in codecs for mbps in (0.5, 1.0)]
@@ -67,7 +68,7 @@ def test_a_codec_has_one_color_and_marker_in_all_panels_and_the_system_is_first_
     looks = {(line.get_label(), line.get_color(), line.get_marker()) for panel in figure.axes for line in panel.lines}
     assert len(looks) == 3
     texts = legend_of(figure).get_texts()
-    assert texts[0].get_text() == SYSTEM and [t.get_fontweight() for t in texts] == ["bold", "normal", "normal"]
+    assert texts[0].get_text() == BEST and [t.get_fontweight() for t in texts] == ["bold", "normal", "normal"]
 
 
 def test_ticks_are_plain_numbers_within_the_rates_however_wide_these_are():

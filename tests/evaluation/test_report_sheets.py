@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from meshreel.evaluation.names import BEST
 from meshreel.evaluation.report import write_report
 from meshreel.evaluation.report.boxes import cut_out, detail_box, is_covered, layout_of
-from meshreel.evaluation.report.looks import SYSTEM
 from meshreel.evaluation.report.plots import WIDTH, matplotlib_settings
 from meshreel.evaluation.report.sheets import draw_sheet, find_shots, sheet_figure
 from meshreel.metrics.render import Window
 from tests.evaluation.report_rows import SIZE, body, experiment, pictured, row, save
 
-CODECS = ("draco", SYSTEM, "somebody's codec with a long name")
+CODECS = ("draco", BEST, "somebody's codec with a long name")
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_a_window_beyond_the_picture_is_white():
 def test_each_codec_has_one_column_at_its_point_nearest_to_the_common_rate(shots):
     folder, rows = shots
     found = find_shots(rows, [folder])
-    assert [files.row["codec"] for files in found.columns] == [SYSTEM, "draco", "somebody's codec with a long name"]
+    assert [files.row["codec"] for files in found.columns] == [BEST, "draco", "somebody's codec with a long name"]
     assert {files.row["mbps"] for files in found.columns} == {1.0} and found.mbps == pytest.approx(1.0)
     assert (found.frame, found.limit_percent, found.left_out) == (5, 0.5, ())
 
@@ -114,7 +114,7 @@ def test_a_sheet_has_the_original_a_column_a_codec_two_rows_boxes_and_a_scale(sh
     inset = np.asarray(panels["0 0"].get_images()[1].get_array())
     assert (inset == body()[60:80, 20:40]).all()
     told = texts(figure)
-    assert {"original", "frame 5", SYSTEM, "draco", "1 Mbps", "D2 61.00 dB", "masked SSIM 0.610"} <= set(told)
+    assert {"original", "frame 5", BEST, "draco", "1 Mbps", "D2 61.00 dB", "masked SSIM 0.610"} <= set(told)
     assert told.count("1 Mbps") == 3 and figure.get_size_inches()[0] <= WIDTH + 1e-9
     [scale] = [axes for axes in figure.axes if axes.get_label() == "scale"]
     assert "% of" in scale.get_xlabel() and [t.get_text() for t in scale.get_xticklabels()] == ["0", "0.25", "0.5"]

@@ -6,8 +6,9 @@ import pytest
 from markdown_it import MarkdownIt
 
 from meshreel.evaluation.curves import D2_PAPER, NORMALS, SSIM, SYMMETRIC
+from meshreel.evaluation.names import BEST
 from meshreel.evaluation.report import bd_table, comparable_table, ranked_table
-from meshreel.evaluation.report.looks import KNOWN, SYSTEM, direction, in_order, looks_of
+from meshreel.evaluation.report.looks import KNOWN, direction, in_order, looks_of
 from meshreel.evaluation.report.tables import DAGGER, NEAR, common_rate, failure_table, maker_table, nearest, text
 from tests.evaluation.report_rows import failed, row
 
@@ -44,12 +45,12 @@ def test_codecs_at_a_rate_are_shown_by_their_nearest_point_and_far_ones_are_not_
     rows = [
         row("dancer", "draco", 4.0, 80.0),
         row("dancer", "draco", 9.0, 85.0),
-        row("dancer", SYSTEM, 0.5, 60.0),
-        row("dancer", SYSTEM, 1.2, 66.0),
+        row("dancer", BEST, 0.5, 60.0),
+        row("dancer", BEST, 1.2, 66.0),
         row("dancer", "tvmc", 0.9, 64.0),
     ]
     lines = comparable_table(rows, 1.0)
-    assert cells(lines[2])[:3] == [SYSTEM, "1.2", "**66**"]
+    assert cells(lines[2])[:3] == [BEST, "1.2", "**66**"]
     assert cells(lines[3])[:3] == ["tvmc", "0.9", "*64*"]
     assert cells(lines[4])[:3] == [f"draco {DAGGER}", "4", "80"]
     assert lines[-1].startswith(DAGGER) and f"{NEAR:g} of 1 Mbps" in lines[-1] and len(lines) == 7
@@ -85,13 +86,13 @@ def test_the_common_rate_is_the_median_over_codecs_and_of_two_as_near_the_cheape
 
 
 def test_bd_rates_state_their_overlap_and_say_where_there_is_none():
-    rows = [row("dancer", SYSTEM, mbps, db) for mbps, db in ((0.5, 60.0), (1.0, 70.0))]
+    rows = [row("dancer", BEST, mbps, db) for mbps, db in ((0.5, 60.0), (1.0, 70.0))]
     rows += [row("dancer", "draco", 2 * mbps, db) for mbps, db in ((0.5, 60.0), (1.0, 70.0))]
     rows += [row("dancer", "necgs", mbps, db) for mbps, db in ((0.5, 40.0), (1.0, 50.0))]
     rows += [row("dancer", "klt_tsdf", 1.0, 65.0)]
-    lines = bd_table(rows, SYSTEM, (D2_PAPER, NORMALS, SSIM))
+    lines = bd_table(rows, BEST, (D2_PAPER, NORMALS, SSIM))
     heads = [f"rate at equal {name} ↓" for name in ("D2, paper form", "normal error", "masked SSIM without keys")]
-    assert cells(lines[0]) == [f"{SYSTEM} against", *heads]
+    assert cells(lines[0]) == [f"{BEST} against", *heads]
     found = {cells(line)[0]: cells(line)[1:] for line in lines[2:]}
     assert found["draco"][:2] == ["-50.0 % (60 dB to 70 dB)", "-50.0 % (6 degrees to 4 degrees)"]
     assert found["draco"][2].startswith("not measured of draco and meshreel best")
@@ -158,11 +159,11 @@ def test_a_name_is_shown_as_it_is(name):
 
 
 def test_a_codec_looks_the_same_wherever_it_is_and_the_system_is_first_and_bold():
-    names = ["zeta", "draco", SYSTEM, "alpha"]
-    assert in_order(names) == [SYSTEM, "draco", "alpha", "zeta"]
+    names = ["zeta", "draco", BEST, "alpha"]
+    assert in_order(names) == [BEST, "draco", "alpha", "zeta"]
     looks = looks_of(names)
     assert looks_of(reversed(names)) == looks and looks["draco"] == KNOWN["draco"]
-    assert looks[SYSTEM].width == max(look.width for look in looks.values()) > looks["draco"].width
+    assert looks[BEST].width == max(look.width for look in looks.values()) > looks["draco"].width
     many = looks_of([*KNOWN, *(f"codec {i}" for i in range(20))])
     others = [(many[f"codec {i}"].color, many[f"codec {i}"].marker) for i in range(20)]
     assert len(set(others)) == 20 and not {color for color, _ in others} & {look.color for look in KNOWN.values()}

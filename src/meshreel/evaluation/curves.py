@@ -29,6 +29,11 @@ class Measure:
     sign: int = 1  # -1 where smaller is better
     least: float = 0.0  # an overlap of two curves below which nothing is said of them
 
+    @property
+    def label(self) -> str:
+        """Its name with its unit."""
+        return f"{self.name} ({self.unit.strip()})" if self.unit else self.name
+
     def shown(self, quality: float) -> str:
         """A quality of a curve, with its unit and its own sign."""
         return f"{self.sign * quality:.4g}{self.unit}"

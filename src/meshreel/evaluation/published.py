@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from .names import DRACO, KLT, NECGS, TSMC, TVMC
+
 
 @dataclass(frozen=True, slots=True)
 class Published:
@@ -20,14 +22,6 @@ class Published:
     mbps: float | None
 
 
-TSMC, BEST, TVMC, DRACO, KLT, NECGS = (
-    "meshreel paper m, quality 50",
-    "meshreel best",
-    "tvmc",
-    "draco",
-    "klt_tsdf",
-    "necgs",
-)
 # TSMC, table 1: mean of four captured scenes, 13.73 % of the vertices dynamic, "under similar bitrates", not told.
 TABLE_1 = (
     Published("TSMC", TSMC, 53.48, 0.8949, 34.50, None),

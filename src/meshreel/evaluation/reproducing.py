@@ -10,7 +10,8 @@ from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
 from .curves import curve_of, value
-from .published import BEST, RELEASED, RELEASED_TVMC, TABLE_1, TABLE_2, Published
+from .names import BEST
+from .published import RELEASED, RELEASED_TVMC, TABLE_1, TABLE_2, Published
 from .rows import Row, curve_rows, measured_rows
 
 NAMES = ("figure6", "table1", "table2")  # experiments whose rows count

@@ -75,7 +75,7 @@ class Study:
     frames: Mapping[str, int] = field(default_factory=dict)  # the first so many of a sequence; none said: all
     common: tuple[str, float] | None = None  # a table of each codec's point nearest to this, by the key of a row
     notes: Sequence[str] = ()  # Markdown, before the tables
-    METRICS: Sequence[tuple[str, str]] = tuple((measure.key, measure.name) for measure in MEASURES)
+    METRICS: Sequence[tuple[str, str]] = tuple((measure.key, measure.label) for measure in MEASURES)
     FLOOR_NAME: str = TRUTH_ITSELF  # what a line in the plots is
     COMPARISON: ComparisonOptions = field(default_factory=ComparisonOptions)
 

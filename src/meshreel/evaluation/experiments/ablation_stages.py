@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..names import BEST
 from ..study import Study, Sweep
 
 PARTS = (
@@ -14,17 +15,17 @@ PARTS = (
 )
 LONG = "crane60"  # groups alone show only where there are several
 ALONE = "groups alone"
-BEST = {"preset": "best"}
+WHOLE = {"preset": "best"}
 AROUND = {"quality": (20.0, 50.0, 80.0)}  # the whole's curve reaches around every variant's
 QUALITIES = {"quality": (35.0, 65.0)}
 STUDY = Study(
     sequences=("dancer", LONG),
     sweeps=(
-        Sweep("meshreel", AROUND, BEST),
-        *(Sweep("meshreel", QUALITIES, BEST | {"variant": part}, only=("dancer",)) for part in PARTS),
-        Sweep("meshreel", QUALITIES, BEST | {"variant": ALONE}, only=(LONG,)),
+        Sweep("meshreel", AROUND, WHOLE),
+        *(Sweep("meshreel", QUALITIES, WHOLE | {"variant": part}, only=("dancer",)) for part in PARTS),
+        Sweep("meshreel", QUALITIES, WHOLE | {"variant": ALONE}, only=(LONG,)),
     ),
-    anchor="meshreel best",
+    anchor=BEST,
     frames={LONG: 32},
     notes=("Positive: without the part more rate is needed.",),
 )

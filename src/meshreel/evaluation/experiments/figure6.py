@@ -6,6 +6,7 @@ SYSTEMS are the paper's, at operating points of their own kinds, and the anchors
 from __future__ import annotations
 
 from ..codecs.necgs import QUICK
+from ..names import BEST
 from ..study import Study, Sweep
 from .figure6_goals import goals
 
@@ -46,7 +47,7 @@ NOTES = (
 STUDY = Study(
     sequences=("synthetic4", *SCENES, *BODIES),
     sweeps=SYSTEMS,
-    best="meshreel best",
+    best=BEST,
     goals=goals,
     truths=(ROOM, "procedural_room"),
     frames={"demo": 10, "procedural_room": 30},

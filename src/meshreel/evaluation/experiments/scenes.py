@@ -12,6 +12,7 @@ from typing import Any
 from ...metrics.bd_rate import BdRate, Curve, bd_bound, hull
 from ...metrics.report import ComparisonOptions
 from ..curves import Measure, curve, value
+from ..names import BEST
 from ..promises import Promise
 from ..rows import Point, Row, curve_rows, select
 from ..scene_rows import BACKGROUND_S, FLOOR, MEASURED_EVERY, MEMORY, NOISE_FLOOR, SCENE, SEGMENTATION
@@ -20,7 +21,6 @@ from .scenes_goals import own_goals, segmentation_goal
 
 COMPARISON = ComparisonOptions(ssim=True)  # scenes are looked at from where their cameras stood
 ROOM, STANDING = SCENES
-SYSTEM = "meshreel best"
 WHOLE = ((0.2, 12), (0.1, 11), (0.05, 11), (0.02, 10), (0.01, 9))  # anchor a: share of the faces, bits
 WHOLE_SUBDIVIDED = ((0.05, 11), (0.02, 10))
 PEOPLE = ((0.5, 11), (0.25, 11), (0.1, 10), (0.05, 10), (0.02, 9))  # anchor b, of what moves
@@ -99,7 +99,7 @@ def floors(rows: Sequence[Row]) -> dict[str, float]:
 def promises(rows: Sequence[Row]) -> list[Promise]:
     """The targets, with what the rows say."""
     found = [segmentation_goal(name, select(rows, name, kind=SEGMENTATION)) for name in SCENES]
-    system = curve_rows(rows, ROOM, SYSTEM)
+    system = curve_rows(rows, ROOM, BEST)
     found += own_goals(system, select(rows, ROOM, kind=FLOOR), select(rows, ROOM, kind=MEMORY), DEFAULT)
     own = [row for row in rows if row["sequence"] == ROOM]
     return found + [_gain(own, anchor) for anchor in ANCHORS]
@@ -157,7 +157,7 @@ def sections(rows: Sequence[Row]) -> Iterator[str]:
 
 def _seams(rows: Sequence[Row]) -> Iterator[str]:
     """Lines of Markdown on where bodies meet the background, at the default quality."""
-    at_default = (row for row in rows if row["codec"] == SYSTEM and row["options"].get("quality") == DEFAULT)
+    at_default = (row for row in rows if row["codec"] == BEST and row["options"].get("quality") == DEFAULT)
     for row in at_default:
         if row.get("seam_gap_mm_median") is None:
             continue
@@ -204,11 +204,11 @@ def _system(quality: float, frames: int | None = None, **changed: Any) -> Point:
 def _against(rows: Sequence[Row], anchor: str, measure: Measure, limited: bool) -> BdRate | None:
     """BD-rate of the system against the hull of an anchor's forms; None where either was not measured."""
     forms = [name for name in (ANCHORS[anchor], f"{ANCHORS[anchor]}, subdivided") if _of(rows, name)]
-    if not forms or not _of(rows, SYSTEM):
+    if not forms or not _of(rows, BEST):
         return None
     highest = floors(rows).get(measure.key, float("inf")) if limited else float("inf")
     peers: list[Curve] = [curve(_of(rows, name), name, measure) for name in forms]
-    return bd_bound(hull(f"anchor {anchor}", peers), curve(_of(rows, SYSTEM), SYSTEM, measure), highest)
+    return bd_bound(hull(f"anchor {anchor}", peers), curve(_of(rows, BEST), BEST, measure), highest)
 
 
 def _gain(rows: Sequence[Row], anchor: str) -> Promise:

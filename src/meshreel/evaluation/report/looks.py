@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-SYSTEM = "meshreel best"
+from ..names import BEST, DECIMATED, DRACO, KLT, NECGS, ONCE, ONCE_SUBDIVIDED, SUBDIVIDED, TSMC, TVMC
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,17 +24,17 @@ class Look:
 # In the order of legends and sheets. Colors that the color-blind tell apart (Okabe and Ito) come first; codecs that are
 # never in one plot may share one.
 KNOWN: dict[str, Look] = {
-    SYSTEM: Look("#D55E00", "o", 2.2, 4.4),
+    BEST: Look("#D55E00", "o", 2.2, 4.4),
     "meshreel paper": Look("#E69F00", "s"),
-    "meshreel paper m, quality 50": Look("#A6761D", "d"),
-    "tvmc": Look("#009E73", "P", size=4.2),
-    "klt_tsdf": Look("#CC79A7", "X", size=4.2),
-    "necgs": Look("#7B4EA3", "*", size=5.5),
-    "draco": Look("#0072B2", "^"),
-    "decimated_draco": Look("#56B4E9", "v"),
-    "decimated_draco_subdivided": Look("#1B3A5C", "D", size=2.8),
-    "background_once_draco": Look("#44AA99", "<"),
-    "background_once_draco_subdivided": Look("#117733", "H"),
+    TSMC: Look("#A6761D", "d"),
+    TVMC: Look("#009E73", "P", size=4.2),
+    KLT: Look("#CC79A7", "X", size=4.2),
+    NECGS: Look("#7B4EA3", "*", size=5.5),
+    DRACO: Look("#0072B2", "^"),
+    DECIMATED: Look("#56B4E9", "v"),
+    SUBDIVIDED: Look("#1B3A5C", "D", size=2.8),
+    ONCE: Look("#44AA99", "<"),
+    ONCE_SUBDIVIDED: Look("#117733", "H"),
     "a: decimated Draco": Look("#56B4E9", "v"),
     "a: decimated Draco, subdivided": Look("#1B3A5C", "D", size=2.8),
     "b: background once, decimated Draco": Look("#44AA99", "<"),

@@ -17,9 +17,10 @@ import numpy as np
 from ...io.write import replacing
 from ..curves import SSIM_WITHOUT_KEYS, curve_of, value
 from ..experiment import Experiment
+from ..names import BEST, title
 from ..rows import Row, curve_rows
 from ..scene_rows import NOISE_FLOOR
-from .looks import SYSTEM, Look, direction
+from .looks import Look, direction
 
 METRICS = (
     ("d2_psnr_paper", "D2-PSNR, paper form (dB)"),
@@ -201,10 +202,11 @@ def _add_legend(figure: Any, panels: Any, used: int, down: int) -> None:
         figure.set_size_inches(WIDTH, _HEIGHT * down + 0.3 + _LINE * lines)
         drawn = figure.legend(*shown, loc="outside lower center", ncols=columns, frameon=False)
     for text in drawn.get_texts():
-        if text.get_text() == SYSTEM:
+        if text.get_text() == title(BEST):
             text.set_fontweight("bold")
 
 
 def _shown(name: str) -> str:
-    """A name as a label: matplotlib leaves those out that begin with an underscore."""
-    return f" {name}" if name.startswith("_") else name
+    """A curve's title as a label: matplotlib leaves those out that begin with an underscore."""
+    label = title(name)
+    return f" {label}" if label.startswith("_") else label

@@ -16,10 +16,11 @@ from jaxtyping import UInt8
 
 from ...metrics.render import Window
 from ..curves import curve_of, value
+from ..names import BEST
 from ..rows import Row
 from .boxes import Layout, cut_out, layout_of
 from .grids import LETTERS, Grid, Place
-from .looks import SYSTEM, in_order
+from .looks import in_order
 from .plots import matplotlib_settings, new_figure, write_figure
 from .tables import common_rate, nearest
 
@@ -102,7 +103,7 @@ def sheet_figure(shots: Shots) -> Any:
     for column, lines in enumerate(told):
         row, first = (1, grid.name_lines) if column else (0, 1)  # the original has no map: its caption is in its place
         for place, line in [*enumerate(grid.names[column]), *enumerate(lines, first)]:
-            weight = "bold" if names[column] == SYSTEM and place < first else "normal"
+            weight = "bold" if names[column] == BEST and place < first else "normal"
             at = grid.line(column, place, row)
             figure.text(*at, line, ha="center", va="top", fontsize=LETTERS, fontweight=weight)
     _scale(figure, grid.bar(1 + len(told[0])), shots.limit_percent)

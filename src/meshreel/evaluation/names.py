@@ -1,0 +1,30 @@
+"""Names of curves, as rows have them, and as papers write them.
+
+In -> out: the name of a curve -> its title. A name is a codec's `name`, with more behind it where a basis is fixed
+(`curves.curve_of`).
+"""
+
+from __future__ import annotations
+
+BEST = "meshreel best"
+TSMC = "meshreel paper m, quality 50"  # as the paper has it: the number of basis vectors is varied
+TVMC, DRACO, KLT, NECGS = "tvmc", "draco", "klt_tsdf", "necgs"
+DECIMATED, SUBDIVIDED = "decimated_draco", "decimated_draco_subdivided"
+ONCE, ONCE_SUBDIVIDED = "background_once_draco", "background_once_draco_subdivided"
+
+_TITLES = {
+    TSMC: "TSMC (meshreel paper)",
+    TVMC: "TVMC*",
+    DRACO: "Draco",
+    KLT: "KLT on TSDF",
+    NECGS: "NeCGS",
+    DECIMATED: "Draco, decimated",
+    SUBDIVIDED: "Draco, decimated, subdivided",
+    ONCE: "background once, Draco",
+    ONCE_SUBDIVIDED: "background once, Draco, subdivided",
+}
+
+
+def title(name: str) -> str:
+    """What a legend calls a curve."""
+    return _TITLES.get(name, name)
