@@ -50,10 +50,11 @@ def interior_samples(mesh: Mesh, count: int, generator: np.random.Generator) -> 
 
 def winding_inside(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
     """Whether each query lies inside: |winding number| > 1/2, whichever way the faces look."""
-    return np.abs(_winding(mesh, queries)) > 0.5
+    return np.abs(winding_numbers(mesh, queries)) > 0.5
 
 
-def _winding(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+def winding_numbers(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+    """How often the mesh, whose faces have areas, goes around each query: 1 where all faces look away, -1 towards."""
     import igl
 
     if len(queries) == 0:
@@ -84,7 +85,7 @@ def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> 
     centers = low + (np.indices(tuple(shape)).reshape(3, -1).T + 0.5) * side
     near = _touched(mesh, low, side, shape)
     winding = np.zeros(len(centers))
-    winding[~near] = np.abs(_winding(mesh, centers[~near]))
+    winding[~near] = np.abs(winding_numbers(mesh, centers[~near]))
     near |= np.abs(winding - 0.5) < 0.3  # in the mouth of a hole the number changes smoothly, with no surface to tell
     offsets = (np.indices((BLOCK,) * 3).reshape(3, -1).T - BLOCK / 2) * spacing
     points = (centers[near | (winding > 0.5), None] + offsets).reshape(-1, 3)

@@ -14,9 +14,11 @@ from meshreel.evaluation.codecs.necgs.cubes import cut, extract
 from meshreel.evaluation.codecs.necgs.grid import MARGIN, Placement, box_of, place_grids, truncated_distances
 from meshreel.evaluation.codecs.necgs.shape import Shape, dequantize, quantize
 from meshreel.evaluation.codecs.necgs.stream import Coded, decode_stream, encode_stream
-from meshreel.geometry.topology import border_edges, unique_edges
+from meshreel.geometry.nearest import Surface
+from meshreel.geometry.topology import border_edges, concatenate, face_normals, unique_edges
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh
+from tests.scenes import moved, plane, sphere
 
 SHAPE = Shape(resolution=16, features=2, channels=4, bits=8)
 
@@ -129,15 +131,39 @@ def test_an_open_sheet_is_trimmed_where_it_ends():
     assert len(found.faces) < len(extract(volume, trimmed=False).faces)
 
 
+def test_a_room_that_is_seen_from_within_is_not_taken_for_a_body():
+    side = plane(4.0, 4)
+    turned = Mesh.of(side.vertices * [1, 1, 0] + [0, 0, 4], side.faces[:, ::-1])  # a ceiling: looks down
+    around = [Mesh.of(mesh.vertices[:, axes], mesh.faces) for mesh in (side, turned) for axes in ([2, 0, 1], [1, 2, 0])]
+    ball = moved(sphere(0.6, 3), (2.0, 2.0, 1.5))
+    scene = concatenate([side, *around, ball])  # open above: from within the winding number is about -0.8
+    volume, placement, sheets = volume_of(scene, 64)
+    found = placement.forward(extract(volume, sheets), 0, 64)
+    middles, (normals, areas) = found.vertices[found.faces].mean(axis=1), face_normals(found)
+    hits = Surface(scene).closest(middles)
+    agree = np.einsum("nd,nd->n", normals, face_normals(scene)[0][hits.faces])
+    assert sheets and (areas * agree).sum() > 0.95 * areas.sum()
+    assert np.linalg.norm(hits.points - middles, axis=1).max() < placement.cell
+
+
 def test_a_loose_face_of_a_body_makes_nothing_inside_behind_it():
     ball = deforming_sphere(1)[0]
     corner = np.array([[1.1, 0, 0.1], [1.1, 0.1, 0], [1.1, 0, 0]])
     loose = Mesh.of(np.concatenate([ball.vertices, corner]), [*ball.faces, len(ball.vertices) + np.arange(3)])
-    for faces in (loose.faces, loose.faces[:, ::-1]):
-        volume, placement, sheets = volume_of(Mesh.of(loose.vertices, faces), 32)
-        found = placement.forward(extract(volume, sheets), 0, 32)
-        assert not sheets
-        assert np.abs(np.linalg.norm(found.vertices, axis=1) - 1).max() < placement.cell
+    volume, placement, sheets = volume_of(loose, 32)
+    found = placement.forward(extract(volume, sheets), 0, 32)
+    assert not sheets
+    assert np.abs(np.linalg.norm(found.vertices, axis=1) - 1).max() < placement.cell
+
+
+def test_an_open_body_whose_faces_look_inwards_keeps_its_surface():
+    ball = deforming_sphere(1)[0]
+    turned = Mesh.of(ball.vertices, ball.faces[1:, ::-1])
+    volume, placement, sheets = volume_of(turned, 32)
+    found = placement.forward(extract(volume, sheets), 0, 32)
+    assert (
+        sheets and np.abs(np.linalg.norm(found.vertices, axis=1) - 1).max() < placement.cell and enclosed(found) < -3.5
+    )
 
 
 def test_a_mesh_without_area_has_no_surface():

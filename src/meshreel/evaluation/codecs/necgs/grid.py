@@ -3,7 +3,8 @@
 In -> out: meshes, m -> a placement of one grid a frame; a mesh in cells -> K x K x K values, negative inside. Distances
 are those to the closest point (`geometry.nearest`). Inside is where the winding number is above 1/2
 (`geometry.inside`), but for points whose closest face has no inside on either side, a sheet's: behind it is inside
-there. What flips its sign far from any surface, past a sheet's border, is trimmed by the decoder.
+there, as of the walls of a room that was seen from within, whose number is below -1/2. What flips its sign far from any
+surface, past a sheet's border, is trimmed by the decoder.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
 from ....errors import InputError
-from ....geometry.inside import winding_inside
+from ....geometry.inside import winding_numbers
 from ....geometry.nearest import Hits, Surface
 from ....geometry.topology import border_edges, face_normals, weld
 from ....types import Mesh
@@ -101,7 +102,8 @@ class _Signs:
 
     def __init__(self, mesh: Mesh) -> None:
         self.surface = Surface(mesh)
-        sheet = _sheet_faces(self.surface)
+        self._closed = not len(border_edges(weld(mesh)))
+        sheet = np.zeros(len(mesh.faces), bool) if self._closed else self._sheet_faces()
         self.has_sheets = bool(self.surface.areas[sheet].sum() > SHEETS * self.surface.areas.sum())
         self._sheet = sheet & self.has_sheets  # untrimmed, one loose face would have all that is behind it inside
 
@@ -109,14 +111,16 @@ class _Signs:
         """Whether points are inside a body, or behind the sheet that is closest to them."""
         sheet = self._sheet[hits.faces]
         behind = np.einsum("nd,nd->n", points - hits.points, self.surface.normals[hits.faces]) < 0
-        behind[~sheet] = winding_inside(self.surface.mesh, points[~sheet])
+        behind[~sheet] = self._enclosed(points[~sheet])
         return behind
 
+    def _enclosed(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Whether points are in a body; all faces of a closed mesh may look inwards."""
+        numbers = winding_numbers(self.surface.mesh, points)
+        return (np.abs(numbers) if self._closed else numbers) > 0.5
 
-def _sheet_faces(surface: Surface) -> Bool[np.ndarray, " F"]:
-    """Faces that have no inside on either side; a closed mesh has none."""
-    mesh = surface.mesh
-    if not len(border_edges(weld(mesh))):
-        return np.zeros(len(mesh.faces), bool)
-    middles, offsets = mesh.vertices[mesh.faces].mean(axis=1), _PROBE * surface.normals
-    return ~(winding_inside(mesh, middles - offsets) | winding_inside(mesh, middles + offsets))
+    def _sheet_faces(self) -> Bool[np.ndarray, " F"]:
+        """Faces that have no inside on either side."""
+        mesh = self.surface.mesh
+        middles, offsets = mesh.vertices[mesh.faces].mean(axis=1), _PROBE * self.surface.normals
+        return ~(self._enclosed(middles - offsets) | self._enclosed(middles + offsets))
