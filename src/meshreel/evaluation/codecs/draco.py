@@ -17,9 +17,12 @@ from ...container.writer import ReelWriter
 from ...decoder import open as open_video
 from ...encoder import make_header
 from ...errors import InputError
-from ...geometry.decimate import decimate
+from ...geometry.decimate import decimate, decimate_faces
 from ...types import Mesh, MeshSequence
 from ..codec import Progress
+
+LARGE = 100_000  # faces; what has more is decimated in two steps: a number of vertices takes some rounds
+ON_THE_WAY = 3  # times the vertices that are wanted, after the first step
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +118,9 @@ def encode_frame(mesh: Mesh, qp: int, fraction: float, levels: int) -> bytes:
     if mesh.is_empty:
         return encode_empty()
     if fraction < 1:
-        mesh = decimate(mesh, max(4, round(fraction * len(mesh.vertices))))
+        vertices = max(4, round(fraction * len(mesh.vertices)))
+        if len(mesh.faces) > max(LARGE, 2 * ON_THE_WAY * vertices):
+            mesh = decimate_faces(mesh, 2 * ON_THE_WAY * vertices)
+        mesh = decimate(mesh, vertices)
     extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
     return encode_intra([mesh], lattice_step(extent, qp), levels)
