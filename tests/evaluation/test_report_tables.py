@@ -9,7 +9,16 @@ from meshreel.evaluation.curves import D2_PAPER, NORMALS, SSIM, SYMMETRIC
 from meshreel.evaluation.names import BEST
 from meshreel.evaluation.report import bd_table, comparable_table, ranked_table
 from meshreel.evaluation.report.looks import KNOWN, direction, in_order, looks_of
-from meshreel.evaluation.report.tables import DAGGER, NEAR, common_rate, failure_table, maker_table, nearest, text
+from meshreel.evaluation.report.tables import (
+    DAGGER,
+    NEAR,
+    common_rate,
+    failure_table,
+    maker_table,
+    nearest,
+    point_table,
+    text,
+)
 from tests.evaluation.report_rows import failed, row
 
 
@@ -176,3 +185,18 @@ def test_a_codec_looks_the_same_wherever_it_is_and_the_system_is_first_and_bold(
 )
 def test_a_metric_tells_which_way_it_is_better(key, sign):
     assert direction(key) == sign
+
+
+def test_options_that_all_points_of_a_codec_share_are_told_once_and_empty_columns_not_at_all():
+    rows = [
+        row("a", "draco", 1.0, 60.0, options={"qp": 7, "levels": 1}),
+        row("a", "draco", 2.0, 60.0, options={"qp": 8, "levels": 1}),
+        row("a", "alone", 3.0, 60.0, options={"size": 4, "unset": None}),
+    ]
+    lines = point_table(rows)
+    assert "| draco | qp 7 | 1 |" in lines[2] and "| draco | qp 8 | 2 |" in lines[3]
+    assert "| alone | size 4 | 3 |" in lines[4] and lines[-1] == "All points of draco: levels 1."
+    assert "DracoPy" not in lines[0] and lines[0].count("|") == lines[2].count("|")
+    with_peer = [rows[0] | {"decode_over_peer": 1.5}, *rows[1:]]
+    assert "/ DracoPy" in point_table(with_peer)[0]
+    assert len(point_table([rows[2]])) == 3  # one point shares nothing

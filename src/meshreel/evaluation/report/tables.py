@@ -6,9 +6,11 @@ In -> out: rows -> lines of Markdown. Names and reasons are escaped: what a row 
 from __future__ import annotations
 
 import re
-from collections.abc import Hashable, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from itertools import compress
 from math import exp, log
 from statistics import median
+from typing import Any
 
 from ..curves import Measure, against, curve, curve_of, value
 from ..promises import Promise
@@ -154,19 +156,26 @@ def promise_table(promises: Sequence[Promise]) -> list[str]:
 
 
 def point_table(rows: Sequence[Row]) -> list[str]:
-    """Operating points: rate, every metric, groups, encode and decode times."""
-    heads = ["codec", "operating point", "Mbps", *(key for key, _ in METRICS), "worst frame dB", "groups"]
-    heads += ["encode s/frame", "by stage", "decode ms/frame", "/ DracoPy", "decode peak MB"]
-    lines = []
+    """Operating points: rate, every metric, groups, encode and decode times; below, what all points of a codec share.
+
+    Columns of which nothing is known are left out.
+    """
+    heads = ["codec", "operating point", "Mbps", *(label for _, label in METRICS), "worst frame (dB)", "groups"]
+    heads += ["encode (s/frame)", "by stage", "decode (ms/frame)", "/ DracoPy", "decode peak (MB)"]
+    lines, shared = list[list[str]](), _shared_options(rows)
     for row in rows:
         stages = ", ".join(f"{k} {v:.2g}" for k, v in row.get("encode_stages_s", {}).items())
         decode = row.get("decode", {})
         qualities = [_shown(value(row, key)) for key, _ in METRICS]
-        cells = [text(row["codec"]), text(_point(row)), _shown(row["mbps"]), *qualities]
+        cells = [text(row["codec"]), text(_point(row, shared[row["codec"]])), _shown(row["mbps"]), *qualities]
         cells += [_shown(row.get("d2_psnr_paper_worst")), _group_sizes(row), _shown(row.get("encode_s")), text(stages)]
         times = (decode.get("frame_ms"), row.get("decode_over_peer"), decode.get("peak_rss_mb"))
         lines.append([*cells, *map(_shown, times)])
-    return table(heads, lines)
+    known = [any(line[column] for line in lines) for column in range(len(heads))]
+    lines = [list(compress(line, known)) for line in lines]
+    told = [f"{text(codec)}: {text(_told(options))}" for codec, options in shared.items() if options]
+    below = ["", f"All points of {'; '.join(told)}."] if told else []
+    return [*table(list(compress(heads, known)), lines), *below]
 
 
 def failure_table(rows: Sequence[Row]) -> list[str]:
@@ -225,8 +234,22 @@ def _bd_cell(rows: Sequence[Row], test: str, other: str, measure: Measure) -> st
     return f"{found.percent:+.1f} % ({measure.shown(found.low)} to {measure.shown(found.high)})"
 
 
-def _point(row: Row) -> str:
-    told = ", ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
+def _shared_options(rows: Sequence[Row]) -> dict[str, dict[str, Any]]:
+    """By codec the options that are the same at all of its points; none where it has one point."""
+    found: dict[str, dict[str, Any]] = {}
+    for codec in dict.fromkeys(row["codec"] for row in rows):
+        first, *others = (row["options"] for row in rows if row["codec"] == codec)
+        same = {key: value for key, value in first.items() if all(other.get(key) == value for other in others)}
+        found[codec] = same if others and len(same) < len(first) else {}
+    return found
+
+
+def _told(options: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} {value}" for key, value in options.items() if value is not None)
+
+
+def _point(row: Row, shared: Collection[str] = ()) -> str:
+    told = _told({key: value for key, value in row["options"].items() if key not in shared})
     coded = row.get("coded_frames", row.get("frames"))
     return told if coded == row.get("frames") else f"{told}; {coded} of {row['frames']} frames coded"
 
