@@ -14,6 +14,7 @@ from meshreel.cli.bench import describe
 from meshreel.evaluation.experiments import targets
 from meshreel.evaluation.rows import Point
 from meshreel.evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
+from meshreel.evaluation.study import Study, Sweep
 from tests.cli.conftest import failed
 from tests.evaluation.report_rows import failed as failed_row
 from tests.evaluation.report_rows import pictured, row
@@ -51,6 +52,50 @@ def test_a_run_writes_rows_and_goes_on_where_it_was(run, tiny):
 def test_only_some_codecs_may_be_run(run, tiny):
     said = run("bench", "run", "tiny", "-o", tiny / "r.jsonl", "--data", tiny, "--no-ssim", "--json", "--only", "draco")
     assert said.row["rows"] == 1
+
+
+@pytest.fixture
+def study(tmp_path, monkeypatch):
+    """An experiment of the paper's kind that has one point, and a user's sequence beside its own; where these are."""
+    balls = sliding_sphere(2, levels=2)
+    for name in ("own", "ball"):
+        np.savez(tmp_path / f"{name}.npz", vertices=np.stack([mesh.vertices for mesh in balls]), faces=balls[0].faces)
+    chosen = Study(sequences=("ball",), sweeps=(Sweep("draco", {"qp": (7,)}),))
+    monkeypatch.setattr("meshreel.cli.bench.find_experiment", lambda _: chosen)
+    monkeypatch.setattr("meshreel.cli.bench.EXPERIMENTS", {"figure6": chosen})
+    return tmp_path
+
+
+def test_an_experiment_takes_a_sequence_and_operating_points_more(run, study):
+    rows, added = study / "r.jsonl", ("draco:qp=9", "decimated_draco:fraction=0.5,qp=8", "draco")
+    plain = ("bench", "run", "figure6", "-o", rows, "--data", study, "--no-ssim")
+    said = run(*plain, "--add", *added, "--on", "own", "--json")
+    assert said.code == 0 and said.row["rows"] == 4
+    found = [json.loads(line) for line in rows.read_text().splitlines()]
+    assert {row["sequence"] for row in found} == {"own"}
+    assert [row["options"].get("fraction") for row in found] == [None, None, 0.5, None]
+    by_path = run(*plain, "--on", study / "own.npz", "--only", "draco")
+    assert by_path.code == 0 and len(rows.read_text().splitlines()) == 5
+    report = run("bench", "report", rows, "-o", study / "out", "--json")
+    assert report.code == 0 and len({Path(path).name for path in report.row["files"]}) == len(report.row["files"])
+    assert all(Path(path).is_relative_to(study / "out") for path in report.row["files"])
+
+
+@pytest.mark.parametrize(
+    ("point", "told"),
+    [("zipmesh", "zipmesh"), ("draco:qp", "option=value"), ("draco:=3", "option=value"), ("draco:size=3", "size")],
+)
+def test_operating_points_that_are_none_are_told(run, study, point, told):
+    said = run("bench", "run", "figure6", "-o", study / "r.jsonl", "--data", study, "--add", point)
+    assert failed(said, point.split(":")[0], told) and not (study / "r.jsonl").exists()
+
+
+def test_a_sequence_that_is_not_there_and_points_for_another_experiment_are_told(run, study, monkeypatch):
+    said = run("bench", "run", "figure6", "-o", study / "r.jsonl", "--data", study, "--on", "nobody")
+    assert failed(said, "nobody", "--data")
+    monkeypatch.setattr("meshreel.cli.bench.find_experiment", lambda _: targets)
+    said = run("bench", "run", "targets", "-o", study / "r.jsonl", "--data", study, "--add", "draco")
+    assert failed(said, "--add draco", "figure6")
 
 
 def test_a_report_has_what_failed_and_the_pictures_beside_the_rows(run, tiny):

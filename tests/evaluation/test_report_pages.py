@@ -7,11 +7,10 @@ from html.parser import HTMLParser
 
 import pytest
 
-from meshreel.evaluation.names import BEST
+from meshreel.evaluation.names import BEST, file_name
 from meshreel.evaluation.report import write_report
 from meshreel.evaluation.report.html import html_page
 from meshreel.evaluation.report.looks import looks_of
-from meshreel.evaluation.report.pages import file_name
 from tests.evaluation.report_rows import experiment, failed, pictured, row
 
 BAD = '<script>alert("x")</script>'

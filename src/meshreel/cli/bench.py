@@ -16,12 +16,13 @@ from rich.table import Table
 from ..errors import InputError
 from ..evaluation.apart import begin, end_all
 from ..evaluation.bench import Bench
+from ..evaluation.experiment import Experiment
 from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
 from ..evaluation.promises import Promise
 from ..evaluation.rd_rows import FLOOR as RATED_FLOOR
 from ..evaluation.report import write_report
-from ..evaluation.rows import FAILED, Row, failed_rows, join_rows, measured_rows, read_rows
+from ..evaluation.rows import FAILED, Point, Row, failed_rows, join_rows, measured_rows, read_rows
 from ..evaluation.runner import run_points
 from ..evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from ..evaluation.study import Study
@@ -42,10 +43,46 @@ class Running:
     """Seconds that a point may take; one that takes longer, crashes or decodes nonsense becomes a row that says so."""
     retry: Annotated[bool, Parameter(negative="")] = False
     """Measure points again that failed before."""
+    ssim: bool = True
+    """Render and compare pictures too (slower)."""
 
     def __post_init__(self) -> None:
         if self.jobs < 1 or not 0 < self.limit < math.inf:
             raise InputError(f"--jobs {self.jobs}, --limit {self.limit:g}: give at least 1, and seconds above 0")
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Which points, of which data."""
+
+    data: Path = DATA
+    """The folder of the sequences."""
+    small: bool = False
+    """A few points on a few frames only, of the paper's experiments on procedural ones: minutes."""
+    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
+    """Only the points of these codecs, as `tvmc`; the others keep the rows they have."""
+    on: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
+    """Only the points on these sequences, as `synthetic4`; the paper's experiments are run on any other, too: a name
+    below the folder of the sequences, or a path."""
+    add: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
+    """Operating points more, of any codec, as `zipmesh` or `draco:qp=12` (`codec:option=value,option=value`)."""
+
+    def of(self, chosen: Experiment, experiment: str) -> list[Point]:
+        """The points of an experiment. InputError where there are none."""
+        if isinstance(chosen, Study):
+            known = {point.sequence for point in chosen.points(self.small)}
+            chosen = chosen.extended([] if known.issuperset(self.on) else self.on, self.add)
+        elif self.add:
+            raise InputError(f"--add {' '.join(self.add)}: {experiment} has points of its own kinds; take figure6")
+        found = [
+            point
+            for point in chosen.points(self.small)
+            if (not self.only or point.codec in self.only) and (not self.on or point.sequence in self.on)
+        ]
+        if not found:
+            raise InputError(f"--only {' '.join(self.only)} --on {' '.join(self.on)}: {experiment} has no such points")
+        return found
 
 
 @contextmanager
@@ -70,11 +107,7 @@ def run(
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    data: Path = DATA,
-    small: bool = False,
-    only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
-    on: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = (),
-    ssim: bool = True,
+    selection: Selection = Selection(),
     running: Running = Running(),
     common: Common = Common(),
 ) -> None:
@@ -90,24 +123,12 @@ def run(
         `ablation_stages`, which share the rows of points that they have in common; or `scenes`, `layers`, `targets`.
     output
         A JSON-lines file.
-    data
-        The folder of the sequences.
-    small
-        A few points on a few frames only, of the paper's experiments on procedural ones: minutes.
-    only
-        Only the points of these codecs, as `tvmc`; the others keep the rows they have.
-    on
-        Only the points on these sequences, as `synthetic4`.
-    ssim
-        Render and compare pictures too (slower).
     """
     chosen = find_experiment(experiment)
-    points = [p for p in chosen.points(small) if (not only or p.codec in only) and (not on or p.sequence in on)]
-    if not points:
-        raise InputError(f"--only {' '.join(only)} --on {' '.join(on)}: {experiment} has no such points")
-    comparison, cache = replace(chosen.COMPARISON, ssim=ssim), output.with_suffix(".cache")
+    points = selection.of(chosen, experiment)
+    comparison, cache = replace(chosen.COMPARISON, ssim=running.ssim), output.with_suffix(".cache")
     alike = [name for name, other in EXPERIMENTS.items() if isinstance(other, Study) and isinstance(chosen, Study)]
-    bench = Bench(data, experiment, comparison, cache, running.limit, running.retry, tuple(alike))
+    bench = Bench(selection.data, experiment, comparison, cache, running.limit, running.retry, tuple(alike))
     with common.stages(len(points)) as progress, side_by_side(running.jobs) as executor:
 
         def tell(row: Row, new: bool) -> None:

@@ -26,6 +26,7 @@ from .codecs import make_codec
 from .datasets import Dataset, open_known
 from .fresh import peak_rss_mb
 from .groups import group_records
+from .names import file_name
 from .peers import measure_fresh_decode
 from .pictures import draw_decoded, draw_original
 from .rows import Point, Row
@@ -134,7 +135,7 @@ def _pictures(point: Point, known: Dataset, numbers: Sequence[int], shown: tuple
     folder = bench.cache.with_suffix(".pictures")
     index = len(numbers) // 2
     original = known.sequence[numbers[index]]
-    file = f"{point.sequence}-{numbers[index]}-{len(known.sequence)}-original.png"
+    file = f"{file_name(point.sequence)}-{numbers[index]}-{len(known.sequence)}-original.png"
     camera = draw_original(folder / file, original, known.cameras)
     name = hashlib.sha256(point.key.encode()).hexdigest()[:16]
     found: Row = {"frame": numbers[index], "original": file}

@@ -6,12 +6,15 @@ those of `rd_rows`.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from ..errors import InputError
 from ..metrics.bd_rate import Curve, beats
 from ..metrics.report import ComparisonOptions
+from .codecs import make_codec
 from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
 from .rd_rows import FLOOR, RATED, SAMPLED, TRUTH_ITSELF
@@ -36,7 +39,7 @@ Values = Mapping[str, Sequence[Any]]  # options that are varied together, by nam
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """A codec over operating points: one for each of the values."""
+    """A codec over operating points: one for each of the values, or the fixed one where there are none."""
 
     codec: str
     values: Values
@@ -52,7 +55,7 @@ class Sweep:
             return
         values = self.on.get(sequence, self.values)
         kind = SAMPLED if sequence in self.sampled else RATED
-        for point in zip(*values.values(), strict=True):
+        for point in zip(*values.values(), strict=True) if values else [()]:
             options = {**self.fixed, **dict(zip(values, point, strict=True))}
             yield Point(sequence, self.codec, options, frames, kind)
 
@@ -90,6 +93,14 @@ class Study:
                 yield Point(sequence, "captured", {}, frames, FLOOR)
             for sweep in self.sweeps:
                 yield from sweep.points(sequence, frames)
+
+    def extended(self, sequences: Sequence[str], added: Sequence[str]) -> Study:
+        """The same with operating points more (`operating_point`), and on these sequences instead, where there are any.
+
+        A sequence may be any that `datasets` opens: a name or a path.
+        """
+        more = [Sweep(codec, {}, options) for codec, options in map(operating_point, added)]
+        return replace(self, sequences=sequences or self.sequences, sweeps=(*self.sweeps, *more))
 
     def references(self, _sequence: str) -> dict[str, list[tuple[float, float]]]:
         """Curves that were not measured here: none."""
@@ -137,6 +148,22 @@ class Study:
             return Promise(text, "in D2 and masked SSIM")
         found = f"in {sum(decided)} of {len(met)} comparisons, {len(met) - len(decided)} undecided"
         return Promise(text, "in D2 and masked SSIM", "; ".join([found, *told]), all(decided))
+
+
+def operating_point(text: str) -> tuple[str, dict[str, Any]]:
+    """A codec and its options, from `codec` or `codec:option=value,option=value`. InputError where it is neither."""
+    codec, _, told = text.partition(":")
+    options: dict[str, Any] = {}
+    for each in told.split(",") if told else ():
+        name, is_told, found = each.partition("=")
+        if not (is_told and name):
+            raise InputError(f"operating point {text!r}: {each!r} is no option=value")
+        try:
+            options[name] = json.loads(found)
+        except json.JSONDecodeError:
+            options[name] = found  # text without quotes
+    make_codec(codec, options)  # refuses what it does not know
+    return codec, options
 
 
 def _curve(rows: Sequence[Row], name: str, measure: Measure) -> Curve:

@@ -6,8 +6,6 @@ what failed, and how all of it was made. No clock is asked.
 
 from __future__ import annotations
 
-import hashlib
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,7 @@ from pathlib import Path
 from ...io.write import make_folder, replacing
 from ..curves import curve_of
 from ..experiment import Experiment
+from ..names import file_name
 from ..provenance import makers
 from ..reproducing import reproducing_page
 from ..rows import Row, curve_rows, failed_rows, measured_rows
@@ -87,12 +86,6 @@ def write_report(
         with replacing(folder / page) as file:
             file.write(content.encode())
     return [*(folder / page for page in pages), *files]
-
-
-def file_name(name: str) -> str:
-    """A name as that of a file anywhere; two names never make one."""
-    plain = re.sub(r"[^A-Za-z0-9._-]", "_", name)
-    return plain if plain == name else f"{plain}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 def _draw(part: Part, looks: Mapping[str, Look], shots: Mapping[str, Shots]) -> Iterator[Path]:
