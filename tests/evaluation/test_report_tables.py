@@ -193,10 +193,11 @@ def test_options_that_all_points_of_a_codec_share_are_told_once_and_empty_column
         row("a", "draco", 2.0, 60.0, options={"qp": 8, "levels": 1}),
         row("a", "alone", 3.0, 60.0, options={"size": 4, "unset": None}),
     ]
-    lines = point_table(rows)
+    lines = point_table(rows[::-1])
     assert "| draco | qp 7 | 1 |" in lines[2] and "| draco | qp 8 | 2 |" in lines[3]
     assert "| alone | size 4 | 3 |" in lines[4] and lines[-1] == "All points of draco: levels 1."
     assert "DracoPy" not in lines[0] and lines[0].count("|") == lines[2].count("|")
+    assert [cells(line)[0] for line in lines[2:5]] == ["draco", "draco", "alone"]
     with_peer = [rows[0] | {"decode_over_peer": 1.5}, *rows[1:]]
     assert "/ DracoPy" in point_table(with_peer)[0]
     assert len(point_table([rows[2]])) == 3  # one point shares nothing

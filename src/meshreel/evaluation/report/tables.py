@@ -158,8 +158,10 @@ def promise_table(promises: Sequence[Promise]) -> list[str]:
 def point_table(rows: Sequence[Row]) -> list[str]:
     """Operating points: rate, every metric, groups, encode and decode times; below, what all points of a codec share.
 
-    Columns of which nothing is known are left out.
+    Curve by curve, each from its lowest rate on. Columns of which nothing is known are left out.
     """
+    order = in_order(map(curve_of, rows))
+    rows = sorted(rows, key=lambda row: (order.index(curve_of(row)), row["mbps"]))
     heads = ["codec", "operating point", "Mbps", *(label for _, label in METRICS), "worst frame (dB)", "groups"]
     heads += ["encode (s/frame)", "by stage", "decode (ms/frame)", "/ DracoPy", "decode peak (MB)"]
     lines, shared = list[list[str]](), _shared_options(rows)
