@@ -125,5 +125,7 @@ def test_what_is_missing_is_told(run, tmp_path):
     assert failed(said, "dancer", "--data")
     assert failed(run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--jobs", "0"), "--jobs", "0")
     said = run("bench", "run", "scenes", "-o", tmp_path / "r.jsonl", "--only", "nothing")
-    assert failed(said, "--only nothing", "no such points")
+    assert failed(said, "--only nothing", "no such points; it has captured, meshreel, segmentation")
+    said = run("bench", "run", "figure6", "-o", tmp_path / "r.jsonl", "--on", "room3", "demo", "--small")
+    assert failed(said, "--on room3", "it has demo")
     assert failed(run("bench", "report", tmp_path / "none.jsonl", "-o", tmp_path), "none.jsonl", "bench run")

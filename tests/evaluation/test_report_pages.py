@@ -130,7 +130,7 @@ def test_it_says_how_it_was_made(tmp_path):
     write_report([row("dancer", "draco", 1.0, 60.0, made_by=made)], experiment(), tmp_path)
     text = (tmp_path / "results.md").read_text()
     assert "meshreel bench report made up.jsonl -o FOLDER" in text
-    assert "| made up | 0.1.0 | abc | P | 3.12 | 2 | 1 |" in text
+    assert "| made up | 0.1.0 | abc | P | not recorded | 3.12 | 2 | 1 |" in text
 
 
 def test_a_codec_has_one_color_in_all_sequences(tmp_path):

@@ -13,6 +13,7 @@ from meshreel.evaluation.report import write_report
 from meshreel.evaluation.report.boxes import cut_out, detail_box, is_covered, layout_of
 from meshreel.evaluation.report.plots import WIDTH, matplotlib_settings
 from meshreel.evaluation.report.sheets import draw_sheet, find_shots, sheet_figure
+from meshreel.evaluation.report.tables import DAGGER
 from meshreel.metrics.render import Window
 from tests.evaluation.report_rows import SIZE, body, experiment, pictured, row, save
 
@@ -114,7 +115,7 @@ def test_a_sheet_has_the_original_a_column_a_codec_two_rows_boxes_and_a_scale(sh
     inset = np.asarray(panels["0 0"].get_images()[1].get_array())
     assert (inset == body()[60:80, 20:40]).all()
     told = texts(figure)
-    assert {"original", "frame 5", BEST, "draco", "1 Mbps", "D2 61.00 dB", "masked SSIM 0.610"} <= set(told)
+    assert {"original", "frame 5", BEST, "Draco", "1 Mbps", "D2 61.00 dB", "masked SSIM 0.610"} <= set(told)
     assert told.count("1 Mbps") == 3 and figure.get_size_inches()[0] <= WIDTH + 1e-9
     [scale] = [axes for axes in figure.axes if axes.get_label() == "scale"]
     assert "% of" in scale.get_xlabel() and [t.get_text() for t in scale.get_xticklabels()] == ["0", "0.25", "0.5"]
@@ -205,3 +206,11 @@ def test_pictures_of_another_frame_or_scale_are_left_out_and_told(tmp_path):
 def test_pictures_of_several_folders_are_on_one_sheet(tmp_path):
     rows = [pictured(tmp_path / codec, row("dancer", codec, 1.0, 60.0)) for codec in ("a", "b")]
     assert len(find_shots(rows, [tmp_path / "a", tmp_path / "b"]).columns) == 2
+
+
+def test_a_point_far_from_the_common_rate_is_marked(tmp_path):
+    rows = [pictured(tmp_path, row("dancer", name, mbps, 61.0)) for name, mbps in (("x", 1.0), ("y", 1.1), ("z", 4.0))]
+    shots = find_shots(rows, [tmp_path])
+    with matplotlib_settings():
+        told = texts(sheet_figure(shots))
+    assert {"1 Mbps", "1.1 Mbps", f"4 Mbps {DAGGER}"} <= set(told)

@@ -131,13 +131,13 @@ def test_failures_are_listed_with_their_reasons_on_one_line():
 
 
 def test_makers_are_counted_by_what_they_say():
-    made = {"meshreel": "0.1.0", "commit": "abc", "platform": "P", "python": "3.12", "cores": 2}
+    made = {"meshreel": "0.1.0", "commit": "abc", "platform": "P", "cpu": "C", "python": "3.12", "cores": 2}
     rows = [row("a", "x", 1.0, 60.0, made_by=made), row("a", "y", 1.0, 60.0, made_by=made), row("a", "z", 1.0, 60.0)]
     rows.append(row("a", "w", 1.0, 60.0, made_by=made | {"commit": None}))
     assert [cells(line) for line in maker_table(rows)[2:]] == [
-        ["made up", "0.1.0", "abc", "P", "3.12", "2", "2"],
-        ["made up", *["not recorded"] * 5, "1"],
-        ["made up", "0.1.0", "none: installed", "P", "3.12", "2", "1"],
+        ["made up", "0.1.0", "abc", "P", "C", "3.12", "2", "2"],
+        ["made up", *["not recorded"] * 6, "1"],
+        ["made up", "0.1.0", "none: installed", "P", "C", "3.12", "2", "1"],
     ]
 
 

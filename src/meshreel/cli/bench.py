@@ -42,7 +42,7 @@ class Running:
     limit: float = 3600.0
     """Seconds that a point may take; one that takes longer, crashes or decodes nonsense becomes a row that says so."""
     retry: Annotated[bool, Parameter(negative="")] = False
-    """Measure points again that failed before."""
+    """Measure points again that failed before; those that were measured are never measured again."""
     ssim: bool = True
     """Render and compare pictures too (slower)."""
 
@@ -59,7 +59,7 @@ class Selection:
     data: Path = DATA
     """The folder of the sequences."""
     small: bool = False
-    """A few points on a few frames only, of the paper's experiments on procedural ones: minutes."""
+    """A few points on a few frames only, minutes; the paper's experiments take procedural frames for that."""
     only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
     """Only the points of these codecs, as `tvmc`; the others keep the rows they have."""
     on: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
@@ -75,14 +75,27 @@ class Selection:
             chosen = chosen.extended([] if known.issuperset(self.on) else self.on, self.add)
         elif self.add:
             raise InputError(f"--add {' '.join(self.add)}: {experiment} has points of its own kinds; take figure6")
+        points = list(chosen.points(self.small))
+        for name, wanted, there in (("--only", self.only, _codecs(points)), ("--on", self.on, _sequences(points))):
+            if unknown := [each for each in wanted if each not in there]:
+                told = f"{experiment} has no such points; it has {', '.join(there)}"
+                raise InputError(f"{name} {' '.join(unknown)}: {told}")
         found = [
             point
-            for point in chosen.points(self.small)
+            for point in points
             if (not self.only or point.codec in self.only) and (not self.on or point.sequence in self.on)
         ]
         if not found:
-            raise InputError(f"--only {' '.join(self.only)} --on {' '.join(self.on)}: {experiment} has no such points")
+            raise InputError(f"{experiment} has no points of {' '.join(self.only)} on {' '.join(self.on)}")
         return found
+
+
+def _codecs(points: Sequence[Point]) -> list[str]:
+    return list(dict.fromkeys(point.codec for point in points))
+
+
+def _sequences(points: Sequence[Point]) -> list[str]:
+    return list(dict.fromkeys(point.sequence for point in points))
 
 
 @contextmanager
@@ -134,7 +147,8 @@ def run(
         def tell(row: Row, new: bool) -> None:
             done[0] += 1
             progress("points", done[0], len(points))
-            common.note(f"{done[0]}/{len(points)} {describe(row)}{'' if new else ' (measured before)'}")
+            before = "" if new else " (before; --retry tries again)" if FAILED in row else " (measured before)"
+            common.note(f"{done[0]}/{len(points)} {describe(row)}{before}")
 
         done = [0]
         rows = run_points(points, output, bench, tell, executor)
@@ -143,6 +157,8 @@ def run(
     reached = chosen.promises(measured_rows(rows))
     told = {"output": str(output), "rows": len(rows), "failed": len(failed)}
     common.result(told | _promised(reached), promise_table(reached))
+    if len(failed) == len(rows):
+        raise InputError(f"{output}: all {len(rows)} points failed; mend what they say, and run again with --retry")
 
 
 @command.command

@@ -9,6 +9,7 @@ import os
 import platform
 import subprocess
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -37,10 +38,21 @@ def _git(folder: Path, *words: str) -> str:
     return answer.stdout.strip()
 
 
+@cache
+def _cpu() -> str | None:
+    """The processor's model, where the system tells it."""
+    with suppress(OSError):
+        told = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")  # Linux
+        for line in told.splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or None
+
+
 def made_by() -> Row:
     """For a row: version, commit, and the machine."""
-    machine = {"platform": platform.platform(), "python": platform.python_version(), "cores": os.cpu_count()}
-    return {MADE_BY: {"meshreel": __version__, "commit": commit()} | machine}
+    machine = {"platform": platform.platform(), "python": platform.python_version()}
+    return {MADE_BY: {"meshreel": __version__, "commit": commit()} | machine | {"cpu": _cpu(), "cores": os.cpu_count()}}
 
 
 def makers(rows: Sequence[Row]) -> list[str]:

@@ -22,9 +22,9 @@ TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each t
 
 
 def reproducing_page(rows: Sequence[Row]) -> list[str]:
-    """The lines of the page; no lines where no row of the paper's experiments is there."""
+    """The lines of the page; no lines where no row of the paper's experiments on one of its sequences is there."""
     own = list({row["point"]: row for row in measured_rows(rows) if row.get("experiment") in NAMES}.values())
-    if not own:
+    if not {row["sequence"] for row in own} & {*SCENES, SYNTHETIC, *RELEASED}:
         return []
     tables = {"{table_1}": _table_1, "{table_2}": _table_2, "{released}": _released}
     text = (files(__package__) / TEXT).read_text(encoding="utf-8")
@@ -33,10 +33,10 @@ def reproducing_page(rows: Sequence[Row]) -> list[str]:
 
 def _table_1(rows: Sequence[Row]) -> Iterator[str]:
     scenes = [scene for scene in SCENES if curve_rows(rows, scene)]
-    yield from _heads(["paper"], scenes)
+    yield from _heads(["paper"], scenes or SCENES)
     for system in (*TABLE_1, None):
         codec = BEST if system is None else system.codec
-        cells = [_published(system), *(_near_best(curve_rows(rows, scene), codec) for scene in scenes)]
+        cells = [_published(system), *(_near_best(curve_rows(rows, scene), codec) for scene in scenes or SCENES)]
         yield _line(system, codec, cells)
 
 
@@ -81,7 +81,7 @@ def _published(system: Published | None) -> str:
 
 def _told(row: Row | None) -> str:
     if row is None:
-        return ""
+        return "not measured"
     decode = row.get("decode", {}).get("frame_ms")
     ssim = value(row, "ssim")
     told = [f"{row['mbps']:.3g} Mbps", f"{row['d2_psnr_paper']:.2f} dB"]
@@ -97,7 +97,7 @@ def _near_best(rows: Sequence[Row], codec: str) -> str:
     """The point of a codec that is nearest in D2 to the best of `best`."""
     best = _of(rows, BEST)
     if not best:
-        return ""
+        return _told(None)
     wanted = best[-1]["d2_psnr_paper"]
     found = min(_of(rows, codec), key=lambda row: abs(row["d2_psnr_paper"] - wanted), default=None)
     return _told(found) + (FAR if found is not None and abs(found["d2_psnr_paper"] - wanted) > NEAR_DB else "")

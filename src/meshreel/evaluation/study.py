@@ -18,7 +18,7 @@ from .codecs import make_codec
 from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
 from .rd_rows import FLOOR, RATED, SAMPLED, TRUTH_ITSELF
-from .report.tables import bd_table, comparable_table
+from .report.tables import bd_table, common_rate, comparable_table
 from .rows import Point, Row, select
 
 SMALL_SEQUENCE, SMALL_FRAMES = "demo", 3  # procedural: `--small` needs no data
@@ -119,6 +119,9 @@ class Study:
     def comparisons(self, rows: Sequence[Row]) -> Iterator[str]:
         """BD-rates on the rows of one sequence."""
         measures = [each for each in MEASURES if any(value(row, each.key) is not None for row in rows)]
+        if self.common is None and (several := [row for row in rows if row["kind"] in (RATED, SAMPLED)]):
+            rate = common_rate(several)
+            yield from ("", f"Each codec's point nearest to {rate:.3g} Mbps:", "", *comparable_table(several, rate), "")
         yield from bd_table(rows, self.best, measures) if self.best else ()
         yield from bd_table(rows, self.anchor, measures, is_anchor=True) if self.anchor else ()
 
@@ -140,7 +143,8 @@ class Study:
         for name in dict.fromkeys(map(curve_of, own)):
             for measure in PROMISED if name != self.best else ():
                 best, other = _curve(own, str(self.best), measure), _curve(own, name, measure)
-                left = beats(best, other, measure.least)
+                several = min(len(best.rates), len(other.rates)) > 1  # a point is no range
+                left = beats(best, other, measure.least) if several else None
                 met.append(left)
                 told += [f"not {name}: {against(other, best, measure)}"] if left is False else []
         decided = [left for left in met if left is not None]

@@ -33,16 +33,16 @@ KNOWN: dict[str, Look] = {
     DRACO: Look("#0072B2", "^"),
     DECIMATED: Look("#56B4E9", "v"),
     SUBDIVIDED: Look("#1B3A5C", "D", size=2.8),
-    ONCE: Look("#44AA99", "<"),
-    ONCE_SUBDIVIDED: Look("#117733", "H"),
+    ONCE: Look("#000000", "<"),
+    ONCE_SUBDIVIDED: Look("#777777", "H"),
     "a: decimated Draco": Look("#56B4E9", "v"),
     "a: decimated Draco, subdivided": Look("#1B3A5C", "D", size=2.8),
-    "b: background once, decimated Draco": Look("#44AA99", "<"),
-    "b: background once, decimated Draco, subdivided": Look("#117733", "H"),
+    "b: background once, decimated Draco": Look("#000000", "<"),
+    "b: background once, decimated Draco, subdivided": Look("#777777", "H"),
     "b: background once, decimated Draco, labels found": Look("#8F8F1F", "x", size=4.2),
 }
 # For all others, by their place among the sorted names: 8 colors and 5 markers make 40 pairs.
-_COLORS = ("#882255", "#6699CC", "#999933", "#332288", "#AA4499", "#661100", "#777777", "#66A61E")
+_COLORS = ("#882255", "#6699CC", "#999933", "#332288", "#AA4499", "#661100", "#44AA99", "#66A61E")
 _MARKERS = (">", "p", "<", "H", "d")
 
 _HIGHER = ("psnr", "ssim", "iou", "covered")

@@ -22,8 +22,11 @@ from .looks import Look, looks_of
 from .plots import plot_curves
 from .sheets import Shots, draw_sheet, find_shots
 from .tables import (
+    DAGGER,
     FIRST,
+    NEAR,
     failure_table,
+    is_near,
     maker_table,
     point_table,
     promise_table,
@@ -124,6 +127,8 @@ def _sheet(part: Part, shots: Shots) -> Iterator[str]:
     yield f"Frame {shots.frame} of the original and of each codec's point nearest to {shots.mbps:.3g} Mbps. Colors are"
     yield "normals; the solid red box magnifies the dotted one. Below: the error, in % of the diagonal."
     yield "Rates and qualities are those of all frames that were coded, and of those that were measured."
+    if any(not is_near(files.row, shots.mbps) for files in shots.columns):
+        yield f"{DAGGER} not within a factor of {NEAR:g} of that rate."
     if shots.left_out:
         yield f"Not shown, as their pictures are of another frame, scale or size: {text(', '.join(shots.left_out))}."
 

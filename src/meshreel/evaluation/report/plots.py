@@ -97,7 +97,7 @@ def curves_figure(measured: Sequence[Row], chosen: Experiment, looks: Mapping[st
     across = {1: 1, 2: 2, 4: 2}.get(len(metrics), WIDEST)
     down = max(1, -(-len(metrics) // across))
     figure, panels = _panels(down, across)
-    figure.suptitle(sequence, fontsize=8, fontweight="bold")
+    figure.suptitle(f"{sequence}, {measured[0]['frames']} frames", fontsize=8, fontweight="bold")
     rates = [row["mbps"] for row in rows]
     for panel, (key, label) in zip(panels, metrics, strict=False):
         _draw_curves(panel, rows, key, looks)

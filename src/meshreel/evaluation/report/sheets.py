@@ -16,13 +16,13 @@ from jaxtyping import UInt8
 
 from ...metrics.render import Window
 from ..curves import curve_of, value
-from ..names import BEST
+from ..names import BEST, title
 from ..rows import Row
 from .boxes import Layout, cut_out, layout_of
 from .grids import LETTERS, Grid, Place
 from .looks import in_order
 from .plots import matplotlib_settings, new_figure, write_figure
-from .tables import common_rate, nearest
+from .tables import DAGGER, common_rate, is_near, nearest
 
 PICTURES = "pictures"  # of a row: the names of its files, the frame, and where the scale of errors ends
 _KEYS = {"normals", "errors", "frame", "limit_percent"}
@@ -91,8 +91,8 @@ def sheet_figure(shots: Shots) -> Any:
     """Columns: the original, then codecs. Rows: normals with the magnified box, maps of the error; captions below."""
     original, normals, errors = _read(shots)
     layout = layout_of(original, normals)
-    names = ["original", *(curve_of(files.row) for files in shots.columns)]
-    told = [[f"frame {shots.frame}"], *(_qualities(files.row) for files in shots.columns)]
+    names = ["original", *(title(curve_of(files.row)) for files in shots.columns)]
+    told = [[f"frame {shots.frame}"], *(_qualities(files.row, shots.mbps) for files in shots.columns)]
     grid = Grid.of(names, layout.cut.shape, max(map(len, told)))
     figure = new_figure(*grid.size, None)
     for column, picture in enumerate([original, *normals]):
@@ -103,7 +103,7 @@ def sheet_figure(shots: Shots) -> Any:
     for column, lines in enumerate(told):
         row, first = (1, grid.name_lines) if column else (0, 1)  # the original has no map: its caption is in its place
         for place, line in [*enumerate(grid.names[column]), *enumerate(lines, first)]:
-            weight = "bold" if names[column] == BEST and place < first else "normal"
+            weight = "bold" if names[column] == title(BEST) and place < first else "normal"
             at = grid.line(column, place, row)
             figure.text(*at, line, ha="center", va="top", fontsize=LETTERS, fontweight=weight)
     _scale(figure, grid.bar(1 + len(told[0])), shots.limit_percent)
@@ -155,9 +155,9 @@ def _pixels(path: Path) -> Picture:
         return np.asarray(picture.convert("RGB"), dtype=np.uint8)
 
 
-def _qualities(row: Row) -> list[str]:
-    """Rate and qualities, a line each."""
-    lines = [f"{row['mbps']:.3g} Mbps"]
+def _qualities(row: Row, mbps: float) -> list[str]:
+    """Rate, marked where it is far from the common one, and qualities, a line each."""
+    lines = [f"{row['mbps']:.3g} Mbps" + ("" if is_near(row, mbps) else f" {DAGGER}")]
     for measures in (_D2, _SSIM):
         found = [form.format(number) for key, form in measures if (number := value(row, key)) is not None]
         lines += found[:1]

@@ -92,6 +92,11 @@ def nearest(rows: Sequence[Row], wanted: float, key: str = "mbps") -> dict[str, 
     return found
 
 
+def is_near(row: Row, wanted: float, key: str = "mbps") -> bool:
+    """Whether a row is within a factor of `NEAR` of a rate, or within `NEAR_DB` of a PSNR."""
+    return _apart(row, wanted, key) <= 1 + 1e-9
+
+
 def _apart(row: Row, wanted: float, key: str) -> float:
     """How far a row is from what is wanted, in units of what is near."""
     found = value(row, key) or 0.0
@@ -116,7 +121,7 @@ def comparable_table(rows: Sequence[Row], wanted: float, key: str = "mbps") -> l
     if not any(sign for _, sign, _ in kept):
         return []
     for sequence, (name, row) in told:
-        near = _apart(row, wanted, key) <= 1 + 1e-9
+        near = is_near(row, wanted, key)
         first = [text(sequence)] if len(names) > 1 else []
         lines.append([*first, text(name) + ("" if near else f" {DAGGER}"), *(_read(row, at) for _, _, at in kept)])
         groups.append(sequence if near else None)
@@ -196,10 +201,10 @@ def maker_table(rows: Sequence[Row]) -> list[str]:
     for row in rows:
         made = row.get(MADE_BY) or row.get("machine") or {}  # older rows have a machine without a commit
         commit = made.get("commit", _UNKNOWN) or "none: installed"
-        told = [made.get(key) or _UNKNOWN for key in ("platform", "python", "cores")]
+        told = [made.get(key) or _UNKNOWN for key in ("platform", "cpu", "python", "cores")]
         key = (row.get("experiment", FIRST), made.get("meshreel") or _UNKNOWN, commit, *told)
         counts[tuple(map(text, key))] = counts.get(tuple(map(text, key)), 0) + 1
-    heads = ["experiment", "meshreel", "commit", "platform", "Python", "cores", "rows"]
+    heads = ["experiment", "meshreel", "commit", "platform", "processor", "Python", "cores", "rows"]
     return table(heads, [[*key, str(count)] for key, count in counts.items()])
 
 
