@@ -13,13 +13,12 @@ from meshreel.cli.bench import describe
 from meshreel.derived import Chosen
 from meshreel.encoder import encode
 from meshreel.errors import InputError
-from meshreel.evaluation import peers, rd_rows
+from meshreel.evaluation import fresh, peers, rd_rows
 from meshreel.evaluation.bench import Bench
 from meshreel.evaluation.codec import TwoStepCodec
 from meshreel.evaluation.codecs import CODECS, make_codec
 from meshreel.evaluation.curves import SSIM_WITHOUT_KEYS, value
 from meshreel.evaluation.datasets import open_known
-from meshreel.evaluation.fresh import FIRST_FRAME
 from meshreel.evaluation.measure import measure_point
 from meshreel.evaluation.rd_rows import FLOOR, RATED, SAMPLED
 from meshreel.evaluation.rows import Point
@@ -164,6 +163,6 @@ def test_rows_of_an_experiment_that_measures_alike_count(bench, monkeypatch, tmp
 
 def test_a_decoder_that_is_another_in_a_fresh_process_is_refused(bench, monkeypatch):
     asked = peers.run_fresh
-    monkeypatch.setattr(peers, "run_fresh", lambda *a: asked(*a) | {FIRST_FRAME: "0" * 64})
-    with pytest.raises(InputError, match="draco decodes another first frame in a fresh process"):
+    monkeypatch.setattr(peers, "run_fresh", lambda *a: asked(*a) | {fresh.FRAMES: ["0" * 64] * 3})
+    with pytest.raises(InputError, match="draco decodes another frame 0 in a fresh process"):
         measure_point(Point("ball", "draco", {"qp": 9}, kind=RATED), bench)

@@ -51,10 +51,10 @@ class Running:
 @contextmanager
 def side_by_side(jobs: int) -> Iterator[Executor | None]:
     """Threads that wait for so many processes, none for one; an interrupt ends these at once."""
+    begin()
     if jobs == 1:
         yield None
         return
-    begin()
     with ThreadPoolExecutor(jobs) as executor:
         try:
             yield executor
