@@ -6,7 +6,6 @@ import json
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -267,9 +266,19 @@ def test_a_row_waits_while_another_run_writes(tmp_path):
 def test_where_rows_cannot_be_written_nothing_is_measured(folder, tmp_path, monkeypatch):
     monkeypatch.setattr("meshreel.evaluation.runner.measure_point", lambda *_: pytest.fail("measured"))
     (tmp_path / "file").write_text("")
-    for place in (tmp_path / "file" / "rows.jsonl", Path("/dev/full" if os.name == "posix" else "CON") / "rows.jsonl"):
-        with pytest.raises(InputError, match=r"rows.jsonl: cannot be written .*choose another file"):
-            run_points([Point("ball", "draco", {})], place, Bench(folder, comparison=QUICK), lambda *_: None)
+    with pytest.raises(InputError, match=r"rows.jsonl: cannot be written .*choose another file"):
+        run_points([Point("ball", "draco", {})], tmp_path / "file" / "rows.jsonl", Bench(folder), lambda *_: None)
+
+
+@pytest.mark.parametrize("name", [".", os.devnull])
+def test_what_is_no_file_has_no_rows(tmp_path, name):
+    with pytest.raises(InputError, match="is no file"):
+        read_rows(tmp_path / name)
+
+
+def test_halves_of_characters_are_question_marks(tmp_path):
+    append_row(tmp_path / "rows.jsonl", row("a", failed="no file \udcff \U0001f600"))
+    assert read_rows(tmp_path / "rows.jsonl") == [row("a", failed="no file ? \U0001f600")]
 
 
 def test_rows_that_cannot_be_written_are_told_with_the_file(tmp_path):

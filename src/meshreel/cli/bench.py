@@ -28,6 +28,7 @@ from ..evaluation.study import Study
 from .console import Common
 
 command = App(name="bench", help="Measure codecs against each other, and make tables and plots of the rows.")
+BESIDE = (".cache", ".pictures")  # endings of folders
 DATA = Path("../shared/data")
 
 
@@ -103,6 +104,8 @@ def run(
     """
     chosen = find_experiment(experiment)
     points = [p for p in chosen.points(small) if (not only or p.codec in only) and (not on or p.sequence in on)]
+    if not output.name or output.suffix in BESIDE:
+        raise InputError(f"--output {output}: give a file, as rows.jsonl; {' and '.join(BESIDE)} are folders beside it")
     if not points:
         raise InputError(f"--only {' '.join(only)} --on {' '.join(on)}: {experiment} has no such points")
     comparison, cache = replace(chosen.COMPARISON, ssim=ssim), output.with_suffix(".cache")

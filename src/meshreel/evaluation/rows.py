@@ -48,6 +48,8 @@ def read_rows(path: Path) -> list[Row]:
 
     Raises InputError where the file is missing or a line is no row.
     """
+    if path.exists() and not (path.is_file() or path.is_fifo()):  # devices may have no end
+        raise InputError(f"{path}: is no file; give one that `meshreel bench run` made")
     try:
         data = path.read_bytes()
         lines = data[: _whole(data)].decode().splitlines()
@@ -64,8 +66,13 @@ def read_rows(path: Path) -> list[Row]:
             raise InputError(f"{path}, line {number}: not JSON: {told}; delete that line") from error
         if problem := _problem(row):
             raise InputError(f"{path}, line {number}: not a row: {problem}; delete that line")
-        rows.append(row)
+        rows.append(_printable(row) if "\\ud" in line else row)
     return rows
+
+
+def _printable(row: Row) -> Row:
+    """The row with ? for halves of characters, as in names of files: they can be neither written nor drawn."""
+    return dict(json.loads(json.dumps(row, ensure_ascii=False).encode(errors="replace")))
 
 
 def _not_json(found: str) -> float:
