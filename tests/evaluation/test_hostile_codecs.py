@@ -208,14 +208,16 @@ def test_temporary_files_of_a_codec_that_crashes_are_removed(site, monkeypatch):
 def test_who_measures_ends_with_who_asked_for_it(site):
     code = "from pathlib import Path; from tests.evaluation.test_hostile_codecs import measured; measured('hang')"
     root = str(Path(__file__).parents[2])
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(site), root])}
-    process = subprocess.Popen([sys.executable, "-c", code], env=environment)
+    (site / "temporary").mkdir()
+    paths = {"PYTHONPATH": os.pathsep.join([str(site), root]), "TMPDIR": str(site / "temporary")}
+    process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | paths)
     wait_until(lambda: (site / "pid").exists() and (site / "pid").read_text())
     pid = (site / "pid").read_text()
     assert is_running(pid)
     process.kill()
     process.wait()
     wait_until(lambda: not is_running(pid))
+    assert not list((site / "temporary").iterdir())
 
 
 def wait_until(true, seconds=60):

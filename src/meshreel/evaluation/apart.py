@@ -12,6 +12,7 @@ import itertools
 import json
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -27,6 +28,7 @@ from .rows import FAILED, Point, Row
 from .said import LONGEST, last_words
 from .timer import ONE_THREAD
 
+_PREFIX = "meshreel-point-"  # of folders for temporary files
 _RUNNING: set[subprocess.Popen[bytes]] = set()
 _STARTING, _ENDED = threading.Lock(), threading.Event()
 
@@ -61,7 +63,7 @@ def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = (
 
 def _folder() -> tempfile.TemporaryDirectory[str]:
     """Where a process has its temporary files, which are removed with it, however it ends."""
-    return tempfile.TemporaryDirectory(prefix="meshreel-", ignore_cleanup_errors=True)
+    return tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
 
 
 def _started(said: IO[bytes], folder: str) -> subprocess.Popen[bytes]:
@@ -186,6 +188,8 @@ def _end_with_parent() -> None:
     def watch() -> None:
         while os.read(parent, 1):
             pass
+        if (folder := Path(tempfile.gettempdir())).name.startswith(_PREFIX):  # who would remove it is no more
+            shutil.rmtree(folder, ignore_errors=True)
         if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
             os.killpg(os.getpgrp(), signal.SIGKILL)
         os._exit(1)
