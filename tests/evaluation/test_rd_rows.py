@@ -166,3 +166,13 @@ def test_a_decoder_that_is_another_in_a_fresh_process_is_refused(bench, monkeypa
     monkeypatch.setattr(peers, "run_fresh", lambda *a: asked(*a) | {fresh.FRAMES: ["0" * 64] * 3})
     with pytest.raises(InputError, match="draco decodes another frame 0 in a fresh process"):
         measure_point(Point("ball", "draco", {"qp": 9}, kind=RATED), bench)
+
+
+def test_pictures_of_any_sequence_are_beside_the_rows(bench, tmp_path):
+    """A sequence may be a path."""
+    place = str(bench.data / "ball.npz")
+    for name in (place, str(bench.data / ".." / bench.data.name / "ball.npz")):
+        row = measure_point(Point(name, "draco", {"qp": 9}, 1, RATED), replace(bench, cache=tmp_path / "rows.cache"))
+        folder, named = tmp_path / "rows.pictures", row["pictures"]
+        assert {named[key] for key in ("original", "normals", "errors")} <= {path.name for path in folder.iterdir()}
+    assert len(list(folder.iterdir())) == 6 and [path.name for path in bench.data.glob("*.png")] == []

@@ -24,6 +24,7 @@ from .checked import check_told, decoded_by, decoder_of
 from .codec import Codec, TwoStepCodec, coded_row
 from .codecs import make_codec
 from .datasets import Dataset, open_known
+from .filenames import file_name
 from .fresh import peak_rss_mb
 from .groups import group_records
 from .peers import measure_fresh_decode
@@ -135,7 +136,7 @@ def _pictures(point: Point, known: Dataset, numbers: Sequence[int], shown: tuple
     folder = bench.cache.with_suffix(".pictures")
     index = len(numbers) // 2
     original = known.sequence[numbers[index]]
-    file = f"{point.sequence}-{numbers[index]}-{len(known.sequence)}-original.png"
+    file = f"{file_name(point.sequence)}-{numbers[index]}-{len(known.sequence)}-original.png"
     camera = draw_original(folder / file, original, known.cameras)
     name = hashlib.sha256(point.key.encode()).hexdigest()[:16]
     found: Row = {"frame": numbers[index], "original": file}

@@ -15,7 +15,7 @@ from ..metrics.report import ComparisonOptions
 from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
 from .rd_rows import FLOOR, RATED, SAMPLED, TRUTH_ITSELF
-from .report.tables import bd_table, comparable_table
+from .report.tables import bd_table, comparable_table, text
 from .rows import Point, Row, select
 
 SMALL_SEQUENCE, SMALL_FRAMES = "demo", 3  # procedural: `--small` needs no data
@@ -124,19 +124,19 @@ class Study:
 
     def _left_of_all(self, rows: Sequence[Row], sequence: str) -> Promise:
         own = [row for kind in (RATED, SAMPLED) for row in select(rows, sequence, kind=kind)]
-        text = f"{sequence}: {self.best} needs less rate than every other codec wherever both reach a quality"
+        promised = f"{text(sequence)}: {self.best} needs less rate than every other codec wherever both reach a quality"
         told, met = list[str](), list[bool | None]()
         for name in dict.fromkeys(map(curve_of, own)):
             for measure in PROMISED if name != self.best else ():
                 best, other = _curve(own, str(self.best), measure), _curve(own, name, measure)
                 left = beats(best, other, measure.least)
                 met.append(left)
-                told += [f"not {name}: {against(other, best, measure)}"] if left is False else []
+                told += [f"not {text(name)}: {against(other, best, measure)}"] if left is False else []
         decided = [left for left in met if left is not None]
         if not decided:
-            return Promise(text, "in D2 and masked SSIM")
+            return Promise(promised, "in D2 and masked SSIM")
         found = f"in {sum(decided)} of {len(met)} comparisons, {len(met) - len(decided)} undecided"
-        return Promise(text, "in D2 and masked SSIM", "; ".join([found, *told]), all(decided))
+        return Promise(promised, "in D2 and masked SSIM", "; ".join([found, *told]), all(decided))
 
 
 def _curve(rows: Sequence[Row], name: str, measure: Measure) -> Curve:

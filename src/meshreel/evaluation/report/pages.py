@@ -6,8 +6,6 @@ what failed, and how all of it was made. No clock is asked.
 
 from __future__ import annotations
 
-import hashlib
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +13,7 @@ from pathlib import Path
 from ...io.write import make_folder, replacing
 from ..curves import curve_of
 from ..experiment import Experiment
+from ..filenames import file_name
 from ..provenance import makers
 from ..reproducing import reproducing_page
 from ..rows import Row, curve_rows, failed_rows, measured_rows
@@ -30,6 +29,7 @@ from .tables import (
     promise_table,
     sequences,
     text,
+    without_html,
 )
 
 FOLDER = "results"  # of plots and sheets, beside the pages
@@ -75,7 +75,7 @@ def write_report(
             part = Part(name, chosen, own, folder)
             shots = {sequence: find_shots(curve_rows(own, sequence), pictures) for sequence in sequences(own)}
             files += _draw(part, looks, {sequence: found for sequence, found in shots.items() if found})
-            lines += [*([""] if lines else []), *_part(part, shots)]
+            lines += [*([""] if lines else []), *map(without_html, _part(part, shots))]
     lines += [*_failures(failed_rows(rows)), *_origin(rows, experiments)]
     # The page has the PNG of each plot; its SVG twin comes after it, and takes its place in HTML.
     inlined = {f"{FOLDER}/{path.with_suffix('.png').name}": path.read_bytes() for path in files}
@@ -85,14 +85,8 @@ def write_report(
         pages["reproducing.md"] = "\n".join(told) + "\n"
     for page, content in pages.items():
         with replacing(folder / page) as file:
-            file.write(content.encode())
+            file.write(content.encode(errors="backslashreplace"))
     return [*(folder / page for page in pages), *files]
-
-
-def file_name(name: str) -> str:
-    """A name as that of a file anywhere; two names never make one."""
-    plain = re.sub(r"[^A-Za-z0-9._-]", "_", name)
-    return plain if plain == name else f"{plain}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 def _draw(part: Part, looks: Mapping[str, Look], shots: Mapping[str, Shots]) -> Iterator[Path]:
@@ -117,7 +111,7 @@ def _part(part: Part, shots: Mapping[str, Shots | None]) -> Iterator[str]:
         yield from ("", f"## {text(sequence)}, {own[0]['frames']} frames", "")
         yield from (part.link(sequence, "quality against rate"), "")
         if len(made := makers(own)) > 1:
-            yield from (f"Rows of more than one version: {', '.join(made)}.", "")
+            yield from (f"Rows of more than one version: {text(', '.join(made))}.", "")
         shown = part.chosen.shown(own)
         yield from (*(point_table(shown) if shown else ()), "", *part.chosen.comparisons(own))
         if (found := shots[sequence]) is not None:
