@@ -200,6 +200,7 @@ def test_a_process_that_a_codec_leaves_behind_is_ended(site):
 def test_temporary_files_of_a_codec_that_crashes_are_removed(site, monkeypatch):
     (site / "temporary").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(site / "temporary"))
+    monkeypatch.setenv("TMPDIR", str(site / "temporary"))
     [row] = measured("litter")
     assert "exit code 5" in row[FAILED] and not list((site / "temporary").iterdir())
 
@@ -228,6 +229,7 @@ def wait_until(true, seconds=60):
         time.sleep(0.1)
 
 
+@pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.usefixtures("site")
 def test_a_limit_longer_than_any_clock_is_none():
     [row] = measured("", limit_s=1e300)
