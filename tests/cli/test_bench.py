@@ -124,6 +124,9 @@ def test_what_is_missing_is_told(run, tmp_path):
     said = run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--data", tmp_path)
     assert failed(said, "dancer", "--data")
     assert failed(run("bench", "run", "targets", "-o", tmp_path / "r.jsonl", "--jobs", "0"), "--jobs", "0")
+    for name in (".", "rows.cache", "rows.pictures"):
+        said = run("bench", "run", "scenes", "-o", name)
+        assert failed(said, f"--output {name}", "give a file, as rows.jsonl")
     said = run("bench", "run", "scenes", "-o", tmp_path / "r.jsonl", "--only", "nothing")
     assert failed(said, "--only nothing", "no such points; it has captured, meshreel, segmentation")
     said = run("bench", "run", "figure6", "-o", tmp_path / "r.jsonl", "--on", "room3", "demo", "--small")

@@ -171,7 +171,7 @@ def test_a_point_that_was_measured_at_last_counts():
 
 def test_rows_say_what_made_them():
     made = provenance.made_by()[provenance.MADE_BY]
-    assert set(made) == {"meshreel", "commit", "platform", "python", "cores"}
+    assert set(made) == {"meshreel", "commit", "platform", "python", "cpu", "cores"}
     assert made["commit"] is None or set(made["commit"]) <= set("0123456789abcdef+")
     rows = [{provenance.MADE_BY: made | {"commit": "a"}}, {}, {provenance.MADE_BY: made | {"commit": None}}, {}]
     assert len(provenance.makers(rows)) == 3 and provenance.makers(rows)[1] == "not recorded"

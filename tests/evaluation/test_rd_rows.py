@@ -13,13 +13,12 @@ from meshreel.cli.bench import describe
 from meshreel.derived import Chosen
 from meshreel.encoder import encode
 from meshreel.errors import InputError
-from meshreel.evaluation import peers, rd_rows
+from meshreel.evaluation import fresh, peers, rd_rows
 from meshreel.evaluation.bench import Bench
 from meshreel.evaluation.codec import TwoStepCodec
 from meshreel.evaluation.codecs import CODECS, make_codec
 from meshreel.evaluation.curves import SSIM_WITHOUT_KEYS, value
 from meshreel.evaluation.datasets import open_known
-from meshreel.evaluation.fresh import FIRST_FRAME
 from meshreel.evaluation.measure import measure_point
 from meshreel.evaluation.rd_rows import FLOOR, RATED, SAMPLED
 from meshreel.evaluation.rows import Point
@@ -164,6 +163,16 @@ def test_rows_of_an_experiment_that_measures_alike_count(bench, monkeypatch, tmp
 
 def test_a_decoder_that_is_another_in_a_fresh_process_is_refused(bench, monkeypatch):
     asked = peers.run_fresh
-    monkeypatch.setattr(peers, "run_fresh", lambda *a: asked(*a) | {FIRST_FRAME: "0" * 64})
-    with pytest.raises(InputError, match="draco decodes another first frame in a fresh process"):
+    monkeypatch.setattr(peers, "run_fresh", lambda *a: asked(*a) | {fresh.FRAMES: ["0" * 64] * 3})
+    with pytest.raises(InputError, match="draco decodes another frame 0 in a fresh process"):
         measure_point(Point("ball", "draco", {"qp": 9}, kind=RATED), bench)
+
+
+def test_pictures_of_any_sequence_are_beside_the_rows(bench, tmp_path):
+    """A sequence may be a path."""
+    place = str(bench.data / "ball.npz")
+    for name in (place, str(bench.data / ".." / bench.data.name / "ball.npz")):
+        row = measure_point(Point(name, "draco", {"qp": 9}, 1, RATED), replace(bench, cache=tmp_path / "rows.cache"))
+        folder, named = tmp_path / "rows.pictures", row["pictures"]
+        assert {named[key] for key in ("original", "normals", "errors")} <= {path.name for path in folder.iterdir()}
+    assert len(list(folder.iterdir())) == 6 and [path.name for path in bench.data.glob("*.png")] == []

@@ -7,7 +7,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from meshreel.evaluation.names import BEST, file_name
+from meshreel.evaluation.experiments import EXPERIMENTS
+from meshreel.evaluation.filenames import file_name
+from meshreel.evaluation.names import BEST
 from meshreel.evaluation.report import write_report
 from meshreel.evaluation.report.html import html_page
 from meshreel.evaluation.report.looks import looks_of
@@ -154,5 +156,36 @@ def test_same_rows_are_same_bytes(tmp_path):
 
 def test_names_of_files_are_plain_and_never_meet():
     assert file_name("layers-dancer") == "layers-dancer"
-    names = [file_name(name) for name in ("a/b", "a b", "a_b", "../a", "a\\b", "é")]
+    long = "a" * 1000
+    names = [file_name(name) for name in ("a/b", "a b", "a_b", "../a", "a\\b", "é", "\ud800", long, long + "a")]
+    assert max(map(len, names)) < 120
     assert len(set(names)) == len(names) and all(re.fullmatch(r"[\w.-]+", name, re.ASCII) for name in names)
+
+
+@pytest.mark.parametrize("name", list(EXPERIMENTS))
+def test_no_name_of_a_row_is_markup_in_the_markdown_of_an_experiment(tmp_path, name):
+    kind = "curve" if name in ("scenes", "layers", "targets") else "rated"
+    rows = [
+        row(sequence, codec, mbps, 50.0 + mbps, experiment=name, kind=kind, groups=[], point=f"{sequence}{codec}{mbps}")
+        for sequence in ("a", BAD)
+        for codec in (BEST, "draco", BAD)
+        for mbps in (1.0, 2.0, 3.0)
+    ]
+    write_report(rows, EXPERIMENTS, tmp_path)
+    text = (tmp_path / "results.md").read_text()
+    assert "script" in text and not re.search(r"(?<!\\)<script", text)
+    assert "script" not in Page((tmp_path / "index.html").read_text()).tags
+
+
+def test_rows_of_another_version_and_of_other_codecs_are_shown_as_far_as_they_go(tmp_path):
+    rows = [
+        row("dancer", "a", 1.0, 60.0, made_by={"meshreel": BAD}),
+        row("dancer", "b", 2.0, 60.0, made_by={}, options={"basis_size": 3}),
+        row("dancer", "c", 2.0, 60.0, options={"basis_size": 3, "quality": "high"}),
+        failed("dancer", "e", "no file \ud800"),
+        row("x" * 300, "d" * 300, 2.0, 60.0),
+    ]
+    write_report(rows, experiment(), tmp_path)
+    text = (tmp_path / "results.md").read_text()
+    assert "Rows of more than one version: \\<script>" in text and "unknown version (installed)" in text
+    assert "no file \\ud800" in text

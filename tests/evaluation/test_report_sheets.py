@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from itertools import combinations
 
 import numpy as np
@@ -174,7 +175,7 @@ def test_a_row_that_names_no_pictures_of_the_folder_has_no_place(shots, named):
     assert len(find_shots([rows[0] | {"pictures": named}, rows[1]], [folder]).columns) == 1
 
 
-@pytest.mark.parametrize("harm", ["missing", "cut off", "no picture", "of another size"])
+@pytest.mark.parametrize("harm", ["missing", "cut off", "no picture", "of another size", "too large"])
 def test_a_row_whose_file_cannot_be_shown_has_no_place(shots, harm):
     folder, rows = shots
     rows = rows[:2]
@@ -183,6 +184,10 @@ def test_a_row_whose_file_cannot_be_shown_has_no_place(shots, harm):
         file.unlink()
     elif harm == "of another size":
         save(file, body(size=120))
+    elif harm == "too large":  # says that it has 10^10 pixels
+        data = file.read_bytes()
+        head = data[12:16] + (100_000).to_bytes(4, "big") * 2 + data[24:29]
+        file.write_bytes(data[:12] + head + zlib.crc32(head).to_bytes(4, "big") + data[33:])
     else:
         file.write_bytes(file.read_bytes()[:200] if harm == "cut off" else b"nothing")
     assert [files.row["codec"] for files in find_shots(rows, [folder]).columns] == [rows[1]["codec"]]

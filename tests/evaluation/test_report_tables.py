@@ -155,6 +155,8 @@ def test_makers_are_counted_by_what_they_say():
         "\\",
         "![x](y)",
         "a < b",
+        "\\<b>x</b>",
+        "\\\\<b>",
         "~~x~~",
         "klt_tsdf",
     ],

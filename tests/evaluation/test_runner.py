@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -18,6 +20,7 @@ from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import CODECS, make_codec
 from meshreel.evaluation.datasets import open_dataset
 from meshreel.evaluation.fresh import peak_rss_mb
+from meshreel.evaluation.locked import locked
 from meshreel.evaluation.measure import run_point
 from meshreel.evaluation.peers import equal_anchor, run_fresh
 from meshreel.evaluation.rows import Point, append_row, read_rows
@@ -196,22 +199,86 @@ def test_the_demo_is_a_sequence_too(tmp_path):
     assert len(open_dataset("demo", tmp_path, 7)) == 7
 
 
-@pytest.mark.parametrize("text", ["[1]\n", '{"a": 1}\n', "{\n"])
-def test_a_line_that_is_no_row_is_told_by_its_number(tmp_path, text):
-    (tmp_path / "rows.jsonl").write_text('{"point": "", "kind": "quality"}\n' + text)
-    with pytest.raises(InputError, match="line 2"):
+def row(point, **changed):
+    """The least that a row says."""
+    return {"point": point, "kind": "memory", "sequence": "ball", "codec": "draco", "options": {}} | changed
+
+
+def as_line(point, **changed):
+    """The same as a line."""
+    return json.dumps(row(point, **changed)) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[1]\n", "no JSON object"),
+        ('{"a": 1}\n', "'point' is missing, and not a text"),
+        ("{\n", "not JSON"),
+        ("\n", "not JSON"),
+        (as_line("b", mean=float("nan")), "NaN is no number"),
+        (as_line("b", experiment=["targets"]), "'experiment' is .'targets'., and not a text"),
+        (as_line("b", options=None), "'options' is None, and not a JSON object"),
+        (as_line("b", decode="fast"), "'decode' is 'fast'"),
+        (as_line("b", groups=None), "'groups' is None, and not a list"),
+        (as_line("b", kind="curve", frames=2), "'mbps' is missing, and not a number above 0"),
+        (as_line("b", kind="curve", frames=2, mbps=0.0), "'mbps' is 0.0"),
+        (as_line("b", kind="curve", frames=2, mbps="1"), "'mbps' is '1'"),
+        (as_line("b", kind="curve", mbps=1.0), "'frames' is missing"),
+        (as_line("b", kind="curve", frames=2, mbps=1.0).replace("1.0", "1e999"), "'mbps' is inf"),
+    ],
+)
+def test_a_line_that_is_no_row_is_told_by_its_number(tmp_path, text, words):
+    (tmp_path / "rows.jsonl").write_text(as_line("a") + text + as_line("c"))
+    with pytest.raises(InputError, match=f"line 2: .*{words}.*; delete that line"):
         read_rows(tmp_path / "rows.jsonl")
 
 
 def test_a_row_that_was_not_written_to_its_end_is_passed_over_and_replaced(tmp_path):
     path = tmp_path / "rows.jsonl"
-    path.write_text('{"point": "a"}\n{"point": "b", "ki')  # as a process leaves it that is killed
-    assert read_rows(path) == [{"point": "a"}]
-    append_row(path, {"point": "c"})
-    assert path.read_text() == '{"point": "a"}\n{"point": "c"}\n'
-    path.write_text('{"point": "a"}')  # whole, as editors may leave it
-    append_row(path, {"point": "c"})
-    assert read_rows(path) == [{"point": "a"}, {"point": "c"}]
+    path.write_text(as_line("a") + as_line("b")[:20])  # as a process leaves it that is killed
+    assert read_rows(path) == [row("a")]
+    append_row(path, row("c"))
+    assert path.read_text() == as_line("a") + as_line("c")
+    path.write_text(as_line("a").rstrip())  # whole, as editors may leave it
+    append_row(path, row("c"))
+    assert read_rows(path) == [row("a"), row("c")]
+
+
+def test_rows_of_runs_that_write_one_file_at_once_are_all_there(tmp_path):
+    path, points = tmp_path / "rows.jsonl", [f"{number:03}" for number in range(150)]
+    with ThreadPoolExecutor(3) as executor:
+        list(executor.map(lambda point: append_row(path, row(point, told="x" * 20_000)), points))
+    assert sorted(each["point"] for each in read_rows(path)) == points
+
+
+def test_a_row_waits_while_another_run_writes(tmp_path):
+    path = tmp_path / "rows.jsonl"
+    with ThreadPoolExecutor(1) as executor:
+        with path.open("ab") as file, locked(file):
+            waiting = executor.submit(append_row, path, row("b"))
+            time.sleep(0.3)
+            file.write(as_line("a").encode())
+        waiting.result()
+    assert [each["point"] for each in read_rows(path)] == ["a", "b"]
+
+
+def test_where_rows_cannot_be_written_nothing_is_measured(folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("meshreel.evaluation.runner.measure_point", lambda *_: pytest.fail("measured"))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"rows.jsonl: cannot be written .*choose another file"):
+        run_points([Point("ball", "draco", {})], tmp_path / "file" / "rows.jsonl", Bench(folder), lambda *_: None)
+
+
+@pytest.mark.parametrize("name", [".", os.devnull])
+def test_what_is_no_file_has_no_rows(tmp_path, name):
+    with pytest.raises(InputError, match="is no file"):
+        read_rows(tmp_path / name)
+
+
+def test_halves_of_characters_are_question_marks(tmp_path):
+    append_row(tmp_path / "rows.jsonl", row("a", failed="no file \udcff \U0001f600"))
+    assert read_rows(tmp_path / "rows.jsonl") == [row("a", failed="no file ? \U0001f600")]
 
 
 def test_rows_that_cannot_be_written_are_told_with_the_file(tmp_path):

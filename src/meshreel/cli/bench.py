@@ -29,6 +29,7 @@ from ..evaluation.study import Study
 from .console import Common
 
 command = App(name="bench", help="Measure codecs against each other, and make tables and plots of the rows.")
+BESIDE = (".cache", ".pictures")  # endings of folders
 DATA = Path("../shared/data")
 
 
@@ -101,10 +102,10 @@ def _sequences(points: Sequence[Point]) -> list[str]:
 @contextmanager
 def side_by_side(jobs: int) -> Iterator[Executor | None]:
     """Threads that wait for so many processes, none for one; an interrupt ends these at once."""
+    begin()
     if jobs == 1:
         yield None
         return
-    begin()
     with ThreadPoolExecutor(jobs) as executor:
         try:
             yield executor
@@ -138,6 +139,8 @@ def run(
         A JSON-lines file.
     """
     chosen = find_experiment(experiment)
+    if not output.name or output.suffix in BESIDE:
+        raise InputError(f"--output {output}: give a file, as rows.jsonl; {' and '.join(BESIDE)} are folders beside it")
     points = selection.of(chosen, experiment)
     comparison, cache = replace(chosen.COMPARISON, ssim=running.ssim), output.with_suffix(".cache")
     alike = [name for name, other in EXPERIMENTS.items() if isinstance(other, Study) and isinstance(chosen, Study)]

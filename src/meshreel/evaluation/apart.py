@@ -12,30 +12,33 @@ import itertools
 import json
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import IO
 
 from .bench import Bench
 from .provenance import made_by
 from .rows import FAILED, Point, Row
+from .said import LONGEST, last_words
 from .timer import ONE_THREAD
 
-_LAST = 300  # characters of what a process said last
+_PREFIX = "meshreel-point-"  # of folders for temporary files
 _RUNNING: set[subprocess.Popen[bytes]] = set()
 _STARTING, _ENDED = threading.Lock(), threading.Event()
 
 
 def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = ()) -> Iterator[Row]:
     """The rows of some points, each as it is there; a point may take `bench.limit_s`. `rows` are those before them."""
-    left = list(points)
+    left, bench = list(points), bench.absolute()
     while left:
-        with tempfile.TemporaryFile() as said:
-            process = _started(said)
+        with tempfile.TemporaryFile() as said, _folder() as folder:
+            process = _started(said, folder)
             limit = _Limit(process, bench.limit_s)
             try:
                 for line in _lines(process, (left, bench, list(rows))):
@@ -43,20 +46,27 @@ def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = (
                     row = dict(json.loads(line))
                     yield row if FAILED not in row else _failed(left[0], bench, row[FAILED])
                     left.pop(0)
-            except BaseException:
-                _end(process)
-                raise
+                    if not left:
+                        break  # and whatever threads it has left do not matter
+                else:
+                    process.wait()  # by itself: its exit code tells why
             finally:
-                process.wait()
                 limit.stop()
+                _end(process)
+                _close(process)
                 _RUNNING.discard(process)
             if left and _ENDED.is_set():
                 raise InterruptedError("the sweep has been ended")
             if left:
-                yield _failed(left.pop(0), bench, limit.reached or _reason(process.returncode, said))
+                yield _failed(left.pop(0), bench, limit.reached or last_words(process.returncode, said))
 
 
-def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    """Where a process has its temporary files, which are removed with it, however it ends."""
+    return tempfile.TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
+
+
+def _started(said: IO[bytes], folder: str) -> subprocess.Popen[bytes]:
     """A process that waits for its task. Raises InterruptedError where the sweep has been ended."""
     with _STARTING:
         if _ENDED.is_set():
@@ -67,7 +77,7 @@ def _started(said: IO[bytes]) -> subprocess.Popen[bytes]:
             stdout=subprocess.PIPE,
             stderr=said,
             start_new_session=True,  # with all that it starts it is ended by one signal
-            env=os.environ | ONE_THREAD,
+            env=os.environ | ONE_THREAD | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder),
         )
         _RUNNING.add(process)
     return process
@@ -78,7 +88,7 @@ def _lines(process: subprocess.Popen[bytes], task: object) -> Iterator[bytes]:
     assert process.stdin is not None and process.stdout is not None
     with contextlib.suppress(BrokenPipeError):  # it has ended, and said why
         process.stdin.write(pickle.dumps(task))
-        process.stdin.close()
+        process.stdin.flush()  # and it stays open: its end is ours
     yield from itertools.takewhile(lambda line: line.endswith(b"\n"), process.stdout)
 
 
@@ -95,7 +105,7 @@ class _Limit:
         """A row has come."""
         self.stop()
         if self._seconds is not None:
-            self._timer = threading.Timer(self._seconds, self._over)
+            self._timer = threading.Timer(min(self._seconds, threading.TIMEOUT_MAX), self._over)
             self._timer.daemon = True
             self._timer.start()
 
@@ -125,25 +135,26 @@ def end_all() -> None:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Ends a process and, where the system can, those that it has started."""
+    """Ends a process, if it has not ended, and, where the system can, those that it has started and left behind."""
     if hasattr(os, "killpg"):
-        with contextlib.suppress(ProcessLookupError):  # it has just ended
+        with contextlib.suppress(ProcessLookupError, PermissionError):  # it has just ended, and all that it started
             os.killpg(process.pid, signal.SIGKILL)
     else:
         process.kill()
     process.wait()
 
 
+def _close(process: subprocess.Popen[bytes]) -> None:
+    """Closes what is still open to a process that has ended."""
+    for pipe in (process.stdin, process.stdout):
+        with contextlib.suppress(BrokenPipeError):  # it has not read all that it was told
+            if pipe is not None:
+                pipe.close()
+
+
 def _failed(point: Point, bench: Bench, reason: str) -> Row:
     head: Row = {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | made_by()
     return head | {"sequence": point.sequence, "codec": point.codec, "options": point.options, FAILED: reason}
-
-
-def _reason(code: int, said: IO[bytes]) -> str:
-    said.seek(0)
-    lines = said.read().decode(errors="replace").strip().splitlines()
-    ended = f"ended by signal {-code}" if code < 0 else f"exit code {code}"
-    return f"{ended}: {lines[-1][:_LAST]}" if lines else ended
 
 
 def main() -> None:
@@ -156,13 +167,34 @@ def main() -> None:
     from .measure import measure_point
 
     points, bench, before = pickle.load(sys.stdin.buffer)
+    _end_with_parent()
+    here = Path.cwd()
     for point in points:
         try:
+            os.chdir(here)  # where a codec may have left
             row = json.dumps(measure_point(point, bench, before), allow_nan=False)
-        except Exception as error:  # whatever a codec raises is its row
-            row = json.dumps({FAILED: f"{type(error).__name__}: {error}"[:_LAST]})
+        except (Exception, SystemExit) as error:  # whatever a codec raises is its row
+            row = json.dumps({FAILED: f"{type(error).__name__}: {error}"[:LONGEST]})
         rows.write(row + "\n")
         rows.flush()
+
+
+def _end_with_parent() -> None:
+    """Ends this process and those that it starts when standard input does: nobody is left to hear of rows."""
+    parent = os.dup(0)
+    with Path(os.devnull).open("rb") as nothing:
+        os.dup2(nothing.fileno(), 0)  # a codec that asks gets no answer
+
+    def watch() -> None:
+        while os.read(parent, 1):
+            pass
+        if (folder := Path(tempfile.gettempdir())).name.startswith(_PREFIX):  # who would remove it is no more
+            shutil.rmtree(folder, ignore_errors=True)
+        if hasattr(os, "killpg") and os.getpgrp() == os.getpid():
+            os.killpg(os.getpgrp(), signal.SIGKILL)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 if __name__ == "__main__":

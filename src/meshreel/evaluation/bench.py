@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..metrics.report import ComparisonOptions
@@ -19,3 +19,7 @@ class Bench:
     limit_s: float | None = None  # wall time of a point, which then has a process of its own; None: measured in this
     retry: bool = False  # points that failed before are measured again
     alike: tuple[str, ...] = ()  # experiments that measure in the same way: their rows count, too
+
+    def absolute(self) -> Bench:
+        """The same wherever a process goes."""
+        return replace(self, data=self.data.absolute(), cache=self.cache and self.cache.absolute())

@@ -81,7 +81,8 @@ def curve_of(row: Row) -> str:
     options, name = row["options"], str(row["codec"])
     if options.get("basis_size") is None:
         return name
-    told = [f"quality {options['quality']:g}"]
+    quality = options.get("quality")
+    told = [f"quality {quality:g}"] if isinstance(quality, (int, float)) else []  # codecs of others have other options
     for key, usual in USUAL.items():
         told += [f"{key} {options[key]}"] if options.get(key) not in (None, usual) else []
     return ", ".join([name, *told])

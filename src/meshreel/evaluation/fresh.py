@@ -1,16 +1,17 @@
 """Measurements in a process of its own, which `runner.py` and `peers.py` start: nothing else is in memory, or warm.
 
-`decode FILE [CODEC]` gives times of decoding a .reel file, or that of another codec; `draco FILE` the same of DracoPy
-on the frames in an .npz, the named peer; `pair FILE FILE` decodes two files by turns, the second with DracoPy alone
-too; `encode NAME DATA FRAMES OPTIONS` encodes a sequence, `scene` one of the benchmark's scenes. Times are processor
-time; decoding starts from bytes. The steady state is the best of three passes, each group's cost spread over its
-frames.
+`decode FILE [CODEC]` gives times of decoding a .reel file, or that of another codec, and digests of its frames;
+`frames FILE [CODEC]` gives these alone; `draco FILE` gives times of DracoPy on the frames in an .npz, the named peer;
+`pair FILE FILE` decodes two files by turns, the second with DracoPy alone too; `encode NAME DATA FRAMES OPTIONS`
+encodes a sequence, `scene` one of the benchmark's scenes. Times are processor time; decoding starts from bytes. The
+steady state is the best of three passes, each group's cost spread over its frames.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import os
 import pickle
 import sys
 import tempfile
@@ -23,39 +24,47 @@ from ..decoder import Video
 from ..decoder import open as open_video
 from ..types import Mesh
 
-FIRST_FRAME = "first_frame_sha256"  # of a row: the digest of the mesh that is decoded first
+FRAMES = "frames_sha256"  # of a row: the digest of each mesh that is decoded
 PASSES = 3
 SLOW_MS = 2000.0  # a frame: who takes so long in all passes so far is not asked again
 PAIR_PASSES = 7
 
 
 def main(task: str, *arguments: str) -> None:
-    """Prints what `task` measured."""
+    """Prints what `task` measured; what codecs print goes where errors go."""
+    answer = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
     tasks: dict[str, Callable[..., dict[str, Any]]] = {
         "decode": measure_decode,
+        "frames": decode_frames,
         "draco": measure_draco,
         "pair": measure_pair,
         "encode": measure_encode,
         "scene": measure_scene_encode,
     }
     row = tasks[task](*arguments)
-    sys.stdout.write(json.dumps(row | {"peak_rss_mb": peak_rss_mb()}) + "\n")
+    answer.write(json.dumps(row | {"peak_rss_mb": peak_rss_mb()}) + "\n")
+    answer.flush()
 
 
 def measure_decode(path: str, decoder: str | None = None) -> dict[str, Any]:
     """First frame and steady state, ms a frame, of the file at `path`; `decoder` is a file with a pickled codec."""
-    decode = open_video if decoder is None else pickle.loads(Path(decoder).read_bytes()).decode
-    data = Path(path).read_bytes()
+    decode, data = _decoder(decoder), Path(path).read_bytes()
     start = time.process_time()
     decode(data)[0]
     first_ms = 1e3 * (time.process_time() - start)
     passes = [_pass_ms(lambda: decode(data))]
     while len(passes) < PASSES and len(passes) * passes[0] < SLOW_MS:
         passes.append(_pass_ms(lambda: decode(data)))
-    frames = decode(data)
-    sizes, first = [len(mesh.vertices) for mesh in frames], digest(frames[0])
-    row = {"first_frame_ms": first_ms, "frame_ms": min(passes), "frames": len(sizes), FIRST_FRAME: first}
-    return row | {"vertices": sum(sizes) / len(sizes)}
+    row = {"first_frame_ms": first_ms, "frame_ms": min(passes)} | decode_frames(path, decoder)
+    return row | {"vertices": row.pop("vertices") / row["frames"]}
+
+
+def decode_frames(path: str, decoder: str | None = None) -> dict[str, Any]:
+    """The digests of all frames of the file at `path`, and how many frames and vertices there are."""
+    decode, data = _decoder(decoder), Path(path).read_bytes()
+    found = [(len(mesh.vertices), digest(mesh)) for mesh in decode(data)]
+    return {"frames": len(found), "vertices": sum(size for size, _ in found), FRAMES: [told for _, told in found]}
 
 
 def digest(mesh: Mesh) -> str:
@@ -144,6 +153,14 @@ def peak_rss_mb() -> float | None:
         return None
     unit = 1 if sys.platform == "darwin" else 1024
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6
+
+
+def _decoder(path: str | None) -> Callable[[bytes], Sequence[Mesh] | Video]:
+    """Of the codec that is pickled there; of .reel files where there is none."""
+    if path is None:
+        return open_video
+    decode: Callable[[bytes], Sequence[Mesh]] = pickle.loads(Path(path).read_bytes()).decode
+    return decode
 
 
 def _pass_ms(opened: Callable[[], Sequence[Mesh] | Video]) -> float:

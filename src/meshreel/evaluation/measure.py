@@ -21,14 +21,14 @@ from ..metrics.report import ComparisonOptions, compare_sequences
 from ..types import Frames, MeshSequence
 from .bench import Bench
 from .bridges import count_bridges, count_degenerate
-from .checked import Checked
+from .checked import check_told, decoded_by, decoder_of
 from .codec import Codec, coded_row
 from .codecs import make_codec
 from .codecs.draco import lattice_step
 from .datasets import open_dataset
 from .fresh import peak_rss_mb
 from .groups import group_records
-from .peers import cheapest_forms, measure_fresh_decode, measure_pair, run_fresh
+from .peers import cheapest_forms, confirmed, measure_fresh_decode, measure_pair, run_fresh
 from .provenance import made_by
 from .rd_rows import KINDS as RATED_KINDS
 from .rd_rows import measure_rated
@@ -48,11 +48,11 @@ def run_point(name: str, sequence: MeshSequence, codec: Codec, options: Comparis
 
 def _measured_codec(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> tuple[Row, bytes]:
     """The row of `run_point` and the bytes it is about."""
-    timer = StageTimer()
+    decoder, timer = decoder_of(codec), StageTimer()
     data = codec.encode(sequence, timer)
     encode_s = timer.stop() / len(sequence)
-    video = Checked(codec.decode(data), codec.name, sequence)
-    decode = measure_fresh_decode(data, codec, video[0])
+    check_told(codec, data)
+    decode, video = measure_fresh_decode(data, decoder, decoded_by(decoder, data, codec.name, sequence))
     peer = measure_peer(video)
     row = _rate(name, sequence, codec, data) | {
         "encode_s": encode_s,
@@ -69,10 +69,12 @@ def _measured_codec(name: str, sequence: MeshSequence, codec: Codec, options: Co
 
 def run_curve_point(name: str, sequence: MeshSequence, codec: Codec, options: ComparisonOptions) -> Row:
     """Rate, groups and metrics only: a point of an anchor's sweep, or of an ablation."""
-    start = time.process_time()
+    decoder, start = decoder_of(codec), time.process_time()
     data = codec.encode(sequence)
-    row = _rate(name, sequence, codec, data) | {"encode_s": (time.process_time() - start) / len(sequence)}
-    video = Checked(codec.decode(data), codec.name, sequence)
+    encode_s = (time.process_time() - start) / len(sequence)
+    check_told(codec, data)
+    row = _rate(name, sequence, codec, data) | {"encode_s": encode_s}
+    video = confirmed(data, decoder, decoded_by(decoder, data, codec.name, sequence))
     measured = compare_sequences(sequence, video, options).to_row()
     frames = [{key: frame[key] for key in CURVE_METRICS if key in frame} for frame in measured["per_frame"]]
     return row | measured | {"per_frame": frames, "groups": group_records(data)}

@@ -1,13 +1,10 @@
-"""Names of curves, as rows have them, as papers write them, and as files may have them.
+"""Names of curves, as rows have them and as papers write them.
 
-In -> out: the name of a curve -> its title; any name -> that of a file. The name of a curve is its codec's `name`, with
+In -> out: the name of a curve -> its title. The name of a curve is its codec's `name`, with
 more behind it where a basis is fixed (`curves.curve_of`).
 """
 
 from __future__ import annotations
-
-import hashlib
-import re
 
 BEST = "meshreel best"
 TSMC = "meshreel paper m, quality 50"  # as the paper has it: the number of basis vectors is varied
@@ -31,9 +28,3 @@ _TITLES = {
 def title(name: str) -> str:
     """What a legend calls a curve."""
     return _TITLES.get(name, name)
-
-
-def file_name(name: str) -> str:
-    """A name as that of a file anywhere; two names never make one."""
-    plain = re.sub(r"[^A-Za-z0-9._-]", "_", name)
-    return plain if plain == name else f"{plain}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import pickle
 import subprocess
 import sys
 import tempfile
@@ -22,10 +21,11 @@ from ..choice import IntraOptions, cheapest_intra, measure
 from ..decoder import Video
 from ..errors import InputError
 from ..types import Mesh, MeshSequence
-from .codec import Codec
+from .checked import Checked, Confirmed
 from .codecs import make_codec
-from .fresh import FIRST_FRAME, digest
+from .fresh import FRAMES
 from .rows import Point, Row
+from .said import last_words
 from .timer import ONE_THREAD
 
 ANCHOR = "decimated_draco_subdivided"  # A2s
@@ -88,25 +88,38 @@ def cheapest_forms(sequence: MeshSequence, video: Video) -> list[int | None]:
 def run_fresh(task: str, *arguments: str) -> Row:
     """What `evaluation.fresh` measures, on one thread."""
     command = [sys.executable, "-m", "meshreel.evaluation.fresh", task, *arguments]
-    answer = subprocess.run(command, capture_output=True, text=True, env=os.environ | ONE_THREAD, check=False)
-    if answer.returncode != 0:
-        raise RuntimeError(f"measuring `{task}` in a fresh process failed: {answer.stderr.strip().splitlines()[-1:]}")
+    with tempfile.TemporaryFile() as said:  # not a pipe: who inherits its end could keep it open
+        answer = subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said, env=os.environ | ONE_THREAD
+        )
+        if answer.returncode != 0:
+            raise RuntimeError(f"measuring `{task}` in a fresh process failed: {last_words(answer.returncode, said)}")
     return dict(json.loads(answer.stdout))
 
 
-def measure_fresh_decode(data: bytes, codec: Codec, first: Mesh) -> Row:
+def measure_fresh_decode(data: bytes, decoder: bytes, decoded: Checked) -> tuple[Row, Confirmed]:
     """First frame and steady state, ms, and peak memory of decoding these bytes from a file in a fresh process.
 
-    Raises InputError where its first frame is another than `first`, the one decoded here.
+    With `decoded`, the frames that were decoded here, of which each that is asked for is then compared with that of the
+    fresh process. `decoder` is the pickled codec.
     """
+    return _decoded_apart("decode", data, decoder, decoded)
+
+
+def confirmed(data: bytes, decoder: bytes, decoded: Checked) -> Confirmed:
+    """The frames as `measure_fresh_decode` gives them, where nothing is timed."""
+    return _decoded_apart("frames", data, decoder, decoded)[1]
+
+
+def _decoded_apart(task: str, data: bytes, decoder: bytes, decoded: Checked) -> tuple[Row, Confirmed]:
+    if len(decoded):
+        decoded[0]  # raises what is wrong with it, in words
     with tempfile.TemporaryDirectory() as folder:
-        path, decoder = Path(folder) / "video", Path(folder) / "codec"
-        path.write_bytes(data)
-        decoder.write_bytes(pickle.dumps(codec))
-        row = run_fresh("decode", str(path), str(decoder))
-    if row.pop(FIRST_FRAME) != digest(first):
-        raise InputError(f"{codec.name} decodes another first frame in a fresh process; bytes alone must decide")
-    return row
+        paths = [Path(folder) / "video", Path(folder) / "codec"]
+        for path, content in zip(paths, (data, decoder), strict=True):
+            path.write_bytes(content)
+        row = run_fresh(task, *map(str, paths))
+    return row, Confirmed(decoded, row.pop(FRAMES))
 
 
 def _own_row(name: str, options: Row, point: Point, rows: Sequence[Row]) -> Row:

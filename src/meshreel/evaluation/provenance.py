@@ -60,5 +60,9 @@ def makers(rows: Sequence[Row]) -> list[str]:
     found = []
     for row in rows:
         made = row.get(MADE_BY)
-        found.append("not recorded" if made is None else f"{made['meshreel']} {made['commit'] or '(installed)'}")
+        found.append("not recorded" if made is None else _version(made))
     return list(dict.fromkeys(found))
+
+
+def _version(made: Row) -> str:
+    return f"{made.get('meshreel', 'unknown version')} {made.get('commit') or '(installed)'}"

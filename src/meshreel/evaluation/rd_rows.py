@@ -20,13 +20,13 @@ from ..metrics.report import compare_sequences
 from ..metrics.truth import Scene, scene_means, scene_row
 from ..types import Frames, MeshSequence, evenly
 from .bench import Bench
-from .checked import Checked
+from .checked import check_told, decoded_by, decoder_of
 from .codec import Codec, TwoStepCodec, coded_row
 from .codecs import make_codec
 from .datasets import Dataset, open_known
+from .filenames import file_name
 from .fresh import peak_rss_mb
 from .groups import group_records
-from .names import file_name
 from .peers import measure_fresh_decode
 from .pictures import draw_decoded, draw_original
 from .rows import Point, Row
@@ -53,14 +53,15 @@ def measure_rated(point: Point, bench: Bench) -> Row:
     if point.kind == FLOOR:
         return head | {"codec": TRUTH_ITSELF, "options": point.options} | _floor(known, numbers, bench)
     codec = make_codec(point.codec, point.options)
+    decoder = decoder_of(codec)
     sampled = point.kind == SAMPLED
     source = Chosen(known.sequence, numbers) if sampled else known.sequence
     data, times = _encoded(codec, source, (point.sequence, point.frames, sampled))
+    check_told(codec, data)
     head |= coded_row(codec, source, data) | {"coded_frames": len(source)}
     head |= times | {"encode_peak_rss_mb": peak_rss_mb()}
     head |= {"groups": group_records(data) if len(numbers) == count else []}  # which count in frames, as metrics do
-    decoded = Checked(codec.decode(data), codec.name, source)
-    head["decode"] = measure_fresh_decode(data, codec, decoded[0])
+    head["decode"], decoded = measure_fresh_decode(data, decoder, decoded_by(decoder, data, codec.name, source))
     shown = decoded if sampled else Chosen(decoded, numbers)
     return head | _metrics(known, numbers, shown, bench) | _pictures(point, known, numbers, (shown, bench))
 

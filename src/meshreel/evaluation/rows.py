@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import json
+import math
+import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from .locked import locked
 
 Row = dict[str, Any]
 FAILED = "failed"  # of a row: why nothing was measured
 CURVE_KINDS = ("quality", "curve", "floor", "scene", "rated", "sampled")  # rows that have a rate and metrics
+
+REQUIRED = ("point", "kind", "sequence", "codec", "options")  # of every row, whether it failed or not
+_TEXTS = ("point", "kind", "sequence", "codec", "experiment", FAILED)
+_OBJECTS = ("options", "decode", "encode_stages_s", "made_by")
+_LISTS = ("groups", "per_frame")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +46,10 @@ class Point:
 def read_rows(path: Path) -> list[Row]:
     """The rows of a JSON-lines file, without one that was not written to its end.
 
-    Raises InputError where the file is missing or a line is no JSON object.
+    Raises InputError where the file is missing or a line is no row.
     """
+    if path.exists() and not (path.is_file() or path.is_fifo()):  # devices may have no end
+        raise InputError(f"{path}: is no file; give one that `meshreel bench run` made")
     try:
         data = path.read_bytes()
         lines = data[: _whole(data)].decode().splitlines()
@@ -50,13 +60,43 @@ def read_rows(path: Path) -> list[Row]:
     rows = []
     for number, line in enumerate(lines, 1):
         try:
-            row = json.loads(line)
-        except json.JSONDecodeError as error:
-            raise InputError(f"{path}, line {number}: not JSON: {error.msg}; delete that line") from error
-        if not isinstance(row, dict) or "point" not in row:
-            raise InputError(f"{path}, line {number}: not a row; delete that line")
-        rows.append(row)
+            row = json.loads(line, parse_constant=_not_json)
+        except ValueError as error:
+            told = error.msg if isinstance(error, json.JSONDecodeError) else error
+            raise InputError(f"{path}, line {number}: not JSON: {told}; delete that line") from error
+        if problem := _problem(row):
+            raise InputError(f"{path}, line {number}: not a row: {problem}; delete that line")
+        rows.append(_printable(row) if "\\ud" in line else row)
     return rows
+
+
+def _printable(row: Row) -> Row:
+    """The row with ? for halves of characters, as in names of files: they can be neither written nor drawn."""
+    return dict(json.loads(json.dumps(row, ensure_ascii=False).encode(errors="replace")))
+
+
+def _not_json(found: str) -> float:
+    raise ValueError(f"{found} is no number")
+
+
+def _problem(row: object) -> str | None:
+    """Why something is no row; None where it is one."""
+    if not isinstance(row, dict):
+        return "no JSON object"
+    for keys, kind, told in ((_TEXTS, str, "text"), (_OBJECTS, dict, "JSON object"), (_LISTS, list, "list")):
+        for key in keys:
+            if (key in row or key in REQUIRED) and not isinstance(row.get(key), kind):
+                return f"{key!r} is {_told(row, key)}, and not a {told}"
+    if row["kind"] in CURVE_KINDS and FAILED not in row:
+        for key in ("mbps", "frames"):
+            number = row.get(key)
+            if not (isinstance(number, (int, float)) and 0 < number < math.inf):
+                return f"{key!r} is {_told(row, key)}, and not a number above 0"
+    return None
+
+
+def _told(row: Row, key: str) -> str:
+    return repr(row[key])[:60] if key in row else "missing"
 
 
 def join_rows(files: Sequence[Sequence[Row]]) -> list[Row]:
@@ -70,20 +110,33 @@ def join_rows(files: Sequence[Sequence[Row]]) -> list[Row]:
 def append_row(path: Path, row: Row) -> None:
     """The row as one more line of the file, made if needed, in the place of one that was not written to its end.
 
-    Raises InputError where it cannot be written.
+    Several processes may do so at once. Raises InputError where it cannot be written.
     """
     line = (json.dumps(row, allow_nan=False) + "\n").encode()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("r+b" if path.exists() else "xb") as file:
-            data = file.read() if file.readable() else b""
+        with path.open("a+b") as file, locked(file):
+            file.seek(0)
+            data = file.read()
             end = _whole(data)
-            file.seek(end)
-            file.truncate()
+            file.truncate(end)
             file.write(b"\n" * (end > 0 and data[end - 1 : end] != b"\n") + line)
     except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"{path}: cannot be written ({reason}); free space, or choose another file") from None
+        raise _not_written(path, error) from None
+
+
+def check_appendable(path: Path) -> None:
+    """Raises InputError where rows could not be written: hours before the first one is there."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("r+b") if path.exists() else tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise _not_written(path, error) from None
+
+
+def _not_written(path: Path, error: OSError) -> InputError:
+    return InputError(f"{path}: cannot be written ({error.strerror or error}); free space, or choose another file")
 
 
 def _whole(data: bytes) -> int:

@@ -12,7 +12,6 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from queue import SimpleQueue
 
-from ..errors import InputError
 from .apart import measure_apart
 from .bench import Bench
 from .codec import TwoStepCodec
@@ -20,7 +19,7 @@ from .codecs import make_codec
 from .datasets import open_dataset
 from .measure import measure_point
 from .rd_rows import KINDS as RATED_KINDS
-from .rows import FAILED, Point, Row, append_row, measured_rows, read_rows
+from .rows import FAILED, Point, Row, append_row, check_appendable, measured_rows, read_rows
 from .scene_rows import KINDS as SCENE_KINDS
 
 AFTER = ("decode",)  # kinds of points that compare with rows measured before
@@ -52,6 +51,8 @@ def run_points(
         if point.key in known:
             tell(known[point.key], False)
     missing = [point for point in points if point.key not in known]
+    if missing:
+        check_appendable(file)
     _check_sequences(missing, bench)
     for row in _measured(missing, list(known.values()), bench, executor):
         append_row(file, row)
@@ -94,10 +95,10 @@ def _shared(point: Point) -> object:
     if point.kind in RATED_KINDS:
         try:
             codec = make_codec(point.codec, point.options)
-        except InputError:  # told when the point is measured
+            if isinstance(codec, TwoStepCodec):
+                return point.sequence, point.frames, point.kind, str(codec.analysis_key)
+        except (Exception, SystemExit):  # whatever it is, it is told when the point is measured
             return point.key
-        if isinstance(codec, TwoStepCodec):
-            return point.sequence, point.frames, point.kind, codec.analysis_key
     return point.key
 
 

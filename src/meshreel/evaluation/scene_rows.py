@@ -19,6 +19,7 @@ from ..format.layout import ChunkKind
 from ..metrics.seams import measure_seam, seam_row
 from ..metrics.truth import Scene, scene_means, scene_row
 from ..types import Mesh
+from .checked import Checked, decoder_of
 from .codec import Codec
 from .codecs import make_codec
 from .codecs.scenes import BackgroundDracoCodec
@@ -78,15 +79,15 @@ def _intra(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
 
 def _stream(scene: SceneData, numbers: Sequence[int], codec: Codec) -> Row:
     """A codec's row: the whole scene is coded, some of its frames are measured; decoding is in a fresh process."""
-    start = time.process_time()
+    decoder, start = decoder_of(codec), time.process_time()
     data = codec.encode(scene.meshes)
     seconds = (time.process_time() - start) / len(scene.meshes)
     video = open_video(data)
     once = sum(chunk.size for chunk in video.reader.chunks if chunk.kind == ChunkKind.STATIC)
     row = _rate(len(data), once, len(scene.meshes), scene.meshes.frame_rate)
-    row |= {"encode_s": seconds, "decode": measure_fresh_decode(data, codec, video[0])}
-    row |= seams_of(scene, numbers, video)
-    return row | _metrics(scene, numbers, [video[number] for number in numbers])
+    decode, decoded = measure_fresh_decode(data, decoder, Checked(video, codec.name, scene.meshes))
+    row |= {"encode_s": seconds, "decode": decode} | seams_of(scene, numbers, video)
+    return row | _metrics(scene, numbers, [decoded[number] for number in numbers])
 
 
 def seams_of(scene: SceneData, numbers: Sequence[int], video: Apart) -> Row:

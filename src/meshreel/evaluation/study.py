@@ -18,7 +18,7 @@ from .codecs import make_codec
 from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
 from .rd_rows import FLOOR, RATED, SAMPLED, TRUTH_ITSELF
-from .report.tables import bd_table, common_rate, comparable_table
+from .report.tables import bd_table, common_rate, comparable_table, text
 from .rows import Point, Row, select
 
 SMALL_SEQUENCE, SMALL_FRAMES = "demo", 3  # procedural: `--small` needs no data
@@ -138,7 +138,7 @@ class Study:
 
     def _left_of_all(self, rows: Sequence[Row], sequence: str) -> Promise:
         own = [row for kind in (RATED, SAMPLED) for row in select(rows, sequence, kind=kind)]
-        text = f"{sequence}: {self.best} needs less rate than every other codec wherever both reach a quality"
+        promised = f"{text(sequence)}: {self.best} needs less rate than every other codec wherever both reach a quality"
         told, met = list[str](), list[bool | None]()
         for name in dict.fromkeys(map(curve_of, own)):
             for measure in PROMISED if name != self.best else ():
@@ -146,22 +146,22 @@ class Study:
                 several = min(len(best.rates), len(other.rates)) > 1  # a point is no range
                 left = beats(best, other, measure.least) if several else None
                 met.append(left)
-                told += [f"not {name}: {against(other, best, measure)}"] if left is False else []
+                told += [f"not {text(name)}: {against(other, best, measure)}"] if left is False else []
         decided = [left for left in met if left is not None]
         if not decided:
-            return Promise(text, "in D2 and masked SSIM")
+            return Promise(promised, "in D2 and masked SSIM")
         found = f"in {sum(decided)} of {len(met)} comparisons, {len(met) - len(decided)} undecided"
-        return Promise(text, "in D2 and masked SSIM", "; ".join([found, *told]), all(decided))
+        return Promise(promised, "in D2 and masked SSIM", "; ".join([found, *told]), all(decided))
 
 
-def operating_point(text: str) -> tuple[str, dict[str, Any]]:
+def operating_point(point: str) -> tuple[str, dict[str, Any]]:
     """A codec and its options, from `codec` or `codec:option=value,option=value`. InputError where it is neither."""
-    codec, _, told = text.partition(":")
+    codec, _, told = point.partition(":")
     options: dict[str, Any] = {}
     for each in told.split(",") if told else ():
         name, is_told, found = each.partition("=")
         if not (is_told and name):
-            raise InputError(f"operating point {text!r}: {each!r} is no option=value")
+            raise InputError(f"operating point {point!r}: {each!r} is no option=value")
         try:
             options[name] = json.loads(found)
         except json.JSONDecodeError:

@@ -12,7 +12,7 @@ from jaxtyping import TypeCheckError
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.evaluation.codecs import make_codec
-from meshreel.evaluation.codecs.klt_tsdf import KltTsdfCodec, blocks, codec, train
+from meshreel.evaluation.codecs.klt_tsdf import KltTsdfCodec, blocks, codec, frames, train
 from meshreel.evaluation.codecs.klt_tsdf.basis import MOST, ONE, basis_of, decode_basis, encode_basis, learned, pack
 from meshreel.evaluation.codecs.klt_tsdf.blocks import decode_bits, decode_places, encode_bits, encode_places
 from meshreel.evaluation.codecs.klt_tsdf.grid import VOLUME, prepared, sample, voxel_index
@@ -278,6 +278,16 @@ def test_more_blocks_than_a_decoder_takes_are_refused(body, monkeypatch):
     monkeypatch.setattr(blocks, "MOST_BLOCKS", 10)
     with pytest.raises(InputError, match="give fewer cells"):
         SMALL.encode(body)
+
+
+def test_more_surface_than_a_decoder_takes_is_refused_before_it_is_made(body, stream, monkeypatch):
+    video = SMALL.decode(stream)
+    monkeypatch.setattr(frames, "MOST_CROSSED", 100)
+    monkeypatch.setattr(frames, "polygonize", lambda _field: pytest.fail("made"))
+    with pytest.raises(InputError, match=r"surface in \d+ cells of a frame, over 100; give fewer cells"):
+        SMALL.encode(body)
+    with pytest.raises(FormatError, match=r"surface in \d+ cells of a frame, over 100"):
+        video[0]
 
 
 def test_every_truncation_and_every_extra_byte_is_refused(stream):

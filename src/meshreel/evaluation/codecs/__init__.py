@@ -49,6 +49,7 @@ def _of_another_package(kind: str) -> Callable[..., Codec]:
         raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted({*CODECS, *others}))}")
     try:
         make: Callable[..., Codec] = others[kind].load()
-    except ImportError as error:
-        raise InputError(f"codec {kind!r} cannot be loaded ({error}); install what its package needs") from error
+    except Exception as error:  # what runs when a package is imported may raise anything
+        told = error if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
+        raise InputError(f"codec {kind!r} cannot be loaded ({told}); install what its package needs") from error
     return make

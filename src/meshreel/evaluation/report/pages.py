@@ -13,7 +13,7 @@ from pathlib import Path
 from ...io.write import make_folder, replacing
 from ..curves import curve_of
 from ..experiment import Experiment
-from ..names import file_name
+from ..filenames import file_name
 from ..provenance import makers
 from ..reproducing import reproducing_page
 from ..rows import Row, curve_rows, failed_rows, measured_rows
@@ -32,6 +32,7 @@ from .tables import (
     promise_table,
     sequences,
     text,
+    without_html,
 )
 
 FOLDER = "results"  # of plots and sheets, beside the pages
@@ -77,7 +78,7 @@ def write_report(
             part = Part(name, chosen, own, folder)
             shots = {sequence: find_shots(curve_rows(own, sequence), pictures) for sequence in sequences(own)}
             files += _draw(part, looks, {sequence: found for sequence, found in shots.items() if found})
-            lines += [*([""] if lines else []), *_part(part, shots)]
+            lines += [*([""] if lines else []), *map(without_html, _part(part, shots))]
     lines += [*_failures(failed_rows(rows)), *_origin(rows, experiments)]
     # The page has the PNG of each plot; its SVG twin comes after it, and takes its place in HTML.
     inlined = {f"{FOLDER}/{path.with_suffix('.png').name}": path.read_bytes() for path in files}
@@ -87,7 +88,7 @@ def write_report(
         pages["reproducing.md"] = "\n".join(told) + "\n"
     for page, content in pages.items():
         with replacing(folder / page) as file:
-            file.write(content.encode())
+            file.write(content.encode(errors="backslashreplace"))
     return [*(folder / page for page in pages), *files]
 
 
@@ -113,7 +114,7 @@ def _part(part: Part, shots: Mapping[str, Shots | None]) -> Iterator[str]:
         yield from ("", f"## {text(sequence)}, {own[0]['frames']} frames", "")
         yield from (part.link(sequence, "quality against rate"), "")
         if len(made := makers(own)) > 1:
-            yield from (f"Rows of more than one version: {', '.join(made)}.", "")
+            yield from (f"Rows of more than one version: {text(', '.join(made))}.", "")
         shown = part.chosen.shown(own)
         yield from (*(point_table(shown) if shown else ()), "", *part.chosen.comparisons(own))
         if (found := shots[sequence]) is not None:

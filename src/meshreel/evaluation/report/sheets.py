@@ -138,7 +138,8 @@ def _size(path: Path) -> tuple[int, int] | None:
         with Image.open(path) as picture:
             picture.load()
             return picture.size
-    except (OSError, SyntaxError):  # Pillow's names for files that are missing, cut off or no pictures
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
+        # Pillow's names for files that are missing, cut off, no pictures, or ones that claim to fill the memory
         return None
 
 

@@ -31,10 +31,14 @@ _UNKNOWN = "not recorded"
 def text(found: object) -> str:
     """Anything as text of one line, that Markdown shows as it is."""
     line = " ".join(str(found).split())
-    line = re.sub(r"([\\`*|\[\]~])", r"\\\1", line)
-    line = re.sub(r"<(?=[A-Za-z/!?])", r"\\<", line)
+    line = without_html(re.sub(r"([\\`*|\[\]~])", r"\\\1", line))
     line = re.sub(r"&(?=#?\w+;)", r"\\&", line)
     return re.sub(r"(?<![A-Za-z0-9])_|_(?![A-Za-z0-9])", r"\\_", line)
+
+
+def without_html(line: str) -> str:
+    """Markdown in which what looks like a tag is text."""
+    return re.sub(r"(?<!\\)((?:\\\\)*)<(?=[A-Za-z/!?])", r"\1\\<", line)  # behind an even number of backslashes
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -13,16 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
+from ....errors import FormatError, InputError
 from ....geometry.nearest import Surface, past_border
 from ....types import Mesh
 from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols
 from .grid import SIDE, block_keys, prepared, sample
-from .surface import Field, cells_of, crossed, field_of, polygonize, without
+from .surface import Field, cells_of, count_crossed, crossed, field_of, polygonize, without
 from .weights import Model, forward
 from .wire import Reader, Writer
 
 _FAR = 1.5  # voxels from the surface beyond which decoded surface is left out
 _PAST = 0.5  # voxels past a border
+MOST_CROSSED = 1 << 22  # cells of a frame with surface: as many blocks as there may be, of noise, would have 16 million
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +37,10 @@ class Group:
 
 
 def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndarray, " M"]) -> bytes:
-    """The bytes of some frames in voxel units, and of what mean square weights are expected."""
+    """The bytes of some frames in voxel units, and of what mean square weights are expected.
+
+    Raises InputError where a frame has more blocks, or more surface, than a decoder takes.
+    """
     group = Group([], [], [])
     for mesh in meshes:
         mesh = prepared(mesh)
@@ -43,7 +48,10 @@ def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndar
         symbols = forward(blocks, model, energies)
         group.places.append(blocks.places)
         group.symbols.append(symbols)
-        group.omitted.append(_encode_omitted(mesh, field_of(blocks.places, symbols, model)))
+        field = field_of(blocks.places, symbols, model)
+        if (count := count_crossed(field)) > MOST_CROSSED:
+            raise InputError(f"surface in {count} cells of a frame, over {MOST_CROSSED}; give fewer cells")
+        group.omitted.append(_encode_omitted(mesh, field))
     out = Writer()
     out.blob(encode_places(group.places))
     out.blob(encode_symbols(np.concatenate(group.symbols), group.places))
@@ -65,6 +73,8 @@ def decode_group(data: bytes, count: int, width: int) -> Group:
 def decode_frame(group: Group, number: int, model: Model) -> Mesh:
     """A frame of a group, in voxel units. Raises FormatError where its bytes are damaged."""
     field = field_of(group.places[number], group.symbols[number], model)
+    if (count := count_crossed(field)) > MOST_CROSSED:
+        raise FormatError(f"surface in {count} cells of a frame, over {MOST_CROSSED}; the stream is damaged")
     return without(polygonize(field), _decode_omitted(group.omitted[number], field))
 
 

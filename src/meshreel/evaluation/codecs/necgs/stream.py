@@ -1,7 +1,7 @@
 """The bytes of a coded set: a head, and streams of integers (`coding.entropy`). In -> out: a record <-> bytes.
 
 A checksum refuses what was damaged by chance; what claims more numbers than its bytes can say is refused before memory
-is taken for them, and the largest network that the head can name takes a few hundred MB to run.
+is taken for them, and the largest network that the head can name takes about a GB to run.
 """
 
 from __future__ import annotations
