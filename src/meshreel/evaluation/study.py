@@ -18,7 +18,7 @@ from .codecs import make_codec
 from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
 from .rd_rows import FLOOR, RATED, SAMPLED, TRUTH_ITSELF
-from .report.tables import bd_table, common_rate, comparable_table, text
+from .report.tables import bd_table, comparable_table, text
 from .rows import Point, Row, select
 
 SMALL_SEQUENCE, SMALL_FRAMES = "demo", 3  # procedural: `--small` needs no data
@@ -119,9 +119,6 @@ class Study:
     def comparisons(self, rows: Sequence[Row]) -> Iterator[str]:
         """BD-rates on the rows of one sequence."""
         measures = [each for each in MEASURES if any(value(row, each.key) is not None for row in rows)]
-        if self.common is None and (several := [row for row in rows if row["kind"] in (RATED, SAMPLED)]):
-            rate = common_rate(several)
-            yield from ("", f"Each codec's point nearest to {rate:.3g} Mbps:", "", *comparable_table(several, rate), "")
         yield from bd_table(rows, self.best, measures) if self.best else ()
         yield from bd_table(rows, self.anchor, measures, is_anchor=True) if self.anchor else ()
 
