@@ -17,7 +17,7 @@ from meshreel.work import SpanStore, shared_options
 from tests.small_options import quick
 
 BODY = tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.04)))
-PAPER = replace(quick(), form=Form.LAPLACIAN, group_size=2)
+PAPER = quick("paper", group_size=2)
 
 
 def with_basis(size: int) -> windows.EncoderOptions:
