@@ -260,8 +260,10 @@ def _encoded_windows(work: Work, seen: Survey) -> Iterator[Iterable[EncodedGroup
     windows = (_Normalised(sequence, seen, window) for window in seen.windows(size))
     if executor is None:
         for frames in windows:
-            alone = encode_segment(frames, options, stages) if layered else None
-            yield alone or encode_window(frames, options, stages, work.spans.find)
+            if layered:
+                yield encode_segment(frames, options, stages)
+            else:
+                yield encode_window(frames, options, stages, work.spans.find)
         return
     ahead = getattr(executor, "_max_workers", 8)
     waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()
