@@ -30,9 +30,7 @@ def main(arguments: list[str]) -> int:
         print("usage: scripts/generate [--check]", file=sys.stderr)
         return 2
     stale = {
-        path: text
-        for path, text in made().items()
-        if not path.exists() or path.read_text(encoding="utf-8") != text
+        path: text for path, text in made().items() if not path.exists() or path.read_text(encoding="utf-8") != text
     }
     for path, text in stale.items():
         if arguments:
