@@ -1,0 +1,3 @@
+// The package: importing it defines <meshreel-player>.
+
+export { MeshreelPlayer } from "./element.ts";
