@@ -13,7 +13,7 @@ export interface Statistics extends Stats, PictureStats {
 export function statisticsLines(stats: Statistics, info: Info | null, frame: number): (readonly [string, string])[] {
   const most = info?.mostQuality ?? 0;
   return [
-    ["Frame", info ? `${frame + 1} of ${info.frameCount}, ${Number(info.frameRate.toFixed(2))} a second` : "none yet"],
+    ["Frame", info ? `${frame + 1} of ${info.frameCount}, ${Number(info.frameRate.toFixed(2))} fps` : "none yet"],
     ["Rate", stats.mbps > 0 ? formatRate(stats.mbps) : "not known yet"],
     ["Bandwidth", stats.bandwidthMbps > 0 ? formatRate(stats.bandwidthMbps) : "not known yet"],
     ["Fetched", info ? `${formatAmount(stats.fetchedBytes, "B")} of ${formatAmount(info.size, "B")}` : formatAmount(stats.fetchedBytes, "B")],
@@ -21,7 +21,7 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
     ["Quality", most > 0 ? `${stats.quality} of ${most}` : "one only"],
     ["Triangles", formatCount(stats.triangles)],
-    ["Pictures", `${formatCount(stats.fps)} a second`],
+    ["Display", `${formatCount(stats.fps)} fps`],
     ["GPU memory", formatAmount(stats.gpuBytes, "B")],
     ["Skipped groups", formatCount(stats.skippedGroups)],
   ];

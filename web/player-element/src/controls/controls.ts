@@ -48,8 +48,8 @@ export class Controls implements Surface {
     this.#big.addEventListener("click", () => act("toggle"));
     this.#activity = new Activity((idle) => this.#root.toggleAttribute("data-idle", idle));
     this.#root.append(
-      this.picture, this.#poster, this.#big, make("div", { class: "spinner", part: "spinner" }), emptyPanel(open), this.#bar.element,
-      this.#bar.settings, this.#statistics.element, this.#toasts.element, this.#error.element, this.#help.element, this.#file,
+      this.picture, this.#poster, this.#statistics.element, this.#big, make("div", { class: "spinner", part: "spinner" }), emptyPanel(open),
+      this.#bar.element, this.#bar.settings, this.#toasts.element, this.#error.element, this.#help.element, this.#file,
       make("div", { class: "veil", "aria-hidden": "true" }, icon("open"), make("strong", {}, "Drop to play")),
     );
     shadow.append(this.#root);

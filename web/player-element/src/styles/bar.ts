@@ -8,7 +8,7 @@ const THUMB = `
 
 export const BAR = `
 .bar {
-  position: absolute; inset: auto 0 0; display: none; padding: 0 6px 4px; background: var(--_panel);
+  position: absolute; inset: auto 0 0; display: none; padding: 0 6px 4px; background: color-mix(in srgb, var(--_panel) 90%, transparent);
   border-top: 1px solid var(--_line); transition: opacity .2s, translate .2s;
 }
 .root[data-controls] .bar { display: block; }
@@ -69,6 +69,7 @@ export const BAR = `
 .settings .button .label { position: static; width: auto; height: auto; clip-path: none; }
 .settings .button[aria-pressed="true"]::after { align-self: center; margin: 0 0 0 auto; width: 8px; height: 8px; border-radius: 50%; }
 .settings .tool { display: none; }
+@container player (max-height: 280px) { .settings :is(.choice, .button) { min-height: 34px; height: 34px; } .choice select { height: 28px; } }
 @container player (max-width: 620px) { .row .tool { display: none; } .settings .tool { display: flex; } }
 @container player (max-width: 400px) { .row .step { display: none; } .time .all { display: none; } }
 @container player (max-width: 400px) { .bar { padding: 0 2px 2px; } .row { gap: 0; } }

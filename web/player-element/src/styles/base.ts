@@ -4,7 +4,7 @@ const DARK = `
   --_background: var(--meshreel-background, #14171c);
   --_text: var(--meshreel-text, #f4f6f8);
   --_quiet: var(--meshreel-quiet, #b4bcc6);
-  --_panel: var(--meshreel-panel, #1d2127f0);
+  --_panel: var(--meshreel-panel, #1d2127);
   --_line: var(--meshreel-line, #ffffff2e);
   --_hover: var(--meshreel-hover, #ffffff26);
   --_accent: var(--meshreel-accent, #5ab0ff);
@@ -17,7 +17,7 @@ const LIGHT = `
   --_background: var(--meshreel-background, #e9ecf0);
   --_text: var(--meshreel-text, #14181d);
   --_quiet: var(--meshreel-quiet, #4d5661);
-  --_panel: var(--meshreel-panel, #fffffff0);
+  --_panel: var(--meshreel-panel, #ffffff);
   --_line: var(--meshreel-line, #00000029);
   --_hover: var(--meshreel-hover, #00000014);
   --_accent: var(--meshreel-accent, #0a63c9);
@@ -97,6 +97,7 @@ button:disabled, select:disabled { cursor: default; opacity: .45; }
 .veil { inset: 8px; border: 2px dashed var(--_accent); border-radius: 10px; background: var(--_panel); pointer-events: none; }
 .empty { inset: 0; padding: 0 12px calc(var(--_button) + 12px); }
 .veil .icon, .empty .icon { width: 40px; height: 40px; color: var(--_quiet); }
+@container player (max-height: 220px) { .empty .icon { display: none; } }
 .root[data-over] .veil, .root[data-controls][data-empty] .empty { display: grid; }
 
 @media (prefers-reduced-motion: reduce) {

@@ -4,7 +4,10 @@ export const PANELS = `
 .panel { position: absolute; background: var(--_panel); border: 1px solid var(--_line); border-radius: 10px; }
 .panel dl, .panel p { margin: 0; }
 
-.statistics { left: 8px; top: 8px; margin: 0; padding: 8px 12px; font-size: 12px; line-height: 1.5; pointer-events: none; max-width: calc(100% - 16px); }
+.statistics {
+  left: 8px; top: 8px; margin: 0; padding: 8px 12px; font-size: 12px; line-height: 1.5; pointer-events: none; max-width: calc(100% - 16px);
+  max-height: calc(100% - 16px); overflow: hidden; background: color-mix(in srgb, var(--_panel) 88%, transparent);
+}
 .statistics div { display: grid; grid-template-columns: 100px auto; gap: 8px; }
 .statistics dt { color: var(--_quiet); }
 .statistics dd { margin: 0; }
@@ -18,12 +21,12 @@ export const PANELS = `
   overflow: auto; box-shadow: 0 6px 30px #0006;
 }
 .help-panel .title { display: flex; align-items: center; justify-content: space-between; font-size: 16px; margin: -6px -8px 4px 0; }
-.help-panel dl { display: grid; grid-template-columns: 1fr 1fr; gap: 6px 28px; }
-.help-panel dl div { display: grid; grid-template-columns: 74px 1fr; align-items: baseline; }
+.help-panel dl { columns: 2; column-gap: 28px; }
+.help-panel dl div { display: grid; grid-template-columns: 76px 1fr; align-items: baseline; padding: 3px 0; break-inside: avoid; }
 .help-panel dd { margin: 0; }
 .help-panel p { margin-top: 12px; color: var(--_quiet); max-width: 46ch; }
 kbd { padding: 1px 7px; border: 1px solid var(--_line); border-radius: 5px; background: var(--_hover); font: inherit; font-size: 12px; }
-@container player (max-width: 480px) { .help-panel dl { grid-template-columns: 1fr; } }
+@container player (max-width: 480px) { .help-panel dl { columns: 1; } }
 
 .error {
   left: 50%; top: 50%; translate: -50% -50%; display: grid; justify-items: center; gap: 6px; width: max-content; max-width: min(420px, calc(100% - 16px));
@@ -41,7 +44,7 @@ kbd { padding: 1px 7px; border: 1px solid var(--_line); border-radius: 5px; back
 .text:focus-visible { outline-offset: 2px; }
 @container player (max-width: 360px) or (max-height: 240px) {
   .error { padding: 8px 12px; gap: 3px; font-size: 13px; }
-  .error > .icon { display: none; }
+  .error > .icon, .error code { display: none; }
   .text { min-height: 32px; padding: 0 12px; }
 }
 
