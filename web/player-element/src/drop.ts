@@ -1,16 +1,20 @@
 // Files that are dropped on the player.
 
-/** Calls `open` with a file dropped on `target`, and `over` when one comes and goes. Ends with `signal`. */
-export function acceptDrops(
-  target: HTMLElement, open: (file: File) => void, over: (inside: boolean) => void, signal: AbortSignal,
-): void {
+export interface DropActs {
+  welcome(): boolean; // whether files are taken at the moment
+  open(file: File): void;
+  over(inside: boolean): void; // a file hangs over the player, or no longer
+}
+
+/** Takes files that are dropped on `target`. Ends with `signal`. */
+export function acceptDrops(target: HTMLElement, { welcome, open, over }: DropActs, signal: AbortSignal): void {
   let depth = 0; // enter and leave come for each node inside
   const leave = () => {
     depth = 0;
     over(false);
   };
   const on = (type: "dragenter" | "dragover" | "dragleave" | "drop", act: (event: DragEvent) => void) =>
-    target.addEventListener(type, (event) => { if (hasFiles(event)) act(event); }, { signal });
+    target.addEventListener(type, (event) => { if (welcome() && hasFiles(event)) act(event); }, { signal });
   on("dragenter", (event) => {
     event.preventDefault();
     if (depth++ === 0) over(true);

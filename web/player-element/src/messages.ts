@@ -1,4 +1,5 @@
-// What a viewer is told when something fails: plain words, what can be done, and the exact error below.
+// What a viewer is told when something fails: plain words, what can be done, and the exact error below. The patterns are of the
+// messages of player-core (checks.ts, reader.ts, http_answer.ts) and of stage_three.ts.
 
 export interface Message {
   readonly title: string;
@@ -9,11 +10,11 @@ export interface Message {
 
 const CASES: readonly { pattern: RegExp; title: string; advice: string; retry: boolean }[] = [
   { pattern: /webgl/i, title: "This browser cannot draw it", advice: "WebGL 2 is switched off or missing. Switch on graphics acceleration, or use another browser.", retry: true },
-  { pattern: /\b(404|410)\b/, title: "The recording was not found", advice: "The address may be wrong, or the file was moved.", retry: true },
-  { pattern: /\b(401|403)\b/, title: "The recording is not open to you", advice: "The server refuses it. Sign in where it is kept, or ask its owner.", retry: true },
-  { pattern: /\b5\d\d\b/, title: "The server has a problem", advice: "Try again in a moment.", retry: true },
-  { pattern: /\bversion\b/i, title: "This file is newer than the player", advice: "Update the player, then open it again.", retry: false },
-  { pattern: /\bmagic\b|not a \.?reel|no \.?reel|not a meshreel/i, title: "This is not a .reel file", advice: "Open a file that meshreel wrote.", retry: false },
+  { pattern: /not found \((404|410)\)/, title: "The recording was not found", advice: "The address may be wrong, or the file was moved.", retry: true },
+  { pattern: /refused \((401|403)\)/, title: "The recording is not open to you", advice: "The server refuses it. Sign in where it is kept, or ask its owner.", retry: true },
+  { pattern: /answers 5\d\d/, title: "The server has a problem", advice: "Try again in a moment.", retry: true },
+  { pattern: /^format version \d/, title: "This file is newer than the player", advice: "Update the player, then open it again.", retry: false },
+  { pattern: /not a \.reel file|sends a web page/, title: "This is not a .reel file", advice: "Open a file that meshreel wrote, or correct the address.", retry: true },
 ];
 
 /** The message for an error of a source, a file or the GPU. */

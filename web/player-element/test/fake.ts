@@ -35,7 +35,7 @@ export class FakePlayback extends EventTarget implements Playback {
     this.interpolate = settings.interpolate;
     this.quality = settings.quality;
     const bad = typeof source === "string" && source.includes("404");
-    this.#later(10, () => (bad ? this.fail(`${String(source)}: the server answers 404`) : this.#head()));
+    this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`) : this.#head()));
   }
 
   get duration(): number {

@@ -119,7 +119,7 @@ describe("menus", () => {
 describe("messages", () => {
   const error = (name: string, message: string) => Object.assign(new Error(message), { name });
   test("errors are told in plain words with the exact ones below", () => {
-    const message = explain(error("SourceError", "http://x/a.reel: the server answers 404"));
+    const message = explain(error("SourceError", "http://x/a.reel: not found (404), check the address"));
     expect(message.title).toBe("The recording was not found");
     expect(message.detail).toContain("404");
     expect(message.retry).toBe(true);
@@ -128,13 +128,13 @@ describe("messages", () => {
     const kinds = [
       error("FormatError", "not a .reel file: the signature is missing"), error("FormatError", "format version 9: this player knows version 1, update it"),
       error("FormatError", "the head is damaged: its checksum does not match"), error("SourceError", "http://x: no answer"),
-      error("SourceError", "http://x: the server answers 503"), error("Error", "WebGL 2 is not available"), error("Error", "else"),
+      error("SourceError", "http://x: the server answers 503, not the file"), error("Error", "WebGL 2 is not available"), error("Error", "else"),
     ];
     expect(new Set(kinds.map((kind) => explain(kind).title)).size).toBe(kinds.length);
     expect(explain(kinds[1]!).retry).toBe(false);
   });
   test("digits of an address are no status", () => {
-    expect(explain(error("FormatError", "http://x:40499/a.reel: 12 bytes too many")).title).toBe("This file is damaged");
+    expect(explain(error("FormatError", "http://x:404/503.reel: 12 bytes too many")).title).toBe("This file is damaged");
   });
 });
 

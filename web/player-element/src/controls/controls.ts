@@ -70,7 +70,11 @@ export class Controls implements Surface {
     this.#activity.connect(this.#root, signal);
     player.addEventListener("keydown", (event) => this.#key(event), { signal });
     acceptTaps(this.picture, (tap) => this.#tap(tap), signal);
-    if (player.controls) this.#acceptFiles(signal);
+    acceptDrops(this.#root, {
+      welcome: () => player.controls,
+      open: (file) => this.#openFile(file),
+      over: (inside) => this.#root.toggleAttribute("data-over", inside),
+    }, signal);
     document.addEventListener("fullscreenchange", () => this.refresh(), { signal });
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => player.applyBackground(), { signal });
     this.#root.addEventListener("pointerdown", (event) => this.#outside(event), { signal });
@@ -183,11 +187,6 @@ export class Controls implements Surface {
       this.#bar.toggleSettings(false);
     }
     if (path.includes(this.picture)) this.picture.focus({ preventScroll: true });
-  }
-
-  #acceptFiles(signal: AbortSignal): void {
-    const over = (inside: boolean) => this.#root.toggleAttribute("data-over", inside);
-    acceptDrops(this.#root, (file) => this.#openFile(file), over, signal);
   }
 
   #chosen(): void {
