@@ -43,6 +43,7 @@ def main(arguments: list[str]) -> int:
         exports = [f"-Wl,--export={name}" for name in names]
         compiler = [sys.executable, "-m", "ziglang", "c++", *FLAGS, *includes, *exports]
         subprocess.run([*compiler, *map(str, sources), "-o", str(made)], check=True)
+        made.chmod(0o644)  # the linker thinks it can be run
         made.replace(out)
     return 0
 

@@ -1,4 +1,4 @@
-// Vertices as the GPU takes them, as core/include/meshreel/packing.h has it.
+// Vertices as the GPU takes them, as core/wasm/packing.h has it.
 
 import { FormatError } from "../errors.ts";
 import type { Mesh } from "../mesh.ts";
