@@ -5,6 +5,7 @@ import { chosenFile } from "../src/drop.ts";
 import { formatAmount, formatRate, formatSpeed, formatTime, recordingName, speakTime } from "../src/format.ts";
 import { actionOf, KEYS, seekStep, takesKey } from "../src/keyboard.ts";
 import { explain } from "../src/messages.ts";
+import { readParameters, readTime } from "../src/parameters.ts";
 import { ranges } from "../src/ranges.ts";
 import { statisticsLines } from "../src/stats.ts";
 import { differs, goesOn } from "../src/view.ts";
@@ -182,5 +183,18 @@ describe("small parts", () => {
       "Skipped groups": "0", Display: "60 fps",
     });
     playback.dispose();
+  });
+});
+
+describe("the address of the page", () => {
+  test("parameters are attributes; flags that say no take them away", () => {
+    const { attributes, time, bench } = readParameters("?src=a%20b.reel&loop&autoplay=1&controls=0&mode=normal&quality=2&evil=1&speed=&t=1:05.5&bench");
+    expect([...attributes]).toEqual([
+      ["src", "a b.reel"], ["mode", "normal"], ["quality", "2"], ["autoplay", ""], ["loop", ""], ["controls", null],
+    ]);
+    expect([time, bench]).toEqual([65.5, true]);
+  });
+  test("a time that is none is the start", () => {
+    expect(["", "12.5", "2s", "1:00:01", "-4", "1e9", "x", null].map(readTime)).toEqual([0, 12.5, 2, 3601, 0, 0, 0, 0]);
   });
 });
