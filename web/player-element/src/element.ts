@@ -20,6 +20,12 @@ const PROPERTIES = [
   "background", "camera", "currentTime",
 ];
 
+declare global {
+  interface HTMLElementTagNameMap {
+    "meshreel-player": MeshreelPlayer;
+  }
+}
+
 export class MeshreelPlayer extends Reflected {
   static readonly observedAttributes = OBSERVED;
   /** Where playbacks and stages come from; index.ts sets the real one before it defines the element. */
@@ -172,8 +178,10 @@ export class MeshreelPlayer extends Reflected {
   }
   /** Opens once more what failed, where it stopped. */
   retry(): void {
+    const plays = !this.paused;
     this.#startAt = this.currentTime;
     this.#open();
+    if (plays) this.play().catch(() => undefined); // its error event tells
   }
   async vrSupported(): Promise<boolean> {
     const { xr } = navigator as Navigator & { xr?: { isSessionSupported(mode: string): Promise<boolean> } };
@@ -286,8 +294,9 @@ export class MeshreelPlayer extends Reflected {
   }
 
   #onView(event: Event): void {
-    if (event.type === "drawn") this.#controls.drawn();
-    else {
+    if (event.type === "drawn") {
+      if (this.#view?.shows) this.#controls.drawn();
+    } else {
       if (event.type !== "change") this.dispatchEvent(new Event(event.type));
       this.#controls.onStage(event.type);
     }

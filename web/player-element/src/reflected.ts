@@ -2,8 +2,11 @@
 
 import * as parse from "./attributes.ts";
 
+// Pages that are made on a server import this where there are no elements.
+const Element = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
+
 /** The base class of the element, with nothing but its reflected properties. */
-export class Reflected extends HTMLElement {
+export class Reflected extends Element {
   /** Properties set on the node before the element was defined hide the accessors; this sets them again. */
   protected upgrade(...names: string[]): void {
     for (const name of names) {

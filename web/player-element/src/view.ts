@@ -19,8 +19,8 @@ export class View {
   #dirty = true;
   #onScreen = true;
   #handle = 0;
-  #before = 0;
-  #gaps = 0;
+  #before: number | null = null; // when the last picture was due, of the page's or the headset's clock
+  #clock = 0; // ms; the playback's own, that stands still while nothing can be drawn
   #times: number[] = [];
   #stop = new AbortController();
   #sizes: ResizeObserver;
@@ -99,10 +99,11 @@ export class View {
   };
 
   #tick(now: number): boolean {
-    if (now - this.#before > LONGEST_GAP && this.#before > 0) this.#gaps += now - this.#before - PICTURE;
+    const since = this.#before === null ? PICTURE : now - this.#before;
+    this.#clock += since < 0 || since > LONGEST_GAP ? PICTURE : since;
     this.#before = now;
     const playback = this.#playback;
-    const shown = playback?.update(now - this.#gaps) ?? null;
+    const shown = playback?.update(this.#clock) ?? null;
     const fresh = this.#dirty || this.stage.presenting || differs(shown, this.#last);
     const moving = fresh && this.#draw(shown);
     if (shown) this.#last = shown;
@@ -115,7 +116,8 @@ export class View {
       return false;
     }
     this.#dirty = false;
-    const moving = this.stage.draw(shown ?? this.#last);
+    if (shown) this.#last = shown;
+    const moving = this.stage.draw(this.#last);
     this.#dirty ||= moving;
     this.drawn++;
     this.#times.push(performance.now());
@@ -137,7 +139,7 @@ export class View {
   }
 
   #onStage(event: Event): void {
-    if (event.type === "vrend") this.#before = 0; // the headset's clock is another one
+    if (event.type === "vrstart" || event.type === "vrend") this.#before = null; // the headset's clock is another one
     this.#report(event);
     this.refresh();
   }

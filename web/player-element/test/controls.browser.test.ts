@@ -273,6 +273,22 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await expect.poll(() => on.page.locator(".toasts").textContent()).toBe("No headset was found");
   });
 
+  test("time stands still while no picture can be drawn, as in a page that was hidden", async () => {
+    await on.shown("loop");
+    const times = await on.page.evaluate(async () => {
+      const player = document.querySelector("meshreel-player")!;
+      await player.enterVr();
+      await player.play();
+      const { frame } = engine.stages[0]!;
+      return [0, 20, 40, 600_040, 600_060, 300, 320].map((now) => {
+        frame!(now);
+        return Math.round(player.currentTime * 1000);
+      });
+    });
+    expect(times).toEqual([0, 20, 40, 57, 77, 93, 113]);
+    await on.get((player) => player.exitVr());
+  });
+
   test("with a headset its frames drive the picture", async () => {
     await on.page.evaluate(() => Object.defineProperty(navigator, "xr", { configurable: true, value: { isSessionSupported: async () => true } }));
     await on.shown();

@@ -11,9 +11,6 @@ const PAGE = fileURLToPath(new URL("./page_fake.ts", import.meta.url));
 
 declare global {
   const engine: FakeEngine; // of the page
-  interface HTMLElementTagNameMap {
-    "meshreel-player": MeshreelPlayer;
-  }
 }
 
 /** What the tests of a file share: one browser, one page. */

@@ -1,5 +1,7 @@
 // Names, focus, contrast and sizes: whether everybody can use the controls.
 
+import { readFileSync } from "node:fs";
+import { fileURLToPath } from "node:url";
 import { expect, test } from "vitest";
 import { describeOnPage } from "./fixture.ts";
 
@@ -11,6 +13,16 @@ describeOnPage("look of <meshreel-player>", (on) => {
       [...player.shadowRoot!.querySelectorAll("button, select, input:not([aria-hidden])")]
         .filter((node) => !node.getAttribute("aria-label") && !node.textContent!.trim()).length);
     expect(unnamed).toBe(0);
+  });
+
+  test("the parts are those of the documentation", async () => {
+    await on.shown("stats");
+    const parts = await on.get((player) =>
+      [...player.shadowRoot!.querySelectorAll("[part]")].flatMap((node) => [...node.part]));
+    const text = readFileSync(fileURLToPath(new URL("../../../docs/player.md", import.meta.url)), "utf8");
+    const section = text.slice(text.indexOf("`::part()` reaches"), text.indexOf("```css"));
+    const documented = [...section.matchAll(/`([a-z-]+)`/g)].map((match) => match[1]!);
+    expect(new Set(documented)).toEqual(new Set([...parts, "toast"])); // a toast is there only now and then
   });
 
   test("the focus is seen on everything that takes it", async () => {

@@ -11,7 +11,7 @@ const STATISTICS_EVERY = 250; // ms
 
 /** The statistics; they are counted only while they are shown. */
 export class StatisticsPanel {
-  readonly element = make("dl", { class: "panel statistics", part: "stats", "aria-label": "Statistics", role: "group" });
+  readonly element = make("dl", { class: "panel statistics", part: "statistics", "aria-label": "Statistics", role: "group" });
   #player: MeshreelPlayer;
   #timer = 0;
 
@@ -54,7 +54,7 @@ export class HelpPanel {
     const rows = KEYS.map(({ shown, says }) => make("div", {}, make("dt", {}, make("kbd", {}, shown)), make("dd", {}, says)));
     const button = new Button("close", "", () => ({ icon: "close", label: "Close" }), close);
     this.element = make(
-      "div", { class: "panel help-panel", part: "help", role: "dialog", "aria-label": "Keys" },
+      "div", { class: "panel help-panel", part: "help-panel", role: "dialog", "aria-label": "Keys" },
       make("div", { class: "title" }, make("strong", {}, "Keys"), button.element),
       make("dl", {}, ...rows),
       make("p", {}, "Drag to turn, with the right button or two fingers to move, wheel or pinch to come closer."),
