@@ -13,7 +13,7 @@ const out = resolve(here, process.env.MESHREEL_PLAYER ?? "../src/meshreel/player
 const KEPT = new Set(["core.wasm"]);
 
 /** Built one after the other (`vite build --mode NAME`), so that each is one file of a known name. */
-const ENTRIES: Readonly<Record<string, string>> = {
+export const ENTRIES: Readonly<Record<string, string>> = {
   "meshreel-player": "player-element/src/index.ts",
   worker: "player-core/src/worker_entry.ts",
   page: "player-element/src/page.ts",

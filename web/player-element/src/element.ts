@@ -39,6 +39,7 @@ export class MeshreelPlayer extends Reflected {
   #error: Error | null = null;
   #waiting = false;
   #playable = false;
+  #wished = false; // it plays, or would if it could
   #startAt = 0; // s; where to begin once the head is there
   #queued = false;
 
@@ -90,10 +91,11 @@ export class MeshreelPlayer extends Reflected {
     if (this.#playback === null && this.isConnected) this.#open();
     if (this.#playback === null) throw this.#error ?? new DOMException("there is nothing to play: set src", "NotSupportedError");
     this.#view?.wake();
-    await this.#playback.play();
+    await this.#play(this.#playback);
   }
 
   pause(): void {
+    this.#wished = false;
     this.#playback?.pause();
   }
 
@@ -102,8 +104,8 @@ export class MeshreelPlayer extends Reflected {
   }
   set currentTime(seconds: number) {
     if (!Number.isFinite(seconds)) throw new TypeError(`currentTime ${seconds}: a finite number of seconds is needed`);
-    if (this.#playback?.info) this.#playback.currentTime = seconds;
-    else this.#startAt = Math.max(0, seconds);
+    this.#startAt = Math.max(0, seconds);
+    if (this.#playback) this.#playback.currentTime = this.#startAt;
     this.#view?.wake();
   }
 
@@ -164,6 +166,7 @@ export class MeshreelPlayer extends Reflected {
   }
   /** Pauses and shows the frame so many further; negative goes back. */
   step(frames: number): void {
+    this.#wished = false;
     this.#playback?.step(frames);
     this.#view?.wake();
   }
@@ -178,10 +181,10 @@ export class MeshreelPlayer extends Reflected {
   }
   /** Opens once more what failed, where it stopped. */
   retry(): void {
-    const plays = !this.paused;
+    const wished = this.#wished;
     this.#startAt = this.currentTime;
     this.#open();
-    if (plays) this.play().catch(() => undefined); // its error event tells
+    if (wished) this.play().catch(() => undefined); // its error event tells
   }
   async vrSupported(): Promise<boolean> {
     const { xr } = navigator as Navigator & { xr?: { isSessionSupported(mode: string): Promise<boolean> } };
@@ -228,21 +231,27 @@ export class MeshreelPlayer extends Reflected {
       this.#fail(error instanceof Error ? error : new Error(String(error)));
       return;
     }
+    if (this.#startAt > 0) playback.currentTime = this.#startAt;
     this.#waiting = true;
     this.#listen(playback);
     this.dispatchEvent(new Event("loadstart"));
     view.show(playback);
     const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    if (this.autoplay && !still) playback.play().catch(() => undefined); // its error event tells
+    if (this.autoplay && !still) this.#play(playback).catch(() => undefined); // its error event tells
+  }
+
+  #play(playback: Playback): Promise<void> {
+    this.#wished = true;
+    return playback.play();
   }
 
   #close(): void {
     if (this.#playback === null) return;
-    this.#passing.abort();
     this.#view?.show(null);
-    this.#playback.dispose();
+    this.#playback.dispose(); // tells what to release
+    this.#passing.abort();
     this.#playback = null;
-    this.#waiting = this.#playable = false;
+    this.#waiting = this.#playable = this.#wished = false;
     this.dispatchEvent(new Event("emptied"));
   }
 
@@ -267,6 +276,7 @@ export class MeshreelPlayer extends Reflected {
     if (event.type === "canplay") this.#playable = true;
     if (["canplay", "playing", "seeked"].includes(event.type)) this.#waiting = false;
     if (event.type === "waiting") this.#waiting = true;
+    if (event.type === "ended") this.#wished = false;
     if (event.type === "error") {
       this.#fail(detail instanceof Error ? detail : new Error("unknown"));
       return;
@@ -283,7 +293,6 @@ export class MeshreelPlayer extends Reflected {
     this.#view.stage.begin(info);
     const camera = this.getAttribute("camera");
     if (camera) this.#view.stage.camera = camera;
-    if (this.#startAt > 0) this.#playback!.currentTime = Math.min(this.#startAt, info.duration);
   }
 
   #fail(error: Error): void {

@@ -1,7 +1,6 @@
 // The real engine: recordings come from the network or from files, workers decode them, three.js draws them.
 
-import { BlobSource, HttpSource, Player } from "@meshreel/player-core";
-import type { WorkerLike } from "@meshreel/player-core";
+import { BlobSource, HttpSource, Player, WorkerPool, type WorkerLike } from "@meshreel/player-core";
 import type { Engine, Settings, Stage } from "./stage.ts";
 import { ThreeStage } from "./stage_three.ts";
 
@@ -12,19 +11,34 @@ export interface Files {
   readonly draco: URL;
 }
 
+const POOL_KEPT = 1000; // ms that workers are kept after the last player is closed: a change of `src` needs them again
+
+/** Workers, and how many players use them. */
+interface Shared {
+  readonly workers: WorkerPool;
+  users: number;
+}
+
 export class RealEngine implements Engine {
   readonly #files: Files;
+  #shared: Shared | null = null; // what the next player gets
 
   constructor(files: Files) {
     this.#files = files;
   }
 
   open(source: string | Blob, { quality, interpolate, loop, playbackRate }: Settings): Player {
-    const { core, draco } = this.#files;
-    const player = new Player({
+    const { worker, core, draco } = this.#files;
+    const create = (): WorkerLike => openWorker(worker);
+    const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: core.href, draco: draco.href }), users: 0 });
+    shared.users++;
+    const player = new PooledPlayer({
       source: typeof source === "string" ? new HttpSource(source) : new BlobSource(source),
-      workers: { create: () => openWorker(this.#files.worker), core: core.href, draco: draco.href },
+      workers: shared.workers,
     });
+    player.leave = () => this.#leave(shared);
+    // Workers that could not be started are not tried again by their pool: whoever tries again gets new ones.
+    player.addEventListener("error", () => this.#forget(shared));
     Object.assign(player, { quality, interpolate, loop, playbackRate });
     player.load().catch(() => undefined); // its error event tells
     return player;
@@ -32,6 +46,30 @@ export class RealEngine implements Engine {
 
   stage(canvas: HTMLCanvasElement): Stage {
     return new ThreeStage(canvas);
+  }
+
+  #leave(shared: Shared): void {
+    shared.users--;
+    setTimeout(() => {
+      if (shared.users > 0) return;
+      this.#forget(shared);
+      shared.workers.dispose();
+    }, POOL_KEPT);
+  }
+
+  #forget(shared: Shared): void {
+    if (this.#shared === shared) this.#shared = null;
+  }
+}
+
+/** A player that tells when it no longer needs the pool. */
+class PooledPlayer extends Player {
+  leave: (() => void) | null = null;
+
+  override dispose(): void {
+    super.dispose();
+    this.leave?.();
+    this.leave = null;
   }
 }
 

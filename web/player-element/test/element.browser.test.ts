@@ -134,7 +134,7 @@ describeOnPage("<meshreel-player>", (on) => {
       player.src = "walk.reel";
       player.currentTime = 0.75;
       document.body.append(player);
-      await new Promise((done) => player.addEventListener("seeked", done));
+      await new Promise((done) => player.addEventListener("canplay", done));
       return player.currentTime;
     });
     expect(time).toBe(0.75);

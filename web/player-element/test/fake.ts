@@ -48,7 +48,8 @@ export class FakePlayback extends EventTarget implements Playback {
     return this.#time;
   }
   set currentTime(seconds: number) {
-    this.#time = Math.min(this.duration, Math.max(0, seconds));
+    this.#time = this.info ? Math.min(this.duration, Math.max(0, seconds)) : seconds;
+    if (!this.info) return;
     this.ended = false;
     this.seeking = true;
     this.#tell("seeking");
