@@ -1,6 +1,6 @@
 // Content time from display time.
 
-const LONGEST_STEP = 1; // s of display time; a longer one means that nothing was displayed, and time stood still
+const LONGEST_STEP = 0.5; // s of display time; where nothing was displayed for longer, time stood still
 const ROUNDING = 1e-6; // s; a time that is so little short of a frame's own is that frame's
 
 /** When each frame is shown, s from the first: `starts` has a number for each frame, then the end of the last. */
@@ -48,12 +48,26 @@ export class Clock {
   time = 0; // s
   rate = 1;
   loop = false;
-  isRunning = false;
+  #isRunning = false;
   #last = NaN; // ms, of the picture before
   #before = 0; // s, time at the picture before
 
   constructor(timeline: Timeline) {
     this.timeline = timeline;
+  }
+
+  get isRunning(): boolean {
+    return this.#isRunning;
+  }
+
+  /** Runs from the next picture on. */
+  start(): void {
+    this.#isRunning = true;
+    this.#last = NaN;
+  }
+
+  stop(): void {
+    this.#isRunning = false;
   }
 
   get isAtEnd(): boolean {
@@ -65,15 +79,15 @@ export class Clock {
     const passed = (now - this.#last) / 1000;
     this.#last = now;
     this.#before = this.time;
-    if (!this.isRunning || !(passed > 0)) return;
+    if (!this.#isRunning || !(passed > 0)) return;
     const { duration } = this.timeline;
     this.time += Math.min(passed, LONGEST_STEP) * this.rate;
     if (this.time >= duration) this.time = this.loop ? this.time % duration : duration;
   }
 
-  /** Takes the last step back: what it led to is not at hand. Time stands still until `isRunning` is set again. */
+  /** Stops, and takes the last step back: what it led to is not at hand. */
   hold(): void {
     this.time = this.#before;
-    this.isRunning = false;
+    this.#isRunning = false;
   }
 }

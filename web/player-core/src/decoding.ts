@@ -24,7 +24,7 @@ interface State {
 }
 
 const TRIES = 3; // of a job whose state a worker had dropped
-const TIMINGS = 12; // jobs that the load is measured over
+const [FEWEST_TIMINGS, TIMINGS] = [2, 12]; // jobs that the load is measured over, at least and at most
 
 export class Decoding implements Holdings {
   /** Counts what changes in what can be shown. */
@@ -40,6 +40,7 @@ export class Decoding implements Holdings {
   readonly #running = new Map<number, Step>();
   readonly #submitted = new Map<number, Step>();
   readonly #failed = new Set<number>();
+  #lost: readonly Chunk[] = []; // that the file ends before or within
   readonly #tries = new Map<number, number>();
   #keep: ReadonlySet<number> = new Set();
   #bytesPerFrame = 0; // of the last groups
@@ -82,16 +83,6 @@ export class Decoding implements Holdings {
     return this.#decoded.get(chunk.number)?.bytes ?? this.#bytesPerFrame * chunk.frameCount;
   }
 
-  get decodedBytes(): number {
-    let sum = 0;
-    for (const { bytes } of this.#decoded.values()) sum += bytes;
-    return sum;
-  }
-
-  get decodedCount(): number {
-    return this.#decoded.size;
-  }
-
   /** Groups that cannot be shown. */
   get failedGroups(): number {
     let count = 0;
@@ -99,14 +90,11 @@ export class Decoding implements Holdings {
     return count;
   }
 
-  /** Milliseconds of decoding a frame of one track, over the last groups; 0 before the first. */
+  /** Milliseconds of decoding a frame of one track, over the last groups; 0 before there are some. */
   get msPerFrame(): number {
+    if (this.#timings.length < FEWEST_TIMINGS) return 0;
     const frames = this.#timings.reduce((sum, timing) => sum + timing.frames, 0);
-    return frames > 0 ? this.#timings.reduce((sum, timing) => sum + timing.ms, 0) / frames : 0;
-  }
-
-  get isIdle(): boolean {
-    return this.#running.size === 0 && this.#submitted.size === 0;
+    return this.#timings.reduce((sum, timing) => sum + timing.ms, 0) / frames;
   }
 
   /** Does the steps whose bytes are at hand, in their order; cancels all others that have not started. */
@@ -120,6 +108,11 @@ export class Decoding implements Holdings {
       this.#submitted.set(step.chunk.number, step);
     }
     for (const step of [...this.#submitted.values()]) this.#submit(step);
+  }
+
+  /** Forgets how long decoding took, as where it will take another time from here on. */
+  resetTimings(): void {
+    this.#timings.length = 0;
   }
 
   /** Lets go of what is decoded and is not in the plan any more. States of the background may stay while they are small. */
@@ -136,27 +129,41 @@ export class Decoding implements Holdings {
     }
   }
 
-  /** Chunks that were given up may be tried again, as with fewer layers. */
+  /** Damaged chunks may be tried again, as with fewer layers. */
   forgive(): void {
     this.#failed.clear();
     this.#tries.clear();
     this.version++;
+    for (const chunk of this.#lost) this.#giveUp(chunk);
   }
 
-  /** Gives up a chunk and those that need it. */
-  fail(chunk: Chunk, message: string): void {
+  /** Gives up the chunks that a file which ends at `size` has lost, and those that need them. */
+  cut(size: number): void {
+    this.#lost = this.#head.chunks.filter((chunk) => chunk.offset + chunk.size > size);
+    for (const chunk of this.#lost) this.#giveUp(chunk);
+    const where = `${describe(this.#lost[0])} and all behind it are missing`;
+    this.#events.warn(new FormatError(`truncated, the file ends at byte ${size} of ${this.#head.size}: ${where}, copy it again`));
+  }
+
+  /** Releases all. */
+  close(): void {
+    this.#keep = new Set();
+    for (const number of [...this.#decoded.keys()]) this.#drop(number);
+  }
+
+  /** Gives up a chunk and those that need it; returns how many these are. */
+  #giveUp(chunk: Chunk): number {
     const numbers = this.#links.withDependents(chunk.number).filter((number) => !this.#failed.has(number));
     for (const number of numbers) this.#failed.add(number);
     this.version++;
-    const others = numbers.length - 1;
-    const more = others > 0 ? `, and ${others} that ${others === 1 ? "needs" : "need"} it` : "";
-    if (numbers.length > 0) this.#events.warn(new FormatError(`${describe(chunk)}: ${message}; it is skipped${more}`));
+    return numbers.length;
   }
 
-  close(): void {
-    this.#share.close();
-    this.#keep = new Set();
-    for (const number of [...this.#decoded.keys()]) this.#drop(number);
+  #fail(chunk: Chunk, message: string): void {
+    const others = this.#giveUp(chunk) - 1;
+    const more = others > 0 ? `, and ${others} that ${others === 1 ? "needs" : "need"} it` : "";
+    const text = message.startsWith(`chunk ${chunk.number} `) ? message : `${describe(chunk)}: ${message}`;
+    this.#events.warn(new FormatError(`${text}; it is skipped${more}`));
   }
 
   #hasState({ chunk, quality }: Step): boolean {
@@ -205,7 +212,7 @@ export class Decoding implements Holdings {
       this.#submitted.clear();
       this.#states.delete(chunk.number);
       if (outcome.missingState && this.#countTry(chunk) < TRIES) this.#forgetChain(chunk);
-      else this.fail(chunk, outcome.message);
+      else this.#fail(chunk, outcome.message);
     }
     this.#events.changed();
   }
@@ -230,10 +237,10 @@ export class Decoding implements Holdings {
     this.#events.release(packed);
   }
 
-  #time(chunk: Chunk, ms: number): void {
-    if (chunk.kind !== "group") return; // the background is decoded once
+  #time({ kind, frameCount: frames }: Chunk, ms: number): void {
+    if (kind !== "group") return; // the background is decoded once
     this.lastMs = ms;
-    this.#timings.push({ ms, frames: chunk.frameCount });
+    this.#timings.push({ ms, frames });
     if (this.#timings.length > TIMINGS) this.#timings.shift();
   }
 

@@ -37,7 +37,13 @@ export interface Step {
   readonly quality: number;
   show: boolean; // or only its state is wanted, for the next of its chain
   decode: boolean; // or it is only fetched, for later
-  urgent: boolean; // the frame at the play head needs it
+  ahead: number; // s of content until a frame needs it; 0 or less: that at the play head does
+}
+
+/** Why a chunk is wanted. */
+interface Need {
+  readonly ahead: number; // s
+  readonly decode: boolean;
 }
 
 export interface Plan {
@@ -62,7 +68,7 @@ export function plan(head: Head, links: Links, timeline: Timeline, outlook: Outl
     for (const group of groupsBetween(head, first, last)) {
       const frame = Math.max(group.firstFrame, first);
       const ahead = timeline.starts[frame] - time + (frame < now ? timeline.duration : 0);
-      planner.addGroup(group, frame, frame === now, ahead <= decodeSeconds);
+      planner.addGroup(group, frame, frame === now ? 0 : ahead, ahead <= decodeSeconds);
     }
   }
   for (const group of groupsBetween(head, timeline.frameAt(time - behindSeconds), now)) planner.keep.add(group.number);
@@ -110,27 +116,27 @@ class Planner {
     this.#groupsOfTrack = head.tracks.map(() => 0);
   }
 
-  addGroup(group: Chunk, frame: number, urgent: boolean, isNear: boolean): void {
+  addGroup(group: Chunk, frame: number, ahead: number, isNear: boolean): void {
     const background = this.#head.staticOfFrame(frame);
-    if (background !== null) this.#add(background, urgent, isNear);
+    if (background !== null) this.#add(background, { ahead, decode: isNear });
     if (group.form === Form.EMPTY) return;
     const isSure = ++this.#groupsOfTrack[group.track] <= SURE_GROUPS;
     this.#bytes += this.#holdings.bytesOf(group);
     const decode = isNear && (isSure || this.#bytes <= this.#outlook.memory);
     if (decode) this.#chains.add(this.#links.rootOf(group));
-    this.#add(group, urgent, decode);
+    this.#add(group, { ahead, decode });
   }
 
   plan(): Plan {
     const steps = [...this.#steps.values()];
-    const urgent = steps.filter((step) => step.urgent).sort((a, b) => a.chunk.number - b.chunk.number);
-    return { steps: [...urgent, ...steps.filter((step) => !step.urgent)], keep: this.keep, chainCount: this.#chains.size };
+    const urgent = steps.filter((step) => step.ahead <= 0).sort((a, b) => a.chunk.number - b.chunk.number);
+    return { steps: [...urgent, ...steps.filter((step) => step.ahead > 0)], keep: this.keep, chainCount: this.#chains.size };
   }
 
   /** Wants a chunk to be shown, and before it what it is predicted from, as far as that is not at hand. */
-  #add(chunk: Chunk, urgent: boolean, decode: boolean): void {
+  #add(chunk: Chunk, need: Need): void {
     if (this.#holdings.isFailed(chunk)) return;
-    if (decode) this.keep.add(chunk.number);
+    if (need.decode) this.keep.add(chunk.number);
     const wanted = this.#wantedOf(chunk);
     const decoded = this.#holdings.decodedAt(chunk);
     if (decoded === wanted || (decoded >= 0 && !this.#outlook.exact)) return;
@@ -145,8 +151,8 @@ class Planner {
       }
       before.push(previous);
     }
-    for (const other of before.reverse()) this.#step(other, quality, false, { urgent, decode });
-    this.#step(chunk, quality, true, { urgent, decode });
+    for (const other of before.reverse()) this.#step(other, quality, false, need);
+    this.#step(chunk, quality, true, need);
   }
 
   #wantedOf(chunk: Chunk): number {
@@ -157,12 +163,12 @@ class Planner {
     return Math.max(this.#steps.get(chunk.number)?.quality ?? -1, this.#holdings.stateAt(chunk));
   }
 
-  #step(chunk: Chunk, quality: number, show: boolean, { urgent, decode }: { urgent: boolean; decode: boolean }): void {
+  #step(chunk: Chunk, quality: number, show: boolean, { ahead, decode }: Need): void {
     const old = this.#steps.get(chunk.number);
-    const step = old ?? { chunk, quality: Math.min(quality, mostQuality(chunk)), show, urgent, decode };
+    const step = old ?? { chunk, quality: Math.min(quality, mostQuality(chunk)), show, decode, ahead };
     step.show ||= show && decode;
-    step.urgent ||= urgent;
     step.decode ||= decode;
+    step.ahead = Math.min(step.ahead, ahead);
     this.#steps.set(chunk.number, step);
   }
 }
