@@ -266,8 +266,18 @@ export class MeshreelPlayer extends Reflected {
     this.#passing = new AbortController();
     const { signal } = this.#passing;
     for (const type of PASSED) playback.addEventListener(type, (event) => this.#onPlayback(event), { signal });
-    playback.addEventListener("ready", (event) => this.#view?.stage.prepare((event as CustomEvent<Packed>).detail), { signal });
+    playback.addEventListener("ready", (event) => this.#onReady((event as CustomEvent<Packed>).detail), { signal });
     playback.addEventListener("release", (event) => this.#view?.stage.release((event as CustomEvent<Packed>).detail), { signal });
+  }
+
+  #onReady(packed: Packed): void {
+    if (!this.#view) return;
+    try {
+      this.#view.stage.prepare(packed);
+    } catch (error) {
+      this.#onPlayback(new CustomEvent("warning", { detail: error }));
+    }
+    this.#view.wake(); // it may be what is waited for
   }
 
   #onPlayback(event: Event): void {

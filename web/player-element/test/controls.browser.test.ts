@@ -151,13 +151,14 @@ describeOnPage("controls of <meshreel-player>", (on) => {
   test("help opens with a question mark, takes the focus, and closes with Escape", async () => {
     await on.shown();
     await on.press("?");
-    const help = on.page.getByRole("dialog", { name: "Keys" });
+    const help = on.page.getByRole("dialog", { name: "Keys and gestures" });
     expect(await help.isVisible()).toBe(true);
     expect(await help.textContent()).toContain("Next frame");
     await on.page.keyboard.press("Escape");
     expect(await help.isVisible()).toBe(false);
     await on.page.getByRole("button", { name: "Settings" }).click();
     await on.page.locator("button.help").click();
+    expect(await on.page.locator(".settings").isVisible()).toBe(false);
     await help.getByRole("button", { name: "Close" }).click();
     expect(await help.isVisible()).toBe(false);
   });

@@ -80,7 +80,7 @@ export class FakePlayback extends EventTarget implements Playback {
   }
   step(frames: number): void {
     this.pause();
-    this.currentTime = (this.currentFrame + frames) / INFO.frameRate;
+    this.currentTime = Math.min(INFO.frameCount - 1, this.currentFrame + frames) / INFO.frameRate;
   }
 
   update(now: number): Shown | null {

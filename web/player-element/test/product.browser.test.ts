@@ -66,6 +66,21 @@ describeInBrowser("the built player", () => {
     await page.close();
   });
 
+  test("the quality that is chosen is shown, also while it is paused", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&quality=0");
+    await ready(page);
+    const shown = (quality: number) =>
+      page.waitForFunction((wanted) => document.querySelector("meshreel-player")!.statistics!.quality === wanted, quality);
+    await shown(0);
+    const most = await page.evaluate(() => document.querySelector("meshreel-player")!.info!.mostQuality);
+    expect(most).toBeGreaterThan(0);
+    await page.locator("button.more").click();
+    await page.getByLabel("Quality").selectOption({ label: "Full" });
+    await shown(most);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
   test("a file that is not there is told", async () => {
     const { page } = await site.visit("player/index.html?src=/none.reel");
     await page.getByRole("alert").waitFor();
@@ -101,7 +116,7 @@ describeInBrowser("the built player", () => {
 
   test("it plays in a frame without rights, and offers no full screen there", async () => {
     site.write("inner.html", `<!doctype html>${SCRIPT}${PLAYER}`);
-    site.write("frame.html", '<!doctype html><link rel="icon" href="data:,"><iframe src="inner.html" sandbox="allow-scripts allow-same-origin" width="340" height="260"></iframe>');
+    site.write("frame.html", '<!doctype html><link rel="icon" href="data:,"><iframe src="inner.html" sandbox="allow-scripts allow-same-origin" allow="fullscreen 'none'" width="340" height="260"></iframe>');
     const { page, errors } = await site.visit("frame.html");
     const frame = page.frame({ url: /inner/ })!;
     await frame.waitForFunction(() => customElements.get("meshreel-player"));

@@ -55,8 +55,7 @@ function seekBy(player: MeshreelPlayer, direction: number): void {
 }
 
 function lastFrame(player: MeshreelPlayer): void {
-  const info = player.info;
-  if (info && info.frameCount > 0) player.currentTime = (info.frameCount - 1) / info.frameRate;
+  if (player.info) player.step(player.info.frameCount); // held at the last; its time is the recording's to know
 }
 
 async function toggleFullscreen(player: MeshreelPlayer, surface: Surface): Promise<void> {

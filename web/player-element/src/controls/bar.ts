@@ -108,7 +108,7 @@ export class Bar {
   #rows(): Button[] {
     return [
       this.#button("open", "", () => ({ icon: "open", label: "Open a file" }), () => this.#acts.openFile()),
-      this.#button("help", "?", () => ({ icon: "help", label: "Keys" }), () => this.#acts.act("help")),
+      this.#button("help", "?", () => ({ icon: "help", label: "Keys and gestures" }), () => this.#acts.act("help")),
     ];
   }
 

@@ -121,6 +121,7 @@ export class Controls implements Surface {
   }
 
   toggleHelp(): void {
+    this.#bar.toggleSettings(false);
     this.#help.toggle(!this.#help.open);
     if (!this.#help.open) this.picture.focus({ preventScroll: true });
   }

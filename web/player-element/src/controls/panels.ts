@@ -54,8 +54,8 @@ export class HelpPanel {
     const rows = KEYS.map(({ shown, says }) => make("div", {}, make("dt", {}, make("kbd", {}, shown)), make("dd", {}, says)));
     const button = new Button("close", "", () => ({ icon: "close", label: "Close" }), close);
     this.element = make(
-      "div", { class: "panel help-panel", part: "help-panel", role: "dialog", "aria-label": "Keys" },
-      make("div", { class: "title" }, make("strong", {}, "Keys"), button.element),
+      "div", { class: "panel help-panel", part: "help-panel", role: "dialog", "aria-label": "Keys and gestures" },
+      make("div", { class: "title" }, make("strong", {}, "Keys and gestures"), button.element),
       make("dl", {}, ...rows),
       make("p", {}, "Drag to turn, with the right button or two fingers to move, wheel or pinch to come closer."),
     );

@@ -71,6 +71,7 @@ export const BAR = `
 .settings .tool { display: none; }
 @container player (max-height: 280px) { .settings :is(.choice, .button) { min-height: 34px; height: 34px; } .choice select { height: 28px; } }
 @container player (max-width: 620px) { .row .tool { display: none; } .settings .tool { display: flex; } }
-@container player (max-width: 400px) { .row .step { display: none; } .time .all { display: none; } }
+@container player (max-width: 400px) { .row .step { display: none; } }
+@container player (max-width: 300px) { .time .all { display: none; } }
 @container player (max-width: 400px) { .bar { padding: 0 2px 2px; } .row { gap: 0; } }
 `;

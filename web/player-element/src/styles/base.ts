@@ -94,7 +94,10 @@ button:disabled, select:disabled { cursor: default; opacity: .45; }
 @keyframes come { from { opacity: 0; } }
 
 .veil, .empty { position: absolute; display: none; place-content: center; justify-items: center; gap: 12px; text-align: center; }
-.veil { inset: 8px; border: 2px dashed var(--_accent); border-radius: 10px; background: var(--_panel); pointer-events: none; }
+.veil {
+  inset: 8px; border: 2px dashed var(--_accent); border-radius: 10px; background: color-mix(in srgb, var(--_panel) 85%, transparent);
+  pointer-events: none;
+}
 .empty { inset: 0; padding: 0 12px calc(var(--_button) + 12px); }
 .veil .icon, .empty .icon { width: 40px; height: 40px; color: var(--_quiet); }
 @container player (max-height: 220px) { .empty .icon { display: none; } }

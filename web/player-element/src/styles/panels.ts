@@ -13,6 +13,7 @@ export const PANELS = `
 .statistics dd { margin: 0; }
 @container player (max-width: 360px) or (max-height: 300px) {
   .statistics { padding: 4px 8px; font-size: 10px; line-height: 1.35; }
+  .root[data-controls] .statistics { max-height: calc(100% - var(--_button) - 42px); overflow: auto; pointer-events: auto; }
   .statistics div { grid-template-columns: 78px auto; }
 }
 
@@ -45,11 +46,13 @@ kbd { padding: 1px 7px; border: 1px solid var(--_line); border-radius: 5px; back
 @container player (max-width: 360px) or (max-height: 240px) {
   .error { padding: 8px 12px; gap: 3px; font-size: 13px; }
   .error > .icon, .error code { display: none; }
-  .text { min-height: 32px; padding: 0 12px; }
+  .error strong { font-size: 14px; }
+  .error .ways { flex-wrap: nowrap; gap: 6px; }
+  .text { min-height: 32px; padding: 0 10px; font-size: 13px; white-space: nowrap; }
 }
 
 .toasts {
-  position: absolute; left: 50%; bottom: calc(var(--_button) + 38px); translate: -50%; display: grid; justify-items: center; gap: 6px; width: max-content;
+  position: absolute; left: 50%; bottom: calc(var(--_button) + 58px); translate: -50%; display: grid; justify-items: center; gap: 6px; width: max-content;
   max-width: calc(100% - 16px); pointer-events: none;
 }
 .toast {
