@@ -116,7 +116,8 @@ describeInBrowser("the built player", () => {
 
   test("it plays in a frame without rights, and offers no full screen there", async () => {
     site.write("inner.html", `<!doctype html>${SCRIPT}${PLAYER}`);
-    site.write("frame.html", '<!doctype html><link rel="icon" href="data:,"><iframe src="inner.html" sandbox="allow-scripts allow-same-origin" allow="fullscreen 'none'" width="340" height="260"></iframe>');
+    const frameOf = `<iframe src="inner.html" sandbox="allow-scripts allow-same-origin" allow="fullscreen 'none'" width="340" height="260"></iframe>`;
+    site.write("frame.html", `<!doctype html><link rel="icon" href="data:,">${frameOf}`);
     const { page, errors } = await site.visit("frame.html");
     const frame = page.frame({ url: /inner/ })!;
     await frame.waitForFunction(() => customElements.get("meshreel-player"));
