@@ -181,6 +181,36 @@ describeInBrowser("the built player", () => {
     await page.close();
   }, 90_000);
 
+  test("twenty loops leave heap and GPU memory as they were", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/scene.reel&autoplay&loop&speed=4");
+    await ready(page);
+    const devtools = await page.context().newCDPSession(page);
+    const loops = (count: number) => page.evaluate((wanted) => new Promise<void>((done) => {
+      const player = document.querySelector("meshreel-player")!;
+      let [before, seen] = [player.currentTime, 0];
+      const look = () => {
+        if (player.currentTime < before) seen++;
+        before = player.currentTime;
+        if (seen < wanted) requestAnimationFrame(look);
+        else done();
+      };
+      look();
+    }), count);
+    const memory = async () => {
+      await devtools.send("HeapProfiler.collectGarbage");
+      const { usedSize } = await devtools.send("Runtime.getHeapUsage");
+      return { heap: usedSize, gpu: await page.evaluate(() => document.querySelector("meshreel-player")!.statistics!.gpuBytes) };
+    };
+    await loops(40); // until the browser has compiled what runs often, which takes memory once
+    const before = await memory();
+    await loops(20);
+    const after = await memory();
+    expect(after.heap / before.heap).toBeLessThan(1.05);
+    expect(after.gpu / before.gpu).toBeLessThan(1.05);
+    expect(errors).toEqual([]);
+    await page.close();
+  }, 60_000);
+
   test("two builds give the same bytes, without maps and without addresses of others", async () => {
     await buildPlayer(join(site.folder, "again"));
     const files = readdirSync(join(site.folder, "player")).sort();
