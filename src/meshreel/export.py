@@ -1,6 +1,6 @@
-"""A video as one animated file that other programs play: GLB, or USD.
+"""A .reel file as one animated file that other programs play: GLB, or USD.
 
-In: a Video and a path. Out: the file. Frames of a group that have the same vertices become one shape that moves; other
+In: a reader and a path. Out: the file. Frames of a group that have the same vertices become one shape that moves; other
 frames a shape each, shown for one frame. The states of a background are shapes that stand still.
 """
 
@@ -16,13 +16,13 @@ from typing import Literal
 import numpy as np
 
 from .container.reader import Chunk, ReelReader
-from .decoder import BACKGROUND, Video
 from .errors import InputError
 from .format.layout import Form
 from .geometry.topology import vertex_normals
 from .io.animated_glb import animated_glb
 from .io.animated_usd import EXTENSIONS, animated_usd
 from .io.animation import Animation, AnimationWriter, Points, Shape, Up, check_target
+from .tracks import Background, Track
 from .types import Mesh
 
 MOST_TOGETHER = 64  # frames of a shape: what viewers take as morph targets of one mesh, and what is in memory
@@ -33,18 +33,29 @@ Progress = Callable[[str, int, int], None]  # stage, frames done, frames of all
 
 @dataclass(frozen=True, slots=True)
 class ExportOptions:
-    """What of a video is exported."""
+    """What of a file is exported."""
 
+    layers: int | None = None  # of a group beyond its first, at most; None: all
     only: Literal["all", "background", "moving"] = "all"
-    up: Up = "y"  # axis of the meshes that points up; +y does in the file
+    up: Up = "y"  # axis of the meshes that points up; +y does in what is written
 
     def __post_init__(self) -> None:
-        if self.only not in ("all", "background", "moving"):
-            raise InputError(f"only {self.only!r}: choose all, background or moving")
+        if self.layers is not None and self.layers < 0:
+            raise InputError(f"layers must not be negative, got {self.layers}: give a number, or None for all")
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """A file, decoded as it is asked for, and which frames of it are wanted."""
+
+    reader: ReelReader
+    tracks: tuple[Track, ...]
+    background: Background
+    frames: range
 
 
 def export(
-    video: Video,
+    reader: ReelReader,
     path: Path,
     frames: range | None = None,
     options: ExportOptions = ExportOptions(),
@@ -55,10 +66,16 @@ def export(
     The file appears when it is complete. Memory is that of two groups. Raises InputError where the format cannot hold
     them or the file cannot be written, and FormatError where a chunk is damaged.
     """
-    frames = range(len(video)) if frames is None else frames
+    frames = range(reader.frame_count) if frames is None else frames
+    tracks = tuple(Track(reader, number, options.layers) for number in range(len(reader.tracks)))
+    source = _Source(reader, tracks, Background(reader), frames)
     written = 0
-    with _writer(path, _animation(video.reader, frames, options.up)) as writer:
-        for shape in _shapes(video, frames, options, progress):
+    with _writer(path, _animation(reader, frames, options.up)) as writer:
+        if options.only != "moving":
+            for shape in _states(source):
+                writer.add(shape)
+                written += 1
+        for shape in _moving(source, progress) if options.only != "background" else ():
             writer.add(shape)
             written += 1
     return written
@@ -88,24 +105,9 @@ def _animation(reader: ReelReader, frames: range, up: Up) -> Animation:
     return Animation(times, header.frame_rate, (x, y, z), up)
 
 
-def _shapes(video: Video, frames: range, options: ExportOptions, progress: Progress | None) -> Iterator[Shape]:
-    """The background's, then those of one track after the other. Frames are counted from the first wanted."""
-    if options.only != "moving":
-        yield from _states(video, frames)
-    tracks = video.reader.tracks if options.only != "background" else ()
-    for number, groups in enumerate(tracks):
-        for group in groups:
-            own = range(max(group.first_frame, frames.start), min(group.first_frame + group.frame_count, frames.stop))
-            if own:
-                yield from _group_shapes(video, group, own, frames)
-                if progress is not None:
-                    done = number * len(frames) + own.stop - frames.start
-                    progress("export", done // len(tracks), len(frames))
-
-
-def _states(video: Video, frames: range) -> Iterator[Shape]:
-    """A shape for each state of the background, shown where groups name it."""
-    reader = video.reader
+def _states(source: _Source) -> Iterator[Shape]:
+    """A shape for each state of the background, shown where groups name it; frames count from the first wanted."""
+    reader, frames = source.reader, source.frames
     spans: dict[int, list[tuple[int, int]]] = {}
     starts = sorted({frames.start, *(group.first_frame for group in reader.groups if group.first_frame in frames)})
     for start, end in pairwise([*starts, frames.stop]):
@@ -114,23 +116,36 @@ def _states(video: Video, frames: range) -> Iterator[Shape]:
             first = own.pop()[0] if own and own[-1][1] == start else start
             own.append((first, end))
     for number, own in enumerate(spans.values()):
-        mesh = video.background(own[0][0])
-        if not mesh.is_empty:
+        mesh = source.background.of_frame(own[0][0])
+        if mesh is not None and not mesh.is_empty:
             shown = tuple((first - frames.start, end - frames.start) for first, end in own)
-            yield Shape(BACKGROUND, f"state_{number}", mesh.faces, shown[0][0], 1, map(_points, [mesh]), shown)
+            yield Shape("background", f"state_{number}", mesh.faces, shown[0][0], 1, map(_points, [mesh]), shown)
 
 
-def _group_shapes(video: Video, group: Chunk, own: range, frames: range) -> Iterator[Shape]:
+def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
+    """The shapes of one track after the other."""
+    frames = source.frames
+    for number, groups in enumerate(source.reader.tracks):
+        for group in groups:
+            own = range(max(group.first_frame, frames.start), min(group.first_frame + group.frame_count, frames.stop))
+            if own:
+                yield from _group_shapes(source, group, own)
+                if progress is not None:
+                    done = number * len(frames) + own.stop - frames.start
+                    progress("export", done // len(source.tracks), len(frames))
+
+
+def _group_shapes(source: _Source, group: Chunk, own: range) -> Iterator[Shape]:
     """The shapes of those frames of a group that are wanted."""
-    track = video.tracks[group.track]
+    track = source.tracks[group.track]
     if group.form == Form.EMPTY:
         track[own.start]  # damage is told, however little there is
         return
     meshes = [track[frame] for frame in own]
     for a, b in _runs(meshes):
         if not meshes[a].is_empty:
-            moving = [*meshes[a:b], *_ahead(video, group, meshes[:b], range(own[b - 1] + 1, frames.stop))]
-            first, name = own[a] - frames.start, f"frames_{own[a]}_to_{own[b - 1]}"
+            moving = [*meshes[a:b], *_ahead(source, group, meshes[:b], own[b - 1] + 1)]
+            first, name = own[a] - source.frames.start, f"frames_{own[a]}_to_{own[b - 1]}"
             span = (first, first + b - a)
             part = f"track_{group.track}"
             yield Shape(part, name, meshes[a].faces, first, len(moving), map(_points, moving), (span,))
@@ -145,20 +160,20 @@ def _runs(meshes: Sequence[Mesh]) -> Iterator[tuple[int, int]]:
             first = frame
 
 
-def _ahead(video: Video, group: Chunk, meshes: Sequence[Mesh], rest: range) -> list[Mesh]:
-    """The first of the frames behind `meshes`, of a group, where the last of them moves on to it; else none.
+def _ahead(source: _Source, group: Chunk, meshes: Sequence[Mesh], frame: int) -> list[Mesh]:
+    """The frame behind `meshes`, which are of a group, where the last of them moves on to it; else none.
 
     A group that is predicted from this one may have the same vertices. A patch may have the same faces by chance, so
     the last two frames must be known to have none.
     """
-    if not rest:
+    if frame not in source.frames:
         return []
-    track, following = video.tracks[group.track], video.reader.chunk_of_frame(rest.start, group.track)
+    track, following = source.tracks[group.track], source.reader.chunk_of_frame(frame, group.track)
     if following == group:
-        return [track[rest.start]] if _is_moved(meshes[-1], track[rest.start]) else []
-    if video.reader.group_before(following) != group or len(meshes) < 2 or not _is_moved(*meshes[-2:]):
+        return [track[frame]] if _is_moved(meshes[-1], track[frame]) else []
+    if source.reader.group_before(following) != group or len(meshes) < 2 or not _is_moved(*meshes[-2:]):
         return []
-    mesh = track[rest.start]
+    mesh = track[frame]
     same = len(mesh.vertices) == len(meshes[-1].vertices) and np.array_equal(mesh.faces, meshes[-1].faces)
     return [mesh] if same else []
 

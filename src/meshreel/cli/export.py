@@ -53,17 +53,15 @@ def command(
     up
         The axis of the meshes that points up; in the file it is +y.
     """
-    if layers is not None and layers < 0:
-        raise InputError(f"--layers must not be negative, got {layers}")
+    options = ExportOptions(layers, only, up)
     target = _target(file, output, glb, usd)
     wanted = SequenceOptions(frames=frames)
-    with open_video(file) as whole:
-        video = whole.at(layers)
+    with open_video(file) as video:
         check_part(file, video.reader, only)
         chosen = wanted.chosen(len(video))
         try:
             with common.stages(len(chosen)) as progress:
-                count = export(video, target, chosen, ExportOptions(only, up), progress)
+                count = export(video.reader, target, chosen, options, progress)
         except FormatError as error:
             raise FormatError(f"{file}: {error}; nothing is written, copy the file again") from error
     if count == 0:

@@ -1,7 +1,7 @@
 """USD: a Mesh prim for each shape, its points as time samples, shown and hidden by its visibility.
 
 In: shapes, one after the other. Out: a .usd or .usdc file (crate), .usda (text) or .usdz (package). Needs the extra
-`usd`; the only module that imports `pxr`. What was written is saved shape by shape, so memory stays flat.
+`usd`; the only module that imports `pxr`. What is in memory is saved before it is much, so it stays flat.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from .animation import Animation, Shape, changes, unit_normals
 
 EXTENSIONS = (".usdc", ".usda", ".usdz", ".usd")
 _GREY = (0.8, 0.8, 0.8)
+_MOST_UNSAVED = 64 << 20  # bytes; each time it is saved, the names of all prims are written again
 _ROUNDED = 1e-6  # s: times of .reel files are whole microseconds
 
 
@@ -56,6 +57,7 @@ class UsdWriter:
 
         self._stage, self._animation = stage, animation
         self._codes = _codes(animation)
+        self._unsaved = 0
         stage.SetTimeCodesPerSecond(animation.frame_rate)
         stage.SetFramesPerSecond(animation.frame_rate)
         stage.SetStartTimeCode(0)
@@ -81,8 +83,10 @@ class UsdWriter:
         mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(shape.faces.reshape(-1))))
         mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
         self._show(mesh, shape)
-        self._move(mesh, shape)
-        self._stage.Save()
+        self._unsaved += shape.faces.nbytes + self._move(mesh, shape)
+        if self._unsaved > _MOST_UNSAVED:
+            self._stage.Save()
+            self._unsaved = 0
 
     def _show(self, mesh: Any, shape: Shape) -> None:
         """When it is visible; USD holds such a value until the next."""
@@ -96,10 +100,11 @@ class UsdWriter:
         for frame, is_shown in shown:
             visibility.Set(states[is_shown], self._codes[frame])
 
-    def _move(self, mesh: Any, shape: Shape) -> None:
-        """Where it is; USD goes linearly from one sample to the next."""
+    def _move(self, mesh: Any, shape: Shape) -> int:
+        """Where it is; USD goes linearly from one sample to the next. How many bytes that takes."""
         from pxr import Usd, Vt
 
+        size = 0
         points, normals, extent = mesh.CreatePointsAttr(), mesh.CreateNormalsAttr(), mesh.CreateExtentAttr()
         for number, frame in enumerate(shape.frames):
             code = Usd.TimeCode.Default() if shape.count == 1 else Usd.TimeCode(self._codes[shape.first + number])
@@ -107,6 +112,8 @@ class UsdWriter:
             points.Set(Vt.Vec3fArray.FromNumpy(local), code)
             normals.Set(Vt.Vec3fArray.FromNumpy(unit_normals(frame)), code)
             extent.Set(Vt.Vec3fArray.FromNumpy(np.stack([local.min(axis=0), local.max(axis=0)])), code)
+            size += 2 * local.nbytes
+        return size
 
 
 def _codes(animation: Animation) -> list[float]:
