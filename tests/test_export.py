@@ -101,7 +101,7 @@ def test_khronos_finds_nothing_wrong(tmp_path):
 def test_khronos_would_find_something_wrong(tmp_path):
     export(meshreel.open(GOLDEN / "layers.reel"), tmp_path / "a.glb")
     data = (tmp_path / "a.glb").read_bytes()
-    (tmp_path / "b.glb").write_bytes(data.replace(b'"STEP"', b'"STOP"', 1))
+    (tmp_path / "b.glb").write_bytes(data.replace(b'"VEC3"', b'"VEC2"', 1))
     (issues,) = validate(tmp_path / "b.glb")
     assert issues["numErrors"] > 0
 

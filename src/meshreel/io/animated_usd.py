@@ -6,8 +6,10 @@ In: shapes, one after the other. Out: a .usd or .usdc file (crate), .usda (text)
 
 from __future__ import annotations
 
+import errno
 import re
 import tempfile
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +24,7 @@ from .animation import Animation, Shape, changes, unit_normals
 EXTENSIONS = (".usdc", ".usda", ".usdz", ".usd")
 _GREY = (0.8, 0.8, 0.8)
 _MOST_UNSAVED = 64 << 20  # bytes; each time it is saved, the names of all prims are written again
+_MOST_PACKED = (1 << 32) - (1 << 16)  # of a crate in a .usdz file: a zip without 64-bit lengths
 _ROUNDED = 1e-6  # s: times of .reel files are whole microseconds
 
 
@@ -32,29 +35,31 @@ def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
     Raises InputError where the file cannot be written, or where `pxr` is not installed.
     """
     try:
-        from pxr import Tf, Usd
+        from pxr import Tf
     except ImportError as error:
         raise InputError(f"USD needs the extra usd ({error}): pip install 'meshreel[usd]'") from None
     try:
         with tempfile.TemporaryDirectory(".part", ".", path.parent, ignore_cleanup_errors=True) as folder:
             crate = Path(folder) / "scene.usdc"
-            stage = Usd.Stage.CreateNew(str(crate))
-            writer = UsdWriter(stage, animation)
-            yield writer
-            stage.Save()
-            del stage, writer  # closes the crate
-            _converted(crate, path.suffix.lower()).replace(path)
+            writer = UsdWriter(crate, animation)
+            try:
+                yield writer
+                writer.save()
+            finally:
+                writer.close()
+            _converted(crate, path).replace(path)
     except (OSError, Tf.ErrorException) as error:
         remedy = "free space, or choose another folder"
         raise InputError(f"{path}: cannot be written ({_reason(error)}); {remedy}") from None
 
 
 class UsdWriter:
-    """Adds prims to a stage that lies in a crate file."""
+    """Adds prims to a stage that lies in a new crate file."""
 
-    def __init__(self, stage: Any, animation: Animation) -> None:
+    def __init__(self, crate: Path, animation: Animation) -> None:
         from pxr import Gf, Kind, Usd, UsdGeom
 
+        stage = Usd.Stage.CreateNew(str(crate))
         self._stage, self._animation = stage, animation
         self._codes = _codes(animation)
         self._unsaved = 0
@@ -85,8 +90,16 @@ class UsdWriter:
         self._show(mesh, shape)
         self._unsaved += shape.faces.nbytes + self._move(mesh, shape)
         if self._unsaved > _MOST_UNSAVED:
-            self._stage.Save()
-            self._unsaved = 0
+            self.save()
+
+    def save(self) -> None:
+        """Writes what is in memory."""
+        self._stage.Save()
+        self._unsaved = 0
+
+    def close(self) -> None:
+        """Closes the file, which Windows neither moves nor deletes while it is open."""
+        self._stage = None
 
     def _show(self, mesh: Any, shape: Shape) -> None:
         """When it is visible; USD holds such a value until the next."""
@@ -130,18 +143,34 @@ def _identifier(name: str) -> str:
     return re.sub(r"\W", "_", name, flags=re.ASCII)
 
 
-def _converted(crate: Path, extension: str) -> Path:
-    """The same file in the form that an extension names."""
+def _converted(crate: Path, path: Path) -> Path:
+    """The same file, where it is, in the form that its final name tells. OSError where it is not whole."""
     from pxr import Sdf, UsdUtils
 
+    extension = path.suffix.lower()
     target = crate.with_suffix(extension)
     if extension == ".usda":
-        Sdf.Layer.FindOrOpen(str(crate)).Export(str(target))
+        whole = Sdf.Layer.FindOrOpen(str(crate)).Export(str(target))
     elif extension == ".usdz":
-        UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(crate)), str(target))
+        if crate.stat().st_size > _MOST_PACKED:
+            told = f"{path}: more than the {_MOST_PACKED} bytes that a .usdz file holds"
+            raise InputError(f"{told}; export fewer frames or layers, or to .usdc")
+        whole = UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(crate)), str(target)) and _is_whole(target)
     else:
         crate.replace(target)
+        whole = True
+    if not whole:
+        raise OSError(errno.EIO, f"the {extension} file is too large or not whole")
     return target
+
+
+def _is_whole(package: Path) -> bool:
+    """Whether all of a .usdz file is there: USD does not tell when a disk is full."""
+    try:
+        with zipfile.ZipFile(package) as content:
+            return content.testzip() is None
+    except zipfile.BadZipFile:
+        return False
 
 
 def _reason(error: Exception) -> str:
