@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import meshreel
+from meshreel.coding.intra import encode_intra
+from meshreel.container.writer import ReelWriter
 from meshreel.errors import FormatError, InputError
 from meshreel.export import ExportOptions
 from meshreel.export import export as export_file
@@ -17,6 +19,7 @@ from meshreel.io.sequence import open_sequence
 from meshreel.types import Mesh, MeshList
 from tests.gltf_validator import find_validator, validate
 from tests.golden import GOLDEN
+from tests.metrics.shapes import sphere
 from tests.play_glb import PlayedGlb
 from tests.small_options import quick
 
@@ -159,6 +162,18 @@ def test_frames_of_other_faces_stay_until_the_next(tmp_path, name, extension):
     played = play(tmp_path / f"a.{extension}")
     for frame, time in enumerate(times(video)):
         assert_shows(seen(played.shown(time + 0.039)), parts_of(video, frame), video[frame].diagonal)
+
+
+def test_frames_coded_one_by_one_do_not_become_each_other_though_their_faces_are_equal(tmp_path):
+    header = meshreel.open(GOLDEN / "draco.reel").reader.header
+    ball = sphere(0.25, levels=1)
+    payload = encode_intra([ball, Mesh(ball.vertices + [0.25, 0, 0], ball.faces)], 2**-10, 0)
+    with ReelWriter(tmp_path / "a.reel", header) as writer:
+        writer.add_group(0, 2, payload)
+    video = meshreel.open(tmp_path / "a.reel")
+    assert np.array_equal(video[0].faces, video[1].faces)
+    assert export(video, tmp_path / "a.glb") == 2
+    assert_shows(seen(PlayedGlb(tmp_path / "a.glb").shown(0.039)), parts_of(video, 0), video[0].diagonal)
 
 
 def test_a_long_group_is_several_meshes_and_moves_on_all_the_same(tmp_path, monkeypatch):
