@@ -1,8 +1,8 @@
 """Animated GLB (binary glTF 2.0): a node and a mesh for each shape, morph targets for its frames.
 
 In: shapes, one after the other. Out: a file whose binary chunk was never in memory. Core glTF alone, no extension: a
-node is shown and hidden by a scale of 1 and 0, which the specification ("Transformations") names for that, and weights go
-linearly from one frame to the next.
+node is hidden by a scale of 0, which the specification ("Transformations") names for that, and weights go linearly from
+one frame to the next.
 """
 
 from __future__ import annotations
