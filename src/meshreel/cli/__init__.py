@@ -1,4 +1,4 @@
-"""The command line: `meshreel capture|segment|encode|decode|info|compare|play|serve|bench|demo`.
+"""The command line: `meshreel capture|segment|encode|decode|export|info|compare|play|serve|bench|demo`.
 
 Errors take one line on standard error and exit code 2; `--debug` shows the traceback. A command's module is imported
 when it is called: `decode` and `info` work where the extra `encode` is not installed.
@@ -32,6 +32,7 @@ COMMANDS = {
     "segment": "Tell which faces of a scene move, and with which body.",
     "encode": "Encode a sequence of meshes into one .reel file.",
     "decode": "Decode a .reel file into a directory of meshes.",
+    "export": "Write a .reel file as one animated file, GLB or USD, that other programs play.",
     "info": "Show rate by part, objects over time, groups, forms and the quality recorded when the file was encoded.",
     "compare": "Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.",
     "play": "Play a .reel file in a browser, or in a headset's.",
