@@ -1,6 +1,6 @@
 // The page of scene.browser.test.ts: a canvas of 320 x 240, a scene, and what the tests ask of them.
 
-import { PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import { Color, PerspectiveCamera, Scene, WebGLRenderer } from "three";
 import type { PackedGroup, PackedStatic, Shown } from "@meshreel/player-core/types";
 import { ReelScene } from "../../src/index.ts";
 import type { Mode } from "../../src/index.ts";
@@ -10,11 +10,12 @@ const [WIDTH, HEIGHT] = [320, 240];
 
 const renderer = new WebGLRenderer({ antialias: false });
 renderer.setSize(WIDTH, HEIGHT);
-renderer.setClearColor(0xffffff);
+
 document.body.append(renderer.domElement);
 const camera = new PerspectiveCamera(50, WIDTH / HEIGHT, 0.1, 20);
 camera.position.set(0, 0, 3);
 const root = new Scene();
+root.background = new Color(0xffffff); // a clear colour would be lost with the context
 let scene = new ReelScene();
 root.add(scene);
 let prepared: (PackedGroup | PackedStatic)[] = [];
