@@ -45,6 +45,9 @@ export class MeshreelPlayer extends Reflected {
 
   constructor() {
     super();
+    const internals = this.attachInternals();
+    internals.role = "region";
+    internals.ariaLabel = "Recording"; // an aria-label of the page goes before it
     this.#controls = new Controls(this, this.attachShadow({ mode: "open" }));
   }
 
@@ -162,7 +165,7 @@ export class MeshreelPlayer extends Reflected {
   }
   get statistics(): Statistics | null {
     if (!this.#playback || !this.#view) return null;
-    return { ...this.#playback.stats, ...this.#view.stage.stats, fps: this.#view.fps, drawn: this.#view.drawn };
+    return { ...this.#playback.stats, ...this.#view.stage.stats, fps: this.#view.fps, frameMs: this.#view.frameMs, drawn: this.#view.drawn };
   }
   /** Pauses and shows the frame so many further; negative goes back. */
   step(frames: number): void {

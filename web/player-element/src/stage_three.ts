@@ -14,6 +14,7 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #view = new PerspectiveCamera(45, 1, 0.01, 1000);
   readonly #orbit: OrbitControls;
   #reel = new ReelScene();
+  readonly #stop = new AbortController();
   #info: Info | null = null;
   #shown: Shown | null = null;
   #mode: Mode = "shaded";
@@ -24,6 +25,9 @@ export class ThreeStage extends EventTarget implements Stage {
     this.canvas = canvas;
     this.#renderer = makeRenderer(canvas);
     this.#scene.add(this.#reel);
+    const { signal } = this.#stop;
+    canvas.addEventListener("webglcontextlost", () => this.dispatchEvent(new Event("lost")), { signal });
+    canvas.addEventListener("webglcontextrestored", () => this.dispatchEvent(new Event("restored")), { signal });
     this.#orbit = new OrbitControls(this.#view, canvas);
     this.#orbit.addEventListener("change", () => this.dispatchEvent(new Event("change")));
   }
@@ -101,6 +105,7 @@ export class ThreeStage extends EventTarget implements Stage {
   async enterVr(): Promise<void> {}
   exitVr(): void {}
   dispose(): void {
+    this.#stop.abort();
     this.#orbit.dispose();
     this.#reel.dispose();
     this.#renderer.dispose();

@@ -141,6 +141,27 @@ describeInBrowser("the built player", () => {
     await page.close();
   });
 
+  test("a GPU context that is lost comes back with the picture", async () => {
+    const { page } = await site.visit("player/index.html?src=/scene.reel");
+    await ready(page);
+    const before = await covered(page);
+    await page.evaluate(async () => {
+      const player = document.querySelector("meshreel-player")!;
+      const gl = player.shadowRoot!.querySelector("canvas")!.getContext("webgl2")!;
+      const loss = gl.getExtension("WEBGL_lose_context")!;
+      const told = (type: string) => new Promise((done) => player.addEventListener(type, done, { once: true }));
+      const [lost, restored] = [told("lost"), told("restored")];
+      loss.loseContext();
+      await lost;
+      await new Promise((done) => setTimeout(done, 100)); // it cannot be asked back within the event
+      loss.restoreContext();
+      await restored;
+    });
+    expect(await page.locator(".toast").textContent()).toContain("graphics card");
+    await expect.poll(() => covered(page)).toBeCloseTo(before, 2);
+    await page.close();
+  });
+
   test("two players share the workers, and none is left when both are gone", async () => {
     site.write("two.html", `<!doctype html><link rel="icon" href="data:,">${SCRIPT}${PLAYER}${PLAYER}`);
     const { page, errors } = await site.visit("two.html");
