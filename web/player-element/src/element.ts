@@ -1,5 +1,6 @@
 // <meshreel-player>: an element like <video>, whose picture can be looked at from all sides.
 
+import { vrSupported } from "@meshreel/xr";
 import type { Info, Packed, Playback, PlaybackEvents } from "@meshreel/player-core/types";
 import { OBSERVED } from "./attributes.ts";
 import { Controls } from "./controls/controls.ts";
@@ -190,13 +191,16 @@ export class MeshreelPlayer extends Reflected {
     if (wished) this.play().catch(() => undefined); // its error event tells
   }
   async vrSupported(): Promise<boolean> {
-    const { xr } = navigator as Navigator & { xr?: { isSessionSupported(mode: string): Promise<boolean> } };
-    return (await xr?.isSessionSupported("immersive-vr").catch(() => false)) ?? false;
+    return vrSupported();
   }
   /** Shows the scene in the headset; to be called from a click. */
   async enterVr(): Promise<void> {
     if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
-    await this.#view.enterVr();
+    await this.#view.enterVr({
+      toggle: () => (this.paused ? void this.play().catch(() => undefined) : this.pause()),
+      step: (frames) => this.step(frames),
+      seekBy: (seconds) => (this.currentTime += seconds),
+    });
   }
   exitVr(): void {
     this.#view?.stage.exitVr();

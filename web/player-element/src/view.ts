@@ -1,6 +1,7 @@
 // The picture: a canvas in a box, its stage, and the loop that draws only where something changed.
 
 import type { Playback, Shown } from "@meshreel/player-core/types";
+import type { VrActions } from "@meshreel/xr";
 import type { Engine, Stage } from "./stage.ts";
 
 /** A longer gap between two pictures is a page that was hidden or a machine that slept: time stood still meanwhile. */
@@ -85,8 +86,8 @@ export class View {
     return this.#last !== null;
   }
 
-  async enterVr(): Promise<void> {
-    await this.stage.enterVr((now) => this.#tick(now));
+  async enterVr(actions: VrActions): Promise<void> {
+    await this.stage.enterVr((now) => this.#tick(now), actions);
   }
 
   dispose(): void {
