@@ -12,8 +12,10 @@ import type { PictureStats, Stage } from "./stage.ts";
 const FOV = 45; // degrees, of the picture's height
 const FROM = new Vector3(0.25, 0.25, 1).normalize(); // where a view that fits looks from
 const SHUN = 1.05; // of the distance at which everything just fits
-const CLOSEST = 1e-3; // of the recording's size: how near the camera comes, and sees
+const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
 const FARTHEST = 20; // of its size: how far the camera goes
+const NEAR = 0.002; // of the camera's distance: what it sees. A background may reach far beyond the recording's box.
+const FAR = 50;
 
 export class ThreeStage extends EventTarget implements Stage {
   readonly canvas: HTMLCanvasElement;
@@ -180,8 +182,8 @@ export class ThreeStage extends EventTarget implements Stage {
       const distance = this.#eye.position.distanceTo(middle);
       this.#orbit.minDistance = CLOSEST * radius;
       this.#orbit.maxDistance = FARTHEST * radius;
-      this.#eye.near = Math.max(distance - 1.5 * radius, CLOSEST * radius * 5);
-      this.#eye.far = distance + 1.5 * radius;
+      this.#eye.near = NEAR * Math.max(distance, radius);
+      this.#eye.far = FAR * Math.max(distance, radius);
       this.#eye.updateProjectionMatrix();
     }
     this.dispatchEvent(new Event("change"));
