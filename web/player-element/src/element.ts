@@ -1,25 +1,16 @@
 // <meshreel-player>: an element like <video>, whose picture can be looked at from all sides.
 
+import type { Info, Packed, Playback } from "@meshreel/player-core/types";
+import type { Bench } from "@meshreel/player-three";
 import { vrSupported } from "@meshreel/xr";
-import type { Info, Packed, Playback, PlaybackEvents } from "@meshreel/player-core/types";
-import { OBSERVED } from "./attributes.ts";
+import { OBSERVED, PROPERTIES } from "./attributes.ts";
 import { Controls } from "./controls/controls.ts";
+import { PASSED } from "./events.ts";
 import { type Ranges, ranges } from "./ranges.ts";
 import { Reflected } from "./reflected.ts";
 import type { Engine } from "./stage.ts";
 import type { Statistics } from "./stats.ts";
 import { View } from "./view.ts";
-
-/** Events of the playback that the element passes on; `ready` and `release` stay inside. */
-const PASSED: readonly (keyof PlaybackEvents)[] = [
-  "loadedmetadata", "canplay", "play", "playing", "pause", "waiting", "seeking", "seeked", "timeupdate", "progress", "ended",
-  "ratechange", "qualitychange", "warning", "error",
-];
-
-const PROPERTIES = [
-  "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "quality", "playbackRate", "interpolate", "mode", "theme",
-  "background", "camera", "currentTime",
-];
 
 declare global {
   interface HTMLElementTagNameMap {
@@ -207,6 +198,11 @@ export class MeshreelPlayer extends Reflected {
   }
   get presenting(): boolean {
     return this.#view?.stage.presenting ?? false;
+  }
+  /** Lets a bench collect from now on what is decoded and drawn; what is given back ends that. Error where nothing is open. */
+  measure(bench: Bench): () => void {
+    if (!this.#view || !this.#playback) throw new DOMException("there is nothing to measure: set src", "InvalidStateError");
+    return this.#view.measure(this.#playback, bench);
   }
 
   // Inside -------------------------------------------------------------------------------------------------------

@@ -85,6 +85,7 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   begin(info: Info): void {
+    this.exitVr(); // a session's place is that of one recording
     this.#reel.removeFromParent();
     this.#reel.dispose();
     this.#reel = new ReelScene();

@@ -1,6 +1,7 @@
 // The picture: a canvas in a box, its stage, and the loop that draws only where something changed.
 
-import type { Playback, Shown } from "@meshreel/player-core/types";
+import type { Packed, Playback, Shown } from "@meshreel/player-core/types";
+import type { Bench } from "@meshreel/player-three";
 import type { VrActions } from "@meshreel/xr";
 import type { Engine, Stage } from "./stage.ts";
 
@@ -25,6 +26,7 @@ export class View {
   #clock = 0; // ms; the playback's own, that stands still while nothing can be drawn
   #times: number[] = []; // of the last pictures, ms
   #costs: number[] = []; // of JavaScript for them, ms
+  #bench: Bench | null = null;
   #stop = new AbortController();
   #sizes: ResizeObserver;
   #sight: IntersectionObserver;
@@ -90,6 +92,21 @@ export class View {
     await this.stage.enterVr((now) => this.#tick(now), actions);
   }
 
+  /** Lets a bench collect from now on; what is given back ends that. */
+  measure(playback: Playback, bench: Bench): () => void {
+    const stop = new AbortController();
+    const decoded = (event: Event): void => {
+      const packed = (event as CustomEvent<Packed>).detail;
+      if (packed.kind === "group") bench.decoded(packed.decodeMs, packed.frameCount / (playback.info?.frameRate ?? 30));
+    };
+    playback.addEventListener("ready", decoded, { signal: stop.signal });
+    this.#bench = bench;
+    return () => {
+      stop.abort();
+      this.#bench = null;
+    };
+  }
+
   dispose(): void {
     this.#stop.abort();
     cancelAnimationFrame(this.#handle);
@@ -117,6 +134,7 @@ export class View {
     const moving = fresh && this.#draw(shown);
     if (shown) this.#last = shown;
     if (fresh) this.#measure(start);
+    else this.#bench?.interrupt();
     return moving || this.#dirty || (playback !== null && goesOn(playback, this.#last));
   }
 
@@ -136,6 +154,8 @@ export class View {
 
   #measure(start: number): void {
     const end = performance.now();
+    this.#bench?.frameBegin(start);
+    this.#bench?.frameEnd(end);
     this.#times.push(end);
     this.#costs.push(end - start);
     if (this.#times.length > MOST_TIMES) this.#times.shift();

@@ -55,6 +55,22 @@ describeInBrowser("the built player", () => {
     });
   }
 
+  test("?bench tells what was decoded and drawn, as text and as JSON", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&bench=2");
+    const text = await page.waitForFunction(() => {
+      const said = document.querySelector("pre")?.textContent ?? "";
+      return said.includes("{") ? said : null;
+    });
+    const said = (await text.jsonValue())!;
+    expect(said).toContain("JavaScript a picture");
+    const report = JSON.parse(said.slice(said.indexOf("{")));
+    expect(report.pictures).toBeGreaterThan(0);
+    expect(report.scriptMs.median).toBeGreaterThan(0);
+    expect(report.triangles).toBeGreaterThan(0);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
   test("the address sets time, shading and camera", async () => {
     const { page } = await site.visit("player/index.html?src=/scene.reel&t=0.1&mode=normal&quality=0&loop");
     await ready(page);
