@@ -21,6 +21,7 @@ const OUTLOOK = 10; // s of content that its rate is averaged over
 const SCARCE = 1; // s at hand: the next group must come soon
 const AMPLE = 2; // s at hand: enough to try a better quality
 const PLENTY = 6; // s at hand: enough to use nearly all of the bandwidth
+const BEARABLE = 0.8; // load that a level may make
 const HOLD_MS = 2000; // between a change and a rise
 const PENALTY_MS = [15_000, 120_000] as const; // after decoding fell behind, first and at most, doubled each time
 
@@ -28,6 +29,7 @@ export class Adaptive {
   level: number;
   readonly #head: Head;
   readonly #timeline: Timeline;
+  readonly #loads: number[] = []; // of each level at normal speed, as measured last
   #changed = -Infinity; // ms
   #ceiling = Infinity; // level that decoding did not keep up with, less one
   #ceilingUntil = 0; // ms
@@ -66,26 +68,31 @@ export class Adaptive {
     return affordable(rates, bandwidth / speed, isWaiting ? 0.5 : fetched < SCARCE ? 0.65 : 0.85);
   }
 
-  #forDecoding(rates: readonly number[], { now, load, decoded, fetched, isWaiting }: Conditions): number {
+  #forDecoding(rates: readonly number[], { now, speed, load, decoded, fetched, isWaiting }: Conditions): number {
+    if (load > 0) this.#loads[this.level] = load / speed;
     if (load <= 0.9 || (decoded >= AMPLE && !isWaiting) || fetched <= decoded) return Infinity;
     if (this.level === 0) return 0;
     this.#ceiling = this.level - 1;
     this.#ceilingUntil = now + this.#penalty;
     this.#penalty = Math.min(2 * this.#penalty, PENALTY_MS[1]);
-    return Math.min(this.#ceiling, this.#bearable(rates, load));
+    let level = this.level - 1;
+    const loadAt = (other: number): number => speed * (this.#loads[other] ?? ((load / speed) * rates[other]) / rates[this.level]);
+    while (level > 0 && loadAt(level) > BEARABLE) level--;
+    return level;
   }
 
   #possible(rates: readonly number[], { now, bandwidth, speed, fetched, decoded, load }: Conditions): number {
     if (decoded < AMPLE) return -1;
     const share = fetched >= PLENTY ? 0.9 : 0.7;
     const ceiling = now < this.#ceilingUntil ? this.#ceiling : Infinity;
-    return Math.min(affordable(rates, bandwidth / speed, share), this.#bearable(rates, load), ceiling);
+    return Math.min(affordable(rates, bandwidth / speed, share), this.#bearable(load, speed), ceiling);
   }
 
-  /** The highest level that decodes in time if that takes as long as its bytes are many. */
-  #bearable(rates: readonly number[], load: number): number {
-    const now = rates[Math.min(this.level, rates.length - 1)];
-    return load > 0 ? affordable(rates, now / load, 0.7) : rates.length - 1;
+  /** The highest level that is known to decode in time; or the next one, where this one leaves half of the time. */
+  #bearable(load: number, speed: number): number {
+    if (load === 0) return this.level;
+    const known = this.#loads.reduce((best, other, level) => (speed * other <= BEARABLE ? level : best), 0);
+    return Math.max(known, load <= BEARABLE / 2 ? this.level + 1 : 0);
   }
 
   #change(level: number, now: number): void {

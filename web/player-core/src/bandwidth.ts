@@ -1,18 +1,21 @@
 // How fast bytes come, measured over the time in which something was asked for.
 
 const SAMPLE_MS = 50; // of fetching, at least
+const FIRST_MS = 20; // at least: the bytes of the first answer may all come at once
 const HALF_LIVES_MS = [2000, 8000]; // of fetching
 
 /**
  * Bits a second: the lower of a fast and a slow mean, so that a fall counts at once and a rise only when it lasts.
  *
- * Times are milliseconds of one clock. Waiting for an answer counts as fetching: it is what a small request costs.
+ * Times are milliseconds of one clock. Waiting for an answer counts as fetching, as it is what a small request
+ * costs; but for the first answer, before which a connection was made.
  */
 export class Bandwidth {
   #open = 0;
   #since = 0; // when time was last counted, while something is open
   #busy = 0; // of the sample that is being taken, ms
   #bytes = 0;
+  #isFirst = true; // nothing was measured yet
   readonly #means = HALF_LIVES_MS.map((halfLife) => ({ halfLife, sum: 0, weight: 0 }));
 
   begin(now: number): void {
@@ -21,12 +24,14 @@ export class Bandwidth {
 
   add(bytes: number, now: number): void {
     this.#count(now);
+    if (this.#isFirst && this.#bytes === 0) this.#busy = 0;
     this.#bytes += bytes;
     if (this.#busy >= SAMPLE_MS) this.#take();
   }
 
   end(now: number): void {
     this.#count(now);
+    if (this.#isFirst) this.#busy = Math.max(this.#busy, FIRST_MS);
     if (--this.#open === 0 && this.#bytes > 0 && this.#busy > 0) this.#take();
   }
 
@@ -49,5 +54,6 @@ export class Bandwidth {
       mean.weight = mean.weight * kept + (1 - kept);
     }
     this.#bytes = this.#busy = 0;
+    this.#isFirst = false;
   }
 }

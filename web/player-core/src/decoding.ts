@@ -44,6 +44,7 @@ export class Decoding implements Holdings {
   readonly #tries = new Map<number, number>();
   #keep: ReadonlySet<number> = new Set();
   #bytesPerFrame = 0; // of the last groups
+  #stale = new Set<number>(); // chunks whose jobs had begun when timings were forgotten
   readonly #timings: { readonly ms: number; readonly frames: number }[] = []; // of the last groups
 
   constructor(head: Head, links: Links, fetcher: Fetcher, share: Share, events: DecodingEvents) {
@@ -113,6 +114,7 @@ export class Decoding implements Holdings {
   /** Forgets how long decoding took, as where it will take another time from here on. */
   resetTimings(): void {
     this.#timings.length = 0;
+    this.#stale = new Set(this.#running.keys());
   }
 
   /** Lets go of what is decoded and is not in the plan any more. States of the background may stay while they are small. */
@@ -237,8 +239,8 @@ export class Decoding implements Holdings {
     this.#events.release(packed);
   }
 
-  #time({ kind, frameCount: frames }: Chunk, ms: number): void {
-    if (kind !== "group") return; // the background is decoded once
+  #time({ number, kind, frameCount: frames }: Chunk, ms: number): void {
+    if (this.#stale.delete(number) || kind !== "group") return; // the background is decoded once
     this.lastMs = ms;
     this.#timings.push({ ms, frames });
     if (this.#timings.length > TIMINGS) this.#timings.shift();

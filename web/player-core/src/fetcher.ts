@@ -10,8 +10,11 @@ import type { Source } from "./source.ts";
 export interface Wish {
   readonly chunk: Chunk;
   readonly layers: number;
-  readonly urgent: boolean;
+  readonly when: When;
 }
+
+/** How soon bytes are wanted: for the frame at the play head, before long, or some time, when a request is worth while. */
+export type When = "now" | "soon" | "later";
 
 export interface FetcherEvents {
   arrived(): void; // a chunk has a layer more, or the next request may be made
@@ -20,8 +23,9 @@ export interface FetcherEvents {
 
 const JOIN = 1024; // bytes that are not wanted cost less than one request more
 const URGENT_REQUESTS = 4; // at a time: what the frame at the play head needs may lie apart
+const REQUESTS = 6; // at a time, as many as a browser opens connections
 const BATCH = [1 << 16, 1 << 22] as const; // bytes of a request, at least and at most; in between, those of one second
-const OVERLAP = [1 << 14, 0.1] as const; // the next request is made so many bytes, or seconds, before the last has ended
+const OVERLAP = 0.1; // s before a request has ended, the next one is made: at once they would only delay each other
 
 interface Held {
   pieces: Uint8Array[];
@@ -37,7 +41,7 @@ interface Request {
 interface Range {
   from: number;
   readonly to: number;
-  readonly urgent: boolean;
+  readonly when: When;
 }
 
 export class Fetcher {
@@ -99,6 +103,7 @@ export class Fetcher {
     }
     this.#requests = this.#requests.filter(({ controller }) => !controller.signal.aborted);
     const rest = missing.map((range) => this.#notOnItsWay(range)).filter(({ from, to }) => from < to);
+    if (!isWorthwhile(rest)) rest.length = 0;
     while (rest.length > 0 && this.#mayAsk(rest[0])) this.#ask(this.#batch(rest));
     this.#evict();
   }
@@ -127,35 +132,35 @@ export class Fetcher {
     this.#heldBytes = 0;
   }
 
-  #missingOf({ chunk, layers, urgent }: Wish): Range {
+  #missingOf({ chunk, layers, when }: Wish): Range {
     const held = this.#held.get(chunk.number)?.length ?? 0;
-    return { from: chunk.offset + held, to: chunk.offset + sizeOfLayers(chunk, layers), urgent };
+    return { from: chunk.offset + held, to: chunk.offset + sizeOfLayers(chunk, layers), when };
   }
 
-  #notOnItsWay({ from, to, urgent }: Range): Range {
+  #notOnItsWay({ from, to, when }: Range): Range {
     let start = from;
     for (const request of this.#requests) if (request.at <= start && start < request.to) start = request.to;
-    return { from: start, to, urgent };
+    return { from: start, to, when };
   }
 
-  #mayAsk({ urgent }: Range): boolean {
-    if (urgent) return this.#requests.length < URGENT_REQUESTS;
+  #mayAsk({ when }: Range): boolean {
+    if (when === "now") return this.#requests.length < URGENT_REQUESTS;
     const left = this.#requests.reduce((sum, { at, to }) => sum + to - at, 0);
-    return left <= this.#overlap;
+    return left <= this.#overlap && this.#requests.length < REQUESTS;
   }
 
   get #overlap(): number {
-    return Math.max(OVERLAP[0], (OVERLAP[1] * this.#source.bandwidth) / 8);
+    return (OVERLAP * this.#source.bandwidth) / 8;
   }
 
   /** Takes ranges that lie together from the start of `rest`. */
   #batch(rest: Range[]): Range {
     const { bandwidth } = this.#source;
     const most = bandwidth > 0 ? Math.min(Math.max(bandwidth / 8, BATCH[0]), BATCH[1]) : 4 * BATCH[0];
-    const { from, urgent } = rest[0];
+    const { from, when } = rest[0];
     let { to } = rest.shift()!;
     while (rest.length > 0 && rest[0].from >= to && rest[0].from <= to + JOIN && rest[0].to <= from + most) ({ to } = rest.shift()!);
-    return { from, to, urgent };
+    return { from, to, when };
   }
 
   #ask({ from, to }: Range): void {
@@ -213,4 +218,9 @@ export class Fetcher {
       unwanted -= length;
     }
   }
+}
+
+/** Whether to ask now: what is wanted some time only is collected first. */
+function isWorthwhile(ranges: readonly Range[]): boolean {
+  return ranges.some(({ when }) => when !== "later") || ranges.reduce((sum, { from, to }) => sum + to - from, 0) >= BATCH[0];
 }

@@ -25,7 +25,7 @@ export class Picture {
     [this.#shown, this.#spare] = [empty(), empty()];
   }
 
-  /** The last picture; null before the first. It stays as it is until the update after the next. */
+  /** The last picture; null before the first. The one before it stays as it is until the next is asked for. */
   get shown(): Shown | null {
     return this.#shown.frame < 0 ? null : this.#shown;
   }
@@ -48,7 +48,7 @@ export class Picture {
     if (isSame) this.#copy(next);
     else this.#fill(next, frame);
     next.blend = this.#goesOn(next) ? blend : 0;
-    if (isSame && next.blend === this.#shown.blend) return true;
+    if (!this.#differs(next)) return true;
     this.#spare = this.#shown;
     this.#shown = next;
     return true;
@@ -76,6 +76,13 @@ export class Picture {
     const background = this.#head.staticOfFrame(frame);
     next.background = background && (this.#decoding.packedOf(background) as PackedStatic | null);
     this.#version = this.#decoding.version;
+  }
+
+  #differs({ frame, blend, groups, background }: Mutable): boolean {
+    const shown = this.#shown;
+    if (frame !== shown.frame || blend !== shown.blend || background !== shown.background) return true;
+    for (let track = 0; track < groups.length; track++) if (groups[track] !== shown.groups[track]) return true;
+    return false;
   }
 
   /** Whether a group that is shown has the next frame, too. */

@@ -159,8 +159,9 @@ class Planner {
     return chunk.kind === "static" ? mostQuality(chunk) : Math.min(this.#outlook.quality, mostQuality(chunk));
   }
 
+  /** Of the state that will be there: that of a step takes the place of one at hand, be it coarser. */
   #stateOf(chunk: Chunk): number {
-    return Math.max(this.#steps.get(chunk.number)?.quality ?? -1, this.#holdings.stateAt(chunk));
+    return this.#steps.get(chunk.number)?.quality ?? this.#holdings.stateAt(chunk);
   }
 
   #step(chunk: Chunk, quality: number, show: boolean, { ahead, decode }: Need): void {

@@ -17,7 +17,7 @@ import type { Source } from "./source.ts";
 
 export interface Limits {
   readonly bufferSeconds: number; // of bytes fetched ahead, at normal speed
-  readonly decodedSeconds: number; // of groups decoded ahead, at normal speed
+  readonly decodedSeconds: number; // of groups decoded ahead, at normal speed; 0.5 at least, as plans are made so often
   readonly memory: number; // bytes that decoded groups may take
 }
 
@@ -36,6 +36,7 @@ export interface SessionEvents extends DecodingEvents {
 
 const BEHIND = 1; // s of content: what is decoded behind the play head is kept
 const COMPRESSED = 1 << 25; // bytes of chunks kept though they are not wanted now: they may be again
+const LATER = 3 / 4; // of the seconds that are fetched ahead: what lies beyond waits until it fills a request
 const STATICS = 1 / 4; // share of the memory that states of the background may keep
 
 export class Session {
@@ -81,8 +82,8 @@ export class Session {
   pump(aim: Aim): void {
     this.#speed = aim.speed;
     this.#checkSize();
-    const quality = aim.quality === "auto" ? this.#adaptive.level : aim.quality;
-    const { bufferSeconds, decodedSeconds, memory } = this.#limits;
+    const { bufferSeconds, memory } = this.#limits;
+    const decodedSeconds = Math.max(this.#limits.decodedSeconds, 0.5);
     const outlook = {
       time: aim.time,
       loop: aim.loop,
@@ -90,7 +91,7 @@ export class Session {
       decodeSeconds: decodedSeconds * aim.speed,
       behindSeconds: BEHIND,
       memory,
-      quality,
+      quality: aim.quality === "auto" ? this.#adaptive.level : aim.quality,
       exact: aim.quality !== "auto",
     };
     const made = plan(this.head, this.#links, this.timeline, outlook, this.decoding);
@@ -99,7 +100,8 @@ export class Session {
     this.#plan = { ...made, keep };
     this.decoding.run(this.#plan);
     this.decoding.release(STATICS * memory);
-    this.fetcher.want(made.steps.map((step) => ({ chunk: step.chunk, layers: step.quality + 1, urgent: step.ahead <= 0 })));
+    const later = LATER * outlook.fetchSeconds;
+    this.fetcher.want(made.steps.map(({ chunk, quality, ahead }) => ({ chunk, layers: quality + 1, when: ahead <= 0 ? "now" : ahead < later ? "soon" : "later" })));
     if (aim.quality === "auto") this.#adapt(aim);
   }
 

@@ -12,12 +12,14 @@ export interface Scope {
   onmessage: ((event: MessageEvent<ToWorker>) => void) | null;
 }
 
-/** Makes a scope answer. Messages are worked off in their order. */
+/** Makes a scope answer. Messages are worked off in their order; a start that fails is told as the failure of job -1. */
 export function serve(scope: Scope): void {
   const worker = new Served(scope);
   let last: Promise<void> = Promise.resolve();
   scope.onmessage = (event) => {
-    last = last.then(() => worker.answer(event.data));
+    last = last.then(() => worker.answer(event.data)).catch((error: unknown) => {
+      scope.postMessage({ type: "failed", id: -1, message: error instanceof Error ? error.message : String(error), missingState: false }, []);
+    });
   };
 }
 

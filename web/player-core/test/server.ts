@@ -70,6 +70,8 @@ export class FileServer {
   }
 }
 
+const LATE = 0.1; // s: what a busy machine was late to send is made up for, what nobody asked for is not
+
 /** Sends bytes at a rate, whatever the number of connections; ends with them. Bytes a second. */
 export class Throttle {
   readonly bytesPerSecond: number;
@@ -84,7 +86,7 @@ export class Throttle {
     let at = 0;
     while (at < body.length && !response.destroyed) {
       const now = performance.now();
-      this.#sent = Math.max(this.#sent, ((now - this.#begun) / 1000 - 0.02) * this.bytesPerSecond); // what was not sent is lost
+      this.#sent = Math.max(this.#sent, ((now - this.#begun) / 1000 - LATE) * this.bytesPerSecond);
       const allowed = Math.floor(((now - this.#begun) / 1000) * this.bytesPerSecond - this.#sent);
       if (allowed > 0) {
         const piece = body.subarray(at, at + allowed);

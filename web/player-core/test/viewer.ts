@@ -68,7 +68,7 @@ export class Viewer {
       const wanted = this.#head?.chunkOfFrame(shown.frame, track);
       if (group !== null && !this.alive.has(group)) this.offences.push(`frame ${shown.frame} shows chunk ${group.chunk}, which is not alive`);
       if (group !== null && wanted && group.chunk !== wanted.number) this.offences.push(`frame ${shown.frame} shows chunk ${group.chunk}`);
-      const isWhole = this.player.stats.skippedGroups === 0;
+      const isWhole = this.warnings.length === 0;
       if (group === null && isWhole && wanted && wanted.form !== Form.EMPTY) this.offences.push(`frame ${shown.frame} lacks track ${track}`);
     });
     const background = this.#head?.staticOfFrame(shown.frame)?.number;

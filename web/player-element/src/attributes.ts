@@ -45,3 +45,9 @@ export function parseTheme(text: string | null): Theme {
 export function parseFlag(text: string | null): boolean {
   return text !== null && text.trim().toLowerCase() !== "false";
 }
+
+/** Properties that a page may have set before the element was defined. */
+export const PROPERTIES = [
+  "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "quality", "playbackRate", "interpolate", "mode", "theme",
+  "background", "camera", "currentTime",
+];

@@ -1,24 +1,16 @@
 // <meshreel-player>: an element like <video>, whose picture can be looked at from all sides.
 
-import type { Info, Packed, Playback, PlaybackEvents } from "@meshreel/player-core/types";
-import { OBSERVED } from "./attributes.ts";
+import type { Info, Packed, Playback } from "@meshreel/player-core/types";
+import type { Bench } from "@meshreel/player-three";
+import { vrSupported } from "@meshreel/xr";
+import { OBSERVED, PROPERTIES } from "./attributes.ts";
 import { Controls } from "./controls/controls.ts";
+import { PASSED } from "./events.ts";
 import { type Ranges, ranges } from "./ranges.ts";
 import { Reflected } from "./reflected.ts";
 import type { Engine } from "./stage.ts";
 import type { Statistics } from "./stats.ts";
 import { View } from "./view.ts";
-
-/** Events of the playback that the element passes on; `ready` and `release` stay inside. */
-const PASSED: readonly (keyof PlaybackEvents)[] = [
-  "loadedmetadata", "canplay", "play", "playing", "pause", "waiting", "seeking", "seeked", "timeupdate", "progress", "ended",
-  "ratechange", "qualitychange", "warning", "error",
-];
-
-const PROPERTIES = [
-  "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "quality", "playbackRate", "interpolate", "mode", "theme",
-  "background", "camera", "currentTime",
-];
 
 declare global {
   interface HTMLElementTagNameMap {
@@ -45,6 +37,9 @@ export class MeshreelPlayer extends Reflected {
 
   constructor() {
     super();
+    const internals = this.attachInternals();
+    internals.role = "region";
+    internals.ariaLabel = "Recording"; // an aria-label of the page goes before it
     this.#controls = new Controls(this, this.attachShadow({ mode: "open" }));
   }
 
@@ -162,7 +157,7 @@ export class MeshreelPlayer extends Reflected {
   }
   get statistics(): Statistics | null {
     if (!this.#playback || !this.#view) return null;
-    return { ...this.#playback.stats, ...this.#view.stage.stats, fps: this.#view.fps, drawn: this.#view.drawn };
+    return { ...this.#playback.stats, ...this.#view.stage.stats, fps: this.#view.fps, frameMs: this.#view.frameMs, drawn: this.#view.drawn };
   }
   /** Pauses and shows the frame so many further; negative goes back. */
   step(frames: number): void {
@@ -187,19 +182,27 @@ export class MeshreelPlayer extends Reflected {
     if (wished) this.play().catch(() => undefined); // its error event tells
   }
   async vrSupported(): Promise<boolean> {
-    const { xr } = navigator as Navigator & { xr?: { isSessionSupported(mode: string): Promise<boolean> } };
-    return (await xr?.isSessionSupported("immersive-vr").catch(() => false)) ?? false;
+    return vrSupported();
   }
   /** Shows the scene in the headset; to be called from a click. */
   async enterVr(): Promise<void> {
     if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
-    await this.#view.enterVr();
+    await this.#view.enterVr({
+      toggle: () => (this.paused ? void this.play().catch(() => undefined) : this.pause()),
+      step: (frames) => this.step(frames),
+      seekBy: (seconds) => (this.currentTime += seconds),
+    });
   }
   exitVr(): void {
     this.#view?.stage.exitVr();
   }
   get presenting(): boolean {
     return this.#view?.stage.presenting ?? false;
+  }
+  /** Lets a bench collect from now on what is decoded and drawn; what is given back ends that. Error where nothing is open. */
+  measure(bench: Bench): () => void {
+    if (!this.#view || !this.#playback) throw new DOMException("there is nothing to measure: set src", "InvalidStateError");
+    return this.#view.measure(this.#playback, bench);
   }
 
   // Inside -------------------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 // What the element needs of something that draws, and of something that opens files. The element knows no WebGL.
 
 import type { Info, Packed, Playback, Shown } from "@meshreel/player-core/types";
+import type { VrActions } from "@meshreel/xr";
 import type { Mode, Quality } from "./attributes.ts";
 
 /** Numbers of the picture, for the overlay. */
@@ -31,7 +32,7 @@ export interface Stage extends EventTarget {
   fit(): void;
   picture(): Promise<Blob>; // PNG
   /** From then on `draw` is called by the headset's frames, not by the page's. */
-  enterVr(frame: (now: number) => void): Promise<void>;
+  enterVr(frame: (now: number) => void, actions: VrActions): Promise<void>;
   exitVr(): void;
   dispose(): void;
 }

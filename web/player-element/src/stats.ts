@@ -6,6 +6,7 @@ import type { PictureStats } from "./stage.ts";
 
 export interface Statistics extends Stats, PictureStats {
   readonly fps: number; // pictures in the last second
+  readonly frameMs: number; // JavaScript for a picture on the main thread, median
   readonly drawn: number; // pictures since the view was made
 }
 
@@ -21,7 +22,7 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
     ["Quality", most > 0 ? `${stats.quality} of ${most}` : "one only"],
     ["Triangles", formatCount(stats.triangles)],
-    ["Display", `${formatCount(stats.fps)} fps`],
+    ["Display", `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each`],
     ["GPU memory", formatAmount(stats.gpuBytes, "B")],
     ["Skipped groups", formatCount(stats.skippedGroups)],
   ];

@@ -1,10 +1,13 @@
 // The picture: a canvas in a box, its stage, and the loop that draws only where something changed.
 
-import type { Playback, Shown } from "@meshreel/player-core/types";
+import type { Packed, Playback, Shown } from "@meshreel/player-core/types";
+import type { Bench } from "@meshreel/player-three";
+import type { VrActions } from "@meshreel/xr";
 import type { Engine, Stage } from "./stage.ts";
 
 /** A longer gap between two pictures is a page that was hidden or a machine that slept: time stood still meanwhile. */
 const LONGEST_GAP = 1000; // ms
+const MOST_TIMES = 150; // more than a headset shows in a second
 const PICTURE = 1000 / 60; // ms
 
 export class View {
@@ -21,7 +24,9 @@ export class View {
   #handle = 0;
   #before: number | null = null; // when the last picture was due, of the page's or the headset's clock
   #clock = 0; // ms; the playback's own, that stands still while nothing can be drawn
-  #times: number[] = [];
+  #times: number[] = []; // of the last pictures, ms
+  #costs: number[] = []; // of JavaScript for them, ms
+  #bench: Bench | null = null;
   #stop = new AbortController();
   #sizes: ResizeObserver;
   #sight: IntersectionObserver;
@@ -73,13 +78,33 @@ export class View {
     return this.#times.length;
   }
 
+  /** JavaScript for a picture on the main thread, ms: the median of the last ones; 0 before the first. */
+  get frameMs(): number {
+    return [...this.#costs].sort((a, b) => a - b)[this.#costs.length >> 1] ?? 0;
+  }
+
   /** True once something of the playback was drawn. */
   get shows(): boolean {
     return this.#last !== null;
   }
 
-  async enterVr(): Promise<void> {
-    await this.stage.enterVr((now) => this.#tick(now));
+  async enterVr(actions: VrActions): Promise<void> {
+    await this.stage.enterVr((now) => this.#tick(now), actions);
+  }
+
+  /** Lets a bench collect from now on; what is given back ends that. */
+  measure(playback: Playback, bench: Bench): () => void {
+    const stop = new AbortController();
+    const decoded = (event: Event): void => {
+      const packed = (event as CustomEvent<Packed>).detail;
+      if (packed.kind === "group") bench.decoded(packed.decodeMs, packed.frameCount / (playback.info?.frameRate ?? 30));
+    };
+    playback.addEventListener("ready", decoded, { signal: stop.signal });
+    this.#bench = bench;
+    return () => {
+      stop.abort();
+      this.#bench = null;
+    };
   }
 
   dispose(): void {
@@ -99,6 +124,7 @@ export class View {
   };
 
   #tick(now: number): boolean {
+    const start = performance.now();
     const since = this.#before === null ? PICTURE : now - this.#before;
     this.#clock += since < 0 || since > LONGEST_GAP ? PICTURE : since;
     this.#before = now;
@@ -107,6 +133,8 @@ export class View {
     const fresh = this.#dirty || this.stage.presenting || differs(shown, this.#last);
     const moving = fresh && this.#draw(shown);
     if (shown) this.#last = shown;
+    if (fresh) this.#measure(start);
+    else this.#bench?.interrupt();
     return moving || this.#dirty || (playback !== null && goesOn(playback, this.#last));
   }
 
@@ -120,10 +148,18 @@ export class View {
     const moving = this.stage.draw(this.#last);
     this.#dirty ||= moving;
     this.drawn++;
-    this.#times.push(performance.now());
-    if (this.#times.length > 200) this.#times.splice(0, 100);
     this.#report(new Event("drawn"));
     return moving;
+  }
+
+  #measure(start: number): void {
+    const end = performance.now();
+    this.#bench?.frameBegin(start);
+    this.#bench?.frameEnd(end);
+    this.#times.push(end);
+    this.#costs.push(end - start);
+    if (this.#times.length > MOST_TIMES) this.#times.shift();
+    if (this.#costs.length > MOST_TIMES) this.#costs.shift();
   }
 
   #resize(): void {

@@ -55,6 +55,22 @@ describeInBrowser("the built player", () => {
     });
   }
 
+  test("?bench tells what was decoded and drawn, as text and as JSON", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&bench=2");
+    const text = await page.waitForFunction(() => {
+      const said = document.querySelector("pre")?.textContent ?? "";
+      return said.includes("{") ? said : null;
+    });
+    const said = (await text.jsonValue())!;
+    expect(said).toContain("JavaScript a picture");
+    const report = JSON.parse(said.slice(said.indexOf("{")));
+    expect(report.pictures).toBeGreaterThan(0);
+    expect(report.scriptMs.median).toBeGreaterThan(0);
+    expect(report.triangles).toBeGreaterThan(0);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
   test("the address sets time, shading and camera", async () => {
     const { page } = await site.visit("player/index.html?src=/scene.reel&t=0.1&mode=normal&quality=0&loop");
     await ready(page);
@@ -138,6 +154,27 @@ describeInBrowser("the built player", () => {
     await ready(page);
     await ended(page);
     expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("a GPU context that is lost comes back with the picture", async () => {
+    const { page } = await site.visit("player/index.html?src=/scene.reel");
+    await ready(page);
+    const before = await covered(page);
+    await page.evaluate(async () => {
+      const player = document.querySelector("meshreel-player")!;
+      const gl = player.shadowRoot!.querySelector("canvas")!.getContext("webgl2")!;
+      const loss = gl.getExtension("WEBGL_lose_context")!;
+      const told = (type: string) => new Promise((done) => player.addEventListener(type, done, { once: true }));
+      const [lost, restored] = [told("lost"), told("restored")];
+      loss.loseContext();
+      await lost;
+      await new Promise((done) => setTimeout(done, 100)); // it cannot be asked back within the event
+      loss.restoreContext();
+      await restored;
+    });
+    expect(await page.locator(".toast").textContent()).toContain("graphics card");
+    await expect.poll(() => covered(page)).toBeCloseTo(before, 2);
     await page.close();
   });
 
