@@ -226,14 +226,17 @@ describe("seeking", () => {
 
   test("cancels what was on its way and decodes nothing of it", async () => {
     begin(stream(60, FULL), RATE);
-    workers.msOf = () => 100;
+    workers.msOf = () => 900;
     void player.load();
     await pass(2);
     const open = source.reads.filter(({ state }) => state === "open");
     expect(open.length).toBeGreaterThan(0);
     const begun = workers.begun.length;
+    const readied = viewer.readied.length;
+    expect(begun).toBeGreaterThan(readied); // one is being decoded
     player.currentTime = 40;
-    await pass(5);
+    await pass(10);
+    expect(viewer.readied.slice(readied).filter((chunk) => chunk < 100)).toEqual([]);
     expect(open.every(({ state }) => state === "cancelled")).toBe(true);
     const late = workers.chunks.slice(begun);
     expect(late.filter((chunk) => chunk < 100)).toEqual([]);
