@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import webbrowser
 from contextlib import suppress
 from pathlib import Path
@@ -38,8 +39,13 @@ def command(
 
     def tell(found: list[str]) -> None:
         common.result({"file": str(file), "addresses": found}, f"playing {file} at {' '.join(found)}  (Ctrl-C stops)")
-        if browser:
-            webbrowser.open(found[0])
+        if browser:  # beside: a browser in the terminal returns when it is closed
+            threading.Thread(target=_open, args=(found[0], common), daemon=True).start()
 
     with suppress(KeyboardInterrupt):  # the way to end it
-        run(make_app(Library.of_file(file)), server, tell)
+        run(make_app(Library.of_file(file), hosts=server.hosts), server, tell)
+
+
+def _open(address: str, common: Common) -> None:
+    if not webbrowser.open(address):
+        common.note(f"no browser was found: open {address}")

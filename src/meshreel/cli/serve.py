@@ -40,4 +40,4 @@ def command(
         common.result({"folder": str(folder), "addresses": found}, text)
 
     with suppress(KeyboardInterrupt):  # the way to end it
-        run(make_app(Library(folder), cors=cors), server, tell)
+        run(make_app(Library(folder), cors=cors, hosts=server.hosts), server, tell)

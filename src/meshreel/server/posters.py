@@ -7,55 +7,54 @@ import threading
 from collections import OrderedDict
 from pathlib import Path
 
+import numpy as np
+
+from .. import __version__
 from ..decoder import open as open_video
 from ..errors import MeshreelError
 from ..types import Mesh
 
 WIDTH, HEIGHT = 480, 360  # pixels
+FIELD = 30.0  # degrees, vertical
 MOST_KEPT = 256
 LOOKED_AT = 30  # frames, for one with a surface
 
-Version = tuple[Path, int, int]  # path, time of the last change, size
+
+def poster_tag(path: Path) -> str | None:
+    """The ETag of a file's poster: another one when the file changes, or what draws. None where no file is there."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return f'"{found.st_mtime_ns:x}-{found.st_size:x}-{__version__}"'
 
 
 class Posters:
-    """Rendered one at a time, and kept until the file changes."""
+    """Kept until the file changes. Threads may share it; it does not keep two from drawing the same."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[Version, bytes | None] = OrderedDict()
+        self._known: OrderedDict[tuple[Path, str], bytes | None] = OrderedDict()
         self._lock = threading.Lock()
 
-    def of(self, path: Path) -> bytes | None:
+    def of(self, path: Path, tag: str) -> bytes | None:
         """The PNG; None where nothing can be shown: a damaged or empty file, or no renderer (the extra `encode`)."""
-        try:
-            found = path.stat()
-        except OSError:
-            return None
-        version = (path, found.st_mtime_ns, found.st_size)
+        version = (path, tag)
         with self._lock:
-            if version not in self._known:
-                self._known[version] = _poster(path)
-            self._known.move_to_end(version)
+            if version in self._known:
+                self._known.move_to_end(version)
+                return self._known[version]
+        picture = _poster(path)
+        with self._lock:
+            self._known[version] = picture
             while len(self._known) > MOST_KEPT:
                 self._known.popitem(last=False)
-            return self._known[version]
+        return picture
 
 
 def _poster(path: Path) -> bytes | None:
     try:
-        from PIL import Image
-
-        from ..metrics.cameras import Box, ViewOptions, views_around
-        from ..metrics.render import render_normals
-
         mesh = _first(path)
-        if mesh is None:
-            return None
-        camera = views_around(Box.of([mesh]), ViewOptions(WIDTH, HEIGHT))[0]
-        picture = (255 * render_normals(mesh, camera)).round().astype("uint8")
-        out = io.BytesIO()
-        Image.fromarray(picture).save(out, "PNG")
-        return out.getvalue()
+        return None if mesh is None else _picture(mesh)
     except (MeshreelError, OSError, ModuleNotFoundError):
         return None
 
@@ -68,3 +67,24 @@ def _first(path: Path) -> Mesh | None:
             if not mesh.is_empty:
                 return mesh
     return None
+
+
+def _picture(mesh: Mesh) -> bytes:
+    """A PNG, clear where nothing is; from the front, but for a room that shows the front only its outside."""
+    from PIL import Image
+
+    from ..geometry.raycast import Rays
+    from ..metrics.cameras import Box, ViewOptions, views_around
+    from ..metrics.render import Window, look
+
+    box, rays = Box.of([mesh]), Rays(mesh)
+    shares = []  # of what each of the four views sees, the backs of faces
+    for camera in views_around(box, ViewOptions(WIDTH // 4, HEIGHT // 4, FIELD)):
+        seen = rays.look(camera)
+        shares.append(rays.backs(camera, seen).sum() / max((seen.faces >= 0).sum(), 1))
+    best = int(np.argmin(np.round(shares, 1)))  # the first of those that are about as good
+    view = look(mesh, views_around(box, ViewOptions(WIDTH, HEIGHT, FIELD))[best], Window(0, HEIGHT, 0, WIDTH))
+    picture = np.dstack([view.colors, view.covered])
+    out = io.BytesIO()
+    Image.fromarray((255 * picture).round().astype(np.uint8)).save(out, "PNG")
+    return out.getvalue()
