@@ -178,8 +178,7 @@ export class Player extends EventTarget implements Playback {
       this.#tell("play");
     }
     if (this.#clock?.isRunning) return;
-    const isReady = this.#session?.picture.isReady(this.currentFrame) ?? false;
-    if (!isReady) this.#tell("waiting");
+    if (!this.#session?.picture.isReady(this.currentFrame)) this.#tell("waiting");
     this.#wake();
     return new Promise((resolve, reject) => this.#plays.push({ resolve, reject }));
   }
@@ -248,9 +247,8 @@ export class Player extends EventTarget implements Playback {
       this.#tell("loadedmetadata");
       this.#wake();
     } catch (error) {
-      if (this.#closed.signal.aborted) return; // nobody waits for it any more
       this.#fail(error);
-      throw this.#error;
+      if (this.#error !== null) throw this.#error; // else it was disposed of, and nobody waits
     }
   }
 
