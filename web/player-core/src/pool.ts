@@ -113,7 +113,7 @@ export class WorkerPool {
 
   /** Gives idle workers their next jobs. */
   run(): void {
-    for (const share of this.#shares) {
+    for (const share of [...this.#shares]) {
       const taken = new Set<Task>();
       for (const task of share.queue) {
         const slot = this.slotOf(share, task.lane) ?? this.#idlest();
@@ -121,7 +121,10 @@ export class WorkerPool {
         taken.add(task);
         this.#post(slot, share, task);
       }
-      if (taken.size > 0) share.queue.splice(0, share.queue.length, ...share.queue.filter((task) => !taken.has(task)));
+      if (taken.size === 0) continue;
+      share.queue.splice(0, share.queue.length, ...share.queue.filter((task) => !taken.has(task)));
+      this.#shares.delete(share); // the others are next
+      this.#shares.add(share);
     }
   }
 

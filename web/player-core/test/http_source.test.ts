@@ -7,7 +7,7 @@ import { FileServer, noise } from "./server.ts";
 import type { Respond } from "./server.ts";
 
 const SIZE = 300_000;
-const FAST = { retryMs: 5 };
+const FAST = { retryMs: 2 };
 let server: FileServer;
 let source: HttpSource;
 let warnings: string[];
@@ -190,7 +190,7 @@ describe("a bad connection", () => {
     expect(await readBytes(source, 500, 5000)).toEqual(server.bytes.slice(500, 5500));
     expect(server.asked.map(({ from }) => from)).toEqual([500, 1500, 2500]);
     expect(warnings).toHaveLength(2);
-    expect(warnings[0]).toMatch(/the connection was cut; trying again in 0.005 s/);
+    expect(warnings[0]).toMatch(/the connection was cut; trying again in 0.002 s/);
   });
 
   test("may fail for ever if every answer brings a byte", async () => {
@@ -205,13 +205,13 @@ describe("a bad connection", () => {
     server.respond = first(3, (response) => void response.writeHead(500).end("sorry"));
     expect(await readBytes(source, 0, 10)).toEqual(server.bytes.slice(0, 10));
     expect(server.asked).toHaveLength(4);
-    expect(warnings.map((text) => /again in (.*) s/.exec(text)?.[1])).toEqual(["0.005", "0.01", "0.02"]);
+    expect(warnings.map((text) => /again in (.*) s/.exec(text)?.[1])).toEqual(["0.002", "0.004", "0.008"]);
   });
 
   test("and a server that says 503 for ever is given up", async () => {
     server.respond = (response) => void response.writeHead(503).end();
-    expect((await failure(0, 10)).message).toMatch(/answers 503, tried 9 times/);
-    expect(server.asked).toHaveLength(9);
+    expect((await failure(0, 10)).message).toMatch(/answers 503, tried 12 times/);
+    expect(server.asked).toHaveLength(12);
   });
 
   test("that was never there is given up sooner, and names CORS", async () => {
@@ -238,7 +238,7 @@ describe("a bad connection", () => {
   });
 
   test("that falls silent is cut and tried again", async () => {
-    source = new HttpSource(server.url, { retryMs: 5, silenceMs: 60 });
+    source = new HttpSource(server.url, { retryMs: 2, silenceMs: 60 });
     source.watch = { warn: (error) => warnings.push(error.message), progress: () => {} };
     server.respond = (response, asked, count) => {
       const body = server.begin(response, asked);
