@@ -172,7 +172,7 @@ export class MeshreelPlayer extends Reflected {
   /** A PNG of the picture as it is seen now. */
   async screenshot(): Promise<Blob> {
     if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
-    return this.#view.stage.picture();
+    return this.#view.picture();
   }
   /** Opens once more what failed, where it stopped. */
   retry(): void {

@@ -88,6 +88,14 @@ export class View {
     return this.#last !== null;
   }
 
+  /** A PNG of the picture of this moment, whether or not it was drawn before. */
+  picture(): Promise<Blob> {
+    const shown = this.#playback?.update(this.#clock) ?? null; // the clock does not move
+    if (shown) this.#last = shown;
+    this.stage.draw(this.#last);
+    return this.stage.picture();
+  }
+
   async enterVr(actions: VrActions): Promise<void> {
     await this.stage.enterVr((now) => this.#tick(now), actions);
   }

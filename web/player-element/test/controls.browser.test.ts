@@ -139,6 +139,17 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await on.get(async (player) => (await player.screenshot()).type)).toBe("image/png");
   });
 
+  test("a screenshot shows the frame of its moment, though no picture was drawn since", async () => {
+    await on.shown();
+    const frame = await on.get(async (player) => {
+      player.currentTime = 1;
+      await new Promise((done) => player.addEventListener("seeked", done, { once: true }));
+      void player.screenshot();
+      return engine.stages[0]!.shown!.frame;
+    });
+    expect(frame).toBe(24);
+  });
+
   test("full screen is entered and left with button and key", async () => {
     await on.shown();
     await on.page.locator("button.fullscreen").click();
