@@ -178,6 +178,10 @@ export class FakeStage extends EventTarget implements Stage {
     this.canvas.width = width * pixelRatio;
     this.canvas.height = height * pixelRatio;
   }
+  orbits: number[][] = [];
+  orbit(...turn: number[]): void {
+    this.orbits.push(turn);
+  }
   fit(): void {
     this.fits++;
     this.dispatchEvent(new Event("change"));
