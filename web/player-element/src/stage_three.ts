@@ -1,6 +1,6 @@
 // A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
 
-import type { Info, Packed, Shown } from "@meshreel/player-core/types";
+import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
 import { ReelScene } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
@@ -129,11 +129,10 @@ export class ThreeStage extends EventTarget implements Stage {
 
   fit(): void {
     if (!this.#info) return;
-    const { middle, radius } = this.#ball();
+    const { middle } = this.#ball();
     const half = Math.tan((FOV * Math.PI) / 360);
-    const narrow = Math.atan(half * Math.min(this.#free, this.#eye.aspect));
-    const distance = (SHUN * radius) / Math.sin(narrow);
-    this.#look(middle.clone().addScaledVector(FROM, distance), middle);
+    const distance = SHUN * distanceOf(this.#info.box, half * this.#eye.aspect, half * this.#free);
+    this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
     this.#isFit = true;
   }
 
@@ -207,6 +206,19 @@ export class ThreeStage extends EventTarget implements Stage {
     this.dispatchEvent(new Event("change"));
     this.dispatchEvent(new Event("camerachange"));
   }
+}
+
+/** How far from a box's middle, in the direction FROM, all its corners are seen; tangents of half the angles of view are given. */
+function distanceOf({ size }: Box, wide: number, high: number): number {
+  const right = new Vector3(0, 1, 0).cross(FROM).normalize();
+  const up = FROM.clone().cross(right);
+  let distance = 0;
+  for (let k = 0; k < 8; k++) {
+    const corner = new Vector3(...size).multiply(new Vector3(k & 1 ? 0.5 : -0.5, k & 2 ? 0.5 : -0.5, k & 4 ? 0.5 : -0.5));
+    const aside = Math.max(Math.abs(corner.dot(right)) / wide, Math.abs(corner.dot(up)) / high);
+    distance = Math.max(distance, corner.dot(FROM) + aside);
+  }
+  return distance;
 }
 
 /** Whether the camera comes to rest softly. */
