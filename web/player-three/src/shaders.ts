@@ -175,12 +175,15 @@ void main() {
 `;
 }
 
-/** The bits of the position as float32, and a 1 that tells that something was drawn there. */
+/** Tells a pixel where something was drawn from one that was cleared: those are 0 or 1. */
+export const DRAWN = 7;
+
+/** The bits of the position as float32, and DRAWN. */
 export const READBACK_FRAGMENT = `${PRECISION}
 flat in uvec3 bits;
 out uvec4 fragment;
 
 void main() {
-  fragment = uvec4(bits, 1u);
+  fragment = uvec4(bits, ${DRAWN}u);
 }
 `;
