@@ -10,26 +10,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 SKIPPED = {"tracking.cpp"}  # an encoder's
 # Strict arithmetic, as in CMakeLists.txt. Exceptions are off: a want of memory stops the instance.
-FLAGS = [
-    "-target",
-    "wasm32-wasi",
-    "-mexec-model=reactor",
-    "-std=c++17",
-    "-O3",
-    "-msimd128",
-    "-ffp-contract=off",
-    "-fno-fast-math",
-    "-fno-math-errno",
-    "-fno-trapping-math",
-    "-fno-exceptions",
-    "-fno-rtti",
-    "-DEIGEN_DONT_VECTORIZE",
-    "-DEIGEN_MPL2_ONLY",
-    "-DNDEBUG",
-    "-s",
-    "-Wl,--gc-sections",
-    "-Wl,-z,stack-size=1048576",
-]
+FLAGS = (
+    *("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c++17", "-O3", "-msimd128", "-s"),
+    *("-ffp-contract=off", "-fno-fast-math", "-fno-math-errno", "-fno-trapping-math"),
+    *("-fno-exceptions", "-fno-rtti", "-DEIGEN_DONT_VECTORIZE", "-DEIGEN_MPL2_ONLY", "-DNDEBUG"),
+    *("-Wl,--gc-sections", "-Wl,-z,stack-size=1048576"),
+)
 
 
 def eigen() -> Path:
@@ -57,6 +43,7 @@ def main(arguments: list[str]) -> int:
         exports = [f"-Wl,--export={name}" for name in names]
         compiler = [sys.executable, "-m", "ziglang", "c++", *FLAGS, *includes, *exports]
         subprocess.run([*compiler, *map(str, sources), "-o", str(made)], check=True)
+        made.chmod(0o644)  # the linker thinks it can be run
         made.replace(out)
     return 0
 

@@ -12,7 +12,9 @@ from .records import Nested, record_fields
 HEAD = """\
 // Made from src/meshreel/format/layout.py by scripts/generate. Do not edit.
 
-import { array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint } from "./records.ts";
+import {
+  array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint,
+} from "./records.ts";
 import type { Kind } from "./records.ts";
 """
 

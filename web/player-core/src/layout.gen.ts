@@ -1,6 +1,8 @@
 // Made from src/meshreel/format/layout.py by scripts/generate. Do not edit.
 
-import { array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint } from "./records.ts";
+import {
+  array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint,
+} from "./records.ts";
 import type { Kind } from "./records.ts";
 
 export const MAGIC = [82, 69, 69, 76, 13, 10, 26, 10] as const;

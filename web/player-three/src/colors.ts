@@ -5,7 +5,7 @@ import type { Vector } from "./octahedral.ts";
 /** Okabe and Ito's palette, which people with any colour vision can tell apart, less its black. */
 const PALETTE = [0xe69f00, 0x56b4e9, 0x009e73, 0xf0e442, 0x0072b2, 0xd55e00, 0xcc79a7] as const;
 const CLAY = rgb(0xdcd8d0);
-const HUE_SHARE = 0.2; // of a track's own colour in its clay
+const HUE_SHARE = 0.3; // of a track's own colour in its clay
 const DARKER = 0.68; // from one round through the palette to the next
 
 export const BACKGROUND_CLAY = rgb(0xb9bdc6);

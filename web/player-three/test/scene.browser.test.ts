@@ -3,6 +3,7 @@ import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from "vitest
 import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
 import { makeFloor, makeGroup, RADIUS, SQUARE } from "./analytic.ts";
+import { trackColor } from "../src/colors.ts";
 import { Picture } from "./picture.ts";
 import type { Vector } from "../src/octahedral.ts";
 import type { Mode } from "../src/index.ts";
@@ -137,6 +138,23 @@ describeInBrowser("a scene in Chromium", () => {
     expect(pictures[3].colors()).toBe(4); // white, two tracks, the background
   });
 
+  test("modes look as they are called", async () => {
+    await prepare(false, true);
+    const looking = async (mode: Mode): Promise<Picture> => {
+      await look(mode);
+      await show(2);
+      return picture();
+    };
+    const colour = await looking("colour");
+    expect(colour.at([0.2, 0, 0])).toBeNear(trackColor(0).map((share) => 255 * share), 2);
+    expect(colour.at([0, 0.8, 0])).toBeNear(trackColor(1).map((share) => 255 * share), 2);
+    const shaded = await looking("shaded");
+    expect(shaded.at([0.2, 0, 0])[0]).toBeGreaterThan(shaded.at([0.2 + 0.9 * RADIUS, 0, 0])[0] + 20); // darker to its rim
+    const edges = await looking("wireframe");
+    const line = Array.from({ length: 40 }, (_, k) => edges.at([0.05 + 0.0075 * k, 0.02, 0])[0]);
+    expect(Math.min(...line)).toBeLessThan(Math.max(...line) - 60);
+  });
+
   test("what it shows later costs no upload", async () => {
     await prepare(true);
     await show(0); // the materials of a first track are made with its first picture
@@ -185,6 +203,22 @@ describeInBrowser("a scene in Chromium", () => {
     const after = await numbers();
     expect(after.gpuBytes).toBe(0);
     expect([after.textures, after.geometries]).toEqual([before.textures, before.geometries]);
+  });
+
+  test("forty values that come and go leave nothing, whatever the mode", async () => {
+    const round = (count: number): Promise<void> =>
+      open.page.evaluate((k) => {
+        window.api.prepare(true);
+        window.api.look(k % 2 ? "wireframe" : "shaded");
+        window.api.show(k % 4);
+        window.api.draw();
+        window.api.release();
+      }, count);
+    for (const count of [0, 1]) await round(count);
+    const before = await numbers();
+    for (let count = 0; count < 40; count++) await round(count);
+    const after = await numbers();
+    expect([after.gpuBytes, after.textures, after.geometries]).toEqual([0, before.textures, before.geometries]);
   });
 
   test("a lost context comes back with the same picture", async () => {

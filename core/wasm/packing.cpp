@@ -1,4 +1,4 @@
-#include "meshreel/packing.h"
+#include "packing.h"
 
 #include <algorithm>
 #include <cmath>
