@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
+import threading
 import urllib.request
 
 import pytest
 
 pytest.importorskip("starlette", reason="the extra `play` is not installed")
 
+from meshreel.cli import main
+from meshreel.cli.console import Common
 from tests.cli.conftest import failed
 from tests.golden import GOLDEN
 
@@ -32,9 +34,8 @@ def started():
 
     def start(*arguments: str) -> tuple[subprocess.Popen[str], str]:
         command = [sys.executable, "-m", "meshreel", *arguments, "--json"]
-        environment = os.environ | {"PYTHONUNBUFFERED": "1"}
         pipe = subprocess.PIPE
-        process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment)
+        process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True)
         processes.append(process)
         line = process.stdout.readline()
         assert line, process.stderr.read()
@@ -85,3 +86,46 @@ def test_without_the_extra_its_name_is_told():
     command = [sys.executable, "-c", hidden, "play", str(FILE), "--no-browser"]
     said = subprocess.run(command, capture_output=True, text=True)
     assert said.returncode == 2 and "pip install 'meshreel[play]'" in said.stderr
+
+
+@needs_signals
+def test_a_download_that_is_under_way_does_not_hold_up_the_end(started, tmp_path):
+    with (tmp_path / "big.reel").open("wb") as file:
+        file.truncate(256 * 2**20)
+    process, address = started("serve", str(tmp_path))
+    with urllib.request.urlopen(f"{address}files/big.reel", timeout=60) as answer:  # and is not read on
+        assert len(answer.read(1000)) == 1000
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    assert (process.returncode, out, err) == (0, "", "")
+
+
+@pytest.fixture
+def told_once(monkeypatch):
+    """`play` ends as soon as it has told its address."""
+    monkeypatch.setattr("meshreel.cli.play.run", lambda _app, _options, tell: tell(["http://127.0.0.1:1/"]))
+
+
+@pytest.mark.usefixtures("told_once")
+def test_a_browser_that_stays_open_holds_nothing_up(run, monkeypatch):
+    opened, go_on = threading.Event(), threading.Event()
+    monkeypatch.setattr("webbrowser.open", lambda _: opened.set() or go_on.wait(60))
+    try:
+        assert run("play", FILE).code == 0
+        assert opened.wait(60) and not go_on.is_set()
+    finally:
+        go_on.set()
+
+
+@pytest.mark.usefixtures("told_once")
+def test_where_no_browser_is_found_the_address_is_told_again(monkeypatch):
+    notes: list[str] = []
+    heard = threading.Event()
+    monkeypatch.setattr("webbrowser.open", lambda _: False)
+    monkeypatch.setattr(Common, "note", lambda _, text: notes.append(text) or heard.set())
+    assert main(["play", str(FILE)]) == 0
+    assert heard.wait(60) and notes == ["no browser was found: open http://127.0.0.1:1/"]
+
+
+def test_an_origin_with_a_path_is_told(run, tmp_path):
+    assert failed(run("serve", tmp_path, "--cors", "https://example.org/"), "--cors 'https://example.org/'")

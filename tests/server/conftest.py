@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import shutil
+import threading
 
 import pytest
 
 pytest.importorskip("starlette", reason="the extra `play` is not installed")
 
+import uvicorn
 from starlette.testclient import TestClient
 
 from meshreel.server.app import make_app
 from meshreel.server.library import Library
+from meshreel.server.run import ServerOptions, run
 from tests.golden import GOLDEN
 
 ODD = 'a "b" <i> ü#%.reel'
@@ -46,3 +49,36 @@ def player(tmp_path):
 def client(folder, player):
     """Of the whole folder."""
     return TestClient(make_app(Library(folder), player))
+
+
+@pytest.fixture
+def live(monkeypatch):
+    """Serves an application from a thread and gives its address; stopped from within: signals are not for threads."""
+    servers: list[uvicorn.Server] = []
+    threads: list[threading.Thread] = []
+    made = uvicorn.Server.__init__
+
+    def remember(self, *arguments):
+        servers.append(self)
+        made(self, *arguments)
+
+    def start(app, options=ServerOptions()):
+        told: list[str] = []
+        heard = threading.Event()
+
+        def tell(found):
+            told.extend(found)
+            heard.set()
+
+        threads.append(threading.Thread(target=run, args=(app, options, tell)))
+        threads[-1].start()
+        assert heard.wait(60)
+        return told[0]
+
+    monkeypatch.setattr(uvicorn.Server, "__init__", remember)
+    yield start
+    for server in servers:
+        server.should_exit = True
+    for thread in threads:
+        thread.join(60)
+    assert not any(thread.is_alive() for thread in threads)

@@ -8,6 +8,7 @@ from urllib.parse import quote
 import pytest
 from starlette.testclient import TestClient
 
+from meshreel.errors import InputError
 from meshreel.server.app import make_app
 from meshreel.server.library import Library
 from tests.server.conftest import ODD
@@ -154,3 +155,17 @@ def test_other_origins_may_read_only_where_they_are_named(folder, player):
     assert client.options("/files/walk.reel", headers=preflight).status_code == 200
     other = client.get("/files/walk.reel", headers={"Origin": "https://elsewhere.example"})
     assert "access-control-allow-origin" not in other.headers
+
+
+def test_a_preflight_from_a_page_to_the_local_network_is_answered(folder, player):
+    client = TestClient(make_app(Library(folder), player, ("https://Example.org",)))
+    asking = {"Origin": "https://example.org", "Access-Control-Request-Method": "GET"}
+    asking["Access-Control-Request-Private-Network"] = "true"
+    answer = client.options("/files/walk.reel", headers=asking)
+    assert answer.status_code == 200 and answer.headers["access-control-allow-private-network"] == "true"
+
+
+@pytest.mark.parametrize("origin", ["https://example.org/", "example.org", "", "ftp://example.org", "https://a b"])
+def test_an_origin_that_no_browser_sends_is_told(folder, player, origin):
+    with pytest.raises(InputError, match=r"--cors .*give scheme, host and port alone"):
+        make_app(Library(folder), player, (origin,))

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import socket
 import ssl
-import threading
+import sys
 import urllib.request
+from datetime import timedelta
 
 import pytest
+from cryptography import x509
+from starlette.testclient import TestClient
 
+from meshreel.cli import one_line
 from meshreel.errors import InputError
 from meshreel.server.app import make_app
 from meshreel.server.library import Library
@@ -34,36 +38,40 @@ def test_a_taken_port_and_an_unknown_host_are_told_with_a_remedy(folder, player)
         ServerOptions(port=70_000)
 
 
-def test_https_answers_with_a_certificate_of_its_own(folder, player, monkeypatch):
-    """The server is stopped from within: signals are for the main thread, and tested with the command."""
-    import uvicorn
+def test_https_answers_with_a_certificate_for_this_machines_addresses(folder, player, live):
+    address = live(make_app(Library(folder), player), ServerOptions(https=True))
+    assert address.startswith("https://127.0.0.1:")
+    port = int(address.rstrip("/").rpartition(":")[2])
+    trusting = ssl.create_default_context()
+    trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE
+    with urllib.request.urlopen(f"{address}files/walk.reel", context=trusting, timeout=60) as answer:
+        assert answer.read() == (folder / "walk.reel").read_bytes()
+    made = x509.load_pem_x509_certificate(ssl.get_server_certificate(("127.0.0.1", port)).encode())
+    names = made.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert "localhost" in names.get_values_for_type(x509.DNSName)
+    assert {"127.0.0.1", "::1"} <= {str(one) for one in names.get_values_for_type(x509.IPAddress)}
+    life = made.not_valid_after_utc - made.not_valid_before_utc
+    assert timedelta(days=30) < life < timedelta(days=398)  # what browsers accept
 
-    servers: list[uvicorn.Server] = []
-    made = uvicorn.Server.__init__
 
-    def remember(self, *arguments):
-        servers.append(self)
-        made(self, *arguments)
+def test_https_without_its_library_is_told_before_any_address_is(folder, player, monkeypatch):
+    monkeypatch.setitem(sys.modules, "trustme", None)
+    told = []
+    with pytest.raises(ModuleNotFoundError) as caught:
+        run(make_app(Library(folder), player), ServerOptions(https=True), told.append)
+    assert told == [] and "meshreel[play]" in one_line(caught.value)
 
-    monkeypatch.setattr(uvicorn.Server, "__init__", remember)
-    told: list[list[str]] = []
-    heard = threading.Event()
 
-    def tell(found):
-        told.append(found)
-        heard.set()
+@pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason="this system has no IPv6")
+def test_all_addresses_of_version_6_are_all_of_version_4_too(folder, player, live):
+    address = live(make_app(Library(folder), player), ServerOptions(host="::"))
+    for host in ("127.0.0.1", "[::1]"):
+        with urllib.request.urlopen(address.replace("localhost", host), timeout=60) as answer:
+            assert answer.status == 200
 
-    work = threading.Thread(target=run, args=(make_app(Library(folder), player), ServerOptions(https=True), tell))
-    work.start()
-    try:
-        assert heard.wait(60)
-        trusting = ssl.create_default_context()
-        trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE
-        [address] = told[0]
-        assert address.startswith("https://127.0.0.1:")
-        with urllib.request.urlopen(f"{address}files/walk.reel", context=trusting, timeout=60) as answer:
-            assert answer.read() == (folder / "walk.reel").read_bytes()
-    finally:
-        servers[0].should_exit = True
-        work.join(60)
-    assert not work.is_alive()
+
+def test_who_listens_here_alone_answers_to_its_own_names_alone(folder, player):
+    client = TestClient(make_app(Library(folder), player, hosts=ServerOptions().hosts))
+    for host, code in (("localhost", 200), ("127.0.0.1:80", 200), ("[::1]:80", 200), ("evil.example", 400), ("", 400)):
+        assert client.get("/files/walk.reel", headers={"Host": host}).status_code == code
+    assert ServerOptions(host="0.0.0.0").hosts == ServerOptions(host="192.168.0.7").hosts == ("*",)

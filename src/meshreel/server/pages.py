@@ -38,7 +38,7 @@ li { list-style: none; border-radius: 8px; overflow: hidden; background: #fff; b
 a { display: block; color: inherit; text-decoration: none; }
 a:focus-visible { outline: 3px solid #2563eb; outline-offset: -3px; }
 a:hover .name { text-decoration: underline; }
-img { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: contain; background: #e2e5ea; }
+img, .blank { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: contain; background: #e2e5ea; }
 .told { padding: 10px 12px 12px; }
 .name { font-weight: 600; overflow-wrap: anywhere; }
 .facts { color: #4a5160; font-size: 14px; }
@@ -46,7 +46,7 @@ img { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: contain; bac
 @media (prefers-color-scheme: dark) {
   body { color: #e8eaee; background: #14171c; }
   li { background: #20242b; }
-  img { background: #2a2f38; }
+  img, .blank { background: #2a2f38; }
   .facts { color: #aab1bd; }
   .error { color: #ff9b9b; }
 }
@@ -83,7 +83,9 @@ def _tile(entry: Entry) -> str:
     facts = f"{entry.mbps:.3g} Mbps, {entry.duration:.1f} s, {entry.frames} frames, {_size(entry.size)}"
     told = f'<div class="facts">{facts}</div>' if entry.frames else ""
     told += f'<div class="error">{escape(entry.error)}</div>' if entry.error else ""
-    poster = f'<img src="/posters/{address}.png" alt="" loading="lazy">'
+    poster = (
+        f'<img src="/posters/{address}.png" alt="" loading="lazy">' if entry.frames else '<div class="blank"></div>'
+    )
     inside = f'{poster}<div class="told"><div class="name">{name}</div>{told}</div>'
     return f'<li><a href="/watch/{address}">{inside}</a></li>\n' if entry.frames else f"<li>{inside}</li>\n"
 

@@ -70,7 +70,7 @@ def _first(path: Path) -> Mesh | None:
 
 
 def _picture(mesh: Mesh) -> bytes:
-    """A PNG, clear where nothing is; from the front, but for a room that shows the front only its outside."""
+    """A PNG, clear where nothing is; from the front, where no other side shows clearly more than it."""
     from PIL import Image
 
     from ..geometry.raycast import Rays
@@ -78,11 +78,11 @@ def _picture(mesh: Mesh) -> bytes:
     from ..metrics.render import Window, look
 
     box, rays = Box.of([mesh]), Rays(mesh)
-    shares = []  # of what each of the four views sees, the backs of faces
+    shown = []  # in each of the four views, pixels with the fronts of faces less those with backs: walls from outside
     for camera in views_around(box, ViewOptions(WIDTH // 4, HEIGHT // 4, FIELD)):
         seen = rays.look(camera)
-        shares.append(rays.backs(camera, seen).sum() / max((seen.faces >= 0).sum(), 1))
-    best = int(np.argmin(np.round(shares, 1)))  # the first of those that are about as good
+        shown.append(int((seen.faces >= 0).sum()) - 2 * int(rays.backs(camera, seen).sum()))
+    best = int(np.argmax(shown)) if max(shown) > 2 * shown[0] else 0
     view = look(mesh, views_around(box, ViewOptions(WIDTH, HEIGHT, FIELD))[best], Window(0, HEIGHT, 0, WIDTH))
     picture = np.dstack([view.colors, view.covered])
     out = io.BytesIO()

@@ -21,6 +21,7 @@ from ..errors import InputError
 LOCAL = ("localhost", "127.0.0.1", "::1")
 EVERYWHERE = ("0.0.0.0", "::")
 PATIENCE = 1  # s, for answers that are under way when the server is stopped
+UNKNOWN = "meshreel, for one run of its server"  # who signs
 VALID = timedelta(days=365)  # of a certificate; browsers refuse those that hold for many years
 
 
@@ -60,7 +61,7 @@ def run(app: Starlette, options: ServerOptions, told: Callable[[list[str]], None
             app,
             lifespan="off",
             ws="none",
-            log_level="warning",
+            log_level="error",
             access_log=False,
             server_header=False,
             timeout_graceful_shutdown=PATIENCE,
@@ -103,11 +104,11 @@ def _encryption(address: str) -> ssl.SSLContext:
     """TLS by a certificate that nobody else has signed, for the address and for this machine's own; it is not kept."""
     import trustme
 
-    names = dict.fromkeys([*LOCAL, *_own_addresses(), address])
+    names = [name for name in dict.fromkeys([*LOCAL, *_own_addresses(), address]) if name not in EVERYWHERE]
+    maker = trustme.CA(organization_name=UNKNOWN)
     now = datetime.now(UTC)
-    maker = trustme.CA(organization_name="meshreel", organization_unit_name="made for one run of the server")
     made = maker.issue_cert(
-        *names, organization_name="meshreel", not_before=now - timedelta(days=1), not_after=now + VALID
+        *names, organization_name=UNKNOWN, not_before=now - timedelta(days=1), not_after=now + VALID
     )
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     made.configure_cert(context)

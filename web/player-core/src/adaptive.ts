@@ -29,6 +29,8 @@ export class Adaptive {
   level: number;
   readonly #head: Head;
   readonly #timeline: Timeline;
+  #rates: readonly number[] = [];
+  #ratesAt = NaN; // s
   readonly #loads: number[] = []; // of each level at normal speed, as measured last
   #changed = -Infinity; // ms
   #ceiling = Infinity; // level that decoding did not keep up with, less one
@@ -52,8 +54,15 @@ export class Adaptive {
     return this.level;
   }
 
-  /** Bits a second of content at each level, over the groups that come next. */
-  rates(time: number): number[] {
+  /** Bits a second of content at each level, over the groups that come next; anew where `time` is in another second. */
+  rates(time: number): readonly number[] {
+    const second = Math.floor(time);
+    if (second !== this.#ratesAt) this.#rates = this.#ratesOf(second);
+    this.#ratesAt = second;
+    return this.#rates;
+  }
+
+  #ratesOf(time: number): number[] {
     const { starts, frameCount, duration } = this.#timeline;
     const from = Math.min(time, Math.max(0, duration - OUTLOOK));
     const groups = groupsBetween(this.#head, this.#timeline.frameAt(from), this.#timeline.frameAt(from + OUTLOOK));

@@ -32,14 +32,18 @@ export class Answer {
     this.#listen();
   }
 
-  /** Asks for bytes `from` up to `end`; for the whole file where `from` is 0 and `end` is null. Throws Lost. */
+  /**
+   * Asks for bytes `from` up to `end`; for the whole file where `from` is 0 and `end` is null. Throws Lost.
+   *
+   * Past the browser's cache: Chromium's asks the server twice for ranges of one file that are fetched at once.
+   */
   static async to(options: RequestOptions, range: readonly [number, number | null], measured: Bandwidth, signals: AbortSignal[]): Promise<Answer> {
     const { url, credentials } = options;
     const answer = new Answer(measured, options.silenceMs, signals);
     const [from, end] = range;
     const headers: HeadersInit = from === 0 && end === null ? {} : { Range: `bytes=${from}-${end === null ? "" : end - 1}` };
     try {
-      answer.#response = await fetch(url, { headers, credentials, signal: answer.#controller.signal });
+      answer.#response = await fetch(url, { headers, credentials, cache: "no-store", signal: answer.#controller.signal });
       return answer;
     } catch (error) {
       answer.close();

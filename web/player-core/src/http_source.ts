@@ -16,7 +16,7 @@ export interface HttpOptions {
 }
 
 const FIRST_TRIES = 4; // of a server that never answered; of another one:
-const TRIES = 9; // without a byte between them, half a minute
+const TRIES = 12; // without a byte between them, a minute
 
 export class HttpSource implements Source {
   readonly url: string;

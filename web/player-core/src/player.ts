@@ -2,6 +2,7 @@
 
 import { Clock } from "./clock.ts";
 import { SourceError } from "./errors.ts";
+import { PlaybackTarget } from "./events.ts";
 import { open } from "./opening.ts";
 import { WorkerPool } from "./pool.ts";
 import type { Share, WorkerSetup } from "./pool.ts";
@@ -17,23 +18,12 @@ export interface PlayerOptions extends Partial<Limits> {
 
 const LIMITS: Limits = { bufferSeconds: 10, decodedSeconds: 3, memory: 1 << 28 };
 
-/** Events that a `Player` dispatches, with their types. */
-export interface Player {
-  addEventListener<K extends keyof PlaybackEvents>(
-    type: K, listener: (event: PlaybackEvents[K]) => void, options?: AddEventListenerOptions | boolean,
-  ): void;
-  addEventListener(type: string, listener: EventListenerOrEventListenerObject | null, options?: AddEventListenerOptions | boolean): void;
-  removeEventListener<K extends keyof PlaybackEvents>(
-    type: K, listener: (event: PlaybackEvents[K]) => void, options?: EventListenerOptions | boolean,
-  ): void;
-  removeEventListener(type: string, listener: EventListenerOrEventListenerObject | null, options?: EventListenerOptions | boolean): void;
-}
-
 const TICK_MS = 250; // between plans, and between events of time and progress, while it plays
+const SOON_MS = 40; // from a group's arrival to the next plan while it plays: there are some more until then
 const ENOUGH = [0.25, 1] as const; // s of display time that must be at hand to start, and to go on after a stall
 const MOST_BUFFERED = 60; // s of content that `stats` looks ahead
 
-export class Player extends EventTarget implements Playback {
+export class Player extends PlaybackTarget implements Playback {
   readonly #source: Source;
   readonly #pool: WorkerPool;
   readonly #ownsPool: boolean;
@@ -64,6 +54,7 @@ export class Player extends EventTarget implements Playback {
   #toldAt = 0; // ms
   #plays: { resolve: () => void; reject: (error: Error) => void }[] = [];
   #waking: ReturnType<typeof setTimeout> | undefined;
+  #wakesIn = Infinity; // ms, as it was set
   #ticking: ReturnType<typeof setInterval> | undefined;
 
   constructor({ source, workers, ...limits }: PlayerOptions) {
@@ -178,8 +169,7 @@ export class Player extends EventTarget implements Playback {
       this.#tell("play");
     }
     if (this.#clock?.isRunning) return;
-    const isReady = this.#session?.picture.isReady(this.currentFrame) ?? false;
-    if (!isReady) this.#tell("waiting");
+    if (!this.#session?.picture.isReady(this.currentFrame)) this.#tell("waiting");
     this.#wake();
     return new Promise((resolve, reject) => this.#plays.push({ resolve, reject }));
   }
@@ -238,7 +228,7 @@ export class Player extends EventTarget implements Playback {
         ready: (packed) => this.#tell("ready", packed),
         release: (packed) => this.#tell("release", packed),
         warn: (error) => this.#tell("warning", error),
-        changed: () => this.#wake(),
+        changed: () => this.#wake(this.#clock?.isRunning ? SOON_MS : 0),
         failed: (error) => this.#fail(error),
       });
       this.#clock = new Clock(this.#session.timeline);
@@ -248,9 +238,8 @@ export class Player extends EventTarget implements Playback {
       this.#tell("loadedmetadata");
       this.#wake();
     } catch (error) {
-      if (this.#closed.signal.aborted) return; // nobody waits for it any more
       this.#fail(error);
-      throw this.#error;
+      if (this.#error !== null) throw this.#error; // else it was disposed of, and nobody waits
     }
   }
 
@@ -264,14 +253,16 @@ export class Player extends EventTarget implements Playback {
   }
 
   /** Has it look after everything, soon: never within `update`, and once for all that happens until then. */
-  #wake(): void {
-    if (this.#closed.signal.aborted) return;
-    this.#waking ??= setTimeout(() => this.#tick(), 0);
+  #wake(delay = 0): void {
+    if (this.#closed.signal.aborted || this.#wakesIn <= delay) return;
+    clearTimeout(this.#waking);
+    this.#wakesIn = delay;
+    this.#waking = setTimeout(() => this.#tick(), delay);
   }
 
   #tick(): void {
     clearTimeout(this.#waking);
-    this.#waking = undefined;
+    this.#wakesIn = Infinity;
     const [session, clock] = [this.#session, this.#clock];
     if (session === null || clock === null || this.#error !== null) return;
     session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, quality: this.#quality, isWaiting: this.#hasStalled && !clock.isRunning });

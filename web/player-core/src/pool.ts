@@ -113,18 +113,18 @@ export class WorkerPool {
 
   /** Gives idle workers their next jobs. */
   run(): void {
-    for (const share of this.#shares) {
+    for (const share of [...this.#shares]) {
       const taken = new Set<Task>();
-      const waiting = new Set<number>(); // lanes whose first job has to wait
       for (const task of share.queue) {
-        const slot = waiting.has(task.lane) ? null : (this.slotOf(share, task.lane) ?? this.#idlest());
-        if (slot === null || !slot.isStarted || slot.running !== null) waiting.add(task.lane);
-        else {
-          taken.add(task);
-          this.#post(slot, share, task);
-        }
+        const slot = this.slotOf(share, task.lane) ?? this.#idlest();
+        if (slot === null || !slot.isStarted || slot.running !== null) continue; // so will be the next of its lane
+        taken.add(task);
+        this.#post(slot, share, task);
       }
-      if (taken.size > 0) share.queue.splice(0, share.queue.length, ...share.queue.filter((task) => !taken.has(task)));
+      if (taken.size === 0) continue;
+      share.queue.splice(0, share.queue.length, ...share.queue.filter((task) => !taken.has(task)));
+      this.#shares.delete(share); // the others are next
+      this.#shares.add(share);
     }
   }
 

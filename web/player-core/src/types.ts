@@ -57,7 +57,7 @@ export type Packed = PackedGroup | PackedStatic;
 /** What to draw now: a frame, how far to blend towards the next, and what is at hand of it. */
 export interface Shown {
   readonly frame: number;
-  /** 0 to 1 towards frame + 1; 0 where that is in another group, or where interpolation is off. */
+  /** 0 to 1 towards frame + 1; 0 where that is in another group in all tracks, or where interpolation is off. A track whose group ends here stands. */
   readonly blend: number;
   /** For each track, its group of this frame; null where it is not at hand (damaged) or empty. */
   readonly groups: readonly (PackedGroup | null)[];

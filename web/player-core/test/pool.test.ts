@@ -215,6 +215,15 @@ test("a pool shared by two files keeps them apart, and forgets one that leaves",
   expect(outcomes.get(2)).toMatchObject({ kind: "decoded" });
 });
 
+test("a pool shared by two files gives them turns", async () => {
+  open(1);
+  const other = pool.open();
+  for (let chunk = 0; chunk < 4; chunk++) submit(chunk);
+  for (let chunk = 10; chunk < 14; chunk++) submit(chunk, chunk, null, other);
+  await pass(2);
+  expect(workers.chunks).toEqual([0, 10, 1, 11, 2, 12, 3, 13]);
+});
+
 test("a share that has left hears nothing of what was being done for it", async () => {
   open(1);
   submit(0);

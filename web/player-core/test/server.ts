@@ -1,13 +1,14 @@
 // A web server for one file, honest unless told otherwise.
 
 import { createServer } from "node:http";
-import type { IncomingMessage, Server, ServerResponse } from "node:http";
+import type { IncomingHttpHeaders, IncomingMessage, Server, ServerResponse } from "node:http";
 import type { AddressInfo } from "node:net";
 
 export interface Asked {
   readonly from: number;
   readonly to: number; // behind the last byte
   readonly isRange: boolean;
+  readonly headers: IncomingHttpHeaders;
 }
 
 export type Respond = (response: ServerResponse, asked: Asked, count: number) => Promise<void> | void;
@@ -60,7 +61,7 @@ export class FileServer {
   async #answer(request: IncomingMessage, response: ServerResponse): Promise<void> {
     const [, from, last] = /^bytes=(\d+)-(\d*)$/.exec(request.headers.range ?? "") ?? [];
     const to = last ? Math.min(Number(last) + 1, this.bytes.length) : this.bytes.length;
-    const asked = { from: Number(from ?? 0), to, isRange: from !== undefined };
+    const asked = { from: Number(from ?? 0), to, isRange: from !== undefined, headers: request.headers };
     const count = this.asked.push(asked) - 1;
     response.on("close", () => {
       if (!response.writableFinished) this.cut++;

@@ -20,6 +20,8 @@ export class Viewer {
   readonly errors: Error[] = [];
   readonly offences: string[] = [];
   readonly alive = new Set<Packed>();
+  /** Chunks that were ready, in their order. */
+  readonly readied: number[] = [];
   mostAlive = 0;
   pictures = 0;
   shown: Shown | null = null;
@@ -60,6 +62,7 @@ export class Viewer {
   #ready(packed: Packed): void {
     if (this.alive.has(packed)) this.offences.push(`chunk ${packed.chunk} is ready twice`);
     this.alive.add(packed);
+    this.readied.push(packed.chunk);
     this.mostAlive = Math.max(this.mostAlive, this.alive.size);
   }
 

@@ -3,6 +3,7 @@
 import type { Info, Packed, Playback } from "@meshreel/player-core/types";
 import type { Bench } from "@meshreel/player-three";
 import { vrSupported } from "@meshreel/xr";
+import { applyToPlayback, applyToStage } from "./apply.ts";
 import { OBSERVED, PROPERTIES } from "./attributes.ts";
 import { Controls } from "./controls/controls.ts";
 import { PASSED } from "./events.ts";
@@ -169,10 +170,14 @@ export class MeshreelPlayer extends Reflected {
   fit(): void {
     this.#view?.stage.fit();
   }
+  /** Turns the camera about what it looks at, in radians to the right and up, and brings it so many times closer. */
+  orbit(right: number, up: number, closer = 1): void {
+    this.#view?.stage.orbit(right, up, closer);
+  }
   /** A PNG of the picture as it is seen now. */
   async screenshot(): Promise<Blob> {
     if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
-    return this.#view.stage.picture();
+    return this.#view.picture();
   }
   /** Opens once more what failed, where it stopped. */
   retry(): void {
@@ -259,7 +264,8 @@ export class MeshreelPlayer extends Reflected {
   }
 
   #makeView(): View {
-    const view = new View(MeshreelPlayer.engine, this.#controls.picture, (event) => this.#onView(event));
+    const { picture, cover } = this.#controls;
+    const view = new View(MeshreelPlayer.engine, picture, cover, (event) => this.#onView(event));
     view.stage.mode = this.mode;
     view.stage.background = this.#controls.background;
     return view;
@@ -289,6 +295,7 @@ export class MeshreelPlayer extends Reflected {
     if (event.type === "canplay") this.#playable = true;
     if (["canplay", "playing", "seeked"].includes(event.type)) this.#waiting = false;
     if (event.type === "waiting") this.#waiting = true;
+    if (event.type === "pause" && this.#playable) this.#waiting = false;
     if (event.type === "ended") this.#wished = false;
     if (event.type === "error") {
       this.#fail(detail instanceof Error ? detail : new Error("unknown"));
@@ -325,14 +332,8 @@ export class MeshreelPlayer extends Reflected {
   }
 
   #apply(name: string): void {
-    const stage = this.#view?.stage;
-    const playback = this.#playback;
-    if (playback && name === "loop") playback.loop = this.loop;
-    if (playback && name === "quality") playback.quality = this.quality;
-    if (playback && (name === "speed" || name === "playbackrate")) playback.playbackRate = this.playbackRate;
-    if (playback && name === "interpolate") playback.interpolate = this.interpolate;
-    if (stage && name === "mode") stage.mode = this.mode;
-    if (stage && name === "camera") stage.camera = this.getAttribute("camera") ?? "";
+    if (this.#playback) applyToPlayback(name, this, this.#playback);
+    if (this.#view) applyToStage(name, this, this.#view.stage);
     if (name === "background" || name === "theme") this.applyBackground();
     this.#view?.refresh();
   }

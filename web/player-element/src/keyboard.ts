@@ -2,7 +2,7 @@
 
 export type Action =
   | "toggle" | "back" | "forward" | "first" | "last" | "previousFrame" | "nextFrame" | "fullscreen" | "vr" | "stats"
-  | "mode" | "loop" | "fit" | "help" | "close";
+  | "mode" | "loop" | "fit" | "help" | "close" | "turnLeft" | "turnRight" | "turnUp" | "turnDown" | "closer" | "farther";
 
 /** What `actionOf` looks at of a KeyboardEvent. */
 export interface Key {
@@ -10,33 +10,37 @@ export interface Key {
   readonly ctrlKey?: boolean;
   readonly altKey?: boolean;
   readonly metaKey?: boolean;
+  readonly shiftKey?: boolean;
 }
 
-/** The keys of the help overlay, in its order: names shown, values of `event.key`, action, what it does. */
-export const KEYS: readonly { shown: string; keys: readonly string[]; action: Action; says: string }[] = [
-  { shown: "Space, K", keys: [" ", "k"], action: "toggle", says: "Play or pause" },
-  { shown: "←", keys: ["ArrowLeft"], action: "back", says: "Seek back" },
-  { shown: "→", keys: ["ArrowRight"], action: "forward", says: "Seek forward" },
-  { shown: "Home", keys: ["Home"], action: "first", says: "First frame" },
-  { shown: "End", keys: ["End"], action: "last", says: "Last frame" },
-  { shown: ",", keys: [","], action: "previousFrame", says: "Previous frame" },
-  { shown: ".", keys: ["."], action: "nextFrame", says: "Next frame" },
-  { shown: "L", keys: ["l"], action: "loop", says: "Loop on or off" },
-  { shown: "M", keys: ["m"], action: "mode", says: "Next shading" },
-  { shown: "0", keys: ["0"], action: "fit", says: "Fit the view" },
-  { shown: "S", keys: ["s"], action: "stats", says: "Statistics" },
-  { shown: "F", keys: ["f"], action: "fullscreen", says: "Full screen" },
-  { shown: "V", keys: ["v"], action: "vr", says: "Virtual reality" },
-  { shown: "?", keys: ["?"], action: "help", says: "These keys" },
+/** The keys of the help overlay, in its order: what is shown, and the action of each value of `event.key`. */
+export const KEYS: readonly { shown: string; says: string; keys: Readonly<Record<string, Action>> }[] = [
+  { shown: "Space, K", says: "Play or pause", keys: { " ": "toggle", k: "toggle" } },
+  { shown: "← →", says: "Seek", keys: { ArrowLeft: "back", ArrowRight: "forward" } },
+  { shown: "Home End", says: "First, last frame", keys: { Home: "first", End: "last" } },
+  { shown: ", .", says: "Previous, next frame", keys: { ",": "previousFrame", ".": "nextFrame" } },
+  { shown: "L", says: "Loop on or off", keys: { l: "loop" } },
+  {
+    shown: "Shift + arrows", says: "Turn the view",
+    keys: { "Shift+ArrowLeft": "turnLeft", "Shift+ArrowRight": "turnRight", "Shift+ArrowUp": "turnUp", "Shift+ArrowDown": "turnDown" },
+  },
+  { shown: "+ −", says: "Closer, farther", keys: { "+": "closer", "=": "closer", "-": "farther" } },
+  { shown: "0", says: "Fit the view", keys: { 0: "fit" } },
+  { shown: "M", says: "Next shading", keys: { m: "mode" } },
+  { shown: "S", says: "Statistics", keys: { s: "stats" } },
+  { shown: "F", says: "Full screen", keys: { f: "fullscreen" } },
+  { shown: "V", says: "Virtual reality", keys: { v: "vr" } },
+  { shown: "?", says: "These keys", keys: { "?": "help" } },
 ];
 
-const ACTIONS = new Map(KEYS.flatMap(({ keys, action }) => keys.map((key) => [key, action] as const)));
+const ACTIONS = new Map(KEYS.flatMap(({ keys }) => Object.entries(keys)));
 
 /** The action of a key; null for keys of the browser (with Ctrl, Alt or Meta) and for all others. */
 export function actionOf(event: Key): Action | null {
   if (event.ctrlKey || event.altKey || event.metaKey) return null;
   if (event.key === "Escape") return "close";
-  return ACTIONS.get(event.key.length === 1 ? event.key.toLowerCase() : event.key) ?? null;
+  if (event.key.length === 1) return ACTIONS.get(event.key.toLowerCase()) ?? null; // Shift is in the character already
+  return ACTIONS.get(event.shiftKey ? `Shift+${event.key}` : event.key) ?? null;
 }
 
 /** Seconds that an arrow key seeks: a tenth of the recording, at most five seconds. */

@@ -28,8 +28,11 @@ export interface Stage extends EventTarget {
   release(packed: Packed): void;
   /** Draws; true where the next picture will differ though time stands still (the camera glides). */
   draw(shown: Shown | null): boolean;
-  resize(width: number, height: number, pixelRatio: number): void; // CSS pixels
+  /** All in CSS pixels; the lowest `covered` of them lie under the bar, and what is looked at is put into the middle of the others. */
+  resize(width: number, height: number, pixelRatio: number, covered: number): void;
   fit(): void;
+  /** Turns the camera by radians, and brings it so many times closer. */
+  orbit(right: number, up: number, closer: number): void;
   picture(): Promise<Blob>; // PNG
   /** From then on `draw` is called by the headset's frames, not by the page's. */
   enterVr(frame: (now: number) => void, actions: VrActions): Promise<void>;

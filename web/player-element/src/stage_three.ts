@@ -1,10 +1,10 @@
 // A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
 
-import type { Info, Packed, Shown } from "@meshreel/player-core/types";
+import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
 import { ReelScene } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
-import { Color, Group, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { Mode } from "./attributes.ts";
 import type { PictureStats, Stage } from "./stage.ts";
@@ -12,6 +12,7 @@ import type { PictureStats, Stage } from "./stage.ts";
 const FOV = 45; // degrees, of the picture's height
 const FROM = new Vector3(0.25, 0.25, 1).normalize(); // where a view that fits looks from
 const SHUN = 1.05; // of the distance at which everything just fits
+const STEEPEST = 0.01; // radians from straight above or below
 const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
 const FARTHEST = 20; // of its size: how far the camera goes
 const NEAR = 0.002; // of the camera's distance: what it sees. A background may reach far beyond the recording's box.
@@ -30,6 +31,8 @@ export class ThreeStage extends EventTarget implements Stage {
   #shown: Shown | null = null;
   #mode: Mode = "shaded";
   #background = "";
+  #free = 1; // of the picture's height: what the bar leaves
+  #isFit = true; // nobody has moved the camera: it fits again when the picture's size changes
   #session: VrSession | null = null;
 
   constructor(canvas: HTMLCanvasElement) {
@@ -43,6 +46,7 @@ export class ThreeStage extends EventTarget implements Stage {
     canvas.addEventListener("webglcontextrestored", () => this.dispatchEvent(new Event("restored")), { signal });
     this.#orbit = new OrbitControls(this.#eye, canvas);
     this.#orbit.enableDamping = glides();
+    this.#orbit.addEventListener("start", () => void (this.#isFit = false));
     this.#orbit.addEventListener("change", () => this.#moved());
   }
 
@@ -113,21 +117,32 @@ export class ThreeStage extends EventTarget implements Stage {
     return moves;
   }
 
-  resize(width: number, height: number, pixelRatio: number): void {
+  resize(width: number, height: number, pixelRatio: number, covered: number): void {
     if (this.presenting) return; // the headset has its own size
     this.#renderer.setPixelRatio(pixelRatio);
     this.#renderer.setSize(width, height, false);
     this.#eye.aspect = width / height;
-    this.#eye.updateProjectionMatrix();
+    this.#free = Math.max(0.2, 1 - covered / height);
+    this.#eye.setViewOffset(width, height, 0, ((1 - this.#free) * height) / 2, width, height);
+    if (this.#isFit) this.fit();
   }
 
   fit(): void {
     if (!this.#info) return;
-    const { middle, radius } = this.#ball();
-    const half = (FOV * Math.PI) / 360;
-    const narrow = Math.min(half, Math.atan(Math.tan(half) * this.#eye.aspect));
-    const distance = (SHUN * radius) / Math.sin(narrow);
-    this.#look(middle.clone().addScaledVector(FROM, distance), middle);
+    const { middle } = this.#ball();
+    const half = Math.tan((FOV * Math.PI) / 360);
+    const distance = SHUN * distanceOf(this.#info.box, half * this.#eye.aspect, half * this.#free);
+    this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
+    this.#isFit = true;
+  }
+
+  orbit(right: number, up: number, closer: number): void {
+    const { target, minDistance, maxDistance } = this.#orbit;
+    const place = new Spherical().setFromVector3(this.#eye.position.clone().sub(target));
+    place.theta += right;
+    place.phi = Math.min(Math.PI - STEEPEST, Math.max(STEEPEST, place.phi - up));
+    place.radius = Math.min(maxDistance, Math.max(minDistance, place.radius / closer));
+    this.#look(new Vector3().setFromSpherical(place).add(target), target);
   }
 
   picture(): Promise<Blob> {
@@ -168,6 +183,7 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   #look(eye: Vector3, target: Vector3): void {
+    this.#isFit = false;
     this.#orbit.enableDamping = false; // a view that is asked for is there at once
     this.#eye.position.copy(eye);
     this.#orbit.target.copy(target);
@@ -190,6 +206,19 @@ export class ThreeStage extends EventTarget implements Stage {
     this.dispatchEvent(new Event("change"));
     this.dispatchEvent(new Event("camerachange"));
   }
+}
+
+/** How far from a box's middle, in the direction FROM, all its corners are seen; tangents of half the angles of view are given. */
+function distanceOf({ size }: Box, wide: number, high: number): number {
+  const right = new Vector3(0, 1, 0).cross(FROM).normalize();
+  const up = FROM.clone().cross(right);
+  let distance = 0;
+  for (let k = 0; k < 8; k++) {
+    const corner = new Vector3(...size).multiply(new Vector3(k & 1 ? 0.5 : -0.5, k & 2 ? 0.5 : -0.5, k & 4 ? 0.5 : -0.5));
+    const aside = Math.max(Math.abs(corner.dot(right)) / wide, Math.abs(corner.dot(up)) / high);
+    distance = Math.max(distance, corner.dot(FROM) + aside);
+  }
+  return distance;
 }
 
 /** Whether the camera comes to rest softly. */

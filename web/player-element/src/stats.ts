@@ -22,7 +22,7 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
     ["Quality", most > 0 ? `${stats.quality} of ${most}` : "one only"],
     ["Triangles", formatCount(stats.triangles)],
-    ["Display", `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each`],
+    ["Display", stats.fps > 0 ? `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each` : "still"],
     ["GPU memory", formatAmount(stats.gpuBytes, "B")],
     ["Skipped groups", formatCount(stats.skippedGroups)],
   ];

@@ -16,6 +16,7 @@ export class View {
   /** Pictures drawn since the view was made. */
   drawn = 0;
   #box: HTMLElement;
+  #cover: HTMLElement;
   #report: (event: Event) => void;
   #playback: Playback | null = null;
   #last: Shown | null = null;
@@ -31,9 +32,13 @@ export class View {
   #sizes: ResizeObserver;
   #sight: IntersectionObserver;
 
-  /** `report` is told `drawn` after each picture, and all that the stage tells. Throws where there is no WebGL 2. */
-  constructor(engine: Engine, box: HTMLElement, report: (event: Event) => void) {
+  /**
+   * A canvas in `box`, over whose lower end `cover` lies. `report` is told `drawn` after each picture, and all that the stage tells.
+   * Throws where there is no WebGL 2.
+   */
+  constructor(engine: Engine, box: HTMLElement, cover: HTMLElement, report: (event: Event) => void) {
     this.#box = box;
+    this.#cover = cover;
     this.#report = report;
     this.canvas = document.createElement("canvas");
     this.canvas.part.add("canvas");
@@ -41,6 +46,7 @@ export class View {
     box.append(this.canvas);
     this.#sizes = new ResizeObserver(() => this.#resize());
     this.#sizes.observe(box);
+    this.#sizes.observe(cover);
     this.#sight = new IntersectionObserver((entries) => this.#see(entries));
     this.#sight.observe(box);
     const { signal } = this.#stop;
@@ -86,6 +92,14 @@ export class View {
   /** True once something of the playback was drawn. */
   get shows(): boolean {
     return this.#last !== null;
+  }
+
+  /** A PNG of the picture of this moment, whether or not it was drawn before. */
+  picture(): Promise<Blob> {
+    const shown = this.#playback?.update(this.#clock) ?? null; // the clock does not move
+    if (shown) this.#last = shown;
+    this.stage.draw(this.#last);
+    return this.stage.picture();
   }
 
   async enterVr(actions: VrActions): Promise<void> {
@@ -165,7 +179,7 @@ export class View {
   #resize(): void {
     const { clientWidth, clientHeight } = this.#box;
     if (clientWidth === 0 || clientHeight === 0) return;
-    this.stage.resize(clientWidth, clientHeight, Math.min(devicePixelRatio, 2));
+    this.stage.resize(clientWidth, clientHeight, Math.min(devicePixelRatio, 2), this.#cover.offsetHeight);
     this.refresh();
   }
 

@@ -132,11 +132,29 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await on.page.evaluate(() => engine.stages[0]!.fits)).toBe(2);
   });
 
+  test("the camera turns with Shift and arrows, and comes closer with plus and minus", async () => {
+    await on.shown();
+    for (const key of ["Shift+ArrowLeft", "Shift+ArrowRight", "Shift+ArrowUp", "Shift+ArrowDown", "+", "-"]) await on.press(key);
+    const signs = await on.page.evaluate(() => engine.stages[0]!.orbits.map(([right, up, closer = 1]) => [right!, up!, Math.log(closer)].map(Math.sign)));
+    expect(signs).toEqual([[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]);
+    expect(await on.get((player) => player.currentTime)).toBe(0);
+  });
+
   test("the screenshot button saves a PNG named after recording and frame", async () => {
     await on.shown();
     const [download] = await Promise.all([on.page.waitForEvent("download"), on.page.locator(".row button.screenshot").click()]);
     expect(download.suggestedFilename()).toBe("walk-1.png");
     expect(await on.get(async (player) => (await player.screenshot()).type)).toBe("image/png");
+  });
+
+  test("a screenshot shows the frame of its moment, though no picture was drawn since", async () => {
+    await on.shown();
+    const frame = await on.get((player) => {
+      player.currentTime = 1;
+      void player.screenshot();
+      return engine.stages[0]!.shown!.frame;
+    });
+    expect(frame).toBe(24);
   });
 
   test("full screen is entered and left with button and key", async () => {
@@ -153,7 +171,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await on.press("?");
     const help = on.page.getByRole("dialog", { name: "Keys and gestures" });
     expect(await help.isVisible()).toBe(true);
-    expect(await help.textContent()).toContain("Next frame");
+    expect(await help.textContent()).toContain("next frame");
     await on.page.keyboard.press("Escape");
     expect(await help.isVisible()).toBe(false);
     await on.page.getByRole("button", { name: "Settings" }).click();

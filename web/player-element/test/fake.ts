@@ -146,7 +146,7 @@ export class FakeStage extends EventTarget implements Stage {
   disposed = false;
   prepared: Packed[] = [];
   frame: ((now: number) => void) | null = null;
-  #shown: Shown | null = null;
+  shown: Shown | null = null;
 
   constructor(canvas: HTMLCanvasElement) {
     super();
@@ -161,7 +161,7 @@ export class FakeStage extends EventTarget implements Stage {
   }
   draw(shown: Shown | null): boolean {
     this.draws++;
-    this.#shown = shown;
+    this.shown = shown;
     const context = this.canvas.getContext("2d")!;
     const { width, height } = this.canvas;
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -178,12 +178,16 @@ export class FakeStage extends EventTarget implements Stage {
     this.canvas.width = width * pixelRatio;
     this.canvas.height = height * pixelRatio;
   }
+  orbits: number[][] = [];
+  orbit(...turn: number[]): void {
+    this.orbits.push(turn);
+  }
   fit(): void {
     this.fits++;
     this.dispatchEvent(new Event("change"));
   }
   picture(): Promise<Blob> {
-    this.draw(this.#shown);
+    this.draw(this.shown);
     return new Promise((done) => this.canvas.toBlob((blob) => done(blob!), "image/png"));
   }
   async enterVr(frame: (now: number) => void): Promise<void> {

@@ -34,6 +34,26 @@ describeInBrowser("the built player", () => {
     });
   }
 
+  /** The rows and columns of the picture between which it is not white. */
+  async function extent(page: Page): Promise<{ top: number; bottom: number; left: number; right: number }> {
+    return page.evaluate(async () => {
+      const picture = await createImageBitmap(await document.querySelector("meshreel-player")!.screenshot());
+      const { width, height } = picture;
+      const context = new OffscreenCanvas(width, height).getContext("2d")!;
+      context.drawImage(picture, 0, 0);
+      const { data } = context.getImageData(0, 0, width, height);
+      const found = { top: height, bottom: -1, left: width, right: -1 };
+      for (let i = 0; i < width * height; i++) {
+        if (Math.min(data[4 * i]!, data[4 * i + 1]!, data[4 * i + 2]!) > 250) continue;
+        const [x, y] = [i % width, Math.floor(i / width)];
+        Object.assign(found, {
+          top: Math.min(found.top, y), bottom: Math.max(found.bottom, y), left: Math.min(found.left, x), right: Math.max(found.right, x),
+        });
+      }
+      return found;
+    });
+  }
+
   test("its page plays the recording that the address names", async () => {
     const { page, errors } = await site.visit("player/index.html?src=/scene.reel&autoplay&stats");
     await ready(page);
@@ -79,6 +99,24 @@ describeInBrowser("the built player", () => {
       return { currentTime, mode, quality, loop, paused };
     });
     expect(state).toEqual({ currentTime: 0.1, mode: "normal", quality: 0, loop: true, paused: true });
+    await page.close();
+  });
+
+  test("a view that fits lies above the bar, in any shape, until somebody moves the camera", async () => {
+    const { page } = await site.visit("player/index.html?src=/layers.reel&background=white");
+    await ready(page);
+    const bar = (await page.locator(".bar").boundingBox())!;
+    for (const [width, height] of [[320, 240], [240, 400], [640, 200]] as const) {
+      await page.setViewportSize({ width, height });
+      await page.waitForFunction(([w, h]) => document.querySelector("meshreel-player")!.shadowRoot!.querySelector("canvas")!.width === w && innerHeight === h, [width, height] as const);
+      const { top, bottom, left, right } = await extent(page);
+      expect([top > 0, bottom < height - bar.height, left > 0, right < width - 1], `${width} x ${height}: ${[top, bottom, left, right]}`).toEqual([true, true, true, true]);
+    }
+    await page.locator(".picture").press("Shift+ArrowUp");
+    const moved = await page.evaluate(() => document.querySelector("meshreel-player")!.camera);
+    await page.setViewportSize({ width: 320, height: 240 });
+    await page.waitForTimeout(300);
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.camera)).toBe(moved);
     await page.close();
   });
 

@@ -63,11 +63,12 @@ describe("numbers as text", () => {
 
 describe("keys", () => {
   test("each key of the help overlay has its action, in upper case too", () => {
-    for (const { keys, action } of KEYS) {
-      for (const key of keys) {
-        expect(actionOf({ key })).toBe(action);
-        expect(actionOf({ key: key.length === 1 ? key.toUpperCase() : key })).toBe(action);
-      }
+    for (const [name, action] of KEYS.flatMap(({ keys }) => Object.entries(keys))) {
+      const shiftKey = name.startsWith("Shift+");
+      const key = name.replace("Shift+", "");
+      expect(actionOf({ key, shiftKey })).toBe(action);
+      if (key.length === 1) expect(actionOf({ key: key.toUpperCase(), shiftKey: true })).toBe(action);
+      else expect(actionOf({ key, shiftKey: !shiftKey })).not.toBe(action);
     }
   });
   test("keys with Ctrl, Alt or Meta belong to the browser", () => {

@@ -13,6 +13,9 @@ export interface Surface {
   close(): void;
 }
 
+const TURN = Math.PI / 24; // of a key
+const CLOSER = 1.15;
+
 type Act = (player: MeshreelPlayer, surface: Surface) => void;
 
 const ACTS: Readonly<Record<Action, Act>> = {
@@ -35,6 +38,12 @@ const ACTS: Readonly<Record<Action, Act>> = {
     surface.tell(player.loop ? "Loop on" : "Loop off");
   },
   fit: (player) => player.fit(),
+  turnLeft: (player) => player.orbit(-TURN, 0),
+  turnRight: (player) => player.orbit(TURN, 0),
+  turnUp: (player) => player.orbit(0, TURN),
+  turnDown: (player) => player.orbit(0, -TURN),
+  closer: (player) => player.orbit(0, 0, CLOSER),
+  farther: (player) => player.orbit(0, 0, 1 / CLOSER),
   help: (_, surface) => surface.toggleHelp(),
   close: (_, surface) => surface.close(),
 };

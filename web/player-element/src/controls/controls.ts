@@ -56,6 +56,11 @@ export class Controls implements Surface {
     this.#file.addEventListener("change", () => this.#chosen());
   }
 
+  /** What lies over the lower end of the picture. */
+  get cover(): HTMLElement {
+    return this.#bar.element;
+  }
+
   /** The background's colour as the styles have it now. */
   get background(): string {
     this.picture.style.backgroundColor = this.#player.background;

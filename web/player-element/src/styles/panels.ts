@@ -23,7 +23,7 @@ export const PANELS = `
 }
 .help-panel .title { display: flex; align-items: center; justify-content: space-between; font-size: 16px; margin: -6px -8px 4px 0; }
 .help-panel dl { columns: 2; column-gap: 28px; }
-.help-panel dl div { display: grid; grid-template-columns: 76px 1fr; align-items: baseline; padding: 3px 0; break-inside: avoid; }
+.help-panel dl div { display: grid; grid-template-columns: 116px 1fr; align-items: baseline; padding: 3px 0; break-inside: avoid; }
 .help-panel dd { margin: 0; }
 .help-panel p { margin-top: 12px; color: var(--_quiet); max-width: 46ch; }
 kbd { padding: 1px 7px; border: 1px solid var(--_line); border-radius: 5px; background: var(--_hover); font: inherit; font-size: 12px; }
