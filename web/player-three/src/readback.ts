@@ -6,7 +6,7 @@ import { makeUniforms } from "./materials.ts";
 import type { PartUniforms } from "./materials.ts";
 import { setFrame, setUpload } from "./part.ts";
 import { vertexRoom } from "./ranges.ts";
-import { READBACK_FRAGMENT, readbackVertex } from "./shaders.ts";
+import { DRAWN, READBACK_FRAGMENT, readbackVertex } from "./shaders.ts";
 import type { Upload } from "./upload.ts";
 
 const WIDTH = 2048;
@@ -72,7 +72,7 @@ function positionsOf(pixels: Uint32Array, count: number): Float32Array {
   const floats = new Float32Array(pixels.buffer);
   const positions = new Float32Array(3 * count);
   for (let v = 0; v < count; v++) {
-    const drawn = pixels[4 * v + 3] === 1;
+    const drawn = pixels[4 * v + 3] === DRAWN;
     for (let k = 0; k < 3; k++) positions[3 * v + k] = drawn ? floats[4 * v + k] : NaN;
   }
   return positions;

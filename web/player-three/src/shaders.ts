@@ -133,12 +133,12 @@ vec3 shaded(vec3 n) {
 }
 
 #ifdef EDGES
-// A line of one pixel; it fades where triangles are no larger than lines.
+// A line of one pixel; where triangles are no larger than lines, an even tone.
 float edge() {
   vec3 width = fwidth(barycentric);
-  vec3 inside = smoothstep(vec3(0.0), width * 1.2, barycentric);
+  vec3 inside = smoothstep(vec3(0.0), width * 0.9, barycentric);
   float widest = max(width.x, max(width.y, width.z));
-  return (1.0 - min(inside.x, min(inside.y, inside.z))) * (1.0 - smoothstep(0.35, 1.0, widest));
+  return (1.0 - min(inside.x, min(inside.y, inside.z))) * mix(1.0, 0.45, smoothstep(0.35, 1.0, widest));
 }
 #endif
 
@@ -175,12 +175,15 @@ void main() {
 `;
 }
 
-/** The bits of the position as float32, and a 1 that tells that something was drawn there. */
+/** Tells a pixel where something was drawn from one that was cleared: those are 0 or 1. */
+export const DRAWN = 7;
+
+/** The bits of the position as float32, and DRAWN. */
 export const READBACK_FRAGMENT = `${PRECISION}
 flat in uvec3 bits;
 out uvec4 fragment;
 
 void main() {
-  fragment = uvec4(bits, 1u);
+  fragment = uvec4(bits, ${DRAWN}u);
 }
 `;

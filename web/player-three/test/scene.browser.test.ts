@@ -1,26 +1,33 @@
-// The scene in Chromium: what is drawn, what the GPU has, and that showing a frame brings nothing to it.
-
 import { fileURLToPath } from "node:url";
-
-import { afterAll, afterEach, beforeAll, expect, test } from "vitest";
-
+import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from "vitest";
 import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
-import type { Mode } from "../src/index.ts";
+import { makeFloor, makeGroup, RADIUS, SQUARE } from "./analytic.ts";
 import { trackColor } from "../src/colors.ts";
+import { Picture } from "./picture.ts";
 import type { Vector } from "../src/octahedral.ts";
-import { RADIUS, makeFloor, makeGroup } from "./analytic.ts";
+import type { Mode } from "../src/index.ts";
 import type {} from "./pages/scene.ts";
 
-const [WIDTH, HEIGHT] = [320, 240];
-const UNUSED = -1e9; // what the page says of a vertex that nothing was drawn for
-const FOCAL = HEIGHT / 2 / Math.tan((25 * Math.PI) / 180);
-const EYE = 3; // m before the middle
+const UNUSED = -1e9;
+const FLOAT32 = 1e-6; // m: two roundings of numbers up to 4
+const WHITE = [255, 255, 255];
+const SPHERE_TRIANGLES = 2 * 16 * 32;
 
-/** The pixel in the middle of which a point is seen from (0, 0, EYE). */
-function pixelOf([x, y, z]: Vector): readonly [number, number] {
-  return [Math.floor(WIDTH / 2 + (FOCAL * x) / (EYE - z)), Math.floor(HEIGHT / 2 + (FOCAL * y) / (EYE - z))];
+/** The normal of the sphere where the camera at (0, 0, 3) sees a point of its center's plane. */
+function normalSeen(center: Vector, point: Vector): Vector {
+  const eye: Vector = [0, 0, 3];
+  const ray = normalize(subtract(point, eye));
+  const from = subtract(eye, center);
+  const half = dot(ray, from);
+  const along = -half - Math.sqrt(half * half - dot(from, from) + RADIUS * RADIUS);
+  return normalize([from[0] + along * ray[0], from[1] + along * ray[1], from[2] + along * ray[2]]);
 }
+
+const subtract = (a: Vector, b: Vector): Vector => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+const dot = (a: Vector, b: Vector): number => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const normalize = (a: Vector): Vector => [a[0] / Math.hypot(...a), a[1] / Math.hypot(...a), a[2] / Math.hypot(...a)];
+const colorOf = (normal: Vector): number[] => normal.map((value) => 127.5 * (value + 1));
 
 describeInBrowser("a scene in Chromium", () => {
   let open: OpenPage;
@@ -28,138 +35,208 @@ describeInBrowser("a scene in Chromium", () => {
     open = await openPage(fileURLToPath(new URL("pages/scene.ts", import.meta.url)));
   }, 120_000);
   afterAll(async () => open?.close());
-  afterEach(async () => {
-    expect(open.errors).toEqual([]);
-    await open.page.evaluate(() => window.api.renew());
+  beforeEach(async () => {
+    await open.page.evaluate(() => {
+      window.api.renew();
+      window.api.look("normal");
+      window.api.camera(0, 0, 3);
+    });
   });
+  afterEach(() => expect(open.errors).toEqual([]));
 
-  async function picture(frame: number, mode: Mode = "normal", blend = 0): Promise<(point: Vector) => number[]> {
-    const text = await open.page.evaluate(([f, m, b]) => {
-      window.api.look(m as Mode);
-      window.api.show(f as number, b as number);
-      return window.api.draw();
-    }, [frame, mode, blend]);
-    const pixels = Buffer.from(text, "base64");
-    return (point) => {
-      const [column, row] = pixelOf(point);
-      const at = 4 * (row * WIDTH + column);
-      return [...pixels.subarray(at, at + 3)];
-    };
-  }
+  const picture = async (): Promise<Picture> => new Picture(await open.page.evaluate(() => window.api.draw()));
+  const prepare = (withFloor: boolean, secondTrack = false): Promise<void> =>
+    open.page.evaluate(([floor, track]) => window.api.prepare(floor, track), [withFloor, secondTrack]);
+  const show = (frame: number, blend = 0): Promise<void> => open.page.evaluate(([f, b]) => window.api.show(f, b), [frame, blend]);
+  const look = (mode: Mode, flat = false): Promise<void> => open.page.evaluate(([m, f]) => window.api.look(m, f), [mode, flat] as const);
+  const numbers = () => open.page.evaluate(() => window.api.numbers());
+  const positions = (kind: "group" | "static", frame: number, blend: number): Promise<number[]> =>
+    open.page.evaluate(([k, f, b]) => window.api.read(k, f, b), [kind, frame, blend] as const);
 
-  const WHITE = [255, 255, 255];
-  const LOOKS_HERE = [128, 128, 255]; // rgb = (n + 1) / 2 of +z
 
-  function expectNear(found: number[], wanted: readonly number[], tolerance = 6): void {
-    found.forEach((value, k) => expect(Math.abs(value - wanted[k]), `${found} is not ${wanted}`).toBeLessThanOrEqual(tolerance));
-  }
-
-  test("a sphere is where each frame has it, with its own normals", async () => {
-    await open.page.evaluate(() => window.api.prepare(false));
-    for (let t = 0; t < 4; t++) {
-      const at = await picture(t);
-      const x = -0.6 + 0.4 * t;
-      expectNear(at([x, 0, RADIUS]), LOOKS_HERE);
-      const slant = RADIUS * Math.SQRT1_2;
-      expectNear(at([x + slant, 0, slant]), [255 * (0.5 + 0.5 * Math.SQRT1_2), 128, 255 * (0.5 + 0.5 * Math.SQRT1_2)], 12);
-      expect(at([x > 0 ? -1 : 1, 0, 0])).toEqual(WHITE);
+  test("a sphere is where its frame has it, with its normals as colours", async () => {
+    await prepare(false);
+    for (const t of [0, 1, 3]) {
+      await show(t);
+      const drawn = await picture();
+      const center: Vector = [-0.6 + 0.4 * t, 0, 0];
+      for (const [x, y] of [[0, 0], [0.7, 0], [-0.7, 0], [0, 0.7], [-0.5, -0.5]]) {
+        const point: Vector = [center[0] + RADIUS * x, RADIUS * y, 0];
+        expect(drawn.at(point)).toBeNear(colorOf(normalSeen(center, point)), 6);
+      }
+      expect(drawn.at([center[0] + 1.3 * RADIUS, 0, 0])).toEqual(WHITE);
+      expect(drawn.at([center[0] - 1.3 * RADIUS, 0, 0])).toEqual(WHITE);
+      expect(drawn.at(SQUARE)).toEqual(WHITE); // only frame 2 has it
     }
   });
 
-  test("between two frames it is between their places, and what one frame has alone stands still", async () => {
-    await open.page.evaluate(() => window.api.prepare(false));
-    const at = await picture(1, "normal", 0.5);
-    expectNear(at([0, 0, RADIUS]), LOOKS_HERE);
-    expect(at([-0.2 - RADIUS + 0.03, 0, 0])).toEqual(WHITE);
-    for (const [frame, wanted] of [[1, WHITE], [2, LOOKS_HERE], [3, WHITE]] as const) {
-      expectNear((await picture(frame))([0, 0.6, 0]), wanted);
+  test("what one frame has alone is drawn in that frame, blended or not", async () => {
+    await prepare(false);
+    for (const blend of [0, 0.5]) {
+      await show(2, blend);
+      const drawn = await picture();
+      expect(drawn.at(SQUARE)).toBeNear([128, 128, 255], 2);
+      expect((await numbers()).drawn).toBe(SPHERE_TRIANGLES + 2);
+      expect((await numbers()).triangles).toBe(SPHERE_TRIANGLES + 2);
     }
-    expectNear((await picture(2, "normal", 0.7))([0, 0.6, 0]), LOOKS_HERE);
+    await show(1);
+    await picture();
+    expect((await numbers()).drawn).toBe(SPHERE_TRIANGLES);
+  });
+
+  test("positions read back are the decoder's within one step of quantisation", async () => {
+    await prepare(true);
+    const { packed, positions: truth } = makeGroup();
+    for (const t of [0, 2, 3]) {
+      const read = await positions("group", t, 0);
+      truth[t].forEach((position, v) => {
+        const expected = position ?? [UNUSED, UNUSED, UNUSED];
+        for (let k = 0; k < 3; k++) expect(Math.abs(read[3 * v + k] - expected[k])).toBeLessThanOrEqual(packed.box.size[k] / 65535);
+      });
+      expect(new Set(read.slice(3 * truth[t].length))).toEqual(new Set([UNUSED])); // padding
+    }
+    const floor = makeFloor();
+    const read = await positions("static", 0, 0);
+    expect(read.length).toBe(3 * floor.positions.length);
+    floor.positions.flat().forEach((value, i) => expect(Math.abs(read[i] - value)).toBeLessThanOrEqual(floor.packed.box.size[i % 3] / 65535 + FLOAT32));
+  });
+
+  test("between two frames vertices move in a straight line, those of one frame stay", async () => {
+    await prepare(false);
+    const { packed } = makeGroup();
+    const [here, next] = [await positions("group", 2, 0), await positions("group", 3, 0)];
+    for (const blend of [0.25, 0.5, 1]) {
+      const between = await positions("group", 2, blend);
+      for (let i = 0; i < between.length; i++) {
+        const moves = i < 3 * packed.vertexCount;
+        const expected = moves ? here[i] + blend * (next[i] - here[i]) : here[i];
+        expect(Math.abs(between[i] - expected)).toBeLessThan(FLOAT32);
+      }
+    }
+  });
+
+  test("the last frame of a group is not blended with anything behind it", async () => {
+    await prepare(false);
+    expect(await positions("group", 3, 0.5)).toEqual(await positions("group", 3, 0));
+  });
+
+  test("modes and flat normals differ, and every mode draws the same silhouette", async () => {
+    await prepare(true, true);
+    await open.page.evaluate(() => window.api.camera(0.8, 1, 2.6));
+    const looks: [Mode, boolean][] = [["shaded", false], ["normal", false], ["wireframe", false], ["colour", false], ["shaded", true], ["normal", true]];
+    const pictures: Picture[] = [];
+    for (const [mode, flat] of looks) {
+      await look(mode, flat);
+      await show(2);
+      pictures.push(await picture());
+    }
+    for (const [i, one] of pictures.entries()) {
+      expect(one.covered()).toBe(pictures[0].covered());
+      for (const other of pictures.slice(i + 1)) expect(one.difference(other)).toBeGreaterThan(0.005);
+    }
+    expect(pictures[0].covered()).toBeGreaterThan(0.3);
+    expect(pictures[3].colors()).toBe(4); // white, two tracks, the background
   });
 
   test("modes look as they are called", async () => {
-    await open.page.evaluate(() => window.api.prepare(false, true));
-    const middle: Vector = [0.2, 0, RADIUS];
-    const colour = (await picture(2, "colour"))(middle);
-    expectNear(colour, trackColor(0).map((share) => 255 * share));
-    expectNear((await picture(2, "colour"))([0, 0.8, RADIUS]), trackColor(1).map((share) => 255 * share));
-    const shaded = await picture(2, "shaded");
-    const [front, side] = [shaded(middle), shaded([0.2 + 0.28, 0, 0.1])];
-    expect(front[0]).toBeGreaterThan(side[0] + 20);
-    const edges = await picture(2, "wireframe");
-    const line = Array.from({ length: 40 }, (_, k) => edges([0.05 + 0.0075 * k, 0.02, 0.29])[0]);
+    await prepare(false, true);
+    const looking = async (mode: Mode): Promise<Picture> => {
+      await look(mode);
+      await show(2);
+      return picture();
+    };
+    const colour = await looking("colour");
+    expect(colour.at([0.2, 0, 0])).toBeNear(trackColor(0).map((share) => 255 * share), 2);
+    expect(colour.at([0, 0.8, 0])).toBeNear(trackColor(1).map((share) => 255 * share), 2);
+    const shaded = await looking("shaded");
+    expect(shaded.at([0.2, 0, 0])[0]).toBeGreaterThan(shaded.at([0.2 + 0.9 * RADIUS, 0, 0])[0] + 20); // darker to its rim
+    const edges = await looking("wireframe");
+    const line = Array.from({ length: 40 }, (_, k) => edges.at([0.05 + 0.0075 * k, 0.02, 0])[0]);
     expect(Math.min(...line)).toBeLessThan(Math.max(...line) - 60);
   });
 
-  test("positions on the GPU are the packed ones, to half a step of the box; blends are linear", async () => {
-    await open.page.evaluate(() => window.api.prepare(true));
-    const group = makeGroup();
-    const floor = makeFloor();
-    const compare = (found: number[], wanted: readonly (Vector | null)[], size: readonly number[]): number => {
-      let compared = 0;
-      wanted.forEach((position, v) => {
-        if (position === null || found[3 * v] === UNUSED) return;
-        for (let k = 0; k < 3; k++) expect(Math.abs(found[3 * v + k] - position[k])).toBeLessThanOrEqual(0.501 * (size[k] / 65535) + 1e-6);
-        compared++;
-      });
-      return compared;
-    };
-    for (const frame of [0, 2, 3]) {
-      const found = await open.page.evaluate((f) => window.api.read("group", f, 0), frame);
-      expect(compare(found, group.positions[frame], group.packed.box.size)).toBeGreaterThanOrEqual(group.packed.vertexCount);
+  test("what it shows later costs no upload", async () => {
+    await prepare(true);
+    await show(0); // the materials of a first track are made with its first picture
+    await picture();
+    const uploads = await open.page.evaluate(() => [0, 1, 2, 3].flatMap((t) => window.api.uploadsWhileShowing(t)));
+    expect(uploads).toEqual([]);
+  });
+
+  test("a value that was prepared costs no upload with its first picture", async () => {
+    await prepare(true);
+    expect(await open.page.evaluate(() => window.api.uploadsWhileShowing(2))).toEqual([]);
+  });
+
+  test("edges are made for the mode that draws them, and freed after it", async () => {
+    await prepare(true);
+    await show(2);
+    await picture();
+    const plain = await numbers();
+    await look("wireframe");
+    await show(2);
+    await picture();
+    const edged = await numbers();
+    expect(edged.gpuBytes).toBeGreaterThan(plain.gpuBytes);
+    expect(edged.drawn).toBe(plain.drawn);
+    await look("shaded");
+    await show(2);
+    await picture();
+    const after = await numbers();
+    expect([after.gpuBytes, after.geometries, after.textures]).toEqual([plain.gpuBytes, plain.geometries, plain.textures]);
+  });
+
+  test("release frees all that a value had", async () => {
+    const before = await numbers();
+    await prepare(true, true);
+    const expected = [makeGroup().packed, makeGroup({ track: 1, squareFrame: -1 }).packed, makeFloor().packed];
+    const bytes = expected.map((packed) => packed.texels.byteLength + packed.faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength : 0));
+    expect((await numbers()).gpuBytes).toBe(bytes.reduce((a, b) => a + b));
+    for (let round = 0; round < 3; round++) {
+      await prepare(true, true);
+      await show(2);
+      expect((await picture()).covered()).toBeGreaterThan(0.1);
+      await open.page.evaluate(() => window.api.release());
     }
-    const [low, high] = [group.positions[1], group.positions[2]];
-    const blended = low.map((p, v): Vector | null => (v < group.packed.vertexCount ? ([0, 1, 2].map((k) => 0.75 * p![k] + 0.25 * high[v]![k]) as unknown as Vector) : null));
-    const found = await open.page.evaluate(() => window.api.read("group", 1, 0.25));
-    expect(compare(found, blended, group.packed.box.size)).toBe(group.packed.vertexCount);
-    const still = await open.page.evaluate(() => window.api.read("static", 0, 0));
-    expect(compare(still, floor.positions, floor.packed.box.size)).toBe(floor.positions.length);
+    expect((await picture()).covered()).toBe(0);
+    await open.page.evaluate(() => window.api.renew());
+    const after = await numbers();
+    expect(after.gpuBytes).toBe(0);
+    expect([after.textures, after.geometries]).toEqual([before.textures, before.geometries]);
   });
 
-  test("showing a prepared frame brings nothing to the GPU", async () => {
-    await open.page.evaluate(() => {
-      window.api.prepare(true, true);
-      window.api.look("shaded");
-      window.api.show(0);
-      window.api.draw();
-    });
-    for (const frame of [1, 2, 3, 0]) expect(await open.page.evaluate((f) => window.api.uploadsWhileShowing(f), frame)).toEqual([]);
-    const numbers = await open.page.evaluate(() => window.api.numbers());
-    expect(numbers.drawn).toBe(numbers.triangles);
-  });
-
-  test("what is released is free: forty times prepared and released, the GPU has no more than before", async () => {
-    await open.page.evaluate(() => {
-      window.api.prepare(true);
-      window.api.show(2);
-      window.api.draw();
-      window.api.release();
-    });
-    const before = await open.page.evaluate(() => window.api.numbers());
-    expect(before.gpuBytes).toBe(0);
-    await open.page.evaluate(() => {
-      for (let count = 0; count < 40; count++) {
+  test("forty values that come and go leave nothing, whatever the mode", async () => {
+    const round = (count: number): Promise<void> =>
+      open.page.evaluate((k) => {
         window.api.prepare(true);
-        window.api.look(count % 2 ? "wireframe" : "shaded");
-        window.api.show(count % 4);
+        window.api.look(k % 2 ? "wireframe" : "shaded");
+        window.api.show(k % 4);
         window.api.draw();
         window.api.release();
-      }
-    });
-    const after = await open.page.evaluate(() => window.api.numbers());
-    expect(after.gpuBytes).toBe(0);
-    expect(after.textures).toBeLessThanOrEqual(before.textures);
-    expect(after.geometries).toBeLessThanOrEqual(before.geometries);
+      }, count);
+    for (const count of [0, 1]) await round(count);
+    const before = await numbers();
+    for (let count = 0; count < 40; count++) await round(count);
+    const after = await numbers();
+    expect([after.gpuBytes, after.textures, after.geometries]).toEqual([0, before.textures, before.geometries]);
   });
 
-  test("a context that is lost and restored draws the same again", async () => {
-    await open.page.evaluate(() => window.api.prepare(true));
-    const points: Vector[] = [[0.2, 0, RADIUS], [0, 0.6, 0], [0, -0.5, 1.2], [1.2, 0.9, 0]];
-    const before = await picture(2);
+  test("a lost context comes back with the same picture", async () => {
+    await prepare(true, true);
+    await look("shaded");
+    await show(2);
+    const before = await picture();
     await open.page.evaluate(() => window.api.loseContext());
-    const after = await picture(2);
-    for (const point of points) expectNear(after(point), before(point), 2);
-    expect(before(points[0])).not.toEqual(WHITE);
-    open.errors.splice(0, open.errors.length, ...open.errors.filter((text) => !/context/i.test(text))); // three tells of it
+    expect(await open.page.evaluate(() => window.api.uploadsWhileShowing(2))).toEqual([]); // all is there again already
+    const after = await picture();
+    expect(after.difference(before)).toBe(0);
+    expect(after.covered()).toBeGreaterThan(0.2);
+    await open.page.evaluate(() => window.api.release());
+    expect((await numbers()).gpuBytes).toBe(0);
+  });
+
+  test("a texture that the GPU cannot hold is refused with its size", async () => {
+    const message = await open.page.evaluate(() => window.api.refuse());
+    expect(message).toMatch(/group of chunk 7: a texture of 1000000 x 1, the GPU's largest is \d+/);
   });
 });

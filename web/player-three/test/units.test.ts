@@ -1,41 +1,82 @@
-// What needs no GPU: normals' codes, ranges, colours.
-
 import { expect, test } from "vitest";
-
 import { trackColor } from "../src/colors.ts";
 import { decodeNormal, encodeNormal } from "../src/octahedral.ts";
 import type { Vector } from "../src/octahedral.ts";
 import { localFrame, triangleCount, vertexRoom } from "../src/ranges.ts";
-import { makeFloor, makeGroup } from "./analytic.ts";
+import { Upload } from "../src/upload.ts";
+import { makeFloor, makeGroup, sphere } from "./analytic.ts";
 
-test("every direction comes back within a degree, and the axes exactly enough to be told apart", () => {
-  for (let k = 0; k < 5000; k++) {
-    const z = 1 - (2 * (k + 0.5)) / 5000;
-    const around = k * 2.399963; // golden angle
-    const radius = Math.sqrt(1 - z * z);
-    const n: Vector = [radius * Math.cos(around), radius * Math.sin(around), z];
-    const back = decodeNormal(encodeNormal(n));
-    expect(back[0] * n[0] + back[1] * n[1] + back[2] * n[2]).toBeGreaterThan(Math.cos(Math.PI / 180));
+const angle = (a: Vector, b: Vector): number => Math.acos(Math.min(1, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]));
+
+test("octahedral normals are within one degree of what they were made from", () => {
+  const { normals } = sphere([0, 0, 0], 1, 40);
+  for (const normal of normals) expect((angle(decodeNormal(encodeNormal(normal)), normal) * 180) / Math.PI).toBeLessThan(1);
+});
+
+test("the length of a normal does not matter to its code, and no normal is +z", () => {
+  expect(encodeNormal([3e-9, -2e-9, -4e-9])).toBe(encodeNormal([3, -2, -4]));
+  expect(angle(decodeNormal(encodeNormal([0, 0, 0])), [0, 0, 1])).toBeLessThan(0.01);
+});
+
+test("every code is a unit vector, and codes are made again from what they give", () => {
+  for (let code = 0; code < 65536; code += 7) {
+    const normal = decodeNormal(code);
+    expect(Math.hypot(...normal)).toBeCloseTo(1, 12);
+    expect(angle(decodeNormal(encodeNormal(normal)), normal)).toBeLessThan(1e-6);
   }
-  expect(decodeNormal(encodeNormal([0, 0, 0]))[2]).toBeGreaterThan(0.9999);
 });
 
-test("a frame beside its group counts as its nearest one", () => {
-  const { packed } = makeGroup({ firstFrame: 10, frameCount: 4 });
-  expect([3, 10, 12, 99].map((frame) => localFrame(packed, frame))).toEqual([0, 0, 2, 3]);
+test("a frame shows the group's triangles and its own, and a frame beside the group its nearest", () => {
+  const { packed } = makeGroup({ firstFrame: 10 });
+  const sphereTriangles = packed.faces.length / 3;
+  expect([9, 10, 11, 12, 13, 14].map((frame) => localFrame(packed, frame))).toEqual([0, 0, 1, 2, 3, 3]);
+  expect([10, 11, 12, 13].map((frame) => triangleCount(packed, frame) - sphereTriangles)).toEqual([0, 0, 2, 0]);
+  expect(triangleCount(makeFloor(3).packed, 5)).toBe(18);
 });
 
-test("triangles are those of all frames and those of the frame", () => {
-  const { packed } = makeGroup({ frameCount: 4, squareFrame: 2 });
-  const always = packed.faces.length / 3;
-  expect([0, 1, 2, 3].map((frame) => triangleCount(packed, frame))).toEqual([always, always, always + 2, always]);
-  const floor = makeFloor().packed;
-  expect(triangleCount(floor, 7)).toBe(floor.faces.length / 3);
-  expect(vertexRoom(floor)).toBe(floor.vertexCount);
-  expect(vertexRoom(packed)).toBe(packed.textureWidth * packed.textureHeight - 3 * packed.vertexCount);
+test("numbers of vertices go up to the texture's end", () => {
+  const { packed } = makeGroup();
+  const texels = packed.textureWidth * packed.textureHeight;
+  expect(vertexRoom(packed) + (packed.frameCount - 1) * packed.vertexCount).toBe(texels);
+  expect(vertexRoom(makeFloor(3).packed)).toBe(16);
 });
 
-test("twenty tracks have twenty colours", () => {
-  const colours = Array.from({ length: 20 }, (_, track) => trackColor(track).map((share) => share.toFixed(3)).join());
-  expect(new Set(colours).size).toBe(20);
+test("an upload lies over the arrays it was made of and counts their bytes", () => {
+  const { packed } = makeGroup();
+  const upload = new Upload(packed);
+  expect(upload.texture?.image.data).toBe(packed.texels);
+  expect(upload.faces(false).index?.array).toBe(packed.faces);
+  expect(upload.extra(false)?.index?.array).toBe(packed.extra);
+  const corners = packed.faces.byteLength + packed.extra.byteLength;
+  expect(upload.bytes).toBe(packed.texels.byteLength + corners);
+  expect(upload.faces(true).getAttribute("corner").array).toBe(packed.faces);
+  expect(upload.bytes).toBe(packed.texels.byteLength + 2 * corners);
+  upload.dropEdges();
+  expect(upload.bytes).toBe(packed.texels.byteLength + corners);
+});
+
+test("a background has a texture of its vertices only while edges are drawn", () => {
+  const { packed } = makeFloor();
+  const upload = new Upload(packed);
+  const plain = packed.texels.byteLength + packed.faces.byteLength;
+  expect([upload.texture, upload.bytes]).toEqual([null, plain]);
+  upload.faces(true);
+  expect(upload.texture?.image.data?.subarray(0, packed.texels.length)).toEqual(packed.texels);
+  expect(upload.bytes).toBe(plain + packed.faces.byteLength + 8 * 2048);
+  upload.dropEdges();
+  expect([upload.texture, upload.bytes]).toEqual([null, plain]);
+});
+
+test("the sphere around an upload holds every vertex of every frame", () => {
+  const { packed, positions } = makeGroup();
+  const { center, radius } = new Upload(packed).faces(false).boundingSphere!;
+  const distances = positions.flat().filter((p) => p !== null).map((p) => Math.hypot(p[0] - center.x, p[1] - center.y, p[2] - center.z));
+  expect(Math.max(...distances)).toBeLessThanOrEqual(radius + 1e-6);
+});
+
+test("the colours of 21 tracks are all different", () => {
+  const colors = Array.from({ length: 21 }, (_, track) => trackColor(track));
+  for (const [i, one] of colors.entries()) {
+    for (const other of colors.slice(i + 1)) expect(Math.max(...one.map((value, k) => Math.abs(value - other[k])))).toBeGreaterThan(0.05);
+  }
 });

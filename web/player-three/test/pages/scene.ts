@@ -10,12 +10,11 @@ const [WIDTH, HEIGHT] = [320, 240];
 
 const renderer = new WebGLRenderer({ antialias: false });
 renderer.setSize(WIDTH, HEIGHT);
-
 document.body.append(renderer.domElement);
 const camera = new PerspectiveCamera(50, WIDTH / HEIGHT, 0.1, 20);
 camera.position.set(0, 0, 3);
 const root = new Scene();
-root.background = new Color(0xffffff); // a clear colour would be lost with the context
+root.background = new Color(0xffffff); // three forgets a clear colour with a lost context
 let scene = new ReelScene();
 root.add(scene);
 let prepared: (PackedGroup | PackedStatic)[] = [];
@@ -82,7 +81,16 @@ const api = {
     root.add(scene);
     prepared = [];
   },
-  /** Counts the calls of WebGL that bring data to the GPU while `work` runs. */
+  /** What is said of a group whose texture is too large. */
+  refuse(): string {
+    const packed = { ...makeGroup().packed, chunk: 7, textureWidth: 1_000_000, textureHeight: 1 };
+    try {
+      scene.prepare(packed, renderer);
+    } catch (error) {
+      return String(error);
+    }
+    return "nothing";
+  },
   async loseContext(): Promise<void> {
     const extension = renderer.getContext().getExtension("WEBGL_lose_context");
     const event = (type: string) => new Promise((done) => renderer.domElement.addEventListener(type, done, { once: true }));
