@@ -75,10 +75,8 @@ def test_a_larger_background_flatters_the_whole_form_and_not_the_masked_one():
 
 
 def test_normals_are_found_once_for_all_views(monkeypatch):
-    found = []
-    monkeypatch.setattr(
-        render, "welded_normals", lambda mesh, own=render.welded_normals: found.append(mesh) or own(mesh)
-    )
+    own, found = render.welded_normals, []
+    monkeypatch.setattr(render, "welded_normals", lambda mesh: found.append(mesh) or own(mesh))
     body = sphere(levels=2)
     ssim_normals(body, noisy(body, 0.01), _views(body))
     assert len(found) == 2 and len(_views(body)) == 4
