@@ -1,4 +1,6 @@
-"""Fills FORMAT.md's tables from meshreel.format.layout; with --check changes nothing and fails where they are stale."""
+"""Makes FORMAT.md's tables and the player's reader of records from meshreel.format.layout; with --check changes nothing
+and fails where they are stale.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +9,19 @@ from pathlib import Path
 
 from meshreel.format.describe import fill_tables
 from meshreel.format.layout import PAYLOADS, RECORDS
+from meshreel.format.typescript import typescript
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "FORMAT.md"
+ROOT = Path(__file__).resolve().parents[1]
+DOCUMENT = ROOT / "FORMAT.md"
+MODULE = ROOT / "web/player-core/src/layout.gen.ts"
+
+
+def made() -> dict[Path, str]:
+    """Each generated file as it should be."""
+    return {
+        DOCUMENT: fill_tables(DOCUMENT.read_text(encoding="utf-8"), RECORDS + PAYLOADS),
+        MODULE: typescript(RECORDS + PAYLOADS),
+    }
 
 
 def main(arguments: list[str]) -> int:
@@ -16,14 +29,15 @@ def main(arguments: list[str]) -> int:
     if arguments not in ([], ["--check"]):
         print("usage: scripts/generate [--check]", file=sys.stderr)
         return 2
-    before = DOCUMENT.read_text(encoding="utf-8")
-    after = fill_tables(before, RECORDS + PAYLOADS)
-    if arguments and after != before:
-        print("FORMAT.md is stale: run scripts/generate", file=sys.stderr)
-        return 1
-    if after != before:
-        DOCUMENT.write_text(after, encoding="utf-8")
-    return 0
+    stale = {
+        path: text for path, text in made().items() if not path.exists() or path.read_text(encoding="utf-8") != text
+    }
+    for path, text in stale.items():
+        if arguments:
+            print(f"{path.relative_to(ROOT)} is stale: run scripts/generate", file=sys.stderr)
+        else:
+            path.write_text(text, encoding="utf-8", newline="\n")
+    return 1 if arguments and stale else 0
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from itertools import pairwise
@@ -19,6 +20,7 @@ from tests.run_page import blocks
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 RUN = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
+INTERCHANGE = ROOT / "docs" / "interchange.md"
 
 
 def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
@@ -33,7 +35,13 @@ def test_the_tutorial_runs_as_it_stands_and_shows_layers(tmp_path: Path) -> None
     assert len(shown) == 3 and all(a < c and 2 * b < d for (a, b), (c, d) in pairwise(shown))
 
 
-@pytest.mark.parametrize("page", RUN, ids=lambda page: page.name)
+def test_the_python_of_interchange_runs(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "conformance" / "v1" / "layers.reel", tmp_path / "scan.reel")
+    _run_page(INTERCHANGE, tmp_path)
+    assert (tmp_path / "scan.glb").exists()
+
+
+@pytest.mark.parametrize("page", [*RUN, INTERCHANGE], ids=lambda page: page.name)
 def test_the_commands_of_the_docs_parse(page: Path) -> None:
     from meshreel.cli import make_app
 

@@ -2,6 +2,7 @@
 #include <climits>
 #include <vector>
 
+#include "guarded.h"
 #include "meshreel/laplacian.h"
 
 namespace {
@@ -48,10 +49,10 @@ int64_t mr_farthest_anchors(const int32_t* faces, int64_t face_count, int64_t ve
     if (vertices < 0 || vertices > INT_MAX || face_count < 0 || count < 0) return -1;
     for (int64_t k = 0; k < 3 * face_count; ++k)
         if (faces[k] < 0 || faces[k] >= vertices) return -1;
-    try {
+    int64_t found = 0;
+    const int status = meshreel::guarded(MR_LAPLACIAN_NO_MEMORY, [&] {
         const Graph g = graph_of(faces, face_count, vertices);
         std::vector<int32_t> hops(static_cast<size_t>(vertices), INT_MAX), queue;
-        int64_t found = 0;
         for (int32_t v = 0; v < vertices; ++v) {  // one a component
             if (hops[v] != INT_MAX || g.starts[v] == g.starts[v + 1]) continue;
             add_source(g, v, hops, queue);
@@ -67,8 +68,7 @@ int64_t mr_farthest_anchors(const int32_t* faces, int64_t face_count, int64_t ve
             out[found++] = v;
         }
         std::sort(out, out + found);
-        return found;
-    } catch (...) {
-        return -1;
-    }
+        return MR_LAPLACIAN_OK;
+    });
+    return status == MR_LAPLACIAN_OK ? found : -1;
 }

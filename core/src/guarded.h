@@ -5,6 +5,8 @@
 
 namespace meshreel {
 
+#if defined(__cpp_exceptions)
+
 // What `body` gives, `no_memory` where there was none for it, and `failed` where it threw anything else.
 template <class Body>
 int guarded(int no_memory, int failed, Body body) {
@@ -16,6 +18,16 @@ int guarded(int no_memory, int failed, Body body) {
         return failed;
     }
 }
+
+#else
+
+// A build without exceptions (wasm) stops where there is no memory: its host starts another instance.
+template <class Body>
+int guarded(int, int, Body body) {
+    return body();
+}
+
+#endif
 
 // The same of a body that can throw only for want of memory: std::bad_alloc, or std::length_error.
 template <class Body>

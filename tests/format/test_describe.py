@@ -30,6 +30,9 @@ def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     (tmp_path / "src").symlink_to(ROOT / "src")
     text = (ROOT / "FORMAT.md").read_text(encoding="utf-8")
     (tmp_path / "FORMAT.md").write_text(text, encoding="utf-8")
+    module = tmp_path / "web/player-core/src/layout.gen.ts"
+    module.parent.mkdir(parents=True)
+    module.write_bytes((ROOT / module.relative_to(tmp_path)).read_bytes())
     command = ["bash", str(copied / "generate"), "--check"]
     environment = os.environ | {"PYTHON": sys.executable}
     assert subprocess.run(command, env=environment).returncode == 0
@@ -37,6 +40,10 @@ def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     assert subprocess.run(command, env=environment, capture_output=True).returncode == 1
     assert subprocess.run(command[:-1], env=environment).returncode == 0
     assert (tmp_path / "FORMAT.md").read_text(encoding="utf-8") == text
+    module.write_text(module.read_text(encoding="utf-8").replace("VERSION = 1", "VERSION = 2"), encoding="utf-8")
+    assert subprocess.run(command, env=environment, capture_output=True).returncode == 1
+    assert subprocess.run(command[:-1], env=environment).returncode == 0
+    assert subprocess.run(command, env=environment).returncode == 0
 
 
 def test_offsets_stand_as_long_as_they_are_fixed():

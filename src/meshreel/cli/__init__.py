@@ -1,4 +1,4 @@
-"""The command line: `meshreel capture|segment|encode|decode|info|compare|bench|demo`.
+"""The command line: `meshreel capture|segment|encode|decode|export|info|compare|play|serve|bench|demo`.
 
 Errors take one line on standard error and exit code 2; `--debug` shows the traceback. A command's module is imported
 when it is called: `decode` and `info` work where the extra `encode` is not installed.
@@ -32,11 +32,17 @@ COMMANDS = {
     "segment": "Tell which faces of a scene move, and with which body.",
     "encode": "Encode a sequence of meshes into one .reel file.",
     "decode": "Decode a .reel file into a directory of meshes.",
+    "export": "Write a .reel file as one animated file, GLB or USD, that other programs play.",
     "info": "Show rate by part, objects over time, groups, forms and the quality recorded when the file was encoded.",
     "compare": "Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.",
+    "play": "Play a .reel file in a browser, or in a headset's.",
+    "serve": "Serve a folder of .reel files: a gallery, and a page to play each.",
     "bench": "Measure codecs against each other, and make tables and plots of the rows.",
     "demo": "Make a short capture of moving people, encode it, and measure what comes back.",
 }
+
+
+PLAY_NEEDS = ("starlette", "uvicorn", "trustme")  # of the extra `play`; what else may be missing is of `encode`
 
 
 class Terminated(BaseException):
@@ -86,9 +92,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def one_line(error: Exception) -> str:
     """What went wrong and what to do, without line breaks."""
+    if isinstance(error, ImportError) and isinstance(error.__cause__, ModuleNotFoundError):
+        error = error.__cause__  # of the command's own module, which the parser imports
     text = " ".join(str(error).split()) or type(error).__name__
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("meshreel"):
-        return f"{error.name} is missing; install it with: pip install 'meshreel[encode]'"
+        extra = "play" if error.name in PLAY_NEEDS else "encode"
+        return f"{error.name} is missing; install it with: pip install 'meshreel[{extra}]'"
     if isinstance(error, CycloptsError):
         return f"{text} (see meshreel --help)"
     if isinstance(error, BrokenProcessPool):

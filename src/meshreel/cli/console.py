@@ -56,6 +56,7 @@ class Common:
             console = Console(highlight=False, soft_wrap=True)
             for text in texts:
                 console.print(text, markup=False)
+        sys.stdout.flush()  # a server goes on after it
 
     @contextmanager
     def stages(self, total: int) -> Iterator[StageBars]:

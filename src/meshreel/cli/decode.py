@@ -15,6 +15,8 @@ from ..io.write import frame_names, left_over, make_folder, write_mesh
 from ..types import Mesh
 from .console import Common
 
+Part = Literal["all", "background", "moving"]
+
 
 def command(
     file: Path,
@@ -23,7 +25,7 @@ def command(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     format: Literal["ply", "obj", "glb"] = "ply",
     layers: int | None = None,
-    only: Literal["all", "background", "moving"] = "all",
+    only: Part = "all",
     common: Common = Common(),
 ) -> None:
     """Decode a .reel file into a directory of meshes.
@@ -45,7 +47,7 @@ def command(
     if layers is not None and layers < 0:
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
-    _check_part(file, video.reader, only)
+    check_part(file, video.reader, only)
     look: dict[str, Callable[[int], Mesh]]
     look = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
     make_folder(output)
@@ -69,7 +71,7 @@ def command(
     common.result(row, f"{output}: {len(video)} {format} files")
 
 
-def _check_part(file: Path, reader: ReelReader, only: str) -> None:
+def check_part(file: Path, reader: ReelReader, only: Part) -> None:
     """InputError where a file has no frame with the part that is asked for."""
     if only == "background" and not reader.has_background:
         raise InputError(f"{file}: has no background, leave out --only background")

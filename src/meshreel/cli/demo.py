@@ -83,6 +83,7 @@ def command(
         f"{file}: {describe(row)}",
         f"picture: {picture}",
         f"recording: {output / 'rig'}",
+        f"play: {called_as()} play {file}",
         f"meshes: {called_as()} decode {file} -o {output / 'meshes'}",
     )
 

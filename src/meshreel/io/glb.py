@@ -15,7 +15,7 @@ _DENSEST = 64  # values a byte: no mesh compression comes near
 
 
 def parse_glb(data: bytes) -> Polygons:
-    """The surface of a GLB scene at rest, vertices in the world frame."""
+    """The surface of a GLB scene at rest, vertices in the world frame. What is hidden at rest is left out."""
     tree = _json_chunk(data)
     if not tree.get("meshes"):
         return _joined([], _dropped(tree))
@@ -23,8 +23,10 @@ def parse_glb(data: bytes) -> Polygons:
 
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
-        parts = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
-        return _joined([part for part in parts if isinstance(part[1], trimesh.Trimesh)], _dropped(tree))
+        placed = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
+        # A scale of 0 hides what an animation shows later.
+        parts = [part for part in placed if isinstance(part[1], trimesh.Trimesh) and part[0][:3, :3].any()]
+        return _joined(parts, _dropped(tree))
     except Exception as error:  # whatever a foreign parser raises, the file is what is wrong
         raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
 

@@ -1,0 +1,61 @@
+#include "packing.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace {
+
+constexpr double kMostPlace = 65535.0, kHalfNormal = 127.5;
+
+uint16_t place_of(double x, double low, double high) {
+    const double width = high - low;
+    const double share = width > 0.0 ? (x - low) / width : 0.0;
+    return static_cast<uint16_t>(std::floor(std::min(std::max(share, 0.0), 1.0) * kMostPlace + 0.5));
+}
+
+uint16_t byte_of(double x) { return static_cast<uint16_t>(std::floor((x + 1.0) * kHalfNormal + 0.5)); }
+
+// The sphere onto the octahedron |x| + |y| + |z| = 1, its lower half folded outwards, onto a square.
+uint16_t octahedral(const double* n) {
+    const double sum = std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2]);
+    if (!(sum > 0.0)) return static_cast<uint16_t>(byte_of(0.0) | byte_of(0.0) << 8);
+    double u = n[0] / sum, v = n[1] / sum;
+    if (n[2] < 0.0) {
+        const double folded = (1.0 - std::fabs(v)) * (u < 0.0 ? -1.0 : 1.0);
+        v = (1.0 - std::fabs(u)) * (v < 0.0 ? -1.0 : 1.0);
+        u = folded;
+    }
+    return static_cast<uint16_t>(byte_of(u) | byte_of(v) << 8);
+}
+
+}  // namespace
+
+void mr_grow_box(const double* positions, size_t vertices, double box[6]) {
+    for (size_t v = 0; v < vertices; ++v)
+        for (size_t k = 0; k < 3; ++k) {
+            box[k] = std::min(box[k], positions[3 * v + k]);
+            box[3 + k] = std::max(box[3 + k], positions[3 * v + k]);
+        }
+}
+
+int mr_normal_sums(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, double* sums) {
+    for (size_t k = 0; k < 3 * face_count; ++k)
+        if (faces[k] < 0 || static_cast<size_t>(faces[k]) >= vertices) return 1;
+    std::fill(sums, sums + 3 * vertices, 0.0);
+    for (size_t f = 0; f < face_count; ++f) {
+        const int32_t* face = faces + 3 * f;
+        const double *a = positions + 3 * face[0], *b = positions + 3 * face[1], *c = positions + 3 * face[2];
+        const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+        const double n[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
+        for (size_t corner = 0; corner < 3; ++corner)
+            for (size_t k = 0; k < 3; ++k) sums[3 * face[corner] + k] += n[k];
+    }
+    return 0;
+}
+
+void mr_pack_vertices(const double* positions, const double* sums, size_t vertices, const double box[6], uint16_t* texels) {
+    for (size_t v = 0; v < vertices; ++v) {
+        for (size_t k = 0; k < 3; ++k) texels[4 * v + k] = place_of(positions[3 * v + k], box[k], box[3 + k]);
+        texels[4 * v + 3] = octahedral(sums + 3 * v);
+    }
+}

@@ -1,0 +1,86 @@
+"""`meshreel export`: a .reel file becomes one animated file that other programs play."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..decoder import open as open_video
+from ..errors import FormatError, InputError
+from ..export import ExportOptions, export
+from ..io.animated_usd import EXTENSIONS
+from ..io.animation import Up
+from ..io.sequence import SequenceOptions
+from .console import Common
+from .decode import Part, check_part
+
+
+def command(
+    file: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+    glb: Annotated[bool, Parameter(negative="")] = False,
+    usd: Annotated[bool, Parameter(negative="")] = False,
+    layers: int | None = None,
+    frames: str = ":",
+    only: Part = "all",
+    up: Annotated[Up, Parameter(allow_leading_hyphen=True)] = "y",
+    common: Common = Common(),
+) -> None:
+    """Write a .reel file as one animated file: GLB for viewers and engines, USD for film tools.
+
+    Parameters
+    ----------
+    file
+        The .reel file. Nothing is written where a group of it is damaged.
+    output
+        The file to write: .glb, .usdc or .usd (binary), .usda (text), .usdz (package). If not given, the name of the
+        .reel file with .glb or .usdc, in the current directory.
+    glb
+        Write GLB; need not be said where `output` tells.
+    usd
+        Write USD; needs the extra `usd`.
+    layers
+        Use at most this many layers of a group beyond its first (subdivisions, or KLT components): a coarser, still
+        valid shape.
+    frames
+        Which frames, as A:B with B excluded.
+    only
+        Of a scene, what does not move or what moves; all of every frame if not given.
+    up
+        The axis of the meshes that points up; in the file it is +y.
+    """
+    options = ExportOptions(layers, only, up)
+    target = _target(file, output, glb, usd)
+    wanted = SequenceOptions(frames=frames)
+    with open_video(file) as video:
+        check_part(file, video.reader, only)
+        chosen = wanted.chosen(len(video))
+        try:
+            with common.stages(len(chosen)) as progress:
+                count = export(video.reader, target, chosen, options, progress)
+        except FormatError as error:
+            raise FormatError(f"{file}: {error}; nothing is written, copy the file again") from error
+    if count == 0:
+        common.warn([f"{target}: no frame has a surface, so it shows nothing"])
+    size = target.stat().st_size
+    row = {"output": str(target), "format": target.suffix[1:].lower(), "bytes": size}
+    row |= {"frames": len(chosen), "frame_rate": video.frame_rate, "meshes": count}
+    common.result(row, f"{target}: {len(chosen)} frames in {count} meshes, {size} bytes")
+
+
+def _target(file: Path, output: Path | None, glb: bool, usd: bool) -> Path:
+    """The file to write. Raises InputError where flags and name do not tell the format, or not the same one."""
+    if glb and usd:
+        raise InputError("--glb and --usd: give one of both")
+    if output is None:
+        if not (glb or usd):
+            raise InputError("no format: give --glb, --usd, or a name with -o")
+        return Path(file.stem + (".glb" if glb else ".usdc"))
+    known = (".glb",) if glb else EXTENSIONS if usd else (".glb", *EXTENSIONS)
+    if output.suffix.lower() not in known:
+        raise InputError(f"{output}: the output must end in {' or '.join(known)}")
+    return output

@@ -1,0 +1,51 @@
+"""`meshreel play`: one .reel file in a browser."""
+
+from __future__ import annotations
+
+import threading
+import webbrowser
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..decoder import open as open_video
+from ..server.app import make_app
+from ..server.library import Library
+from ..server.run import ServerOptions, run
+from .console import Common
+
+
+def command(
+    file: Path,
+    /,
+    *,
+    browser: Annotated[bool, Parameter(negative="--no-browser")] = True,
+    server: Annotated[ServerOptions, Parameter(name="*")] = ServerOptions(),
+    common: Common = Common(),
+) -> None:
+    """Play a .reel file in a browser, or in a headset's; stops with Ctrl-C.
+
+    Parameters
+    ----------
+    file
+        The .reel file.
+    browser
+        Open the page in this machine's browser.
+    """
+    with open_video(file):  # raises what is wrong with it before a page is there
+        pass
+
+    def tell(found: list[str]) -> None:
+        common.result({"file": str(file), "addresses": found}, f"playing {file} at {' '.join(found)}  (Ctrl-C stops)")
+        if browser:  # beside: a browser in the terminal returns when it is closed
+            threading.Thread(target=_open, args=(found[0], common), daemon=True).start()
+
+    with suppress(KeyboardInterrupt):  # the way to end it
+        run(make_app(Library.of_file(file), hosts=server.hosts), server, tell)
+
+
+def _open(address: str, common: Common) -> None:
+    if not webbrowser.open(address):
+        common.note(f"no browser was found: open {address}")

@@ -1,0 +1,43 @@
+"""`meshreel serve`: a folder of .reel files as a gallery in a browser."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..errors import InputError
+from ..server.app import make_app
+from ..server.library import Library
+from ..server.run import ServerOptions, run
+from .console import Common
+
+
+def command(
+    folder: Path,
+    /,
+    *,
+    cors: tuple[str, ...] = (),
+    server: Annotated[ServerOptions, Parameter(name="*")] = ServerOptions(),
+    common: Common = Common(),
+) -> None:
+    """Serve a folder of .reel files: a gallery, a page to play each, and the files; stops with Ctrl-C.
+
+    Parameters
+    ----------
+    folder
+        The folder; those below it count, too. It is looked at anew with each request.
+    cors
+        An origin whose pages may read the files, such as https://example.org; * for all. May be given several times.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no folder; give one with .reel files, or use meshreel play for one file")
+
+    def tell(found: list[str]) -> None:
+        text = f"serving {folder} at {' '.join(found)}  (Ctrl-C stops)"
+        common.result({"folder": str(folder), "addresses": found}, text)
+
+    with suppress(KeyboardInterrupt):  # the way to end it
+        run(make_app(Library(folder), cors=cors, hosts=server.hosts), server, tell)

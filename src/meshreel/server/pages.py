@@ -1,0 +1,94 @@
+"""The pages: one that plays a file, and a gallery. In: names and entries. Out: HTML; every name is escaped.
+
+Scripts and styles are files of their own, so that the content security policy can refuse all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from urllib.parse import quote
+
+from .library import Entry
+
+# The player's files are beside the page; its worker and its wasm are its own. Any site may embed the page in a frame.
+POLICY = (
+    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
+    "connect-src 'self' blob: data:; img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; form-action 'none'"
+)
+
+_HEAD = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="dark light">
+<title>{title}</title>
+<link rel="icon" href="data:,">
+<link rel="stylesheet" href="{style}">
+"""
+
+STYLE = """\
+:root { color-scheme: light dark; }
+body { margin: 0; padding: 24px; font: 16px/1.5 system-ui, sans-serif; color: #14171c; background: #f4f5f7; }
+h1 { font-size: 20px; margin: 0 0 16px; overflow-wrap: anywhere; }
+ul { display: grid; grid-template-columns: repeat(auto-fill, minmax(220px, 1fr)); gap: 16px; margin: 0; padding: 0; }
+li { list-style: none; border-radius: 8px; overflow: hidden; background: #fff; box-shadow: 0 1px 3px rgb(0 0 0 / 20%); }
+a { display: block; color: inherit; text-decoration: none; }
+a:focus-visible { outline: 3px solid #2563eb; outline-offset: -3px; }
+a:hover .name { text-decoration: underline; }
+img, .blank { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: contain; background: #e2e5ea; }
+.told { padding: 10px 12px 12px; }
+.name { font-weight: 600; overflow-wrap: anywhere; }
+.facts { color: #4a5160; font-size: 14px; }
+.error { color: #a4161a; font-size: 14px; overflow-wrap: anywhere; }
+@media (prefers-color-scheme: dark) {
+  body { color: #e8eaee; background: #14171c; }
+  li { background: #20242b; }
+  img, .blank { background: #2a2f38; }
+  .facts { color: #aab1bd; }
+  .error { color: #ff9b9b; }
+}
+"""
+
+# Stands where there is no poster: a play mark.
+PLAIN = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 360"><path d="M210 140v80l70-40z" fill="#8a92a0"/></svg>'
+)
+
+
+def player_page(name: str) -> str:
+    """Plays one file over the whole window; what else the address asks for, the player's own script reads."""
+    source = escape(f"/files/{quote(name)}")
+    head = _HEAD.format(title=escape(f"{name} · meshreel"), style="/player/page.css")
+    return (
+        f'{head}<script type="module" src="/player/page.js"></script>\n</head>\n<body>\n'
+        f'<meshreel-player src="{source}" controls autoplay loop></meshreel-player>\n'
+        "<noscript>The player needs JavaScript.</noscript>\n</body>\n</html>\n"
+    )
+
+
+def gallery_page(title: str, entries: Sequence[Entry]) -> str:
+    """A tile for each file."""
+    head = _HEAD.format(title=escape(f"{title} · meshreel"), style="/style.css")
+    tiles = "".join(map(_tile, entries))
+    body = f"<ul>\n{tiles}</ul>" if entries else "<p>No .reel file is here.</p>"
+    return f"{head}</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n{body}\n</main>\n</body>\n</html>\n"
+
+
+def _tile(entry: Entry) -> str:
+    name = escape(entry.name.removesuffix(".reel"))
+    address = quote(entry.name)
+    facts = f"{entry.mbps:.3g} Mbps, {entry.duration:.1f} s, {entry.frames} frames, {_size(entry.size)}"
+    told = f'<div class="facts">{facts}</div>' if entry.frames else ""
+    told += f'<div class="error">{escape(entry.error)}</div>' if entry.error else ""
+    poster = (
+        f'<img src="/posters/{address}.png" alt="" loading="lazy">' if entry.frames else '<div class="blank"></div>'
+    )
+    inside = f'{poster}<div class="told"><div class="name">{name}</div>{told}</div>'
+    return f'<li><a href="/watch/{address}">{inside}</a></li>\n' if entry.frames else f"<li>{inside}</li>\n"
+
+
+def _size(count: int) -> str:
+    return f"{count / 1e6:.3g} MB" if count >= 1e6 else f"{count / 1e3:.3g} kB"

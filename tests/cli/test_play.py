@@ -1,0 +1,131 @@
+"""`meshreel play` and `meshreel serve`: real processes, asked over HTTP and stopped."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+import urllib.request
+
+import pytest
+
+pytest.importorskip("starlette", reason="the extra `play` is not installed")
+
+from meshreel.cli import main
+from meshreel.cli.console import Common
+from tests.cli.conftest import failed
+from tests.golden import GOLDEN
+
+FILE = GOLDEN / "scene.reel"
+needs_signals = pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT for one process on Windows")
+
+
+def fetch(address: str, **headers: str) -> bytes:
+    with urllib.request.urlopen(urllib.request.Request(address, headers=headers), timeout=60) as answer:
+        return answer.read()
+
+
+@pytest.fixture
+def started():
+    """Starts a command and gives its process and the address that it told."""
+    processes = []
+
+    def start(*arguments: str) -> tuple[subprocess.Popen[str], str]:
+        command = [sys.executable, "-m", "meshreel", *arguments, "--json"]
+        pipe = subprocess.PIPE
+        process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True)
+        processes.append(process)
+        line = process.stdout.readline()
+        assert line, process.stderr.read()
+        return process, json.loads(line)["addresses"][0]
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+@needs_signals
+@pytest.mark.parametrize("number, code", [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_play_serves_page_player_and_ranges_until_it_is_stopped(started, number, code):
+    process, address = started("play", str(FILE), "--no-browser")
+    page = fetch(address).decode()
+    assert '<meshreel-player src="/files/scene.reel"' in page
+    assert fetch(f"{address}player/core.wasm")[:4] == b"\0asm"
+    assert fetch(f"{address}files/scene.reel", Range="bytes=0-7") == FILE.read_bytes()[:8]
+    process.send_signal(number)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == code and out == ""
+    assert "Traceback" not in err
+
+
+@needs_signals
+def test_serve_shows_what_is_in_the_folder_now(started, tmp_path):
+    process, address = started("serve", str(tmp_path))
+    assert "No .reel file is here" in fetch(address).decode()
+    (tmp_path / "new.reel").write_bytes(FILE.read_bytes())
+    assert "new" in fetch(address).decode()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+
+
+def test_what_cannot_be_played_is_told_before_anything_is_served(run, tmp_path):
+    damaged = tmp_path / "damaged.reel"
+    damaged.write_bytes(b"nothing")
+    assert failed(run("play", damaged, "--no-browser"), "damaged.reel", "not a .reel file")
+    assert failed(run("play", tmp_path / "absent.reel", "--no-browser"), "absent.reel")
+    assert failed(run("serve", FILE), "no folder")
+    assert failed(run("play", FILE, "--no-browser", "--port", "99999"), "--port 99999")
+
+
+def test_without_the_extra_its_name_is_told():
+    hidden = "import sys; sys.modules['uvicorn'] = None; from meshreel.cli import main; main()"
+    command = [sys.executable, "-c", hidden, "play", str(FILE), "--no-browser"]
+    said = subprocess.run(command, capture_output=True, text=True)
+    assert said.returncode == 2 and "pip install 'meshreel[play]'" in said.stderr
+
+
+@needs_signals
+def test_a_download_that_is_under_way_does_not_hold_up_the_end(started, tmp_path):
+    with (tmp_path / "big.reel").open("wb") as file:
+        file.truncate(256 * 2**20)
+    process, address = started("serve", str(tmp_path))
+    with urllib.request.urlopen(f"{address}files/big.reel", timeout=60) as answer:  # and is not read on
+        assert len(answer.read(1000)) == 1000
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    assert (process.returncode, out, err) == (0, "", "")
+
+
+@pytest.fixture
+def told_once(monkeypatch):
+    """`play` ends as soon as it has told its address."""
+    monkeypatch.setattr("meshreel.cli.play.run", lambda _app, _options, tell: tell(["http://127.0.0.1:1/"]))
+
+
+@pytest.mark.usefixtures("told_once")
+def test_a_browser_that_stays_open_holds_nothing_up(run, monkeypatch):
+    opened, go_on = threading.Event(), threading.Event()
+    monkeypatch.setattr("webbrowser.open", lambda _: opened.set() or go_on.wait(60))
+    try:
+        assert run("play", FILE).code == 0
+        assert opened.wait(60) and not go_on.is_set()
+    finally:
+        go_on.set()
+
+
+@pytest.mark.usefixtures("told_once")
+def test_where_no_browser_is_found_the_address_is_told_again(monkeypatch):
+    notes: list[str] = []
+    heard = threading.Event()
+    monkeypatch.setattr("webbrowser.open", lambda _: False)
+    monkeypatch.setattr(Common, "note", lambda _, text: notes.append(text) or heard.set())
+    assert main(["play", str(FILE)]) == 0
+    assert heard.wait(60) and notes == ["no browser was found: open http://127.0.0.1:1/"]
+
+
+def test_an_origin_with_a_path_is_told(run, tmp_path):
+    assert failed(run("serve", tmp_path, "--cors", "https://example.org/"), "--cors 'https://example.org/'")

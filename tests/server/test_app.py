@@ -1,0 +1,171 @@
+"""What the server answers: ranges, validators, types, pages; and what it refuses."""
+
+from __future__ import annotations
+
+from html import unescape
+from urllib.parse import quote
+
+import pytest
+from starlette.testclient import TestClient
+
+from meshreel.errors import InputError
+from meshreel.server.app import make_app
+from meshreel.server.library import Library
+from tests.server.conftest import ODD
+
+
+def test_a_range_has_the_bytes_asked_for_and_the_whole_file_all(client, folder):
+    data = (folder / "walk.reel").read_bytes()
+    whole = client.get("/files/walk.reel")
+    assert whole.status_code == 200 and whole.content == data
+    assert whole.headers["accept-ranges"] == "bytes" and "content-encoding" not in whole.headers
+    for asked, start, end in (("0-13", 0, 14), ("100-", 100, len(data)), ("-7", len(data) - 7, len(data))):
+        part = client.get("/files/walk.reel", headers={"Range": f"bytes={asked}", "Accept-Encoding": "gzip"})
+        assert part.status_code == 206 and part.content == data[start:end]
+        assert part.headers["content-range"] == f"bytes {start}-{end - 1}/{len(data)}"
+        assert "content-encoding" not in part.headers
+
+
+@pytest.mark.parametrize("asked", ["bytes=99999999-", "bytes=5-2", "bytes=a-b", "bytes=-", "bytes=" + "9" * 400 + "-"])
+def test_ranges_that_are_none_are_refused_and_never_a_fault(client, asked):
+    assert client.get("/files/walk.reel", headers={"Range": asked}).status_code in (400, 416)
+
+
+def test_an_unchanged_file_is_not_sent_again_and_a_changed_one_is_sent_whole(client, folder):
+    first = client.get("/files/walk.reel")
+    tag = first.headers["etag"]
+    assert client.get("/files/walk.reel", headers={"If-None-Match": tag}).status_code == 304
+    ranged = {"Range": "bytes=0-3", "If-Range": tag}
+    assert client.get("/files/walk.reel", headers=ranged).status_code == 206
+    (folder / "walk.reel").write_bytes(first.content + b"\0")
+    changed = client.get("/files/walk.reel", headers=ranged)
+    assert changed.status_code == 200 and changed.headers["etag"] != tag
+    assert client.get("/files/walk.reel", headers={"If-None-Match": tag}).status_code == 200
+
+
+def test_head_has_the_headers_and_no_body(client, folder):
+    answer = client.head("/files/walk.reel")
+    assert answer.status_code == 200 and answer.content == b""
+    assert int(answer.headers["content-length"]) == (folder / "walk.reel").stat().st_size
+    assert client.post("/files/walk.reel").status_code == 405
+
+
+def test_types_are_those_that_browsers_want(client):
+    assert client.get("/player/core.wasm").headers["content-type"] == "application/wasm"
+    assert client.get("/player/meshreel-player.js").headers["content-type"].startswith("text/javascript")
+    assert client.get("/files/walk.reel").headers["content-type"] == "application/octet-stream"
+
+
+TRAVERSALS = [
+    "/files/../outside.reel",
+    "/files/%2e%2e/outside.reel",
+    "/files/..%2foutside.reel",
+    "/files/sub/../../outside.reel",
+    "/files/%2e%2e%5coutside.reel",
+    "/files//etc/passwd",
+    "/files/%2fetc%2fpasswd",
+    "/files/secret.txt",
+    "/files/sub",
+    "/files/walk.reel%00",
+    "/files/" + "a" * 5000 + ".reel",
+    "/player/../videos/secret.txt",
+    "/player/%2e%2e/videos/walk.reel",
+    "/posters/../outside.reel.png",
+    "/posters/%2e%2e/outside.reel.png",
+    "/watch/../outside.reel",
+    "/watch/%2e%2e/outside.reel",
+    "/watch/secret.txt",
+]
+
+
+@pytest.mark.parametrize("path", TRAVERSALS)
+def test_nothing_outside_of_the_folder_and_nothing_but_reels_is_given(client, path):
+    answer = client.get(path)
+    assert answer.status_code == 404, answer.text
+    assert answer.text != "secret"
+
+
+def test_a_link_that_leads_out_is_not_followed(client, folder):
+    try:
+        (folder / "linked.reel").symlink_to(folder.parent / "outside.reel")
+    except OSError:
+        pytest.skip("this system lets nobody make links")
+    assert client.get("/files/linked.reel").status_code == 404
+    assert "linked" not in client.get("/").text
+
+
+def test_the_gallery_tells_rate_and_length_and_what_is_wrong_with_a_file(client):
+    text = client.get("/").text
+    assert text.index("cut") < text.index("none") < text.index("walk")
+    assert "14 frames" in text and "Mbps" in text
+    assert "the file is truncated" in text and "not a .reel file" in text
+    assert unescape(text).count(ODD.removesuffix(".reel")) == 1 and "<i>" not in text
+
+
+def test_every_tile_leads_to_a_page_whose_player_has_the_file(client, folder):
+    for name in ("walk.reel", f"sub/{ODD}"):
+        page = client.get(f"/watch/{quote(name)}")
+        assert page.status_code == 200 and "<i>" not in page.text
+        source = unescape(page.text.split('src="/files')[1].split('"')[0])
+        assert client.get(f"/files{source}").content == (folder / name).read_bytes()
+
+
+def test_pages_run_no_script_but_the_player_and_may_be_embedded(client):
+    page = client.get("/watch/walk.reel")
+    policy = page.headers["content-security-policy"]
+    assert "default-src 'none'" in policy and "script-src 'self' 'wasm-unsafe-eval'" in policy
+    assert "frame-ancestors" not in policy and "x-frame-options" not in page.headers
+    assert "cross-origin-embedder-policy" not in page.headers
+    assert "onclick" not in page.text and "<style" not in page.text and 'lang="en"' in page.text
+
+
+def test_a_poster_is_a_picture_and_a_plain_tile_where_nothing_can_be_shown(client):
+    poster = client.get("/posters/walk.reel.png")
+    assert poster.headers["content-type"] == "image/png" and poster.content[:4] == b"\x89PNG"
+    assert client.get("/posters/none.reel.png").headers["content-type"] == "image/svg+xml"
+    assert client.get("/posters/absent.reel.png").status_code == 404
+
+
+def test_a_file_that_goes_away_after_it_was_listed_is_not_found(client, folder, monkeypatch):
+    found = Library(folder).path_of("walk.reel")
+    monkeypatch.setattr(Library, "path_of", lambda *_: found)
+    (folder / "walk.reel").unlink()
+    assert client.get("/files/walk.reel").status_code == 404
+    assert client.get("/posters/walk.reel.png").status_code == 200  # the plain tile
+    assert client.get("/").status_code == 200
+
+
+def test_one_file_is_served_alone(folder, player):
+    client = TestClient(make_app(Library.of_file(folder / "walk.reel"), player))
+    assert '<meshreel-player src="/files/walk.reel" controls autoplay loop>' in client.get("/").text
+    assert client.get("/files/walk.reel").status_code == 200
+    assert client.get("/files/cut.reel").status_code == client.get("/watch/cut.reel").status_code == 404
+
+
+def test_other_origins_may_read_only_where_they_are_named(folder, player):
+    asking = {"Origin": "https://example.org", "Range": "bytes=0-3"}
+    silent = TestClient(make_app(Library(folder), player)).get("/files/walk.reel", headers=asking)
+    assert "access-control-allow-origin" not in silent.headers
+    client = TestClient(make_app(Library(folder), player, ("https://example.org",)))
+    answer = client.get("/files/walk.reel", headers=asking)
+    assert answer.status_code == 206 and answer.headers["access-control-allow-origin"] == "https://example.org"
+    assert {"Content-Range", "ETag"} <= set(answer.headers["access-control-expose-headers"].split(", "))
+    preflight = {"Origin": "https://example.org", "Access-Control-Request-Method": "GET"}
+    preflight["Access-Control-Request-Headers"] = "range"
+    assert client.options("/files/walk.reel", headers=preflight).status_code == 200
+    other = client.get("/files/walk.reel", headers={"Origin": "https://elsewhere.example"})
+    assert "access-control-allow-origin" not in other.headers
+
+
+def test_a_preflight_from_a_page_to_the_local_network_is_answered(folder, player):
+    client = TestClient(make_app(Library(folder), player, ("https://Example.org",)))
+    asking = {"Origin": "https://example.org", "Access-Control-Request-Method": "GET"}
+    asking["Access-Control-Request-Private-Network"] = "true"
+    answer = client.options("/files/walk.reel", headers=asking)
+    assert answer.status_code == 200 and answer.headers["access-control-allow-private-network"] == "true"
+
+
+@pytest.mark.parametrize("origin", ["https://example.org/", "example.org", "", "ftp://example.org", "https://a b"])
+def test_an_origin_that_no_browser_sends_is_told(folder, player, origin):
+    with pytest.raises(InputError, match=r"--cors .*give scheme, host and port alone"):
+        make_app(Library(folder), player, (origin,))

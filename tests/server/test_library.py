@@ -1,0 +1,107 @@
+"""Which files a library has, and what it tells of each."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import pytest
+from starlette.testclient import TestClient
+
+from meshreel.errors import InputError
+from meshreel.server.app import make_app
+from meshreel.server.library import Library
+from tests.server.conftest import ODD
+
+BYTES_AS_NAMES = sys.platform == "linux"
+
+
+def link(path, target, **options):
+    try:
+        path.symlink_to(target, **options)
+    except OSError:
+        pytest.skip("this system lets nobody make links")
+
+
+def test_files_of_all_folders_are_listed_in_order_and_hidden_ones_are_not(folder):
+    (folder / ".git").mkdir()
+    (folder / "Big").mkdir()
+    (folder / "a folder.reel").mkdir()
+    for name in (".git/x.reel", ".hidden.reel", "Big/b.REEL", "notes.reel.txt"):
+        (folder / name).write_bytes(b"x")
+    assert Library(folder).names() == ["Big/b.REEL", "cut.reel", "none.reel", f"sub/{ODD}", "walk.reel"]
+    assert [Library(folder).path_of(name) for name in (".git/x.reel", ".hidden.reel", "a folder.reel")] == [None] * 3
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", ".reel", "..", "../outside.reel", "sub/../walk.reel", "./walk.reel", "/walk.reel", "sub//walk.reel"]
+    + ["..\\outside.reel", "sub\\..\\walk.reel", "walk.reel\0", "walk\0.reel", "secret.txt", "secret.txt\0.reel"]
+    + ["walk.reel/", "walk.reel/x.reel", "a" * 300 + ".reel", "a/" * 3000 + "b.reel"],
+)
+def test_a_name_that_does_not_lead_straight_down_is_none(folder, name):
+    assert Library(folder).path_of(name) is None
+    assert Library(folder).path_of("walk.reel") == (folder / "walk.reel").resolve()
+
+
+def test_an_absolute_name_is_none(folder):
+    assert Library(folder).path_of(str(folder / "walk.reel")) is None
+
+
+def test_links_are_followed_inside_of_the_folder_alone(folder):
+    link(folder / "inside.reel", folder / "walk.reel")
+    link(folder / "out", folder.parent, target_is_directory=True)
+    library = Library(folder)
+    assert library.path_of("inside.reel") == (folder / "walk.reel").resolve()
+    assert library.path_of("out/outside.reel") is None and "inside.reel" in library.names()
+    assert not any(name.startswith("out") for name in library.names())
+
+
+def test_links_in_a_circle_break_nothing(folder, player):
+    link(folder / "round.reel", "round.reel")
+    link(folder / "up", folder, target_is_directory=True)
+    client = TestClient(make_app(Library(folder), player))
+    assert client.get("/files/round.reel").status_code == client.get("/watch/round.reel").status_code == 404
+    assert "round" not in client.get("/").text
+
+
+def test_a_folder_that_is_a_link_itself_is_served(folder):
+    link(folder.parent / "shortcut", folder, target_is_directory=True)
+    assert Library(folder.parent / "shortcut").names() == Library(folder).names()
+
+
+@pytest.mark.skipif(not BYTES_AS_NAMES, reason="names are Unicode on this system")
+def test_a_name_that_is_no_text_is_told_and_breaks_nothing(folder, player):
+    with open(os.fsencode(folder) + b"/\xff\xfe.reel", "wb") as file:  # noqa: PTH123  (bytes as a name)
+        file.write(b"x")
+    page = TestClient(make_app(Library(folder), player)).get("/")
+    assert page.status_code == 200 and "no Unicode text" in page.text and "??" in page.text
+    with pytest.raises(InputError, match="rename it"):
+        Library.of_file(folder / os.fsdecode(b"\xff\xfe.reel"))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
+def test_a_pipe_is_no_file_to_wait_for(folder):
+    os.mkfifo(folder / "pipe.reel")
+    assert Library(folder).path_of("pipe.reel") is None
+
+
+def test_what_is_told_of_an_error_has_no_path_of_this_machine(folder, monkeypatch):
+    def refused(path):
+        raise InputError(f"{path}: cannot be opened: Permission denied")
+
+    monkeypatch.setattr("meshreel.server.library.FileSource", refused)
+    assert Library(folder).entry("walk.reel").error == "cannot be opened: Permission denied"
+
+
+def test_a_file_that_went_away_is_told(folder):
+    (folder / "walk.reel").unlink()
+    entry = Library(folder).entry("walk.reel")
+    assert (entry.frames, entry.error) == (0, "is not there any more")
+
+
+def test_one_file_is_served_whatever_its_suffix(folder, player):
+    (folder / "walk.reel").rename(folder / "walk.bin")
+    client = TestClient(make_app(Library.of_file(folder / "walk.bin"), player))
+    assert client.get("/files/walk.bin").status_code == 200
+    assert client.get("/files/cut.reel").status_code == client.get("/files/secret.txt").status_code == 404

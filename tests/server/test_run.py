@@ -1,0 +1,77 @@
+"""Where the server listens, and what it tells of that."""
+
+from __future__ import annotations
+
+import socket
+import ssl
+import sys
+import urllib.request
+from datetime import timedelta
+
+import pytest
+from cryptography import x509
+from starlette.testclient import TestClient
+
+from meshreel.cli import one_line
+from meshreel.errors import InputError
+from meshreel.server.app import make_app
+from meshreel.server.library import Library
+from meshreel.server.run import ServerOptions, addresses, run
+
+
+def test_addresses_are_those_to_type():
+    assert addresses(ServerOptions(), 80) == ["http://127.0.0.1:80/"]
+    assert addresses(ServerOptions(host="::1", https=True), 4433) == ["https://[::1]:4433/"]
+    everywhere = addresses(ServerOptions(host="0.0.0.0"), 81)
+    assert everywhere[0] == "http://localhost:81/" and not any("0.0.0.0" in address for address in everywhere)
+
+
+def test_a_taken_port_and_an_unknown_host_are_told_with_a_remedy(folder, player):
+    app = make_app(Library(folder), player)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"cannot listen on 127.0.0.1:{port}: .*give another --port"):
+            run(app, ServerOptions(port=port), lambda _: None)
+    with pytest.raises(InputError, match=r"cannot listen on no\.such\.host\.invalid"):
+        run(app, ServerOptions(host="no.such.host.invalid"), lambda _: None)
+    with pytest.raises(InputError, match="--port 70000"):
+        ServerOptions(port=70_000)
+
+
+def test_https_answers_with_a_certificate_for_this_machines_addresses(folder, player, live):
+    address = live(make_app(Library(folder), player), ServerOptions(https=True))
+    assert address.startswith("https://127.0.0.1:")
+    port = int(address.rstrip("/").rpartition(":")[2])
+    trusting = ssl.create_default_context()
+    trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE
+    with urllib.request.urlopen(f"{address}files/walk.reel", context=trusting, timeout=60) as answer:
+        assert answer.read() == (folder / "walk.reel").read_bytes()
+    made = x509.load_pem_x509_certificate(ssl.get_server_certificate(("127.0.0.1", port)).encode())
+    names = made.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert "localhost" in names.get_values_for_type(x509.DNSName)
+    assert {"127.0.0.1", "::1"} <= {str(one) for one in names.get_values_for_type(x509.IPAddress)}
+    life = made.not_valid_after_utc - made.not_valid_before_utc
+    assert timedelta(days=30) < life < timedelta(days=398)  # what browsers accept
+
+
+def test_https_without_its_library_is_told_before_any_address_is(folder, player, monkeypatch):
+    monkeypatch.setitem(sys.modules, "trustme", None)
+    told = []
+    with pytest.raises(ModuleNotFoundError) as caught:
+        run(make_app(Library(folder), player), ServerOptions(https=True), told.append)
+    assert told == [] and "meshreel[play]" in one_line(caught.value)
+
+
+@pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason="this system has no IPv6")
+def test_all_addresses_of_version_6_are_all_of_version_4_too(folder, player, live):
+    address = live(make_app(Library(folder), player), ServerOptions(host="::"))
+    for host in ("127.0.0.1", "[::1]"):
+        with urllib.request.urlopen(address.replace("localhost", host), timeout=60) as answer:
+            assert answer.status == 200
+
+
+def test_who_listens_here_alone_answers_to_its_own_names_alone(folder, player):
+    client = TestClient(make_app(Library(folder), player, hosts=ServerOptions().hosts))
+    for host, code in (("localhost", 200), ("127.0.0.1:80", 200), ("[::1]:80", 200), ("evil.example", 400), ("", 400)):
+        assert client.get("/files/walk.reel", headers={"Host": host}).status_code == code
+    assert ServerOptions(host="0.0.0.0").hosts == ServerOptions(host="192.168.0.7").hosts == ("*",)

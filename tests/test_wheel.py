@@ -1,0 +1,67 @@
+"""The wheel, as a user gets it: built, installed into a new environment with the extra `play`, and played from."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import urllib.request
+import venv
+from pathlib import Path
+
+import pytest
+
+from tests.golden import GOLDEN
+
+ROOT = Path(__file__).resolve().parents[1]
+FILE = GOLDEN / "scene.reel"
+PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
+
+
+def fetch(address: str) -> bytes:
+    with urllib.request.urlopen(address, timeout=60) as answer:
+        return answer.read()
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory):
+    """The interpreter of a new environment that has the wheel and nothing of this checkout."""
+    folder = tmp_path_factory.mktemp("wheel")
+    subprocess.run([sys.executable, *PIP, "wheel", str(ROOT), "--no-deps", "-w", str(folder)], check=True)
+    [wheel] = folder.glob("meshreel-*.whl")
+    venv.create(folder / "venv", with_pip=True)
+    found = folder / "venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+    subprocess.run([found, *PIP, "install", f"{wheel}[play]"], check=True)
+    return found
+
+
+@pytest.mark.slow
+def test_an_installed_wheel_plays_a_file_with_the_player_that_it_brings(python, tmp_path):
+    """`--no-browser`, then what a browser would fetch: page, scripts, wasm, licences, file."""
+    process = subprocess.Popen(
+        [python, "-m", "meshreel", "play", str(FILE), "--no-browser", "--json"],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+    )
+    try:
+        address = json.loads(process.stdout.readline())["addresses"][0]
+        page = fetch(address).decode()
+        assert '<meshreel-player src="/files/scene.reel"' in page and 'src="/player/page.js"' in page
+        names = {path.name for path in (ROOT / "src/meshreel/player").iterdir()}
+        assert {"meshreel-player.js", "worker.js", "core.wasm", "draco.wasm", "page.js", "LICENSES.txt"} <= names
+        for name in names:
+            assert fetch(f"{address}player/{name}") == (ROOT / "src/meshreel/player" / name).read_bytes()
+        assert fetch(f"{address}files/scene.reel") == FILE.read_bytes()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.slow
+def test_what_the_extra_play_leaves_out_is_told(python, tmp_path):
+    command = [python, "-m", "meshreel", "encode", str(tmp_path), "-o", str(tmp_path / "out.reel")]
+    said = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert said.returncode == 2 and "Traceback" not in said.stderr and said.stderr.count("\n") == 1

@@ -1,0 +1,117 @@
+// Quality that follows the network and the processor: layers are dropped before frames are.
+
+import type { Timeline } from "./clock.ts";
+import { mostQuality, sizeOfLayers } from "./links.ts";
+import type { Head } from "./reader.ts";
+import { groupsBetween } from "./scheduler.ts";
+
+/** How playback goes. Seconds are of display time. */
+export interface Conditions {
+  readonly now: number; // ms
+  readonly time: number; // s of content
+  readonly speed: number; // content seconds a second
+  readonly bandwidth: number; // bits/s; 0 where it sets no limit
+  readonly fetched: number; // s at hand from here on, as bytes; Infinity where all that is wanted is there
+  readonly decoded: number; // s at hand from here on, decoded; Infinity as well
+  readonly load: number; // decoding time over playing time; 0 where it is not known
+  readonly isWaiting: boolean; // for bytes or workers, though it should play
+}
+
+const OUTLOOK = 10; // s of content that its rate is averaged over
+const SCARCE = 1; // s at hand: the next group must come soon
+const AMPLE = 2; // s at hand: enough to try a better quality
+const PLENTY = 6; // s at hand: enough to use nearly all of the bandwidth
+const BEARABLE = 0.8; // load that a level may make
+const HOLD_MS = 2000; // between a change and a rise
+const PENALTY_MS = [15_000, 120_000] as const; // after decoding fell behind, first and at most, doubled each time
+
+export class Adaptive {
+  level: number;
+  readonly #head: Head;
+  readonly #timeline: Timeline;
+  #rates: readonly number[] = [];
+  #ratesAt = NaN; // s
+  readonly #loads: number[] = []; // of each level at normal speed, as measured last
+  #changed = -Infinity; // ms
+  #ceiling = Infinity; // level that decoding did not keep up with, less one
+  #ceilingUntil = 0; // ms
+  #penalty: number = PENALTY_MS[0];
+
+  /** Starts with what the bandwidth measured so far allows; at best where there is none. */
+  constructor(head: Head, timeline: Timeline, bandwidth: number, speed: number) {
+    this.#head = head;
+    this.#timeline = timeline;
+    this.level = affordable(this.rates(0), bandwidth / speed, 0.6);
+  }
+
+  /** The level for the groups that are fetched next. */
+  decide(conditions: Conditions): number {
+    const rates = this.rates(conditions.time);
+    const lower = Math.min(this.level, this.#forNetwork(rates, conditions), this.#forDecoding(rates, conditions));
+    const higher = this.#possible(rates, conditions);
+    if (lower < this.level) this.#change(lower, conditions.now);
+    else if (higher > this.level && conditions.now - this.#changed >= HOLD_MS) this.#change(higher, conditions.now);
+    return this.level;
+  }
+
+  /** Bits a second of content at each level, over the groups that come next; anew where `time` is in another second. */
+  rates(time: number): readonly number[] {
+    const second = Math.floor(time);
+    if (second !== this.#ratesAt) this.#rates = this.#ratesOf(second);
+    this.#ratesAt = second;
+    return this.#rates;
+  }
+
+  #ratesOf(time: number): number[] {
+    const { starts, frameCount, duration } = this.#timeline;
+    const from = Math.min(time, Math.max(0, duration - OUTLOOK));
+    const groups = groupsBetween(this.#head, this.#timeline.frameAt(from), this.#timeline.frameAt(from + OUTLOOK));
+    const frames = groups.reduce((sum, group) => sum + group.frameCount, 0);
+    const perByte = (8 * this.#head.tracks.length * frameCount) / (frames * starts[frameCount]);
+    const most = Math.max(...groups.map(mostQuality));
+    return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeOfLayers(group, level + 1), 0));
+  }
+
+  #forNetwork(rates: readonly number[], { bandwidth, speed, fetched, isWaiting }: Conditions): number {
+    if (bandwidth === 0 || fetched >= PLENTY / 2) return Infinity;
+    return affordable(rates, bandwidth / speed, isWaiting ? 0.5 : fetched < SCARCE ? 0.65 : 0.85);
+  }
+
+  #forDecoding(rates: readonly number[], { now, speed, load, decoded, fetched, isWaiting }: Conditions): number {
+    if (load > 0) this.#loads[this.level] = load / speed;
+    if (load <= 0.9 || (decoded >= AMPLE && !isWaiting) || fetched <= decoded) return Infinity;
+    if (this.level === 0) return 0;
+    this.#ceiling = this.level - 1;
+    this.#ceilingUntil = now + this.#penalty;
+    this.#penalty = Math.min(2 * this.#penalty, PENALTY_MS[1]);
+    let level = this.level - 1;
+    const loadAt = (other: number): number => speed * (this.#loads[other] ?? ((load / speed) * rates[other]) / rates[this.level]);
+    while (level > 0 && loadAt(level) > BEARABLE) level--;
+    return level;
+  }
+
+  #possible(rates: readonly number[], { now, bandwidth, speed, fetched, decoded, load }: Conditions): number {
+    if (decoded < AMPLE) return -1;
+    const share = fetched >= PLENTY ? 0.9 : 0.7;
+    const ceiling = now < this.#ceilingUntil ? this.#ceiling : Infinity;
+    return Math.min(affordable(rates, bandwidth / speed, share), this.#bearable(load, speed), ceiling);
+  }
+
+  /** The highest level that is known to decode in time; or the next one, where this one leaves half of the time. */
+  #bearable(load: number, speed: number): number {
+    if (load === 0) return this.level;
+    const known = this.#loads.reduce((best, other, level) => (speed * other <= BEARABLE ? level : best), 0);
+    return Math.max(known, load <= BEARABLE / 2 ? this.level + 1 : 0);
+  }
+
+  #change(level: number, now: number): void {
+    this.level = level;
+    this.#changed = now;
+  }
+}
+
+/** The highest level whose rate is within a share of what there is; the lowest where none is, the best where nothing is a limit. */
+function affordable(rates: readonly number[], bandwidth: number, share: number): number {
+  if (!(bandwidth > 0)) return rates.length - 1;
+  return Math.max(0, rates.filter((rate) => rate <= share * bandwidth).length - 1); // they never fall
+}

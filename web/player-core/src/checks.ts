@@ -1,0 +1,92 @@
+// What the records of a head must satisfy beyond their bytes; FormatError where they do not. Beside format/checks.py.
+
+import { FormatError } from "./errors.ts";
+import { ChunkKind, Form } from "./layout.gen.ts";
+import type { Header, Index, IndexEntry } from "./layout.gen.ts";
+
+const LARGEST = 1e15;
+const SMALLEST = 1e-15;
+const MOST_TRACKS = 256;
+const MOST_CHANGES = 255;
+
+function require(holds: boolean, message: string): void {
+  if (!holds) throw new FormatError(message);
+}
+
+/** Positive rate and scale, corners in order, an interval of time between each two frames or none. */
+export function checkHeader(header: Header, frameCount: number): void {
+  for (const name of ["frameRate", "scale"] as const) {
+    const value = header[name];
+    require(value >= SMALLEST && value <= LARGEST, `Header.${name}: ${value} is not within ${SMALLEST} .. ${LARGEST}`);
+  }
+  for (const name of ["origin", "minimum", "maximum"] as const) {
+    require(header[name].every((value) => Math.abs(value) <= LARGEST), `Header.${name}: ${header[name]} is beyond ${LARGEST}`);
+  }
+  const ordered = header.minimum.every((low, k) => low <= header.maximum[k]);
+  require(ordered, `Header.minimum: ${header.minimum} is above maximum ${header.maximum}`);
+  const intervals = header.intervals;
+  require(intervals.length === 0 || intervals.length === frameCount - 1, `Header.intervals: ${intervals.length} for ${frameCount} frames`);
+  require(!intervals.includes(0), "Header.intervals: one is 0, two frames at the same time");
+}
+
+/** The laws of an index. FormatError, naming the chunk, where an entry breaks one. */
+export function checkIndex(index: Index): void {
+  const checks = new IndexChecks();
+  for (const entry of index.chunks) checks.add(entry);
+  checks.finish();
+}
+
+class IndexChecks {
+  private readonly frames: number[] = []; // of each track so far
+  private readonly groups: number[] = []; // number of the newest group of each track
+  private readonly changes = new Map<number, number>(); // for each STATIC chunk, how many patches lead to it
+  private place: readonly [number, number] = [0, -1]; // first frame and track of the newest group
+  private count = 0;
+
+  add(entry: IndexEntry): void {
+    const name = `chunk ${this.count}`;
+    const isStatic = entry.kind === ChunkKind.STATIC;
+    require(isStatic === (entry.frames === 0), `${name}: of kind ${entry.kind} with ${entry.frames} frames`);
+    require(entry.layers.length > 0 && entry.layers.every((layer) => layer.size > 0), `${name}: a chunk or a layer without bytes`);
+    require(new Set(entry.dependsOn).size === entry.dependsOn.length, `${name}: depends on ${entry.dependsOn}, on one of them twice`);
+    if (isStatic) this.changes.set(this.count, this.changesOf(entry, name));
+    else this.addGroup(entry, name);
+    this.count += 1;
+  }
+
+  finish(): void {
+    require(this.frames.length > 0, "no frames: the index names no group");
+    this.frames.forEach((frames, track) => {
+      require(frames === this.frames[0], `track ${track} has ${frames} frames, track 0 has ${this.frames[0]}`);
+    });
+  }
+
+  /** How many patches lead to a STATIC chunk: none to a mesh, one more than to what it changes to a patch. */
+  private changesOf(entry: IndexEntry, name: string): number {
+    const isPatch = entry.form === Form.PATCH;
+    require((isPatch || entry.form === Form.DRACO) && entry.track === 0, `${name}: a static chunk of form ${entry.form}, track ${entry.track}`);
+    require(entry.dependsOn.length === (isPatch ? 1 : 0), `${name}: a static chunk of form ${entry.form} depends on ${entry.dependsOn}`);
+    if (!isPatch) return 0;
+    const changes = this.changes.get(entry.dependsOn[0]);
+    if (changes === undefined) throw new FormatError(`${name}: a patch that depends on ${entry.dependsOn}, which is no static chunk before it`);
+    require(changes < MOST_CHANGES, `${name}: patch ${changes + 1} of one background, at most ${MOST_CHANGES}`);
+    return changes + 1;
+  }
+
+  private addGroup(entry: IndexEntry, name: string): void {
+    const track = entry.track;
+    require(entry.form !== Form.PATCH, `${name}: a group of form PATCH`);
+    require(track <= this.frames.length && track < MOST_TRACKS, `${name}: track ${track} after ${this.frames.length}, at most ${MOST_TRACKS}`);
+    const begun = track < this.frames.length;
+    const first = begun ? this.frames[track] : 0;
+    const follows = first > this.place[0] || (first === this.place[0] && track > this.place[1]);
+    require(follows, `${name}: track ${track} from frame ${first}; groups are in order of first frame and track`);
+    const others = entry.dependsOn.filter((other) => !this.changes.has(other));
+    const isNext = others.length === 0 || (begun && others.length === 1 && others[0] === this.groups[track]);
+    require(isNext, `${name}: depends on ${others}, neither a static chunk before it nor the last group of its track`);
+    require(entry.dependsOn.length - others.length <= 1, `${name}: depends on ${entry.dependsOn}, on several static chunks`);
+    this.frames[track] = first + entry.frames;
+    this.groups[track] = this.count;
+    this.place = [first, track];
+  }
+}

@@ -1,0 +1,100 @@
+// The inside of a decoding worker: jobs in, packed groups out. Keeps what groups that follow are predicted from.
+
+import type { Tools } from "./coding/group.ts";
+import { continueGroup, decodeStatic } from "./coding/group.ts";
+import type { LayersState } from "./coding/layers.ts";
+import { checkPayload } from "./decoder.ts";
+import type { Mesh, Placement } from "./mesh.ts";
+import { packGroup, packStatic } from "./pack.ts";
+import type { DecodeJob } from "./protocol.ts";
+import type { Packed } from "./types.ts";
+
+const MOST_STATES = 64; // of groups, of all tracks and files; the oldest goes first
+const MOST_STATICS = 4;
+
+/** A job whose predecessor this worker has not, or no longer: the chain is to be sent again. */
+export class MissingState extends Error {
+  override name = "MissingState";
+}
+
+/** Values by file and chunk, at most so many. */
+class Kept<T> {
+  private readonly values = new Map<string, T>();
+
+  constructor(private readonly most: number) {}
+
+  get(file: number, chunk: number): T | undefined {
+    return this.values.get(`${file}/${chunk}`);
+  }
+
+  set(file: number, chunk: number, value: T): void {
+    const key = `${file}/${chunk}`;
+    this.values.delete(key); // so that it counts as the newest
+    this.values.set(key, value);
+    for (const oldest of this.values.keys()) {
+      if (this.values.size <= this.most) break;
+      this.values.delete(oldest);
+    }
+  }
+
+  forget(file: number): void {
+    for (const key of [...this.values.keys()]) if (key.startsWith(`${file}/`)) this.values.delete(key);
+  }
+}
+
+export class ChunkDecoder {
+  private readonly states = new Kept<LayersState>(MOST_STATES);
+  private readonly statics = new Kept<Mesh>(MOST_STATICS);
+
+  constructor(
+    private readonly tools: Tools,
+    private readonly now: () => number = () => performance.now(),
+  ) {}
+
+  /** What the job's chunk is, in metres from the header's origin; null where only its state is wanted. */
+  decode(job: DecodeJob): Packed | null {
+    const start = this.now();
+    const name = job.kind === "static" ? `chunk ${job.chunk} (static)` : `chunk ${job.chunk} (track ${job.track}, frames ${job.firstFrame} to ${job.firstFrame + job.frameCount - 1})`;
+    checkPayload(name, job.form, job.payload, job.layers);
+    const place = { scale: job.scale, origin: [0, 0, 0] };
+    const made = job.kind === "static" ? this.background(job, place) : this.group(job, place);
+    return made && { ...made, decodeMs: this.now() - start };
+  }
+
+  /** Frees what is kept of a file. */
+  forget(file: number): void {
+    this.states.forget(file);
+    this.statics.forget(file);
+  }
+
+  private group(job: DecodeJob, place: Placement): Packed | null {
+    const { file, chunk, track, firstFrame, payload } = job;
+    const previous = this.needed(this.states, job);
+    const { group, state } = continueGroup(this.tools, payload, job.frameCount, job.quality, previous, place);
+    if (state !== null) this.states.set(file, chunk, state);
+    if (job.stateOnly) return null;
+    const quality = Math.max(0, job.layers.length - 1);
+    return { kind: "group", chunk, track, firstFrame, ...packGroup(this.tools.core, group), quality, bytes: payload.length, decodeMs: 0 };
+  }
+
+  private background(job: DecodeJob, place: Placement): Packed | null {
+    const before = this.needed(this.statics, job);
+    const mesh = decodeStatic(this.tools, job.payload, before, place);
+    this.statics.set(job.file, job.chunk, mesh);
+    if (job.stateOnly) return null;
+    return { kind: "static", chunk: job.chunk, ...packStatic(this.tools.core, mesh), bytes: job.payload.length, decodeMs: 0 };
+  }
+
+  private needed<T>(kept: Kept<T>, job: DecodeJob): T | null {
+    if (job.previous === null) return null;
+    const value = kept.get(job.file, job.previous);
+    if (value === undefined) throw new MissingState(`chunk ${job.chunk} needs chunk ${job.previous}, which is not at hand`);
+    return value;
+  }
+}
+
+/** The buffers of a packed value, to be handed over with it. */
+export function buffersOf(packed: Packed): ArrayBufferLike[] {
+  const arrays = packed.kind === "group" ? [packed.texels, packed.faces, packed.extra, packed.extraStarts] : [packed.texels, packed.faces];
+  return [...new Set(arrays.map((array) => array.buffer))];
+}

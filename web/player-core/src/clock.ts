@@ -1,0 +1,93 @@
+// Content time from display time.
+
+const LONGEST_STEP = 0.5; // s of display time; where nothing was displayed for longer, time stood still
+const ROUNDING = 1e-6; // s; a time that is so little short of a frame's own is that frame's
+
+/** When each frame is shown, s from the first: `starts` has a number for each frame, then the end of the last. */
+export class Timeline {
+  readonly starts: Float64Array;
+
+  constructor(starts: Float64Array) {
+    this.starts = starts;
+  }
+
+  get frameCount(): number {
+    return this.starts.length - 1;
+  }
+
+  get duration(): number {
+    return this.starts[this.frameCount];
+  }
+
+  /** The frame that is shown at a time; the first or the last one outside. */
+  frameAt(time: number): number {
+    let [low, high] = [0, this.frameCount - 1];
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.starts[middle] <= time + ROUNDING) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  /** How far a time is from a frame's start to its end, 0 to 1. */
+  blendAt(time: number, frame: number): number {
+    const start = this.starts[frame];
+    return Math.min(1, Math.max(0, (time - start) / (this.starts[frame + 1] - start)));
+  }
+
+  /** The nearest time from 0 to the end. */
+  clamp(time: number): number {
+    return Math.min(Math.max(time, 0), this.duration);
+  }
+}
+
+/** Runs with the display: moves `time` by what has passed between two pictures. Allocates nothing while it runs. */
+export class Clock {
+  readonly timeline: Timeline;
+  time = 0; // s
+  rate = 1;
+  loop = false;
+  #isRunning = false;
+  #last = NaN; // ms, of the picture before
+  #before = 0; // s, time at the picture before
+
+  constructor(timeline: Timeline) {
+    this.timeline = timeline;
+  }
+
+  get isRunning(): boolean {
+    return this.#isRunning;
+  }
+
+  /** Runs from the next picture on. */
+  start(): void {
+    this.#isRunning = true;
+    this.#last = NaN;
+  }
+
+  stop(): void {
+    this.#isRunning = false;
+  }
+
+  get isAtEnd(): boolean {
+    return !this.loop && this.time >= this.timeline.duration;
+  }
+
+  /** Goes on to the time of a picture that is displayed at `now`, ms of any clock that does not go back. */
+  advance(now: number): void {
+    const passed = (now - this.#last) / 1000;
+    this.#last = now;
+    this.#before = this.time;
+    if (!this.#isRunning || !(passed > 0)) return;
+    const { duration } = this.timeline;
+    this.time += Math.min(passed, LONGEST_STEP) * this.rate;
+    if (this.time >= duration) this.time = this.loop ? this.time % duration : duration;
+  }
+
+  /** Stops, and takes the last step back: what it led to is not at hand. */
+  hold(): void {
+    this.time = this.#before;
+    this.#isRunning = false;
+  }
+}

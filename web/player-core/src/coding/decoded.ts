@@ -1,0 +1,42 @@
+// A group of frames as decoded: vertices and faces that all frames have, and what single frames have besides.
+
+import { EMPTY, concatenate } from "../mesh.ts";
+import type { Mesh } from "../mesh.ts";
+
+export interface DecodedGroup {
+  readonly frameCount: number; // T
+  readonly vertexCount: number; // V
+  readonly positions: Float64Array; // T x V x 3
+  readonly faces: Int32Array;
+  /** T x faces, 1 where a frame is shown without one; null where all frames have all. */
+  readonly dropped: Uint8Array | null;
+  /** For each frame what it is shown with besides; null where none has any. */
+  readonly patches: readonly Mesh[] | null;
+}
+
+/** Frames that share nothing. */
+export function ofMeshes(meshes: readonly Mesh[]): DecodedGroup {
+  return { frameCount: meshes.length, vertexCount: 0, positions: new Float64Array(0), faces: new Int32Array(0), dropped: null, patches: meshes };
+}
+
+/** Frame t as one mesh: its vertices behind the shared ones, its faces behind those that it keeps. */
+export function frameOf(group: DecodedGroup, t: number): Mesh {
+  const size = 3 * group.vertexCount;
+  const shared = { vertices: group.positions.subarray(t * size, (t + 1) * size), faces: keptFaces(group, t) };
+  return concatenate([shared, group.patches?.[t] ?? EMPTY]);
+}
+
+/** Those of the shared faces that frame t is shown with. */
+export function keptFaces(group: DecodedGroup, t: number): Int32Array {
+  if (group.dropped === null) return group.faces;
+  const count = group.faces.length / 3;
+  const dropped = group.dropped.subarray(t * count, (t + 1) * count);
+  const kept = new Int32Array(group.faces.length);
+  let size = 0;
+  for (let face = 0; face < count; face++) {
+    if (dropped[face]) continue;
+    kept.set(group.faces.subarray(3 * face, 3 * face + 3), size);
+    size += 3;
+  }
+  return kept.subarray(0, size);
+}

@@ -1,0 +1,135 @@
+// Payloads of chunks: groups of frames of whatever form, and states of the background. Beside coding/{group,intra,background}.py.
+
+import type { DecoderModule } from "draco3d";
+
+import { FormatError } from "../errors.ts";
+import { DracoGroup, EmptyGroup, Form, LaplacianGroup, LayersPatches, StaticPatch } from "../layout.gen.ts";
+import { EMPTY, concatenate, faceCount, placed, vertexCount, without } from "../mesh.ts";
+import type { Mesh, Placement } from "../mesh.ts";
+import { unpackAll } from "../records.ts";
+import type { Core } from "../wasm/memory.ts";
+import { ofMeshes } from "./decoded.ts";
+import type { DecodedGroup } from "./decoded.ts";
+import { decodeDisplacements, framesOf } from "./displacements.ts";
+import { decodeIntegers } from "./entropy.ts";
+import { placeLayers, readLayers } from "./layers.ts";
+import type { LayersState } from "./layers.ts";
+import { checkGrowth, checkStep, decodeMesh, subdivideMidpoint } from "./mesh.ts";
+import { decodePatches, fillRuns } from "./patches.ts";
+
+/** What decodes: the compiled core, and Draco. */
+export interface Tools {
+  readonly core: Core;
+  readonly draco: DecoderModule;
+}
+
+/** A group as decoded and placed, and what the next may be predicted from. */
+export interface Continued {
+  readonly group: DecodedGroup;
+  readonly state: LayersState | null;
+}
+
+/**
+ * The frames of a group, from a whole payload or a prefix of its layers; with `quality`, from at most so many beyond the
+ * first. `previous` is the state that this gave for the group before. FormatError on damaged bytes.
+ */
+export function continueGroup(
+  tools: Tools,
+  data: Uint8Array,
+  frameCount: number,
+  quality: number | null,
+  previous: LayersState | null,
+  place: Placement,
+): Continued {
+  const made = data[0] === Form.LAYERS ? decodeLayers(tools, data, quality, previous, place) : decodeAlone(tools, data, frameCount, quality, place);
+  if (made.group.frameCount !== frameCount) throw new FormatError(`a group of ${made.group.frameCount} frames where the index says ${frameCount}`);
+  return made;
+}
+
+function decodeLayers({ core, draco }: Tools, data: Uint8Array, quality: number | null, previous: LayersState | null, place: Placement): Continued {
+  const records = readLayers(data, quality);
+  const { faces, positions, state } = placeLayers(core, draco, records, previous, place);
+  const frameCount = records.head.frames;
+  const vertices = positions.length / 3 / frameCount;
+  const group = { frameCount, vertexCount: vertices, positions, faces, dropped: null, patches: null };
+  const isPlain = records.end === data.length || (quality !== null && quality <= records.head.levels);
+  if (isPlain) return { group, state };
+  const record = unpackAll(LayersPatches, data.subarray(records.end));
+  const { dropped, meshes } = decodePatches(core, draco, record, frameCount, faces.length / 3);
+  return { group: { ...group, dropped, patches: meshes.map((mesh) => placed(mesh, place)) }, state };
+}
+
+function decodeAlone(tools: Tools, data: Uint8Array, frameCount: number, quality: number | null, place: Placement): Continued {
+  switch (data[0]) {
+    case Form.EMPTY:
+      unpackAll(EmptyGroup, data);
+      return { group: ofMeshes(Array.from({ length: frameCount }, () => EMPTY)), state: null };
+    case Form.DRACO:
+      return { group: ofMeshes(decodeIntra(tools, data).map((mesh) => placed(mesh, place))), state: null };
+    case Form.LAPLACIAN:
+      return { group: decodeLaplacian(tools, unpackAll(LaplacianGroup, data), quality, place), state: null };
+    default:
+      throw new FormatError(`group form ${data[0]} is not known to this player`);
+  }
+}
+
+function decodeIntra({ core, draco }: Tools, data: Uint8Array): Mesh[] {
+  const record = unpackAll(DracoGroup, data);
+  checkStep(record.step);
+  return record.meshes.map((frame) => {
+    const mesh = decodeMesh(draco, frame, record.step);
+    checkGrowth(mesh, record.levels, record.meshes.length);
+    return subdivideMidpoint(core, mesh, record.levels);
+  });
+}
+
+function decodeLaplacian({ core, draco }: Tools, record: LaplacianGroup, quality: number | null, place: Placement): DecodedGroup {
+  checkStep(record.step);
+  const reference = decodeMesh(draco, record.reference, record.step);
+  const frameCount = framesOf(record.displacements);
+  checkGrowth(reference, record.levels, frameCount);
+  const base = subdivideMidpoint(core, reference, record.levels);
+  const field = decodeDisplacements(core, record.displacements, base, quality);
+  const count = vertexCount(base);
+  const positions = new Float64Array(field.length);
+  for (let t = 0; t < frameCount; t++) {
+    for (let v = 0; v < count; v++) {
+      for (let k = 0; k < 3; k++) {
+        const normalised = base.vertices[3 * v + k] + field[3 * (v * frameCount + t) + k];
+        positions[3 * (t * count + v) + k] = place.origin[k] + place.scale * normalised;
+      }
+    }
+  }
+  return { frameCount, vertexCount: count, positions, faces: base.faces, dropped: null, patches: null };
+}
+
+/** A state of the background, placed; `before` is the one that it changes, as this gave it. FormatError on damaged bytes. */
+export function decodeStatic(tools: Tools, data: Uint8Array, before: Mesh | null, place: Placement): Mesh {
+  if (data[0] === Form.PATCH) {
+    if (before === null) throw new FormatError("background: a patch of a state that is not at hand");
+    return decodeChange(tools, unpackAll(StaticPatch, data), before, place);
+  }
+  const meshes = decodeIntra(tools, data);
+  if (meshes.length !== 1) throw new FormatError(`background: ${meshes.length} meshes, a state has one`);
+  return placed(meshes[0], place);
+}
+
+function decodeChange({ core, draco }: Tools, record: StaticPatch, before: Mesh, place: Placement): Mesh {
+  checkStep(record.step);
+  const kept = keptOf(core, record, before);
+  const added = decodeMesh(draco, record.mesh, record.step);
+  checkGrowth(added, 0);
+  const after = concatenate([kept, placed(added, place)]);
+  checkGrowth(after, 0);
+  return after;
+}
+
+/** What the patch leaves of the state before. */
+function keptOf(core: Core, record: StaticPatch, before: Mesh): Mesh {
+  const faces = faceCount(before);
+  if (record.runs === 0 && record.dropped.length === 0) return before;
+  if (record.runs > faces + 1) throw new FormatError(`background: ${record.runs} runs over ${faces} faces`);
+  const [dropped, used] = fillRuns(decodeIntegers(core, record.dropped, record.runs), faces);
+  if (used !== record.runs || !dropped.includes(1)) throw new FormatError(`background: ${record.runs} runs over ${faces} faces`);
+  return without(before, dropped);
+}

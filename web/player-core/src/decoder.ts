@@ -1,0 +1,77 @@
+// A whole .reel file in memory, frame by frame. Beside decoder.py; the player decodes in workers instead.
+
+import { continueGroup, decodeStatic } from "./coding/group.ts";
+import type { Continued, Tools } from "./coding/group.ts";
+import { frameOf } from "./coding/decoded.ts";
+import { crc32 } from "./crc.ts";
+import { FormatError } from "./errors.ts";
+import { EMPTY, concatenate } from "./mesh.ts";
+import type { Mesh, Placement } from "./mesh.ts";
+import { Head, describe } from "./reader.ts";
+import type { Chunk } from "./reader.ts";
+
+/** FormatError where the checksum of a layer does not fit, or the payload is of another form than the index says. */
+export function checkPayload(name: string, form: number, payload: Uint8Array, layers: readonly { size: number; crc: number }[]): void {
+  let offset = 0;
+  layers.forEach((layer, number) => {
+    const part = payload.subarray(offset, offset + layer.size);
+    if (part.length !== layer.size) throw new FormatError(`${name}: truncated, ${payload.length} bytes`);
+    if (crc32(part) !== layer.crc) throw new FormatError(`${name}: layer ${number} is damaged, its checksum does not match`);
+    offset += layer.size;
+  });
+  if (payload[0] !== form) throw new FormatError(`${name}: its form is ${payload[0]}, the index says ${form}`);
+}
+
+export class Video {
+  readonly head: Head;
+  private readonly place: Placement;
+  private readonly groups = new Map<number, Continued>();
+  private readonly states = new Map<number, Mesh>();
+
+  constructor(
+    private readonly tools: Tools,
+    private readonly data: Uint8Array,
+    private readonly quality: number | null = null,
+  ) {
+    this.head = Head.parse(data);
+    this.place = { scale: this.head.header.scale, origin: this.head.header.origin };
+  }
+
+  /** Frame `index` in metres: its background, then its tracks, as one mesh. FormatError where a chunk is damaged. */
+  frame(index: number): Mesh {
+    const state = this.head.staticOfFrame(index);
+    const moving = this.head.tracks.map((_, track) => {
+      const chunk = this.head.chunkOfFrame(index, track);
+      return frameOf(this.decoded(chunk).group, index - chunk.firstFrame);
+    });
+    return concatenate([state === null ? EMPTY : this.state(state), ...moving]);
+  }
+
+  private decoded(chunk: Chunk): Continued {
+    const known = this.groups.get(chunk.number);
+    if (known !== undefined) return known;
+    const before = this.head.groupBefore(chunk);
+    const previous = before === null ? null : this.decoded(before).state;
+    const layers = this.quality === null ? chunk.layers.length : this.quality + 1;
+    const made = continueGroup(this.tools, this.payload(chunk, layers), chunk.frameCount, this.quality, previous, this.place);
+    this.groups.set(chunk.number, made);
+    return made;
+  }
+
+  private state(chunk: Chunk): Mesh {
+    const known = this.states.get(chunk.number);
+    if (known !== undefined) return known;
+    const before = this.head.changedFrom(chunk);
+    const mesh = decodeStatic(this.tools, this.payload(chunk, chunk.layers.length), before && this.state(before), this.place);
+    this.states.set(chunk.number, mesh);
+    return mesh;
+  }
+
+  private payload(chunk: Chunk, count: number): Uint8Array {
+    const layers = chunk.layers.slice(0, Math.max(count, 1));
+    const size = layers.reduce((sum, layer) => sum + layer.size, 0);
+    const payload = this.data.subarray(chunk.offset, chunk.offset + size);
+    checkPayload(describe(chunk), chunk.form, payload, layers);
+    return payload;
+  }
+}

@@ -1,0 +1,263 @@
+// Groups and states of the background that are decoded, and the jobs that decode them.
+
+import { FormatError } from "./errors.ts";
+import type { Fetcher } from "./fetcher.ts";
+import { Form } from "./layout.gen.ts";
+import { mostQuality } from "./links.ts";
+import type { Links } from "./links.ts";
+import type { Outcome, Share } from "./pool.ts";
+import { describe } from "./reader.ts";
+import type { Chunk, Head } from "./reader.ts";
+import type { Holdings, Plan, Step } from "./scheduler.ts";
+import type { Packed } from "./types.ts";
+
+export interface DecodingEvents {
+  ready(packed: Packed): void;
+  release(packed: Packed): void;
+  warn(error: Error): void;
+  changed(): void; // a job is done: there may be more to show, and more to do
+}
+
+interface State {
+  readonly quality: number;
+  readonly worker: number;
+}
+
+const TRIES = 3; // of a job whose state a worker had dropped
+const [FEWEST_TIMINGS, TIMINGS] = [2, 12]; // jobs that the load is measured over, at least and at most
+
+export class Decoding implements Holdings {
+  /** Counts what changes in what can be shown. */
+  version = 0;
+  lastMs = 0; // of decoding the last group
+  readonly #head: Head;
+  readonly #links: Links;
+  readonly #fetcher: Fetcher;
+  readonly #share: Share;
+  readonly #events: DecodingEvents;
+  readonly #decoded = new Map<number, { packed: Packed; quality: number; bytes: number }>(); // by chunk, as all below
+  readonly #states = new Map<number, State>();
+  readonly #running = new Map<number, Step>();
+  readonly #submitted = new Map<number, Step>();
+  readonly #failed = new Set<number>();
+  #lost: readonly Chunk[] = []; // that the file ends before or within
+  readonly #tries = new Map<number, number>();
+  #keep: ReadonlySet<number> = new Set();
+  #bytesPerFrame = 0; // of the last groups
+  #stale = new Set<number>(); // chunks whose jobs had begun when timings were forgotten
+  readonly #timings: { readonly ms: number; readonly frames: number }[] = []; // of the last groups
+
+  constructor(head: Head, links: Links, fetcher: Fetcher, share: Share, events: DecodingEvents) {
+    this.#head = head;
+    this.#links = links;
+    this.#fetcher = fetcher;
+    this.#share = share;
+    this.#events = events;
+  }
+
+  packedOf(chunk: Chunk): Packed | null {
+    return this.#decoded.get(chunk.number)?.packed ?? null;
+  }
+
+  /** Whether all that can be shown of a chunk is at hand. */
+  isSettled(chunk: Chunk): boolean {
+    return this.#decoded.has(chunk.number) || chunk.form === Form.EMPTY || this.#failed.has(chunk.number);
+  }
+
+  decodedAt(chunk: Chunk): number {
+    return this.#decoded.get(chunk.number)?.quality ?? -1;
+  }
+
+  stateAt(chunk: Chunk): number {
+    const { number } = chunk;
+    const running = this.#running.get(number);
+    if (running) return running.quality;
+    const state = this.#states.get(number);
+    return state && this.#share.isAt(this.#links.rootOf(chunk), state.worker) ? state.quality : -1;
+  }
+
+  isFailed(chunk: Chunk): boolean {
+    return this.#failed.has(chunk.number);
+  }
+
+  bytesOf(chunk: Chunk): number {
+    return this.#decoded.get(chunk.number)?.bytes ?? this.#bytesPerFrame * chunk.frameCount;
+  }
+
+  /** Groups that cannot be shown. */
+  get failedGroups(): number {
+    let count = 0;
+    for (const number of this.#failed) if (this.#head.chunks[number].kind === "group") count++;
+    return count;
+  }
+
+  /** Milliseconds of decoding a frame of one track, over the last groups; 0 before there are some. */
+  get msPerFrame(): number {
+    if (this.#timings.length < FEWEST_TIMINGS) return 0;
+    const frames = this.#timings.reduce((sum, timing) => sum + timing.frames, 0);
+    return this.#timings.reduce((sum, timing) => sum + timing.ms, 0) / frames;
+  }
+
+  /** Does the steps whose bytes are at hand, in their order; cancels all others that have not started. */
+  run({ steps, keep }: Plan): void {
+    this.#keep = keep;
+    this.#share.clear();
+    this.#submitted.clear();
+    for (const step of steps) {
+      if (!step.decode || this.#running.has(step.chunk.number)) continue;
+      if (this.#fetcher.layersOf(step.chunk) <= step.quality || !this.#hasState(step)) continue;
+      this.#submitted.set(step.chunk.number, step);
+    }
+    for (const step of [...this.#submitted.values()]) this.#submit(step);
+  }
+
+  /** Forgets how long decoding took, as where it will take another time from here on. */
+  resetTimings(): void {
+    this.#timings.length = 0;
+    this.#stale = new Set(this.#running.keys());
+  }
+
+  /** Lets go of what is decoded and is not in the plan any more. States of the background may stay while they are small. */
+  release(keepStatics: number): void {
+    let statics = 0;
+    for (const { packed, bytes } of this.#decoded.values()) if (packed.kind === "static") statics += bytes;
+    for (const [number, { packed, bytes }] of this.#decoded) {
+      if (this.#keep.has(number)) continue;
+      if (packed.kind === "static") {
+        if (statics <= keepStatics) continue;
+        statics -= bytes;
+      }
+      this.#drop(number);
+    }
+  }
+
+  /** Damaged chunks may be tried again, as with fewer layers. */
+  forgive(): void {
+    this.#failed.clear();
+    this.#tries.clear();
+    this.version++;
+    for (const chunk of this.#lost) this.#giveUp(chunk);
+  }
+
+  /** Gives up the chunks that a file which ends at `size` has lost, and those that need them. */
+  cut(size: number): void {
+    this.#lost = this.#head.chunks.filter((chunk) => chunk.offset + chunk.size > size);
+    for (const chunk of this.#lost) this.#giveUp(chunk);
+    const where = `${describe(this.#lost[0])} and all behind it are missing`;
+    this.#events.warn(new FormatError(`truncated, the file ends at byte ${size} of ${this.#head.size}: ${where}, copy it again`));
+  }
+
+  /** Releases all. */
+  close(): void {
+    this.#keep = new Set();
+    for (const number of [...this.#decoded.keys()]) this.#drop(number);
+  }
+
+  /** Gives up a chunk and those that need it; returns how many these are. */
+  #giveUp(chunk: Chunk): number {
+    const numbers = this.#links.withDependents(chunk.number).filter((number) => !this.#failed.has(number));
+    for (const number of numbers) this.#failed.add(number);
+    this.version++;
+    return numbers.length;
+  }
+
+  #fail(chunk: Chunk, message: string): void {
+    const others = this.#giveUp(chunk) - 1;
+    const more = others > 0 ? `, and ${others} that ${others === 1 ? "needs" : "need"} it` : "";
+    const text = message.startsWith(`chunk ${chunk.number} `) ? message : `${describe(chunk)}: ${message}`;
+    this.#events.warn(new FormatError(`${text}; it is skipped${more}`));
+  }
+
+  #hasState({ chunk, quality }: Step): boolean {
+    const previous = this.#links.previousOf(chunk);
+    if (previous === null) return true;
+    const state = this.#submitted.get(previous.number)?.quality ?? this.stateAt(previous);
+    return state >= Math.min(quality, mostQuality(previous));
+  }
+
+  #submit(step: Step): void {
+    const { chunk, quality } = step;
+    const job = {
+      chunk: chunk.number,
+      kind: chunk.kind,
+      form: chunk.form,
+      track: chunk.track,
+      firstFrame: chunk.firstFrame,
+      frameCount: chunk.frameCount,
+      layers: chunk.layers.slice(0, quality + 1).map(({ size, crc }) => ({ size, crc })),
+      quality: quality === mostQuality(chunk) ? null : quality,
+      previous: this.#links.previousOf(chunk)?.number ?? null,
+      scale: this.#head.header.scale,
+      stateOnly: !step.show,
+    };
+    this.#share.submit({
+      lane: this.#links.rootOf(chunk),
+      start: () => {
+        this.#submitted.delete(chunk.number);
+        this.#running.set(chunk.number, step);
+        return { ...job, payload: this.#fetcher.payload(chunk, quality + 1) };
+      },
+      settle: (outcome) => this.#settle(step, outcome),
+    });
+  }
+
+  #settle(step: Step, outcome: Outcome): void {
+    const { chunk, quality } = step;
+    this.#running.delete(chunk.number);
+    if (outcome.kind === "decoded") {
+      this.#states.set(chunk.number, { quality, worker: outcome.worker });
+      this.#tries.delete(chunk.number);
+      this.#time(chunk, outcome.ms);
+      if (outcome.packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, outcome.packed, quality);
+    } else {
+      this.#share.clear(); // what follows in the chain would fail, too: it is planned again
+      this.#submitted.clear();
+      this.#states.delete(chunk.number);
+      if (outcome.missingState && this.#countTry(chunk) < TRIES) this.#forgetChain(chunk);
+      else this.#fail(chunk, outcome.message);
+    }
+    this.#events.changed();
+  }
+
+  #add(chunk: Chunk, packed: Packed, quality: number): void {
+    const old = this.packedOf(chunk);
+    const bytes = bytesOf(packed);
+    this.#decoded.set(chunk.number, { packed, quality, bytes });
+    if (packed.kind === "group") {
+      const perFrame = bytes / packed.frameCount;
+      this.#bytesPerFrame = this.#bytesPerFrame === 0 ? perFrame : (this.#bytesPerFrame + perFrame) / 2;
+    }
+    this.version++;
+    this.#events.ready(packed);
+    if (old !== null) this.#events.release(old);
+  }
+
+  #drop(number: number): void {
+    const { packed } = this.#decoded.get(number)!;
+    this.#decoded.delete(number);
+    this.version++;
+    this.#events.release(packed);
+  }
+
+  #time({ number, kind, frameCount: frames }: Chunk, ms: number): void {
+    if (this.#stale.delete(number) || kind !== "group") return; // the background is decoded once
+    this.lastMs = ms;
+    this.#timings.push({ ms, frames });
+    if (this.#timings.length > TIMINGS) this.#timings.shift();
+  }
+
+  #countTry(chunk: Chunk): number {
+    const tries = (this.#tries.get(chunk.number) ?? 0) + 1;
+    this.#tries.set(chunk.number, tries);
+    return tries;
+  }
+
+  #forgetChain(chunk: Chunk): void {
+    for (const number of this.#links.withDependents(this.#links.rootOf(chunk))) this.#states.delete(number);
+  }
+}
+
+function bytesOf(packed: Packed): number {
+  const { texels, faces } = packed;
+  return texels.byteLength + faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength + packed.extraStarts.byteLength : 0);
+}

@@ -1,0 +1,226 @@
+// Keeps the bytes of chunks that have come, and asks a source for those that are wanted next.
+
+import { SourceError } from "./errors.ts";
+import { sizeOfLayers } from "./links.ts";
+import type { Chunk, Head } from "./reader.ts";
+import { joined } from "./source.ts";
+import type { Source } from "./source.ts";
+
+/** The first layers of a chunk. */
+export interface Wish {
+  readonly chunk: Chunk;
+  readonly layers: number;
+  readonly when: When;
+}
+
+/** How soon bytes are wanted: for the frame at the play head, before long, or some time, when a request is worth while. */
+export type When = "now" | "soon" | "later";
+
+export interface FetcherEvents {
+  arrived(): void; // a chunk has a layer more, or the next request may be made
+  failed(error: unknown): void; // a source gave up
+}
+
+const JOIN = 1024; // bytes that are not wanted cost less than one request more
+const URGENT_REQUESTS = 4; // at a time: what the frame at the play head needs may lie apart
+const REQUESTS = 6; // at a time, as many as a browser opens connections
+const BATCH = [1 << 16, 1 << 22] as const; // bytes of a request, at least and at most; in between, those of one second
+const OVERLAP = 0.1; // s before a request has ended, the next one is made: at once they would only delay each other
+
+interface Held {
+  pieces: Uint8Array[];
+  length: number; // bytes from the chunk's first on
+}
+
+interface Request {
+  at: number; // next byte
+  readonly to: number;
+  readonly controller: AbortController;
+}
+
+interface Range {
+  from: number;
+  readonly to: number;
+  readonly when: When;
+}
+
+export class Fetcher {
+  readonly #chunks: readonly Chunk[];
+  readonly #source: Source;
+  readonly #events: FetcherEvents;
+  readonly #memory: number;
+  readonly #held = new Map<number, Held>(); // by chunk, those used last at the end
+  #heldBytes = 0;
+  #wanted = new Set<number>();
+  #requests: Request[] = [];
+  #fetchedBytes = 0;
+
+  /** `memory`: bytes that chunks may take that are not wanted any more. */
+  constructor(head: Head, source: Source, events: FetcherEvents, memory: number) {
+    this.#chunks = head.chunks;
+    this.#source = source;
+    this.#events = events;
+    this.#memory = memory;
+  }
+
+  /** Bytes of chunks that have come, ever. */
+  get fetchedBytes(): number {
+    return this.#fetchedBytes;
+  }
+
+  /** Bytes of chunks that are at hand. */
+  get heldBytes(): number {
+    return this.#heldBytes;
+  }
+
+  get isFetching(): boolean {
+    return this.#requests.length > 0;
+  }
+
+  /** How many whole layers of a chunk are at hand. */
+  layersOf(chunk: Chunk): number {
+    let rest = this.#held.get(chunk.number)?.length ?? 0;
+    let layers = 0;
+    while (layers < chunk.layers.length && rest >= chunk.layers[layers].size) rest -= chunk.layers[layers++].size;
+    return layers;
+  }
+
+  /** A copy of the first layers of a chunk. */
+  payload(chunk: Chunk, layers: number): Uint8Array<ArrayBuffer> {
+    const held = this.#held.get(chunk.number)!;
+    if (held.pieces.length > 1) held.pieces = [joined(held.pieces)];
+    this.#held.delete(chunk.number);
+    this.#held.set(chunk.number, held);
+    return held.pieces[0].slice(0, sizeOfLayers(chunk, layers)) as Uint8Array<ArrayBuffer>;
+  }
+
+  /** Fetches these, in their order; what is on its way and not among them is cancelled. */
+  want(wishes: readonly Wish[]): void {
+    this.#wanted = new Set(wishes.map(({ chunk }) => chunk.number));
+    const missing = wishes.map((wish) => this.#missingOf(wish)).filter(({ from, to }) => from < to);
+    for (const request of this.#requests) {
+      if (!missing.some(({ from, to }) => from <= request.at + JOIN && from < request.to && to > request.at)) request.controller.abort();
+    }
+    this.#requests = this.#requests.filter(({ controller }) => !controller.signal.aborted);
+    const rest = missing.map((range) => this.#notOnItsWay(range)).filter(({ from, to }) => from < to);
+    if (!isWorthwhile(rest)) rest.length = 0;
+    while (rest.length > 0 && this.#mayAsk(rest[0])) this.#ask(this.#batch(rest));
+    this.#evict();
+  }
+
+  /** Keeps what of these bytes of the file goes on where the bytes at hand of a chunk end. */
+  put(bytes: Uint8Array, offset: number): void {
+    const end = offset + bytes.length;
+    for (let k = this.#chunkAt(offset); k < this.#chunks.length && this.#chunks[k].offset < end; k++) {
+      const chunk = this.#chunks[k];
+      const held = this.#held.get(k) ?? { pieces: [], length: 0 };
+      const from = chunk.offset + held.length;
+      const to = Math.min(end, chunk.offset + chunk.size);
+      if (from < offset || from >= to) continue;
+      held.pieces.push(bytes.slice(from - offset, to - offset)); // a copy: a view would keep all of what came with it
+      held.length += to - from;
+      this.#heldBytes += to - from;
+      this.#fetchedBytes += to - from;
+      this.#held.set(k, held);
+    }
+  }
+
+  close(): void {
+    for (const { controller } of this.#requests) controller.abort();
+    this.#requests = [];
+    this.#held.clear();
+    this.#heldBytes = 0;
+  }
+
+  #missingOf({ chunk, layers, when }: Wish): Range {
+    const held = this.#held.get(chunk.number)?.length ?? 0;
+    return { from: chunk.offset + held, to: chunk.offset + sizeOfLayers(chunk, layers), when };
+  }
+
+  #notOnItsWay({ from, to, when }: Range): Range {
+    let start = from;
+    for (const request of this.#requests) if (request.at <= start && start < request.to) start = request.to;
+    return { from: start, to, when };
+  }
+
+  #mayAsk({ when }: Range): boolean {
+    if (when === "now") return this.#requests.length < URGENT_REQUESTS;
+    const left = this.#requests.reduce((sum, { at, to }) => sum + to - at, 0);
+    return left <= this.#overlap && this.#requests.length < REQUESTS;
+  }
+
+  get #overlap(): number {
+    return (OVERLAP * this.#source.bandwidth) / 8;
+  }
+
+  /** Takes ranges that lie together from the start of `rest`. */
+  #batch(rest: Range[]): Range {
+    const { bandwidth } = this.#source;
+    const most = bandwidth > 0 ? Math.min(Math.max(bandwidth / 8, BATCH[0]), BATCH[1]) : 4 * BATCH[0];
+    const { from, when } = rest[0];
+    let { to } = rest.shift()!;
+    while (rest.length > 0 && rest[0].from >= to && rest[0].from <= to + JOIN && rest[0].to <= from + most) ({ to } = rest.shift()!);
+    return { from, to, when };
+  }
+
+  #ask({ from, to }: Range): void {
+    const request: Request = { at: from, to, controller: new AbortController() };
+    const { signal } = request.controller;
+    this.#requests.push(request);
+    const take = (bytes: Uint8Array, offset: number): void => {
+      if (signal.aborted) return;
+      this.#take(request, bytes, offset);
+    };
+    this.#source.read(from, to - from, take, signal).then(
+      () => this.#finish(request),
+      (error: unknown) => {
+        if (!signal.aborted) this.#finish(request, error);
+      },
+    );
+  }
+
+  #take(request: Request, bytes: Uint8Array, offset: number): void {
+    const left = request.to - request.at;
+    const chunk = this.#chunks[this.#chunkAt(request.at)];
+    const layers = this.layersOf(chunk);
+    this.put(bytes, offset);
+    request.at = offset + bytes.length;
+    const isRunningOut = left > this.#overlap && request.to - request.at <= this.#overlap;
+    if (isRunningOut || request.at >= chunk.offset + chunk.size || this.layersOf(chunk) > layers) this.#events.arrived();
+  }
+
+  #finish(request: Request, error?: unknown): void {
+    this.#requests = this.#requests.filter((other) => other !== request);
+    const { at, to } = request;
+    if (error === undefined && at < to && this.#source.size === null) error = new SourceError(`bytes ${at} to ${to - 1} did not come, load it again`);
+    if (error === undefined) this.#events.arrived();
+    else this.#events.failed(error);
+  }
+
+  #chunkAt(offset: number): number {
+    let [low, high] = [0, this.#chunks.length - 1];
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (this.#chunks[middle].offset <= offset) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  #evict(): void {
+    let unwanted = 0;
+    for (const [number, { length }] of this.#held) if (!this.#wanted.has(number)) unwanted += length;
+    for (const [number, { length }] of this.#held) {
+      if (unwanted <= this.#memory) return;
+      if (this.#wanted.has(number)) continue;
+      this.#held.delete(number);
+      this.#heldBytes -= length;
+      unwanted -= length;
+    }
+  }
+}
+
+/** Whether to ask now: what is wanted some time only is collected first. */
+function isWorthwhile(ranges: readonly Range[]): boolean {
+  return ranges.some(({ when }) => when !== "later") || ranges.reduce((sum, { from, to }) => sum + to - from, 0) >= BATCH[0];
+}

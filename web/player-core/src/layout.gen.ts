@@ -1,0 +1,271 @@
+// Made from src/meshreel/format/layout.py by scripts/generate. Do not edit.
+
+import {
+  array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint,
+} from "./records.ts";
+import type { Kind } from "./records.ts";
+
+export const MAGIC = [82, 69, 69, 76, 13, 10, 26, 10] as const;
+export const VERSION = 1;
+
+export const ChunkKind = {
+  STATIC: 1,
+  GROUP: 2,
+} as const;
+
+export const Form = {
+  LAPLACIAN: 1,
+  LAYERS: 2,
+  DRACO: 3,
+  EMPTY: 4,
+  PATCH: 5,
+} as const;
+
+export const AnchorRule = {
+  SPREAD: 1,
+  FARTHEST: 2,
+} as const;
+
+export const Origin = {
+  ALONE: 0,
+  PREVIOUS: 1,
+} as const;
+
+export const Presence = {
+  ABSENT: 0,
+  PRESENT: 1,
+} as const;
+
+/** The first bytes of a file: what it is, and how much of it to read before anything else. */
+export interface Preamble {
+  readonly magic: Uint8Array; // `52 45 45 4c 0d 0a 1a 0a`
+  readonly version: number; // version of the format, 1; a reader refuses any other
+  readonly flags: number; // reserved, 0
+  readonly headSize: number; // size of the head, bytes: offset of the first chunk
+}
+export const Preamble: Kind<Preamble> = record("Preamble", {
+  magic: bytes(8),
+  version: u8,
+  flags: u8,
+  headSize: u32,
+});
+
+/** What holds for all frames. Coordinates y in chunks are normalised: x = origin + scale * y is in metres. */
+export interface Header {
+  readonly frameRate: number; // 1/s, above 0
+  readonly origin: readonly number[]; // m
+  readonly scale: number; // m, above 0
+  readonly minimum: readonly number[]; // lower corner of the sequence's bounding box, normalised
+  readonly maximum: readonly number[]; // upper corner of it
+  readonly metadata: string; // a JSON object about the encoding (preset, quality ...); not needed to decode
+  readonly firstTime: number; // time of frame 0, microseconds
+  readonly intervals: readonly number[]; // microseconds from each frame but the last to the next, each above 0; none: frame i is at first_time + 10^6 * i / frame_rate
+}
+export const Header: Kind<Header> = record("Header", {
+  frameRate: f64,
+  origin: array(3, f64),
+  scale: f64,
+  minimum: array(3, f32),
+  maximum: array(3, f32),
+  metadata: text(u16),
+  firstTime: i64,
+  intervals: list(varint, varint),
+});
+
+/** A range of a chunk: its first k layers are its first bytes. Which k are enough to decode depends on the form. */
+export interface Layer {
+  readonly size: number; // bytes, above 0
+  readonly crc: number; // CRC-32 (ISO-HDLC, as in zlib) of these bytes
+}
+export const Layer: Kind<Layer> = record("Layer", {
+  size: varint,
+  crc: u32,
+});
+
+/** One chunk. */
+export interface IndexEntry {
+  readonly kind: number; // what it is for
+  readonly form: number; // how it is coded; equal to its first byte
+  readonly frames: number; // number of frames; 0 if and only if STATIC
+  readonly track: number; // which moving body's frames these are, from 0; 0 if STATIC
+  readonly dependsOn: readonly number[]; // numbers of the chunks before it that it needs: of a GROUP, the STATIC one it is shown with and the GROUP right before it in its track; of a STATIC of form PATCH, the STATIC one that it changes
+  readonly layers: readonly Layer[]; // at least one
+}
+export const IndexEntry: Kind<IndexEntry> = record("IndexEntry", {
+  kind: choice(u8, ChunkKind),
+  form: choice(u8, Form),
+  frames: u16,
+  track: varint,
+  dependsOn: list(u8, varint),
+  layers: list(u16, nested(() => Layer)),
+});
+
+/** All chunks in the order of their bytes; in each track the frames of GROUP chunks follow one another from 0. */
+export interface Index {
+  readonly chunks: readonly IndexEntry[]; // chunk 0, 1 ...
+}
+export const Index: Kind<Index> = record("Index", {
+  chunks: list(u32, nested(() => IndexEntry)),
+});
+
+/** The end of the head. */
+export interface Checksum {
+  readonly crc: number; // CRC-32 of the head up to here
+}
+export const Checksum: Kind<Checksum> = record("Checksum", {
+  crc: u32,
+});
+
+/** The payload of a group of form LAPLACIAN. */
+export interface LaplacianGroup {
+  readonly form: number; // LAPLACIAN
+  readonly levels: number; // midpoint subdivisions of the decoded reference mesh
+  readonly step: number; // spacing of the reference's lattice, above 0: decoded vertices are rounded to multiples
+  readonly reference: Uint8Array; // the reference mesh, Draco
+  readonly displacements: Uint8Array; // a DisplacementHead and its streams
+}
+export const LaplacianGroup: Kind<LaplacianGroup> = record("LaplacianGroup", {
+  form: choice(u8, Form),
+  levels: u8,
+  step: f64,
+  reference: blob(u32),
+  displacements: rest,
+});
+
+/** One direction of the basis and the streams of its weights. */
+export interface Component {
+  readonly basisBits: number; // b, at most 30: the direction's numbers are integers times 2^-b
+  readonly stepLevel: number; // k: the quantiser's step is 2^(-k/8)
+  readonly anchorsSize: number; // bytes of its anchors' stream
+  readonly deltasSize: number; // bytes of its deltas' stream
+}
+export const Component: Kind<Component> = record("Component", {
+  basisBits: u8,
+  stepLevel: u8,
+  anchorsSize: varint,
+  deltasSize: varint,
+});
+
+/** The start of coded displacements. Behind it, for each component in turn, its anchors' and its deltas' stream. */
+export interface DisplacementHead {
+  readonly frames: number; // T, above 0
+  readonly anchorRule: number; // how anchors are chosen
+  readonly anchorCount: number; // number of anchors asked for; each connected component has at least one
+  readonly anchorWeight: number; // factor of the anchors' rows, above 0
+  readonly meanBits: number; // b, at most 30: the mean's numbers are integers times 2^-b
+  readonly components: readonly Component[]; // strongest first, at most 3 T
+  readonly basis: Uint8Array; // integers: 3 T of the mean, then 3 T of each component's direction
+}
+export const DisplacementHead: Kind<DisplacementHead> = record("DisplacementHead", {
+  frames: u16,
+  anchorRule: choice(u8, AnchorRule),
+  anchorCount: varint,
+  anchorWeight: u8,
+  meanBits: u8,
+  components: list(u16, nested(() => Component)),
+  basis: blob(varint),
+});
+
+/** Trajectories in a basis: quantised weights of a causal graph's vertices. */
+export interface CodedField {
+  readonly columns: number; // M, number of basis vectors
+  readonly stepLevel: number; // k: the quantiser's step is 2^(-k/8)
+  readonly basis: Uint8Array; // integers: the basis
+  readonly symbols: Uint8Array; // one stream: the symbols of all columns
+}
+export const CodedField: Kind<CodedField> = record("CodedField", {
+  columns: varint,
+  stepLevel: u8,
+  basis: blob(varint),
+  symbols: blob(varint),
+});
+
+/** The start of a group of form LAYERS: its first layer. A LayersLevel for each level is behind it. */
+export interface LayersGroup {
+  readonly form: number; // LAYERS
+  readonly origin: number; // where the base mesh is from
+  readonly frames: number; // T, above 0
+  readonly levels: number; // L, midpoint subdivisions of the base mesh
+  readonly step: number; // spacing of the base's lattice, above 0: decoded vertices are rounded to multiples
+  readonly base: Uint8Array; // the base mesh, Draco; no bytes where its origin is PREVIOUS
+  readonly hasMean: number; // whether the basis of the motion has a mean
+  readonly motion: CodedField; // the displacements of the base's vertices
+}
+export const LayersGroup: Kind<LayersGroup> = record("LayersGroup", {
+  form: choice(u8, Form),
+  origin: choice(u8, Origin),
+  frames: u8,
+  levels: u8,
+  step: f64,
+  base: blob(varint),
+  hasMean: choice(u8, Presence),
+  motion: nested(() => CodedField),
+});
+
+/** One level of a group of form LAYERS. */
+export interface LayersLevel {
+  readonly origin: number; // what its scalars are counted from
+  readonly curvature: number; // share of the bend of its edges by which midpoints are lifted, 64ths
+  readonly siblingWeight: number; // of the siblings' mean in a prediction, 64ths
+  readonly scalars: CodedField; // the offsets of its new vertices
+}
+export const LayersLevel: Kind<LayersLevel> = record("LayersLevel", {
+  origin: choice(u8, Origin),
+  curvature: u8,
+  siblingWeight: u8,
+  scalars: nested(() => CodedField),
+});
+
+/** The last layer of a group of form LAYERS, which it may be without: what does not follow the base mesh. */
+export interface LayersPatches {
+  readonly runs: number; // number of integers in `dropped`
+  readonly dropped: Uint8Array; // integers: lengths of runs, of faces that frames are shown without
+  readonly stepLevel: number; // k: the spacing of the mesh's lattice is 2^(-k/8)
+  readonly width: number; // cells of the lattice that each frame has along x
+  readonly mesh: Uint8Array; // what frames are shown with besides, Draco; no bytes: nothing
+}
+export const LayersPatches: Kind<LayersPatches> = record("LayersPatches", {
+  runs: varint,
+  dropped: blob(varint),
+  stepLevel: u8,
+  width: varint,
+  mesh: blob(varint),
+});
+
+/** The payload of a group of form DRACO. */
+export interface DracoGroup {
+  readonly form: number; // DRACO
+  readonly levels: number; // midpoint subdivisions of every decoded mesh
+  readonly step: number; // spacing of the frames' lattice, above 0: decoded vertices are rounded to multiples
+  readonly meshes: readonly Uint8Array[]; // one Draco mesh a frame; no bytes: an empty frame
+}
+export const DracoGroup: Kind<DracoGroup> = record("DracoGroup", {
+  form: choice(u8, Form),
+  levels: u8,
+  step: f64,
+  meshes: list(u16, blob(u32)),
+});
+
+/** The payload of a group of form EMPTY. */
+export interface EmptyGroup {
+  readonly form: number; // EMPTY
+}
+export const EmptyGroup: Kind<EmptyGroup> = record("EmptyGroup", {
+  form: choice(u8, Form),
+});
+
+/** The payload of a STATIC chunk of form PATCH: what it changes of the background that it depends on. */
+export interface StaticPatch {
+  readonly form: number; // PATCH
+  readonly step: number; // spacing of the mesh's lattice, above 0: decoded vertices are rounded to multiples
+  readonly runs: number; // number of integers in `dropped`
+  readonly dropped: Uint8Array; // integers: lengths of runs of faces, kept and dropped in turn
+  readonly mesh: Uint8Array; // what is added, Draco; no bytes: nothing
+}
+export const StaticPatch: Kind<StaticPatch> = record("StaticPatch", {
+  form: choice(u8, Form),
+  step: f64,
+  runs: varint,
+  dropped: blob(varint),
+  mesh: blob(varint),
+});

@@ -1,0 +1,49 @@
+// Which chunk needs which: the chains that groups and states of the background are predicted in.
+
+import type { Chunk, Head } from "./reader.ts";
+
+export class Links {
+  readonly #previous: (Chunk | null)[];
+  readonly #roots: Int32Array;
+  readonly #dependents: number[][];
+
+  constructor(head: Head) {
+    const { chunks } = head;
+    this.#previous = chunks.map((chunk) => (chunk.kind === "group" ? head.groupBefore(chunk) : head.changedFrom(chunk)));
+    this.#roots = new Int32Array(chunks.length);
+    this.#dependents = chunks.map(() => []);
+    this.#previous.forEach((previous, number) => {
+      this.#roots[number] = previous === null ? number : this.#roots[previous.number];
+      if (previous !== null) this.#dependents[previous.number].push(number);
+    });
+  }
+
+  /** The chunk whose state one needs to be decoded: the group before it, or the state of the background that it changes. */
+  previousOf(chunk: Chunk): Chunk | null {
+    return this.#previous[chunk.number];
+  }
+
+  /** Number of the first chunk of the chain that one is in; its own where it stands alone. */
+  rootOf(chunk: Chunk): number {
+    return this.#roots[chunk.number];
+  }
+
+  /** A chunk and all that cannot be decoded without it. */
+  withDependents(number: number): number[] {
+    const found = [number];
+    for (const other of found) found.push(...this.#dependents[other]);
+    return found;
+  }
+}
+
+/** The most layers beyond the first that a chunk has. */
+export function mostQuality(chunk: Chunk): number {
+  return chunk.layers.length - 1;
+}
+
+/** Bytes of the first layers of a chunk. */
+export function sizeOfLayers(chunk: Chunk, layers: number): number {
+  let size = 0;
+  for (let k = 0; k < Math.min(layers, chunk.layers.length); k++) size += chunk.layers[k].size;
+  return size;
+}

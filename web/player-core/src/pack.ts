@@ -1,0 +1,91 @@
+// Decoded groups and backgrounds as the GPU takes them; what types.ts says of PackedGroup and PackedStatic.
+
+import { frameOf } from "./coding/decoded.ts";
+import type { DecodedGroup } from "./coding/decoded.ts";
+import { FormatError } from "./errors.ts";
+import { vertexCount } from "./mesh.ts";
+import type { Mesh } from "./mesh.ts";
+import type { Box, PackedGroup, PackedStatic } from "./types.ts";
+import type { Core } from "./wasm/memory.ts";
+import { growBox, noBounds, packVertices } from "./wasm/packing.ts";
+import type { Bounds } from "./wasm/packing.ts";
+
+const TEXTURE_WIDTH = 2048; // that every WebGL 2 has
+const MOST_ROWS = 16384; // that nearly every one has; 33 million vertices
+
+/** What a group is, besides its texels. */
+export type GroupShape = Pick<
+  PackedGroup,
+  "frameCount" | "vertexCount" | "textureWidth" | "textureHeight" | "faces" | "extra" | "extraStarts" | "texels" | "box"
+>;
+
+export function packGroup(core: Core, group: DecodedGroup): GroupShape {
+  const { frameCount, vertexCount: shared } = group;
+  const frames = Array.from({ length: frameCount }, (_, t) => frameOf(group, t));
+  const alone = frames.map((mesh) => vertexCount(mesh) - shared); // vertices that a frame has for itself
+  const total = frames.reduce((sum, mesh) => sum + vertexCount(mesh), 0);
+  const rows = Math.max(1, Math.ceil(total / TEXTURE_WIDTH));
+  if (rows > MOST_ROWS) throw new FormatError(`a group of ${total} vertices in all frames: over ${MOST_ROWS * TEXTURE_WIDTH}`);
+  const bounds = frames.reduce((box, mesh) => growBox(core, mesh.vertices, box), noBounds());
+  const texels = new Uint16Array(4 * TEXTURE_WIDTH * rows);
+  let behind = frameCount * shared;
+  frames.forEach((mesh, t) => {
+    const packed = packVertices(core, mesh, bounds);
+    texels.set(packed.subarray(0, 4 * shared), 4 * t * shared);
+    texels.set(packed.subarray(4 * shared), 4 * behind);
+    behind += alone[t];
+  });
+  const box = boxOf(bounds);
+  return { frameCount, vertexCount: shared, textureWidth: TEXTURE_WIDTH, textureHeight: rows, ...corners(group), texels, box };
+}
+
+export function packStatic(core: Core, mesh: Mesh): Pick<PackedStatic, "texels" | "box" | "vertexCount" | "faces"> {
+  const bounds = growBox(core, mesh.vertices, noBounds());
+  const texels = packVertices(core, mesh, bounds);
+  return { texels, box: boxOf(bounds), vertexCount: vertexCount(mesh), faces: Uint32Array.from(mesh.faces) };
+}
+
+/** The faces of all frames, and those of single ones: kept there though not everywhere, or of the frame's own mesh. */
+function corners(group: DecodedGroup): Pick<PackedGroup, "faces" | "extra" | "extraStarts"> {
+  const { frameCount, faces, dropped, patches, vertexCount: shared } = group;
+  const count = faces.length / 3;
+  const changing: number[] = [];
+  const common: number[] = [];
+  for (let face = 0; face < count; face++) (isEverDropped(dropped, face, count) ? changing : common).push(face);
+  const extra: number[] = [];
+  const extraStarts = new Uint32Array(frameCount + 1);
+  let first = shared;
+  for (let t = 0; t < frameCount; t++) {
+    for (const face of changing) {
+      if (!dropped![t * count + face]) extra.push(faces[3 * face], faces[3 * face + 1], faces[3 * face + 2]);
+    }
+    const patch = patches?.[t];
+    if (patch) {
+      for (const corner of patch.faces) extra.push(first + corner);
+      first += vertexCount(patch);
+    }
+    extraStarts[t + 1] = extra.length;
+  }
+  return { faces: cornersOf(faces, common), extra: Uint32Array.from(extra), extraStarts };
+}
+
+function isEverDropped(dropped: Uint8Array | null, face: number, count: number): boolean {
+  if (dropped === null) return false;
+  for (let at = face; at < dropped.length; at += count) if (dropped[at]) return true;
+  return false;
+}
+
+function cornersOf(faces: Int32Array, kept: readonly number[]): Uint32Array {
+  const corners = new Uint32Array(3 * kept.length);
+  kept.forEach((face, f) => {
+    for (let k = 0; k < 3; k++) corners[3 * f + k] = faces[3 * face + k];
+  });
+  return corners;
+}
+
+/** An empty box where there is no vertex. */
+function boxOf(bounds: Bounds): Box {
+  const low = [0, 1, 2].map((k) => (Number.isFinite(bounds[k]) ? bounds[k] : 0));
+  const size = low.map((value, k) => Math.max(0, Number.isFinite(bounds[3 + k]) ? bounds[3 + k] - value : 0));
+  return { minimum: low as unknown as Box["minimum"], size: size as unknown as Box["size"] };
+}

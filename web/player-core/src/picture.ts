@@ -1,0 +1,96 @@
+// What is to be shown, in two objects that are used in turn: `update` allocates nothing.
+
+import type { Decoding } from "./decoding.ts";
+import type { Head } from "./reader.ts";
+import type { PackedGroup, PackedStatic, Shown } from "./types.ts";
+
+interface Mutable {
+  frame: number;
+  blend: number;
+  groups: (PackedGroup | null)[];
+  background: PackedStatic | null;
+}
+
+export class Picture {
+  readonly #head: Head;
+  readonly #decoding: Decoding;
+  #shown: Mutable;
+  #spare: Mutable;
+  #version = -1; // of what was at hand when it was made
+
+  constructor(head: Head, decoding: Decoding) {
+    this.#head = head;
+    this.#decoding = decoding;
+    const empty = (): Mutable => ({ frame: -1, blend: 0, groups: head.tracks.map(() => null), background: null });
+    [this.#shown, this.#spare] = [empty(), empty()];
+  }
+
+  /** The last picture; null before the first. The one before it stays as it is until the next is asked for. */
+  get shown(): Shown | null {
+    return this.#shown.frame < 0 ? null : this.#shown;
+  }
+
+  /** Whether all that a frame shows is at hand, but for what can never be. */
+  isReady(frame: number): boolean {
+    const { tracks } = this.#head;
+    for (let track = 0; track < tracks.length; track++) {
+      if (!this.#decoding.isSettled(this.#head.chunkOfFrame(frame, track))) return false;
+    }
+    const background = this.#head.staticOfFrame(frame);
+    return background === null || this.#decoding.isSettled(background);
+  }
+
+  /** Makes it the picture of a frame, `blend` of the way to the next. False, and as before, where the frame is not ready. */
+  show(frame: number, blend: number): boolean {
+    const isSame = frame === this.#shown.frame && this.#decoding.version === this.#version;
+    if (!isSame && !this.isReady(frame)) return false;
+    const next = this.#spare;
+    if (isSame) this.#copy(next);
+    else this.#fill(next, frame);
+    next.blend = this.#goesOn(next) ? blend : 0;
+    if (!this.#differs(next)) return true;
+    this.#spare = this.#shown;
+    this.#shown = next;
+    return true;
+  }
+
+  /** Adds the numbers of the chunks that are shown. */
+  addTo(keep: Set<number>): void {
+    const { groups, background } = this.#shown;
+    for (const group of groups) if (group !== null) keep.add(group.chunk);
+    if (background !== null) keep.add(background.chunk);
+  }
+
+  #copy(next: Mutable): void {
+    const { frame, groups, background } = this.#shown;
+    next.frame = frame;
+    next.background = background;
+    for (let track = 0; track < groups.length; track++) next.groups[track] = groups[track];
+  }
+
+  #fill(next: Mutable, frame: number): void {
+    next.frame = frame;
+    for (let track = 0; track < next.groups.length; track++) {
+      next.groups[track] = this.#decoding.packedOf(this.#head.chunkOfFrame(frame, track)) as PackedGroup | null;
+    }
+    const background = this.#head.staticOfFrame(frame);
+    next.background = background && (this.#decoding.packedOf(background) as PackedStatic | null);
+    this.#version = this.#decoding.version;
+  }
+
+  #differs({ frame, blend, groups, background }: Mutable): boolean {
+    const shown = this.#shown;
+    if (frame !== shown.frame || blend !== shown.blend || background !== shown.background) return true;
+    for (let track = 0; track < groups.length; track++) if (groups[track] !== shown.groups[track]) return true;
+    return false;
+  }
+
+  /** Whether a group that is shown has the next frame, too. */
+  #goesOn({ frame, groups }: Mutable): boolean {
+    for (let track = 0; track < groups.length; track++) {
+      const group = groups[track];
+      if (group !== null && frame + 1 < group.firstFrame + group.frameCount) return true;
+    }
+    return false;
+  }
+}

@@ -1,0 +1,343 @@
+// A player without a picture: fetches, decodes, keeps time. Its events and properties are those of a media element.
+
+import { Clock } from "./clock.ts";
+import { SourceError } from "./errors.ts";
+import { PlaybackTarget } from "./events.ts";
+import { open } from "./opening.ts";
+import { WorkerPool } from "./pool.ts";
+import type { Share, WorkerSetup } from "./pool.ts";
+import { Session } from "./session.ts";
+import type { Limits } from "./session.ts";
+import type { Source } from "./source.ts";
+import type { Info, Playback, PlaybackEvents, Shown, Stats } from "./types.ts";
+
+export interface PlayerOptions extends Partial<Limits> {
+  readonly source: Source; // the player's own from here on: `dispose` closes it
+  readonly workers: WorkerSetup | WorkerPool; // a pool may be shared and is not disposed of
+}
+
+const LIMITS: Limits = { bufferSeconds: 10, decodedSeconds: 3, memory: 1 << 28 };
+
+const TICK_MS = 250; // between plans, and between events of time and progress, while it plays
+const SOON_MS = 40; // from a group's arrival to the next plan while it plays: there are some more until then
+const ENOUGH = [0.25, 1] as const; // s of display time that must be at hand to start, and to go on after a stall
+const MOST_BUFFERED = 60; // s of content that `stats` looks ahead
+
+export class Player extends PlaybackTarget implements Playback {
+  readonly #source: Source;
+  readonly #pool: WorkerPool;
+  readonly #ownsPool: boolean;
+  readonly #share: Share;
+  readonly #limits: Limits;
+  readonly #closed = new AbortController();
+  #loading: Promise<void> | null = null;
+  #session: Session | null = null;
+  #clock: Clock | null = null;
+  #error: Error | null = null;
+
+  #start = 0; // s, where to begin once the head is there
+  #loop = false;
+  #rate = 1;
+  #quality: number | "auto" = "auto";
+  #level = NaN; // quality that was told last
+  interpolate = true;
+
+  #paused = true;
+  #ended = false;
+  #seeking = false;
+  #canPlay = false;
+  #hasStalled = false; // since it last ran
+  #isStallNew = false; // and was not told
+  #stalls = 0;
+  #bytes = 0; // that came from the source
+  #toldBytes = 0;
+  #toldAt = 0; // ms
+  #plays: { resolve: () => void; reject: (error: Error) => void }[] = [];
+  #waking: ReturnType<typeof setTimeout> | undefined;
+  #wakesIn = Infinity; // ms, as it was set
+  #ticking: ReturnType<typeof setInterval> | undefined;
+
+  constructor({ source, workers, ...limits }: PlayerOptions) {
+    super();
+    this.#source = source;
+    this.#limits = { ...LIMITS, ...limits };
+    this.#ownsPool = !(workers instanceof WorkerPool);
+    this.#pool = workers instanceof WorkerPool ? workers : new WorkerPool(workers);
+    this.#share = this.#pool.open();
+    this.#share.onfatal = (error) => this.#fail(error);
+    source.watch = { warn: (error) => this.#tell("warning", error), progress: (bytes) => void (this.#bytes += bytes) };
+  }
+
+  get info(): Info | null {
+    return this.#session?.head.info ?? null;
+  }
+
+  get duration(): number {
+    return this.#session?.timeline.duration ?? 0;
+  }
+
+  get paused(): boolean {
+    return this.#paused;
+  }
+
+  get ended(): boolean {
+    return this.#ended;
+  }
+
+  get seeking(): boolean {
+    return this.#seeking;
+  }
+
+  get currentFrame(): number {
+    return this.#clock?.timeline.frameAt(this.#clock.time) ?? 0;
+  }
+
+  get currentTime(): number {
+    return this.#clock?.time ?? this.#start;
+  }
+
+  set currentTime(time: number) {
+    if (!Number.isFinite(time)) throw new TypeError(`a time of ${time}: give seconds`);
+    if (this.#clock === null) this.#start = Math.max(0, time);
+    else this.#seek(this.#clock, time);
+  }
+
+  get loop(): boolean {
+    return this.#loop;
+  }
+
+  set loop(loop: boolean) {
+    this.#loop = loop;
+    if (this.#clock) this.#clock.loop = loop;
+    this.#wake();
+  }
+
+  get playbackRate(): number {
+    return this.#rate;
+  }
+
+  set playbackRate(rate: number) {
+    if (!Number.isFinite(rate)) throw new TypeError(`a playback rate of ${rate}: give a number from 0.1 to 4`);
+    this.#rate = Math.min(4, Math.max(0.1, rate));
+    if (this.#clock) this.#clock.rate = this.#rate;
+    this.dispatchEvent(new Event("ratechange"));
+    this.#wake();
+  }
+
+  get quality(): number | "auto" {
+    return this.#quality;
+  }
+
+  set quality(quality: number | "auto") {
+    if (quality !== "auto" && !(quality >= 0)) throw new TypeError(`a quality of ${quality}: give "auto" or a number of layers`);
+    if (quality === this.#quality) return;
+    this.#quality = quality === "auto" ? quality : Math.floor(quality);
+    this.#session?.decoding.forgive(); // what is damaged may have whole layers before the damage
+    this.#wake();
+  }
+
+  get stats(): Stats {
+    const session = this.#session;
+    const shown = session?.picture.shown;
+    const quality = Math.max(0, ...(shown?.groups ?? []).map((group) => group?.quality ?? 0));
+    const ahead = session?.readyAhead(this.currentTime, this.#loop, MOST_BUFFERED) ?? 0;
+    return {
+      mbps: session ? session.rateAt(quality) / 1e6 : 0,
+      bandwidthMbps: this.#source.bandwidth / 1e6,
+      decodeMs: session?.decoding.lastMs ?? 0,
+      decodeLoad: session?.load ?? 0,
+      bufferedSeconds: Math.min(ahead, this.#loop ? this.duration : this.duration - this.currentTime),
+      fetchedBytes: this.#bytes,
+      quality,
+      stalls: this.#stalls,
+      skippedGroups: session?.decoding.failedGroups ?? 0,
+    };
+  }
+
+  /** Reads the head and goes on to fetch; `play` does so by itself. Rejects with what the event `error` carries. */
+  load(): Promise<void> {
+    return (this.#loading ??= this.#open());
+  }
+
+  async play(): Promise<void> {
+    if (this.#error !== null) throw this.#error;
+    this.load().catch(() => {}); // told by the event, and by the promise below
+    if (this.#ended && this.#clock) this.#seek(this.#clock, 0);
+    if (this.#paused) {
+      this.#paused = false;
+      this.#ticking = setInterval(() => this.#tick(), TICK_MS);
+      this.#tell("play");
+    }
+    if (this.#clock?.isRunning) return;
+    if (!this.#session?.picture.isReady(this.currentFrame)) this.#tell("waiting");
+    this.#wake();
+    return new Promise((resolve, reject) => this.#plays.push({ resolve, reject }));
+  }
+
+  pause(): void {
+    if (this.#paused) return;
+    this.#rest(new DOMException("paused before it played", "AbortError"));
+    this.#tell("timeupdate");
+    this.#tell("pause");
+  }
+
+  step(frames: number): void {
+    this.pause();
+    if (this.#clock === null) return;
+    const { timeline } = this.#clock;
+    const frame = Math.min(Math.max(this.currentFrame + Math.trunc(frames), 0), timeline.frameCount - 1);
+    this.#seek(this.#clock, timeline.starts[frame]);
+  }
+
+  update(now: number): Shown | null {
+    const session = this.#session;
+    const clock = this.#clock;
+    if (session === null || clock === null) return null;
+    const { picture, timeline } = session;
+    clock.advance(now);
+    const frame = timeline.frameAt(clock.time);
+    const isShown = picture.show(frame, this.interpolate ? timeline.blendAt(clock.time, frame) : 0);
+    if (clock.isRunning && !isShown) {
+      clock.hold();
+      this.#hasStalled = this.#isStallNew = true;
+      this.#wake();
+    } else if (clock.isRunning && clock.isAtEnd) {
+      clock.stop();
+      this.#wake();
+    }
+    return picture.shown;
+  }
+
+  dispose(): void {
+    if (this.#closed.signal.aborted) return;
+    this.#closed.abort();
+    this.#rest(new DOMException("the player was disposed of", "AbortError"));
+    clearTimeout(this.#waking);
+    this.#source.watch = null;
+    this.#source.close();
+    this.#session?.close();
+    this.#session = this.#clock = null;
+    this.#share.close();
+    if (this.#ownsPool) this.#pool.dispose();
+  }
+
+  async #open(): Promise<void> {
+    try {
+      const opened = await open(this.#source, this.#closed.signal);
+      this.#session = new Session(opened, this.#source, this.#share, this.#limits, {
+        ready: (packed) => this.#tell("ready", packed),
+        release: (packed) => this.#tell("release", packed),
+        warn: (error) => this.#tell("warning", error),
+        changed: () => this.#wake(this.#clock?.isRunning ? SOON_MS : 0),
+        failed: (error) => this.#fail(error),
+      });
+      this.#clock = new Clock(this.#session.timeline);
+      this.#clock.rate = this.#rate;
+      this.#clock.loop = this.#loop;
+      this.#clock.time = this.#session.timeline.clamp(this.#start);
+      this.#tell("loadedmetadata");
+      this.#wake();
+    } catch (error) {
+      this.#fail(error);
+      if (this.#error !== null) throw this.#error; // else it was disposed of, and nobody waits
+    }
+  }
+
+  #seek(clock: Clock, time: number): void {
+    clock.time = clock.timeline.clamp(time);
+    clock.stop();
+    this.#ended = this.#hasStalled = this.#isStallNew = false;
+    this.#seeking = true;
+    this.#tell("seeking");
+    this.#wake();
+  }
+
+  /** Has it look after everything, soon: never within `update`, and once for all that happens until then. */
+  #wake(delay = 0): void {
+    if (this.#closed.signal.aborted || this.#wakesIn <= delay) return;
+    clearTimeout(this.#waking);
+    this.#wakesIn = delay;
+    this.#waking = setTimeout(() => this.#tick(), delay);
+  }
+
+  #tick(): void {
+    clearTimeout(this.#waking);
+    this.#wakesIn = Infinity;
+    const [session, clock] = [this.#session, this.#clock];
+    if (session === null || clock === null || this.#error !== null) return;
+    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, quality: this.#quality, isWaiting: this.#hasStalled && !clock.isRunning });
+    this.#tellProgress(session);
+    const level = this.#quality === "auto" ? session.level : this.#quality;
+    if (level !== this.#level) {
+      this.#level = level;
+      this.#tell("qualitychange");
+    }
+    if (this.#isStallNew) {
+      this.#isStallNew = false;
+      this.#stalls++;
+      this.#tell("waiting");
+    }
+    if (session.picture.isReady(this.currentFrame)) this.#goOn(session, clock);
+    if (clock.isAtEnd && !this.#paused && !this.#seeking) this.#end();
+    else if (clock.isRunning) this.#tell("timeupdate");
+  }
+
+  /** The frame at the play head is at hand: tells what has waited for it, and plays where enough follows. */
+  #goOn(session: Session, clock: Clock): void {
+    if (!this.#canPlay) {
+      this.#canPlay = true;
+      this.#tell("canplay");
+    }
+    if (this.#seeking) {
+      this.#seeking = false;
+      this.#tell("timeupdate");
+      this.#tell("seeked");
+    }
+    if (this.#paused || clock.isRunning || clock.isAtEnd) return;
+    const enough = ENOUGH[this.#hasStalled ? 1 : 0] * this.#rate;
+    if (!session.isSated && session.readyAhead(clock.time, this.#loop, enough) < enough) return;
+    clock.start();
+    this.#hasStalled = false;
+    this.#tell("playing");
+    for (const { resolve } of this.#plays.splice(0)) resolve();
+  }
+
+  #end(): void {
+    this.#ended = true;
+    this.#rest(new DOMException("it ended before it played", "AbortError"));
+    this.#tell("timeupdate");
+    this.#tell("pause");
+    this.#tell("ended");
+  }
+
+  /** Stands still; promises of `play` that still wait are broken. */
+  #rest(error: Error): void {
+    this.#paused = true;
+    this.#clock?.stop();
+    clearInterval(this.#ticking);
+    for (const { reject } of this.#plays.splice(0)) reject(error);
+  }
+
+  #fail(reason: unknown): void {
+    if (this.#error !== null || this.#closed.signal.aborted) return;
+    this.#error = reason instanceof Error ? reason : new SourceError(String(reason));
+    const wasPaused = this.#paused;
+    this.#rest(this.#error);
+    this.#session?.stop();
+    if (!wasPaused) this.#tell("pause");
+    this.#tell("error", this.#error);
+  }
+
+  #tellProgress(session: Session): void {
+    const now = performance.now();
+    if (this.#bytes === this.#toldBytes || (session.fetcher.isFetching && now - this.#toldAt < TICK_MS)) return;
+    this.#toldBytes = this.#bytes;
+    this.#toldAt = now;
+    this.#tell("progress");
+  }
+
+  #tell(type: keyof PlaybackEvents, detail?: unknown): void {
+    if (this.#closed.signal.aborted && type !== "release") return;
+    this.dispatchEvent(detail === undefined ? new Event(type) : new CustomEvent(type, { detail }));
+  }
+}

@@ -1,0 +1,30 @@
+// What passes between the player and its decoding workers.
+
+import type { Packed } from "./types.ts";
+
+export type ToWorker =
+  | { type: "start"; core: ArrayBuffer | string; draco: ArrayBuffer | string } // wasm bytes, or their URLs
+  | { type: "decode"; id: number; job: DecodeJob }
+  | { type: "forget"; file: number };
+
+/** One chunk to decode. */
+export interface DecodeJob {
+  file: number;
+  chunk: number;
+  kind: "group" | "static";
+  form: number;
+  track: number;
+  firstFrame: number;
+  frameCount: number;
+  payload: Uint8Array; // its buffer is transferred
+  layers: { size: number; crc: number }[]; // of the bytes given
+  quality: number | null; // layers beyond the first; null: all
+  previous: number | null; // chunk whose state it needs, decoded earlier in this worker; or the static chunk that a patch changes
+  scale: number;
+  stateOnly: boolean; // decode for the chain's sake, pack nothing
+}
+
+export type FromWorker =
+  | { type: "started" }
+  | { type: "decoded"; id: number; packed: Packed | null; ms: number } // null for stateOnly
+  | { type: "failed"; id: number; message: string; missingState: boolean }; // the state was evicted: send the chain again

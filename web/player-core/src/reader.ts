@@ -1,0 +1,197 @@
+// The head of a .reel file, checked, and where everything else lies. Beside container/reader.py.
+// In: the first bytes of a file. Out: chunks by number, by frame and by what they need. Fetches nothing itself.
+
+import { checkHeader, checkIndex } from "./checks.ts";
+import { crc32 } from "./crc.ts";
+import { FormatError } from "./errors.ts";
+import { Checksum, ChunkKind, Form, Header, Index, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
+import type { Layer } from "./layout.gen.ts";
+import { unpack, unpackAll } from "./records.ts";
+import type { Box, Info } from "./types.ts";
+
+export const FIRST_REQUEST = 16384; // bytes; the head of some minutes of video
+const PREAMBLE_SIZE = Preamble.least;
+
+/** Where a chunk lies and what it holds. */
+export interface Chunk {
+  readonly number: number;
+  readonly kind: "static" | "group";
+  readonly form: number;
+  readonly track: number; // 0 for static
+  readonly firstFrame: number; // 0 for static
+  readonly frameCount: number; // 0 for static
+  readonly dependsOn: readonly number[]; // of a static chunk, and where it is predicted of the group before it
+  readonly offset: number; // bytes from the start of the file
+  readonly size: number; // bytes of all layers
+  readonly layers: readonly Layer[];
+}
+
+export class Head {
+  readonly info: Info;
+  readonly tracks: readonly (readonly Chunk[])[]; // the groups of each
+  private readonly times: Float64Array; // s from the first frame; empty where they follow from the rate
+
+  private constructor(
+    readonly header: Header,
+    readonly chunks: readonly Chunk[],
+  ) {
+    this.tracks = byTrack(chunks);
+    const groups = this.tracks[0];
+    const last = groups[groups.length - 1];
+    const frameCount = last.firstFrame + last.frameCount;
+    checkHeader(header, frameCount);
+    this.times = timesOf(header.intervals);
+    this.info = infoOf(header, chunks, this.tracks.length, frameCount, this.timestampOf(frameCount - 1));
+  }
+
+  /** Bytes of the head, from the first 14 bytes of a file. FormatError where it is none, or of an unknown version. */
+  static sizeOf(start: Uint8Array): number {
+    if (start.length < PREAMBLE_SIZE || !MAGIC.every((byte, k) => start[k] === byte)) {
+      throw new FormatError("not a .reel file: the signature is missing");
+    }
+    const [preamble] = unpack(Preamble, start);
+    if (preamble.version !== VERSION) {
+      throw new FormatError(`format version ${preamble.version}: this player knows version ${VERSION}, update it`);
+    }
+    if (preamble.flags !== 0) throw new FormatError(`flags ${preamble.flags}: version ${VERSION} has none`);
+    if (preamble.headSize < PREAMBLE_SIZE + Checksum.least) throw new FormatError(`a head of ${preamble.headSize} bytes: damaged`);
+    return preamble.headSize;
+  }
+
+  /** The head, from its bytes; those behind it are left alone. FormatError where it is damaged or not whole. */
+  static parse(data: Uint8Array): Head {
+    const size = Head.sizeOf(data);
+    const end = size - Checksum.least;
+    if (data.length < size || unpackAll(Checksum, data.subarray(end, size)).crc !== crc32(data.subarray(0, end))) {
+      throw new FormatError("the head is damaged: its checksum does not match");
+    }
+    const [header, start] = unpack(Header, data.subarray(0, end), PREAMBLE_SIZE);
+    const index = unpackAll(Index, data.subarray(start, end));
+    checkIndex(index);
+    return new Head(header, chunksOf(index, size));
+  }
+
+  /** Bytes of the whole file. */
+  get size(): number {
+    return this.info.size;
+  }
+
+  get frameCount(): number {
+    return this.info.frameCount;
+  }
+
+  /** The time of a frame, s from the first one. RangeError outside 0 .. frameCount - 1. */
+  timestamp(frame: number): number {
+    this.chunkOfFrame(frame, 0);
+    return this.timestampOf(frame);
+  }
+
+  /** The group of a track that holds a frame. RangeError outside 0 .. frameCount - 1. */
+  chunkOfFrame(frame: number, track: number): Chunk {
+    if (!(frame >= 0 && frame < this.frameCount)) throw new RangeError(`frame ${frame}: the file has frames 0 to ${this.frameCount - 1}`);
+    const groups = this.tracks[track];
+    let [low, high] = [0, groups.length - 1];
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (groups[middle].firstFrame <= frame) low = middle;
+      else high = middle - 1;
+    }
+    return groups[low];
+  }
+
+  /** The state of the background that a frame is shown with: the newest that a group of it names. */
+  staticOfFrame(frame: number): Chunk | null {
+    let newest = -1;
+    for (let track = 0; track < this.tracks.length; track++) {
+      for (const number of this.chunkOfFrame(frame, track).dependsOn) {
+        if (this.chunks[number].kind === "static") newest = Math.max(newest, number);
+      }
+    }
+    return newest < 0 ? null : this.chunks[newest];
+  }
+
+  /** The group that one is predicted from. */
+  groupBefore(chunk: Chunk): Chunk | null {
+    const number = chunk.dependsOn.find((other) => this.chunks[other].kind === "group");
+    return number === undefined ? null : this.chunks[number];
+  }
+
+  /** The state that a static chunk of form PATCH changes. */
+  changedFrom(chunk: Chunk): Chunk | null {
+    return chunk.kind === "static" && chunk.dependsOn.length > 0 ? this.chunks[chunk.dependsOn[0]] : null;
+  }
+
+  private timestampOf(frame: number): number {
+    return this.times.length > 0 ? this.times[frame] : frame / this.header.frameRate;
+  }
+}
+
+/** "chunk 3 (track 0, frames 10 to 19)", for messages. */
+export function describe(chunk: Chunk): string {
+  if (chunk.kind === "static") return `chunk ${chunk.number} (static)`;
+  return `chunk ${chunk.number} (track ${chunk.track}, frames ${chunk.firstFrame} to ${chunk.firstFrame + chunk.frameCount - 1})`;
+}
+
+function chunksOf(index: Index, start: number): Chunk[] {
+  const frames: number[] = [];
+  let offset = start;
+  return index.chunks.map((entry, number) => {
+    const isGroup = entry.kind === ChunkKind.GROUP;
+    const size = entry.layers.reduce((sum, layer) => sum + layer.size, 0);
+    const firstFrame = isGroup ? (frames[entry.track] ?? 0) : 0;
+    if (isGroup) frames[entry.track] = firstFrame + entry.frames;
+    const { form, track, dependsOn, layers } = entry;
+    const chunk: Chunk = { number, kind: isGroup ? "group" : "static", form, track, firstFrame, frameCount: entry.frames, dependsOn, offset, size, layers };
+    offset += size;
+    return chunk;
+  });
+}
+
+function byTrack(chunks: readonly Chunk[]): Chunk[][] {
+  const tracks: Chunk[][] = [];
+  for (const chunk of chunks) if (chunk.kind === "group") (tracks[chunk.track] ??= []).push(chunk);
+  return tracks;
+}
+
+function timesOf(intervals: readonly number[]): Float64Array {
+  if (intervals.length === 0) return new Float64Array(0);
+  const times = new Float64Array(intervals.length + 1);
+  let sum = 0;
+  intervals.forEach((interval, k) => {
+    sum += interval;
+    times[k + 1] = sum / 1e6;
+  });
+  return times;
+}
+
+function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, frameCount: number, lastTime: number): Info {
+  const last = chunks[chunks.length - 1];
+  const scaled = chunks.filter((chunk) => chunk.form === Form.LAYERS || chunk.form === Form.LAPLACIAN);
+  return {
+    frameCount,
+    frameRate: header.frameRate,
+    duration: lastTime + 1 / header.frameRate,
+    origin: header.origin as unknown as Info["origin"],
+    box: boxOf(header),
+    trackCount,
+    mostQuality: Math.max(0, ...scaled.map((chunk) => chunk.layers.length - 1)),
+    size: last.offset + last.size,
+    metadata: metadataOf(header.metadata),
+  };
+}
+
+function boxOf(header: Header): Box {
+  const [x, y, z] = header.minimum.map((low) => low * header.scale);
+  const [width, height, depth] = header.minimum.map((low, k) => (header.maximum[k] - low) * header.scale);
+  return { minimum: [x, y, z], size: [width, height, depth] };
+}
+
+/** Not needed to decode: what cannot be read is nothing. */
+function metadataOf(text: string): Record<string, unknown> {
+  try {
+    const value: unknown = JSON.parse(text);
+    return typeof value === "object" && value !== null && !Array.isArray(value) ? (value as Record<string, unknown>) : {};
+  } catch {
+    return {};
+  }
+}

@@ -1,0 +1,175 @@
+// What to fetch and decode next, from where the play head is. Plans only: nothing here fetches or decodes.
+
+import type { Timeline } from "./clock.ts";
+import { Form } from "./layout.gen.ts";
+import { mostQuality } from "./links.ts";
+import type { Links } from "./links.ts";
+import type { Chunk, Head } from "./reader.ts";
+
+/** What a plan builds on. Qualities are layers beyond the first; -1: not at hand. */
+export interface Holdings {
+  /** Of a chunk that is decoded and packed. */
+  decodedAt(chunk: Chunk): number;
+  /** Of the state of a chunk in a worker, or soon in one. */
+  stateAt(chunk: Chunk): number;
+  /** Whether it can never be decoded. */
+  isFailed(chunk: Chunk): boolean;
+  /** Bytes that it takes when it is decoded, measured or estimated. */
+  bytesOf(chunk: Chunk): number;
+}
+
+/** Where the play head is, and how much around it is wanted. */
+export interface Outlook {
+  readonly time: number; // s
+  readonly loop: boolean;
+  readonly fetchSeconds: number; // of content, ahead
+  readonly decodeSeconds: number; // of content, ahead; not more than fetchSeconds
+  readonly behindSeconds: number; // of content: what is decoded behind the play head is kept
+  readonly memory: number; // bytes that decoded groups may take
+  readonly quality: number;
+  /** Whether groups decoded at another quality are decoded again, with the chains they are predicted from. */
+  readonly exact: boolean;
+}
+
+/** One chunk to fetch and, in a worker, to decode. */
+export interface Step {
+  readonly chunk: Chunk;
+  readonly quality: number;
+  show: boolean; // or only its state is wanted, for the next of its chain
+  decode: boolean; // or it is only fetched, for later
+  ahead: number; // s of content until a frame needs it; 0 or less: that at the play head does
+}
+
+/** Why a chunk is wanted. */
+interface Need {
+  readonly ahead: number; // s
+  readonly decode: boolean;
+}
+
+export interface Plan {
+  readonly steps: readonly Step[]; // in order
+  readonly keep: ReadonlySet<number>; // chunks that are shown, or soon will be
+  readonly chainCount: number; // that can be decoded beside each other
+}
+
+const SURE_GROUPS = 2; // of each track, the shown one and the next: wanted whatever memory they take
+
+/**
+ * Steps for the frame at the play head first, then for those ahead in their order, from the start again with `loop`.
+ *
+ * A group predicted from another is decoded to its level or a coarser one. So in the midst of a chain quality only falls;
+ * a rise waits for the next group that stands alone. With `exact` it does not wait: the chain is decoded again, finer.
+ */
+export function plan(head: Head, links: Links, timeline: Timeline, outlook: Outlook, holdings: Holdings): Plan {
+  const planner = new Planner(head, links, outlook, holdings);
+  const { time, decodeSeconds, behindSeconds } = outlook;
+  const now = timeline.frameAt(time);
+  for (const [first, last] of framesAhead(timeline, outlook)) {
+    for (const group of groupsBetween(head, first, last)) {
+      const frame = Math.max(group.firstFrame, first);
+      const ahead = timeline.starts[frame] - time + (frame < now ? timeline.duration : 0);
+      planner.addGroup(group, frame, frame === now ? 0 : ahead, ahead <= decodeSeconds);
+    }
+  }
+  for (const group of groupsBetween(head, timeline.frameAt(time - behindSeconds), now)) planner.keep.add(group.number);
+  return planner.plan();
+}
+
+/** First and last frames of the runs that lie before the play head. */
+function framesAhead(timeline: Timeline, { time, loop, fetchSeconds }: Outlook): [number, number][] {
+  const now = timeline.frameAt(time);
+  const beyond = time + fetchSeconds - timeline.duration;
+  const runs: [number, number][] = [[now, timeline.frameAt(time + fetchSeconds)]];
+  if (loop && beyond > 0 && now > 0) runs.push([0, Math.min(now - 1, timeline.frameAt(beyond))]);
+  return runs;
+}
+
+/** Groups of all tracks that hold a frame from `first` to `last`, in the order of the file, which is that of time. */
+export function groupsBetween(head: Head, first: number, last: number): Chunk[] {
+  const groups: Chunk[] = [];
+  for (let track = 0; track < head.tracks.length; track++) {
+    for (let frame = first; frame <= last; ) {
+      const group = head.chunkOfFrame(frame, track);
+      groups.push(group);
+      frame = group.firstFrame + group.frameCount;
+    }
+  }
+  return groups.sort((a, b) => a.number - b.number);
+}
+
+class Planner {
+  readonly keep = new Set<number>();
+  readonly #head: Head;
+  readonly #links: Links;
+  readonly #outlook: Outlook;
+  readonly #holdings: Holdings;
+  readonly #steps = new Map<number, Step>(); // by chunk
+  readonly #chains = new Set<number>();
+  readonly #groupsOfTrack: number[];
+  #bytes = 0; // decoded
+
+  constructor(head: Head, links: Links, outlook: Outlook, holdings: Holdings) {
+    this.#head = head;
+    this.#links = links;
+    this.#outlook = outlook;
+    this.#holdings = holdings;
+    this.#groupsOfTrack = head.tracks.map(() => 0);
+  }
+
+  addGroup(group: Chunk, frame: number, ahead: number, isNear: boolean): void {
+    const background = this.#head.staticOfFrame(frame);
+    if (background !== null) this.#add(background, { ahead, decode: isNear });
+    if (group.form === Form.EMPTY) return;
+    const isSure = ++this.#groupsOfTrack[group.track] <= SURE_GROUPS;
+    this.#bytes += this.#holdings.bytesOf(group);
+    const decode = isNear && (isSure || this.#bytes <= this.#outlook.memory);
+    if (decode) this.#chains.add(this.#links.rootOf(group));
+    this.#add(group, { ahead, decode });
+  }
+
+  plan(): Plan {
+    const steps = [...this.#steps.values()];
+    const urgent = steps.filter((step) => step.ahead <= 0).sort((a, b) => a.chunk.number - b.chunk.number);
+    return { steps: [...urgent, ...steps.filter((step) => step.ahead > 0)], keep: this.keep, chainCount: this.#chains.size };
+  }
+
+  /** Wants a chunk to be shown, and before it what it is predicted from, as far as that is not at hand. */
+  #add(chunk: Chunk, need: Need): void {
+    if (this.#holdings.isFailed(chunk)) return;
+    if (need.decode) this.keep.add(chunk.number);
+    const wanted = this.#wantedOf(chunk);
+    const decoded = this.#holdings.decodedAt(chunk);
+    if (decoded === wanted || (decoded >= 0 && !this.#outlook.exact)) return;
+    const before: Chunk[] = [];
+    let quality = wanted;
+    for (let previous = this.#links.previousOf(chunk); previous !== null; previous = this.#links.previousOf(previous)) {
+      const state = this.#stateOf(previous);
+      if (state >= Math.min(quality, mostQuality(previous))) break;
+      if (state >= 0 && !this.#outlook.exact) {
+        quality = state;
+        break;
+      }
+      before.push(previous);
+    }
+    for (const other of before.reverse()) this.#step(other, quality, false, need);
+    this.#step(chunk, quality, true, need);
+  }
+
+  #wantedOf(chunk: Chunk): number {
+    return chunk.kind === "static" ? mostQuality(chunk) : Math.min(this.#outlook.quality, mostQuality(chunk));
+  }
+
+  /** Of the state that will be there: that of a step takes the place of one at hand, be it coarser. */
+  #stateOf(chunk: Chunk): number {
+    return this.#steps.get(chunk.number)?.quality ?? this.#holdings.stateAt(chunk);
+  }
+
+  #step(chunk: Chunk, quality: number, show: boolean, { ahead, decode }: Need): void {
+    const old = this.#steps.get(chunk.number);
+    const step = old ?? { chunk, quality: Math.min(quality, mostQuality(chunk)), show, decode, ahead };
+    step.show ||= show && decode;
+    step.decode ||= decode;
+    step.ahead = Math.min(step.ahead, ahead);
+    this.#steps.set(chunk.number, step);
+  }
+}

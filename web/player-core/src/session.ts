@@ -1,0 +1,206 @@
+// One open file: what of it is fetched, decoded and shown, kept in step with the play head.
+
+import { Adaptive } from "./adaptive.ts";
+import { Timeline } from "./clock.ts";
+import { Decoding } from "./decoding.ts";
+import type { DecodingEvents } from "./decoding.ts";
+import { Fetcher } from "./fetcher.ts";
+import { Form } from "./layout.gen.ts";
+import { Links, sizeOfLayers } from "./links.ts";
+import type { Opened } from "./opening.ts";
+import { Picture } from "./picture.ts";
+import type { Share } from "./pool.ts";
+import type { Chunk, Head } from "./reader.ts";
+import { plan } from "./scheduler.ts";
+import type { Plan, Step } from "./scheduler.ts";
+import type { Source } from "./source.ts";
+
+export interface Limits {
+  readonly bufferSeconds: number; // of bytes fetched ahead, at normal speed
+  readonly decodedSeconds: number; // of groups decoded ahead, at normal speed; 0.5 at least, as plans are made so often
+  readonly memory: number; // bytes that decoded groups may take
+}
+
+/** Where the play head is and where it goes. */
+export interface Aim {
+  readonly time: number; // s
+  readonly speed: number; // content seconds a second
+  readonly loop: boolean;
+  readonly quality: number | "auto";
+  readonly isWaiting: boolean; // it should play and cannot
+}
+
+export interface SessionEvents extends DecodingEvents {
+  failed(error: unknown): void;
+}
+
+const BEHIND = 1; // s of content: what is decoded behind the play head is kept
+const COMPRESSED = 1 << 25; // bytes of chunks kept though they are not wanted now: they may be again
+const LATER = 3 / 4; // of the seconds that are fetched ahead: what lies beyond waits until it fills a request
+const STATICS = 1 / 4; // share of the memory that states of the background may keep
+
+export class Session {
+  readonly head: Head;
+  readonly timeline: Timeline;
+  readonly picture: Picture;
+  readonly decoding: Decoding;
+  readonly fetcher: Fetcher;
+  readonly #links: Links;
+  readonly #source: Source;
+  readonly #share: Share;
+  readonly #limits: Limits;
+  readonly #events: SessionEvents;
+  readonly #adaptive: Adaptive;
+  readonly #movingTracks: number; // that have something to decode
+  readonly #rates = new Map<number, number>(); // bits/s by quality
+  #plan: Plan = { steps: [], keep: new Set(), chainCount: 0 };
+  #size: number | null = null; // of the file, as the source had it last
+  #speed = 1;
+
+  constructor({ head, first }: Opened, source: Source, share: Share, limits: Limits, events: SessionEvents) {
+    this.head = head;
+    this.#source = source;
+    this.#share = share;
+    this.#limits = limits;
+    this.#events = events;
+    this.#movingTracks = head.tracks.filter((groups) => groups.some((group) => group.form !== Form.EMPTY)).length;
+    this.timeline = timelineOf(head);
+    this.#links = new Links(head);
+    this.fetcher = new Fetcher(head, source, { arrived: events.changed, failed: events.failed }, COMPRESSED);
+    this.fetcher.put(first, 0);
+    this.decoding = new Decoding(head, this.#links, this.fetcher, share, events);
+    this.picture = new Picture(head, this.decoding);
+    this.#adaptive = new Adaptive(head, this.timeline, this.#bandwidth, 1);
+  }
+
+  /** Layers beyond the first that "auto" chooses now. */
+  get level(): number {
+    return this.#adaptive.level;
+  }
+
+  /** Plans anew and sets fetching and decoding to work; what is not wanted any more is cancelled and released. */
+  pump(aim: Aim): void {
+    this.#speed = aim.speed;
+    this.#checkSize();
+    const { bufferSeconds, memory } = this.#limits;
+    const decodedSeconds = Math.max(this.#limits.decodedSeconds, 0.5);
+    const outlook = {
+      time: aim.time,
+      loop: aim.loop,
+      fetchSeconds: Math.max(bufferSeconds, decodedSeconds) * aim.speed,
+      decodeSeconds: decodedSeconds * aim.speed,
+      behindSeconds: BEHIND,
+      memory,
+      quality: aim.quality === "auto" ? this.#adaptive.level : aim.quality,
+      exact: aim.quality !== "auto",
+    };
+    const made = plan(this.head, this.#links, this.timeline, outlook, this.decoding);
+    const keep = new Set(made.keep);
+    this.picture.addTo(keep);
+    this.#plan = { ...made, keep };
+    this.decoding.run(this.#plan);
+    this.decoding.release(STATICS * memory);
+    const later = LATER * outlook.fetchSeconds;
+    this.fetcher.want(made.steps.map(({ chunk, quality, ahead }) => ({ chunk, layers: quality + 1, when: ahead <= 0 ? "now" : ahead < later ? "soon" : "later" })));
+    if (aim.quality === "auto") this.#adapt(aim);
+  }
+
+  /** Seconds of content from a time on that can be shown; Infinity if that is all. It looks for `most` of them, or some more. */
+  readyAhead(time: number, loop: boolean, most: number): number {
+    const { starts, duration, frameCount } = this.timeline;
+    let frame = this.timeline.frameAt(time);
+    let sum = starts[frame] - time;
+    while (sum < most && this.picture.isReady(frame)) {
+      const next = this.#nextBorder(frame);
+      sum += starts[next] - starts[frame];
+      frame = next % frameCount;
+      if (frame === 0 && (!loop || sum >= duration)) return Infinity;
+    }
+    return Math.max(0, sum);
+  }
+
+  /** Whether all that is wanted soon is decoded, whatever time that makes. */
+  get isSated(): boolean {
+    return this.#firstAhead((step) => step.decode && !this.decoding.isSettled(step.chunk)) === Infinity;
+  }
+
+  /** Decoding time over playing time, of the workers that have something to do. */
+  get load(): number {
+    const { frameCount, duration } = this.timeline;
+    const workers = Math.max(1, Math.min(this.#share.size, this.#plan.chainCount));
+    const framesPerMs = (this.#speed * this.#movingTracks * frameCount) / (1000 * duration);
+    return (this.decoding.msPerFrame * framesPerMs) / workers;
+  }
+
+  /** Bits a second of content of the whole stream, with so many layers beyond the first. */
+  rateAt(quality: number): number {
+    let rate = this.#rates.get(quality);
+    if (rate === undefined) {
+      const layersOf = (chunk: Chunk): number => (chunk.kind === "static" ? chunk.layers.length : quality + 1);
+      const size = this.head.chunks.reduce((sum, chunk) => sum + sizeOfLayers(chunk, layersOf(chunk)), 0);
+      rate = (8 * size) / this.timeline.duration;
+      this.#rates.set(quality, rate);
+    }
+    return rate;
+  }
+
+  /** Fetches and decodes nothing more; what is decoded can still be shown. */
+  stop(): void {
+    this.#share.clear();
+    this.fetcher.close();
+  }
+
+  close(): void {
+    this.stop();
+    this.decoding.close();
+  }
+
+  #adapt(aim: Aim): void {
+    const before = this.#adaptive.level;
+    const level = this.#adaptive.decide({
+      now: performance.now(),
+      time: aim.time,
+      speed: aim.speed,
+      bandwidth: this.#bandwidth,
+      fetched: this.#firstAhead(({ chunk, quality }) => this.fetcher.layersOf(chunk) <= quality) / aim.speed,
+      decoded: this.#firstAhead(({ decode, chunk }) => decode && !this.decoding.isSettled(chunk)) / aim.speed,
+      load: this.load,
+      isWaiting: aim.isWaiting,
+    });
+    if (level === before) return;
+    this.decoding.resetTimings();
+    this.#events.changed(); // to plan with it
+  }
+
+  /** A source that sends everything anyhow sends it no sooner where less is asked for. */
+  get #bandwidth(): number {
+    return this.#source.isSelective ? this.#source.bandwidth : 0;
+  }
+
+  /** Seconds of content until the first step of the last plan for which something holds. */
+  #firstAhead(holds: (step: Step) => boolean): number {
+    return this.#plan.steps.reduce((first, step) => (step.ahead < first && holds(step) ? step.ahead : first), Infinity);
+  }
+
+  /** The first frame behind one at which a track begins another group. */
+  #nextBorder(frame: number): number {
+    let border = this.timeline.frameCount;
+    for (let track = 0; track < this.head.tracks.length; track++) {
+      const group = this.head.chunkOfFrame(frame, track);
+      border = Math.min(border, group.firstFrame + group.frameCount);
+    }
+    return border;
+  }
+
+  #checkSize(): void {
+    const { size } = this.#source;
+    if (size === null || size === this.#size) return;
+    this.#size = size;
+    if (size < this.head.size) this.decoding.cut(size);
+  }
+}
+
+function timelineOf(head: Head): Timeline {
+  const { frameCount, duration } = head.info;
+  return new Timeline(Float64Array.from({ length: frameCount + 1 }, (_, frame) => (frame < frameCount ? head.timestamp(frame) : duration)));
+}

@@ -1,0 +1,109 @@
+// Where bytes come from: ranges of a file that can be cancelled.
+
+import { SourceError } from "./errors.ts";
+
+/** Takes bytes as they come: `bytes` lie at `offset` of the file. The array is its own to keep. */
+export type Take = (bytes: Uint8Array, offset: number) => void;
+
+/** What a source tells besides its bytes. */
+export interface SourceWatch {
+  warn(error: Error): void; // it goes on: the network is tried again
+  progress(bytes: number): void; // so many more have come
+}
+
+/** A file to be read in ranges. Errors are SourceErrors; a read that is aborted rejects with the signal's reason. */
+export interface Source {
+  /** Bytes of the whole file; null while that is not known. */
+  readonly size: number | null;
+  /** Whether bytes that are not asked for are not sent: where they are sent all the same, fewer layers save no time. */
+  readonly isSelective: boolean;
+  /** Bits a second as measured lately; 0 where nothing was measured or there is no network. */
+  readonly bandwidth: number;
+  watch: SourceWatch | null;
+  /** Gives bytes from `offset` on, in their order, in pieces as they arrive; fewer than `length` only where the file ends. */
+  read(offset: number, length: number, take: Take, signal?: AbortSignal): Promise<void>;
+  /** Tells the file's size as its head has it. */
+  expect(size: number): void;
+  close(): void;
+}
+
+/** A range of a source as one array. */
+export async function readBytes(source: Source, offset: number, length: number, signal?: AbortSignal): Promise<Uint8Array> {
+  const pieces: Uint8Array[] = [];
+  await source.read(offset, length, (bytes) => pieces.push(bytes), signal);
+  return joined(pieces);
+}
+
+/** All pieces, one behind the other. */
+export function joined(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
+  const all = new Uint8Array(pieces.reduce((sum, piece) => sum + piece.length, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    all.set(piece, at);
+    at += piece.length;
+  }
+  return all;
+}
+
+/** What sources on this machine have in common. */
+abstract class LocalSource implements Source {
+  readonly isSelective = true;
+  readonly bandwidth = 0;
+  watch: SourceWatch | null = null;
+  abstract readonly size: number;
+
+  protected abstract slice(from: number, to: number): Promise<Uint8Array>;
+
+  async read(offset: number, length: number, take: Take, signal?: AbortSignal): Promise<void> {
+    signal?.throwIfAborted();
+    const bytes = await this.slice(offset, Math.min(offset + length, this.size));
+    signal?.throwIfAborted();
+    this.watch?.progress(bytes.length);
+    if (bytes.length > 0) take(bytes, offset);
+  }
+
+  expect(): void {}
+
+  close(): void {}
+}
+
+/** A file that was dropped or picked. */
+export class BlobSource extends LocalSource {
+  readonly #blob: Blob;
+
+  constructor(blob: Blob) {
+    super();
+    this.#blob = blob;
+  }
+
+  get size(): number {
+    return this.#blob.size;
+  }
+
+  protected async slice(from: number, to: number): Promise<Uint8Array> {
+    try {
+      return new Uint8Array(await this.#blob.slice(from, Math.max(from, to)).arrayBuffer());
+    } catch (error) {
+      const name = this.#blob instanceof File ? this.#blob.name : "the file";
+      throw new SourceError(`${name}: bytes ${from} to ${to} could not be read, pick the file again`, { cause: error });
+    }
+  }
+}
+
+/** Bytes in memory. */
+export class BytesSource extends LocalSource {
+  readonly #bytes: Uint8Array;
+
+  constructor(bytes: Uint8Array) {
+    super();
+    this.#bytes = bytes;
+  }
+
+  get size(): number {
+    return this.#bytes.length;
+  }
+
+  protected async slice(from: number, to: number): Promise<Uint8Array> {
+    return this.#bytes.slice(from, to);
+  }
+}

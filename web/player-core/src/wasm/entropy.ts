@@ -1,0 +1,63 @@
+// Entropy decoding, as core/include/meshreel/{entropy,field_coder}.h have it. False or null: the stream is damaged.
+
+import type { Arena, Core } from "./memory.ts";
+
+/** For each of `starts.length - 1` values the earlier ones that it is near: near[starts[v]] up to near[starts[v + 1]]. */
+export interface Neighbours {
+  readonly starts: BigInt64Array;
+  readonly near: Int32Array;
+}
+
+export function decodeIntegers(core: Core, data: Uint8Array, count: number): Int32Array | null {
+  return core.run((arena) => {
+    const values = arena.room(4 * count);
+    const status = core.call("meshreel_decode_integers", arena.put(data), data.length, count, values);
+    return status === 0 ? arena.i32(values, count) : null;
+  });
+}
+
+/** The symbols of all columns, column after column, or the number of the one that is damaged. */
+export function decodeWeights(core: Core, streams: readonly Uint8Array[], count: number, neighbours: Neighbours): Int32Array | number {
+  return core.run((arena) => {
+    const sizes = arena.put(Int32Array.from(streams, (stream) => stream.length));
+    const [symbols, weights] = weightsOf(arena, streams.length, count, neighbours);
+    const failed = arena.struct(["u32", 0]);
+    const status = core.call("meshreel_decode_weights", weights, arena.put(joined(streams)), sizes, failed);
+    return status === 0 ? arena.i32(symbols, count * streams.length) : arena.u32(failed);
+  });
+}
+
+/** The symbols of so many columns out of one stream. */
+export function decodeField(core: Core, data: Uint8Array, columns: number, neighbours: Neighbours): Int32Array | null {
+  const count = neighbours.starts.length - 1;
+  return core.run((arena) => {
+    const [symbols, weights] = weightsOf(arena, columns, count, neighbours);
+    const status = core.call("meshreel_decode_field", weights, arena.put(data), data.length);
+    return status === 0 ? arena.i32(symbols, count * columns) : null;
+  });
+}
+
+/** Room for symbols, and a struct meshreel_weights around it. */
+function weightsOf(arena: Arena, columns: number, count: number, neighbours: Neighbours): [number, number] {
+  const symbols = arena.room(4 * columns * count);
+  const [starts, near] = [arena.put(neighbours.starts), arena.put(neighbours.near)];
+  const struct = arena.struct(
+    ["u32", symbols],
+    ["u32", count],
+    ["u32", columns],
+    ["u32", starts],
+    ["u32", near],
+    ["u32", neighbours.near.length],
+  );
+  return [symbols, struct];
+}
+
+function joined(streams: readonly Uint8Array[]): Uint8Array {
+  const all = new Uint8Array(streams.reduce((sum, stream) => sum + stream.length, 0));
+  let offset = 0;
+  for (const stream of streams) {
+    all.set(stream, offset);
+    offset += stream.length;
+  }
+  return all;
+}

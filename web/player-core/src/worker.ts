@@ -1,0 +1,67 @@
+// The decoding worker: speaks protocol.ts. An error of one job is told and the next one is decoded; a core that has stopped is started
+// again.
+
+import { ChunkDecoder, MissingState, buffersOf } from "./chunk_decoder.ts";
+import type { DecodeJob, FromWorker, ToWorker } from "./protocol.ts";
+import { makeTools } from "./tools.ts";
+import { CoreStopped } from "./wasm/memory.ts";
+
+/** What a worker's global scope is here, and what a test's stand-in has. */
+export interface Scope {
+  postMessage(message: FromWorker, transfer: Transferable[]): void;
+  onmessage: ((event: MessageEvent<ToWorker>) => void) | null;
+}
+
+/** Makes a scope answer. Messages are worked off in their order; a start that fails is told as the failure of job -1. */
+export function serve(scope: Scope): void {
+  const worker = new Served(scope);
+  let last: Promise<void> = Promise.resolve();
+  scope.onmessage = (event) => {
+    last = last.then(() => worker.answer(event.data)).catch((error: unknown) => {
+      scope.postMessage({ type: "failed", id: -1, message: error instanceof Error ? error.message : String(error), missingState: false }, []);
+    });
+  };
+}
+
+class Served {
+  private decoder: ChunkDecoder | null = null;
+  private core: WebAssembly.Module | null = null;
+  private draco: ArrayBuffer | null = null;
+
+  constructor(private readonly scope: Scope) {}
+
+  async answer(message: ToWorker): Promise<void> {
+    if (message.type === "start") {
+      [this.core, this.draco] = await Promise.all([bytesOf(message.core).then((bytes) => WebAssembly.compile(bytes)), bytesOf(message.draco)]);
+      await this.restart();
+      this.scope.postMessage({ type: "started" }, []);
+    } else if (message.type === "forget") this.decoder?.forget(message.file);
+    else await this.decode(message.id, message.job);
+  }
+
+  private async decode(id: number, job: DecodeJob): Promise<void> {
+    const start = performance.now();
+    try {
+      if (this.decoder === null) throw new Error("a job before the start");
+      const packed = this.decoder.decode(job);
+      const message: FromWorker = { type: "decoded", id, packed, ms: performance.now() - start };
+      this.scope.postMessage(message, packed === null ? [] : (buffersOf(packed) as Transferable[]));
+    } catch (error) {
+      const told = error instanceof Error ? error.message : String(error);
+      if (error instanceof CoreStopped || error instanceof WebAssembly.RuntimeError) await this.restart();
+      this.scope.postMessage({ type: "failed", id, message: told, missingState: error instanceof MissingState }, []);
+    }
+  }
+
+  /** New instances; what was kept is gone with the old ones. */
+  private async restart(): Promise<void> {
+    if (this.core !== null && this.draco !== null) this.decoder = new ChunkDecoder(await makeTools(this.core, this.draco));
+  }
+}
+
+async function bytesOf(source: ArrayBuffer | string): Promise<ArrayBuffer> {
+  if (typeof source !== "string") return source;
+  const response = await fetch(source);
+  if (!response.ok) throw new Error(`${source}: ${response.status} ${response.statusText}`);
+  return response.arrayBuffer();
+}

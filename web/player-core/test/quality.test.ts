@@ -1,0 +1,202 @@
+// How many layers are played: as many as network and workers bear, without a frame less.
+
+import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+
+import { group, makeReel, stream } from "./reel.ts";
+import { Rig, frames, pass } from "./rig.ts";
+
+const FULL = [4000, 8000, 16000, 32000]; // bytes a second of each layer
+const RATE = 60_000; // of all
+const BEST = 3;
+
+let rig: Rig;
+beforeEach(() => {
+  vi.useFakeTimers();
+  rig = new Rig();
+});
+afterEach(() => rig.end());
+
+const seen = (): number[] => rig.viewer.qualities;
+const mean = (values: readonly number[]): number => values.reduce((sum, value) => sum + value, 0) / values.length;
+
+async function play(seconds: number): Promise<void> {
+  await Promise.all([rig.player.play(), pass(seconds)]);
+}
+
+describe("auto", () => {
+  test("plays at best where the network gives twice the rate, without a stall", async () => {
+    rig.begin(stream(30, FULL, 5), 2 * RATE);
+    await play(32);
+    expect(rig.viewer.frames).toEqual(frames(0, 750));
+    expect(rig.player.stats).toMatchObject({ stalls: 0, skippedGroups: 0 });
+    expect(mean(seen())).toBeGreaterThan(2.7);
+    expect(rig.viewer.events).toContain("ended");
+  });
+
+  test("drops layers where the network gives half the rate, and no frame", async () => {
+    rig.begin(stream(30, FULL, 5), RATE / 2);
+    await play(32);
+    expect(rig.viewer.frames).toEqual(frames(0, 750));
+    expect(rig.player.stats).toMatchObject({ stalls: 0, skippedGroups: 0 });
+    expect(rig.viewer.events).toContain("ended");
+    expect(mean(seen())).toBeGreaterThan(0.5); // the first two layers take a fifth of the rate
+    expect(Math.max(...seen())).toBeLessThan(BEST);
+  });
+
+  test("goes down when the network falls, and up again when it is back", async () => {
+    rig.begin(stream(90, FULL, 5), 4 * RATE);
+    await play(20);
+    expect(seen().at(-1)).toBe(BEST);
+    rig.source.bytesPerSecond = RATE / 3;
+    await pass(30);
+    expect(seen().at(-1)).toBeLessThan(BEST);
+    expect(seen().at(-1)).toBeGreaterThan(0);
+    rig.source.bytesPerSecond = 4 * RATE;
+    await pass(30);
+    expect(seen().at(-1)).toBe(BEST);
+    await pass(15);
+    expect(rig.viewer.frames).toEqual(frames(0, 2250));
+    expect(rig.player.stats.stalls).toBe(0);
+    expect(rig.viewer.count("qualitychange")).toBeLessThan(12);
+  });
+
+  test("settles where the network gives just what a level takes", async () => {
+    for (const share of [0.3, 0.47, 0.6, 0.9, 1, 1.1]) {
+      rig.begin(stream(60, FULL, 5), share * RATE);
+      await play(62);
+      expect(rig.viewer.frames).toHaveLength(1500);
+      expect(rig.player.stats.stalls).toBe(0);
+      expect(rig.viewer.count("qualitychange")).toBeLessThan(16);
+      rig.viewer.stop();
+      rig.player.dispose();
+    }
+  });
+
+  test("drops layers where workers are too slow for all of them", async () => {
+    rig.workers.msOf = ({ layers }) => [100, 200, 400, 900][layers.length - 1]; // of groups of 400 ms
+    rig.begin(stream(60, FULL, 5), 20 * RATE, { count: 1 });
+    await play(70);
+    expect(rig.viewer.frames).toEqual(frames(0, 1500));
+    expect(rig.player.stats.stalls).toBeLessThanOrEqual(2); // the first is how it finds out
+    const later = seen().slice(60 * 20);
+    expect(mean(later)).toBeLessThan(2.2);
+    expect(mean(later)).toBeGreaterThanOrEqual(1);
+    expect(seen().slice(60)).not.toContain(0); // it is not thrown back by what began before
+    expect(rig.player.stats.decodeLoad).toBeGreaterThan(0.2);
+    expect(rig.player.stats.decodeLoad).toBeLessThan(1.1);
+  });
+
+  test("counts workers that can work beside each other", async () => {
+    rig.workers.msOf = () => 600; // of groups of 400 ms, each alone
+    rig.begin(stream(20, FULL), 20 * RATE, { count: 3 });
+    await play(10);
+    expect(rig.player.stats).toMatchObject({ stalls: 0, decodeLoad: expect.closeTo(0.5, 1) as number });
+    await pass(14);
+    expect(new Set(seen())).toEqual(new Set([BEST]));
+    expect(rig.player.stats.stalls).toBe(0);
+  });
+
+  test("does not count on workers that have nothing to do: a chain is in one", async () => {
+    rig.workers.msOf = ({ layers }) => 200 * layers.length;
+    rig.begin(stream(20, FULL, 100), 20 * RATE, { count: 3 });
+    await play(30);
+    expect(seen().slice(600)).not.toContain(BEST);
+    expect(rig.viewer.events).toContain("ended");
+  });
+
+  test("asks for no fewer layers of a server that sends everything anyhow", async () => {
+    rig.begin(stream(20, FULL), RATE / 2);
+    rig.source.isSelective = false;
+    await play(60);
+    expect(new Set(seen())).toEqual(new Set([BEST]));
+    expect(rig.viewer.frames).toEqual(frames(0, 500));
+    expect(rig.player.stats.stalls).toBeGreaterThan(0);
+  });
+
+  test("rises only at a group that stands alone: nothing is decoded twice for it", async () => {
+    rig.begin(stream(40, FULL, 20), RATE / 3);
+    await play(1);
+    rig.source.bytesPerSecond = 10 * RATE;
+    await pass(40);
+    const rises = seen().flatMap((quality, k) => (k > 0 && quality > seen()[k - 1] ? [k] : []));
+    expect(rises.length).toBeGreaterThan(0);
+    expect(new Set(rig.workers.chunks).size).toBe(rig.workers.chunks.length);
+    const starts = new Set(rig.workers.begun.filter(({ job }, k, all) => k > 0 && job.layers.length > all[k - 1].job.layers.length).map(({ job }) => job.chunk % 20));
+    expect(starts).toEqual(new Set([0]));
+  });
+
+  test("plays on at the lowest level, with stalls, where even that is too much", async () => {
+    rig.begin(stream(10, FULL), 3000);
+    await play(30);
+    expect(new Set(seen())).toEqual(new Set([0]));
+    expect(rig.viewer.frames).toEqual(frames(0, 250));
+    expect(rig.player.stats.stalls).toBeGreaterThan(0);
+  });
+});
+
+describe("a quality by hand", () => {
+  test("is what is fetched and shown, and no more", async () => {
+    rig.begin(stream(20, FULL, 5), 10 * RATE);
+    rig.player.quality = 1;
+    await play(22);
+    expect(new Set(seen())).toEqual(new Set([1]));
+    expect(rig.source.sentBytes).toBeLessThan(20 * 13_000 + 16_384);
+    expect(rig.player.stats).toMatchObject({ quality: 1, mbps: expect.closeTo((12_000 * 8) / 1e6, 2) as number });
+  });
+
+  test("that is finer is shown at once, its chain decoded again in the same worker; old groups stay until then", async () => {
+    rig.begin(stream(20, FULL, 10), 10 * RATE);
+    rig.player.quality = 1;
+    void rig.player.load();
+    await pass(2);
+    rig.player.currentTime = 2.5; // group 6
+    await pass(2);
+    const begun = rig.workers.begun.length;
+    rig.player.quality = 3;
+    await pass(0.02);
+    expect(rig.viewer.shown?.groups[0]?.quality).toBe(1);
+    await pass(1);
+    expect(rig.viewer.shown?.groups[0]).toMatchObject({ quality: 3, chunk: 6 });
+    const again = rig.workers.begun.slice(begun);
+    expect(again.slice(0, 7).map(({ job }) => [job.chunk, job.stateOnly])).toEqual(
+      [[0, true], [1, true], [2, true], [3, true], [4, true], [5, true], [6, false]],
+    );
+    expect(again.every(({ job }) => job.quality === null)).toBe(true);
+    expect(rig.source.sentBytes).toBeLessThanOrEqual(rig.source.size!);
+    expect(rig.viewer.count("qualitychange")).toBe(2);
+  });
+
+  test("that is coarser is shown at once and needs no chain", async () => {
+    rig.begin(stream(20, FULL, 10), 10 * RATE);
+    rig.player.quality = 3;
+    void rig.player.load();
+    await pass(2);
+    rig.player.currentTime = 2.5;
+    await pass(2);
+    const begun = rig.workers.begun.length;
+    rig.player.quality = 0;
+    await pass(1);
+    expect(rig.viewer.shown?.groups[0]?.quality).toBe(0);
+    expect(rig.workers.begun[begun].job).toMatchObject({ chunk: 6, quality: 0, stateOnly: false });
+  });
+
+  test("beyond what there is means all of it, and chunks of fewer layers are whole", async () => {
+    const chunks = [group(10, [500, 500]), group(10, [300]), group(10, [500, 500, 500], { dependsOn: [1] })];
+    rig.begin(makeReel(chunks, { frameRate: 25 }), 10 * RATE);
+    rig.player.quality = 7;
+    await play(2);
+    expect(rig.workers.begun.map(({ job }) => [job.layers.length, job.quality])).toEqual([[2, null], [1, null], [3, null]]);
+  });
+
+  test("changed in mid-play many times never breaks a chain", async () => {
+    rig.begin(stream(30, FULL, 10), 5 * RATE);
+    await play(1);
+    for (let k = 0; k < 40; k++) {
+      rig.player.quality = ([3, 0, 2, "auto", 1] as const)[k % 5];
+      await pass(0.1 + (k % 7) / 5);
+    }
+    expect(rig.viewer.warnings).toEqual([]);
+    expect(rig.player.stats.skippedGroups).toBe(0);
+    expect(rig.viewer.frames.length).toBeGreaterThan(400);
+  });
+});

@@ -1,0 +1,17 @@
+// How a changed attribute reaches what plays and what draws.
+
+import type { Playback } from "@meshreel/player-core/types";
+import type { Reflected } from "./reflected.ts";
+import type { Stage } from "./stage.ts";
+
+export function applyToPlayback(name: string, settings: Reflected, playback: Playback): void {
+  if (name === "loop") playback.loop = settings.loop;
+  if (name === "quality") playback.quality = settings.quality;
+  if (name === "speed" || name === "playbackrate") playback.playbackRate = settings.playbackRate;
+  if (name === "interpolate") playback.interpolate = settings.interpolate;
+}
+
+export function applyToStage(name: string, settings: Reflected, stage: Stage): void {
+  if (name === "mode") stage.mode = settings.mode;
+  if (name === "camera") stage.camera = settings.getAttribute("camera") ?? "";
+}

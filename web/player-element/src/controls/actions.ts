@@ -1,0 +1,99 @@
+// What keys and buttons do.
+
+import type { MeshreelPlayer } from "../element.ts";
+import { recordingName } from "../format.ts";
+import { type Action, seekStep } from "../keyboard.ts";
+import { modeName, nextMode } from "./choices.ts";
+
+/** What an action can ask of the controls. */
+export interface Surface {
+  /** Says in a few words what was done. */
+  tell(text: string): void;
+  toggleHelp(): void;
+  close(): void;
+}
+
+const TURN = Math.PI / 24; // of a key
+const CLOSER = 1.15;
+
+type Act = (player: MeshreelPlayer, surface: Surface) => void;
+
+const ACTS: Readonly<Record<Action, Act>> = {
+  toggle: (player, surface) => togglePlay(player, surface),
+  back: (player) => seekBy(player, -1),
+  forward: (player) => seekBy(player, 1),
+  first: (player) => void (player.currentTime = 0),
+  last: (player) => lastFrame(player),
+  previousFrame: (player) => player.step(-1),
+  nextFrame: (player) => player.step(1),
+  fullscreen: (player, surface) => void toggleFullscreen(player, surface),
+  vr: (player, surface) => void toggleVr(player, surface),
+  stats: (player) => void (player.stats = !player.stats),
+  mode: (player, surface) => {
+    player.mode = nextMode(player.mode);
+    surface.tell(modeName(player.mode));
+  },
+  loop: (player, surface) => {
+    player.loop = !player.loop;
+    surface.tell(player.loop ? "Loop on" : "Loop off");
+  },
+  fit: (player) => player.fit(),
+  turnLeft: (player) => player.orbit(-TURN, 0),
+  turnRight: (player) => player.orbit(TURN, 0),
+  turnUp: (player) => player.orbit(0, TURN),
+  turnDown: (player) => player.orbit(0, -TURN),
+  closer: (player) => player.orbit(0, 0, CLOSER),
+  farther: (player) => player.orbit(0, 0, 1 / CLOSER),
+  help: (_, surface) => surface.toggleHelp(),
+  close: (_, surface) => surface.close(),
+};
+
+export function perform(action: Action, player: MeshreelPlayer, surface: Surface): void {
+  ACTS[action](player, surface);
+}
+
+function togglePlay(player: MeshreelPlayer, surface: Surface): void {
+  if (!player.paused && !player.ended) player.pause();
+  else player.play().catch((error: Error) => { if (!player.error) surface.tell(error.message); });
+}
+
+function seekBy(player: MeshreelPlayer, direction: number): void {
+  if (!(player.duration > 0)) return;
+  const time = player.currentTime + direction * seekStep(player.duration);
+  player.currentTime = Math.min(player.duration, Math.max(0, time));
+}
+
+function lastFrame(player: MeshreelPlayer): void {
+  if (player.info) player.step(player.info.frameCount); // held at the last; its time is the recording's to know
+}
+
+async function toggleFullscreen(player: MeshreelPlayer, surface: Surface): Promise<void> {
+  try {
+    if (document.fullscreenElement) await document.exitFullscreen();
+    else await player.requestFullscreen();
+  } catch {
+    surface.tell("Full screen is not allowed here");
+  }
+}
+
+async function toggleVr(player: MeshreelPlayer, surface: Surface): Promise<void> {
+  if (player.presenting) player.exitVr();
+  else if (await player.vrSupported()) {
+    await player.enterVr().catch((error: Error) => surface.tell(`The headset did not start: ${error.message}`));
+  } else surface.tell("No headset was found");
+}
+
+/** Saves the picture as a file; its name tells recording and frame. */
+export async function saveScreenshot(player: MeshreelPlayer, surface: Surface): Promise<void> {
+  try {
+    const address = URL.createObjectURL(await player.screenshot());
+    const link = document.createElement("a");
+    link.href = address;
+    link.download = `${recordingName(player.currentSrc)}-${player.currentFrame + 1}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(address), 10_000);
+    surface.tell("Screenshot saved");
+  } catch (error) {
+    surface.tell(`No screenshot: ${error instanceof Error ? error.message : error}`);
+  }
+}

@@ -1,0 +1,144 @@
+// The bar below the picture: seek bar, buttons, and the settings that open above it.
+
+import type { MeshreelPlayer } from "../element.ts";
+import { formatTime } from "../format.ts";
+import type { Action } from "../keyboard.ts";
+import { parseMode, parseQuality } from "../attributes.ts";
+import { modeChoices, qualityChoices, qualityValue, speedChoices } from "./choices.ts";
+import { Button, type Look, make, Menu, setText } from "./dom.ts";
+import { SeekBar } from "./seek.ts";
+
+/** What the bar asks of the controls around it. */
+export interface BarActs {
+  act(action: Action): void;
+  screenshot(): void;
+  openFile(): void;
+}
+
+export class Bar {
+  readonly element: HTMLElement;
+  readonly settings: HTMLElement;
+  readonly seek: SeekBar;
+  /** Whether this browser has a headset; found out when the player enters a document. */
+  headset = false;
+  #player: MeshreelPlayer;
+  #acts: BarActs;
+  #more: Button;
+  #parts: { refresh(): void }[] = [];
+  #now = make("span", { class: "now" });
+  #all = make("span", { class: "all" });
+
+  constructor(player: MeshreelPlayer, acts: BarActs) {
+    this.#player = player;
+    this.#acts = acts;
+    this.seek = new SeekBar(player);
+    this.settings = make("div", { class: "settings", part: "settings", role: "group", "aria-label": "Settings", id: "settings" });
+    this.settings.hidden = true;
+    this.settings.append(...this.#menus(), ...this.#tools().map((button) => button.element), ...this.#rows().map((button) => button.element));
+    this.#more = this.#button("more", "", () => ({ icon: "more", label: "Settings" }), () => this.toggleSettings());
+    this.#more.element.setAttribute("aria-expanded", "false");
+    this.#more.element.setAttribute("aria-controls", "settings");
+    const time = make("span", { class: "time", part: "time" }, this.#now, this.#all);
+    const row = make("div", { class: "row" }, ...this.#transport(), time, make("span", { class: "space" }));
+    row.append(...this.#tools().map((button) => button.element), this.#more.element, ...this.#screens());
+    this.element = make("div", { class: "bar", part: "controls", role: "group", "aria-label": "Player controls" }, this.seek.element, row);
+  }
+
+  get settingsOpen(): boolean {
+    return !this.settings.hidden;
+  }
+
+  toggleSettings(open = this.settings.hidden): void {
+    if (open === this.settingsOpen) return;
+    const inside = this.settings.matches(":focus-within");
+    this.settings.hidden = !open;
+    this.#more.element.setAttribute("aria-expanded", String(open));
+    if (open) this.settings.querySelector<HTMLElement>("select:enabled, button:enabled")?.focus({ preventScroll: true });
+    else if (inside) this.#more.element.focus({ preventScroll: true });
+  }
+
+  refresh(): void {
+    this.seek.refresh();
+    for (const part of this.#parts) part.refresh();
+    this.refreshTime();
+  }
+
+  /** The part of `refresh` that changes with each frame. */
+  refreshTime(): void {
+    this.seek.refresh();
+    const { duration, currentTime } = this.#player;
+    const tenths = duration < 60;
+    setText(this.#now, formatTime(currentTime, tenths));
+    setText(this.#all, ` / ${duration > 0 ? formatTime(duration, tenths) : "–"}`);
+  }
+
+  #button(name: string, hint: string, look: () => Look, act: () => void): Button {
+    const button = new Button(name, hint, look, act);
+    this.#parts.push(button);
+    return button;
+  }
+
+  #transport(): HTMLElement[] {
+    const player = this.#player;
+    const known = () => player.duration > 0;
+    const play = (): Look => {
+      if (player.ended) return { icon: "replay", label: "Play again" };
+      return player.paused ? { icon: "play", label: "Play" } : { icon: "pause", label: "Pause" };
+    };
+    return [
+      this.#button("play", "K", play, () => this.#acts.act("toggle")),
+      this.#button("step-back step", ",", () => ({ icon: "stepBack", label: "Previous frame", enabled: known() }), () => this.#acts.act("previousFrame")),
+      this.#button("step-forward step", ".", () => ({ icon: "stepForward", label: "Next frame", enabled: known() }), () => this.#acts.act("nextFrame")),
+    ].map((button) => button.element);
+  }
+
+  /** Made twice: in the bar, and as rows of the settings where the bar is too narrow for them. */
+  #tools(): Button[] {
+    const player = this.#player;
+    const { act, screenshot } = this.#acts;
+    const known = () => player.info !== null;
+    return [
+      this.#button("loop tool", "L", () => ({ icon: "loop", label: "Loop", pressed: player.loop }), () => act("loop")),
+      this.#button("stats tool", "S", () => ({ icon: "stats", label: "Statistics", pressed: player.stats }), () => act("stats")),
+      this.#button("screenshot tool", "", () => ({ icon: "camera", label: "Save screenshot", enabled: known() }), () => screenshot()),
+      this.#button("fit tool", "0", () => ({ icon: "fit", label: "Fit the view", enabled: known() }), () => act("fit")),
+    ];
+  }
+
+  #rows(): Button[] {
+    return [
+      this.#button("open", "", () => ({ icon: "open", label: "Open a file" }), () => this.#acts.openFile()),
+      this.#button("help", "?", () => ({ icon: "help", label: "Keys and gestures" }), () => this.#acts.act("help")),
+    ];
+  }
+
+  #screens(): HTMLElement[] {
+    const player = this.#player;
+    const vr = (): Look => ({
+      icon: "vr", label: player.presenting ? "Leave virtual reality" : "Virtual reality", shown: this.headset, enabled: player.info !== null,
+    });
+    const screen = (): Look => {
+      const full = document.fullscreenElement !== null;
+      return { icon: full ? "exitFullscreen" : "fullscreen", label: full ? "Leave full screen" : "Full screen", shown: document.fullscreenEnabled };
+    };
+    return [
+      this.#button("vr", "V", vr, () => this.#acts.act("vr")).element,
+      this.#button("fullscreen", "F", screen, () => this.#acts.act("fullscreen")).element,
+    ];
+  }
+
+  #menus(): HTMLElement[] {
+    const player = this.#player;
+    const most = () => player.info?.mostQuality ?? 0;
+    const menus = [
+      new Menu("speed", "Speed", () => ({ choices: speedChoices(player.playbackRate), value: String(player.playbackRate) }),
+        (value) => void (player.playbackRate = Number(value))),
+      new Menu("quality", "Quality",
+        () => ({ choices: qualityChoices(most(), player.quality), value: qualityValue(most(), player.quality), enabled: most() > 0 }),
+        (value) => void (player.quality = parseQuality(value))),
+      new Menu("mode", "Shading", () => ({ choices: modeChoices(), value: player.mode }), (value) => void (player.mode = parseMode(value))),
+    ];
+    this.#parts.push(...menus);
+    return menus.map((menu) => menu.element);
+  }
+}

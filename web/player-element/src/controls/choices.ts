@@ -1,0 +1,49 @@
+// What the menus offer.
+
+import { MODES, type Mode, type Quality } from "../attributes.ts";
+import { formatSpeed } from "../format.ts";
+import type { Choice } from "./dom.ts";
+
+const SPEEDS = [0.1, 0.25, 0.5, 0.75, 1, 1.25, 1.5, 2, 4];
+const MOST_LEVELS = 6;
+const MODE_NAMES: Readonly<Record<Mode, string>> = {
+  shaded: "Shaded", normal: "Normals", wireframe: "Wireframe", colour: "Parts in colour",
+};
+
+/** Usual speeds, and the one that is set if it is none of them. */
+export function speedChoices(current: number): readonly Choice[] {
+  const speeds = SPEEDS.includes(current) ? SPEEDS : [...SPEEDS, current].sort((a, b) => a - b);
+  return speeds.map((speed) => ({ value: String(speed), text: formatSpeed(speed) }));
+}
+
+/** Auto, then levels from full to base; of many levels some, evenly apart, and the one that is set. */
+export function qualityChoices(mostQuality: number, current: Quality): readonly Choice[] {
+  const levels = new Set<number>();
+  const count = Math.min(mostQuality + 1, MOST_LEVELS);
+  for (let i = 0; i < count; i++) levels.add(Math.round((mostQuality * i) / Math.max(1, count - 1)));
+  if (typeof current === "number") levels.add(Math.min(current, mostQuality));
+  const descending = [...levels].sort((a, b) => b - a);
+  return [{ value: "auto", text: "Auto" }, ...descending.map((level) => ({ value: String(level), text: levelName(level, mostQuality) }))];
+}
+
+/** The value of `qualityChoices` for a setting. */
+export function qualityValue(mostQuality: number, current: Quality): string {
+  return current === "auto" ? current : String(Math.min(current, mostQuality));
+}
+
+function levelName(level: number, most: number): string {
+  if (level === most) return "Full";
+  return level === 0 ? "Lowest" : `Level ${level} of ${most}`;
+}
+
+export function modeChoices(): readonly Choice[] {
+  return MODES.map((mode) => ({ value: mode, text: MODE_NAMES[mode] }));
+}
+
+export function modeName(mode: Mode): string {
+  return MODE_NAMES[mode];
+}
+
+export function nextMode(mode: Mode): Mode {
+  return MODES[(MODES.indexOf(mode) + 1) % MODES.length]!;
+}

@@ -1,0 +1,142 @@
+// What lies over the picture: statistics, help, errors, warnings, and what is there before a file is open.
+
+import type { MeshreelPlayer } from "../element.ts";
+import { KEYS } from "../keyboard.ts";
+import { explain } from "../messages.ts";
+import { statisticsLines } from "../stats.ts";
+import { icon } from "../icons.ts";
+import { Button, make, setText } from "./dom.ts";
+
+const STATISTICS_EVERY = 250; // ms
+
+/** The statistics; they are counted only while they are shown. */
+export class StatisticsPanel {
+  readonly element = make("dl", { class: "panel statistics", part: "statistics", "aria-label": "Statistics", role: "group" });
+  #player: MeshreelPlayer;
+  #timer = 0;
+
+  constructor(player: MeshreelPlayer) {
+    this.#player = player;
+    this.element.hidden = true;
+  }
+
+  refresh(): void {
+    const wanted = this.#player.stats && this.#player.isConnected;
+    this.element.hidden = !wanted;
+    if (wanted && this.#timer === 0) {
+      this.#timer = window.setInterval(() => this.#write(), STATISTICS_EVERY);
+      this.#write();
+    } else if (!wanted) {
+      clearInterval(this.#timer);
+      this.#timer = 0;
+    }
+  }
+
+  #write(): void {
+    const numbers = this.#player.statistics;
+    const lines = numbers ? statisticsLines(numbers, this.#player.info, this.#player.currentFrame) : [["State", "nothing is open"] as const];
+    if (this.element.children.length !== lines.length) {
+      this.element.replaceChildren(...lines.map(() => make("div", {}, make("dt"), make("dd"))));
+    }
+    lines.forEach(([name, value], i) => {
+      const row = this.element.children[i]!;
+      setText(row.firstChild!, name);
+      setText(row.lastChild!, value);
+    });
+  }
+}
+
+/** The keys, opened with "?". */
+export class HelpPanel {
+  readonly element: HTMLElement;
+
+  constructor(close: () => void) {
+    const rows = KEYS.map(({ shown, says }) => make("div", {}, make("dt", {}, make("kbd", {}, shown)), make("dd", {}, says)));
+    const button = new Button("close", "", () => ({ icon: "close", label: "Close" }), close);
+    this.element = make(
+      "div", { class: "panel help-panel", part: "help-panel", role: "dialog", "aria-label": "Keys and gestures" },
+      make("div", { class: "title" }, make("strong", {}, "Keys and gestures"), button.element),
+      make("dl", {}, ...rows),
+      make("p", {}, "Drag to turn, with the right button or two fingers to move, wheel or pinch to come closer."),
+    );
+    this.element.hidden = true;
+  }
+
+  get open(): boolean {
+    return !this.element.hidden;
+  }
+
+  toggle(open: boolean): void {
+    this.element.hidden = !open;
+    if (open) this.element.querySelector("button")?.focus({ preventScroll: true });
+  }
+}
+
+/** An error in plain words, and a way on. */
+export class ErrorPanel {
+  readonly element: HTMLElement;
+  #title = make("strong");
+  #advice = make("p");
+  #detail = make("code", { part: "error-detail" });
+  #retry: HTMLButtonElement;
+
+  constructor(retry: () => void, open: () => void) {
+    this.#retry = make("button", { type: "button", class: "text primary", part: "button retry" }, "Try again");
+    const another = make("button", { type: "button", class: "text another", part: "button another" }, "Open a file");
+    this.#retry.addEventListener("click", retry);
+    another.addEventListener("click", open);
+    this.element = make(
+      "div", { class: "panel error", part: "error", role: "alert" },
+      icon("warning"), this.#title, this.#advice, this.#detail, make("div", { class: "ways" }, this.#retry, another),
+    );
+    this.element.hidden = true;
+  }
+
+  show(error: Error | null): void {
+    this.element.hidden = error === null;
+    if (error === null) return;
+    const { title, advice, detail, retry } = explain(error);
+    setText(this.#title, title);
+    setText(this.#advice, advice);
+    setText(this.#detail, detail);
+    this.#retry.hidden = !retry;
+  }
+}
+
+const WARNING_TIME = 8000; // ms
+const TELLING_TIME = 1600; // ms
+const MOST_TOASTS = 3;
+
+/** Short messages that go away by themselves; those who hear are told them too. */
+export class Toasts {
+  readonly element = make("div", { class: "toasts", part: "toasts", role: "status", "aria-live": "polite" });
+
+  /** A warning: it stays longer; the same text is not shown twice at a time. */
+  warn(text: string): void {
+    if ([...this.element.children].some((toast) => toast.textContent === text)) return;
+    this.#add(make("div", { class: "toast warning", part: "toast" }, icon("warning"), make("span", {}, text)), WARNING_TIME);
+  }
+
+  /** What was just done; it takes the place of the one before. */
+  tell(text: string): void {
+    for (const toast of this.element.querySelectorAll(".told")) toast.remove();
+    this.#add(make("div", { class: "toast told", part: "toast" }, make("span", {}, text)), TELLING_TIME);
+  }
+
+  clear(): void {
+    this.element.replaceChildren();
+  }
+
+  #add(toast: HTMLElement, time: number): void {
+    this.element.append(toast);
+    while (this.element.children.length > MOST_TOASTS) this.element.firstChild!.remove();
+    setTimeout(() => toast.remove(), time);
+  }
+}
+
+/** What an empty player says. */
+export function emptyPanel(open: () => void): HTMLElement {
+  const button = make("button", { type: "button", class: "text primary", part: "button open" }, "Open a file");
+  button.addEventListener("click", open);
+  return make("div", { class: "empty", part: "empty" }, icon("open"), make("strong", {}, "Drop a .reel file here"), button);
+}

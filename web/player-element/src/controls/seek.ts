@@ -1,0 +1,78 @@
+// The seek bar: a range input over a drawn track that shows what was played and what is buffered.
+
+import { formatTime, speakTime } from "../format.ts";
+import type { MeshreelPlayer } from "../element.ts";
+import { make, setText } from "./dom.ts";
+
+const THUMB = 14; // px; as in styles.ts
+
+export class SeekBar {
+  readonly element: HTMLElement;
+  readonly input: HTMLInputElement;
+  #player: MeshreelPlayer;
+  #tip = make("span", { class: "tip", part: "tip", "aria-hidden": "true" });
+  #scrubbing = false;
+  #resume = false; // it played before it was dragged
+  #wanted: number | null = null;
+
+  constructor(player: MeshreelPlayer) {
+    this.#player = player;
+    this.input = make("input", {
+      type: "range", min: "0", max: "0", step: "any", value: "0", part: "seek", class: "range", "aria-label": "Seek",
+    });
+    this.element = make("div", { class: "seek" }, make("div", { class: "track", part: "track" }), this.input, this.#tip);
+    this.input.addEventListener("input", () => this.#drag());
+    this.input.addEventListener("change", () => this.#drop());
+    this.element.addEventListener("pointermove", (event) => this.#hover(event));
+    player.addEventListener("seeked", () => this.#follow());
+  }
+
+  refresh(): void {
+    const { duration, currentTime, buffered } = this.#player;
+    const known = duration > 0;
+    this.input.disabled = !known;
+    this.input.max = String(known ? duration : 0);
+    if (!this.#scrubbing) this.input.value = String(currentTime);
+    const time = this.#scrubbing ? Number(this.input.value) : currentTime;
+    const end = buffered.length > 0 ? buffered.end(0) : currentTime;
+    this.element.style.setProperty("--played", String(known ? time / duration : 0));
+    this.element.style.setProperty("--buffered", String(known ? end / duration : 0));
+    this.input.setAttribute("aria-valuetext", known ? `${speakTime(time)} of ${speakTime(duration)}` : "nothing is open");
+  }
+
+  #drag(): void {
+    if (!this.#scrubbing) {
+      this.#scrubbing = true;
+      this.#resume = !this.#player.paused && !this.#player.ended;
+      if (this.#resume) this.#player.pause();
+    }
+    this.#wanted = Number(this.input.value);
+    // While one seek is under way the latest position waits, so that dragging never asks for more than can be shown.
+    if (!this.#player.seeking) this.#follow();
+    this.refresh();
+  }
+
+  #follow(): void {
+    if (this.#wanted === null) return;
+    const wanted = this.#wanted;
+    this.#wanted = null;
+    this.#player.currentTime = wanted;
+  }
+
+  #drop(): void {
+    this.#follow();
+    this.#scrubbing = false;
+    if (this.#resume) this.#player.play().catch(() => undefined); // its error event tells
+    this.#resume = false;
+    this.refresh();
+  }
+
+  #hover(event: PointerEvent): void {
+    const { duration } = this.#player;
+    const { left, width } = this.element.getBoundingClientRect();
+    if (!(duration > 0) || width <= THUMB) return;
+    const part = Math.min(1, Math.max(0, (event.clientX - left - THUMB / 2) / (width - THUMB)));
+    this.element.style.setProperty("--hover", String(part));
+    setText(this.#tip, formatTime(part * duration, duration < 60));
+  }
+}

@@ -1,0 +1,348 @@
+// <meshreel-player>: an element like <video>, whose picture can be looked at from all sides.
+
+import type { Info, Packed, Playback } from "@meshreel/player-core/types";
+import type { Bench } from "@meshreel/player-three";
+import { vrSupported } from "@meshreel/xr";
+import { applyToPlayback, applyToStage } from "./apply.ts";
+import { OBSERVED, PROPERTIES } from "./attributes.ts";
+import { Controls } from "./controls/controls.ts";
+import { PASSED } from "./events.ts";
+import { type Ranges, ranges } from "./ranges.ts";
+import { Reflected } from "./reflected.ts";
+import type { Engine } from "./stage.ts";
+import type { Statistics } from "./stats.ts";
+import { View } from "./view.ts";
+
+declare global {
+  interface HTMLElementTagNameMap {
+    "meshreel-player": MeshreelPlayer;
+  }
+}
+
+export class MeshreelPlayer extends Reflected {
+  static readonly observedAttributes = OBSERVED;
+  /** Where playbacks and stages come from; index.ts sets the real one before it defines the element. */
+  static engine: Engine;
+
+  #controls: Controls;
+  #source: Blob | null = null; // a file that was opened; it stands in for `src`
+  #playback: Playback | null = null;
+  #passing = new AbortController();
+  #view: View | null = null;
+  #error: Error | null = null;
+  #waiting = false;
+  #playable = false;
+  #wished = false; // it plays, or would if it could
+  #startAt = 0; // s; where to begin once the head is there
+  #queued = false;
+
+  constructor() {
+    super();
+    const internals = this.attachInternals();
+    internals.role = "region";
+    internals.ariaLabel = "Recording"; // an aria-label of the page goes before it
+    this.#controls = new Controls(this, this.attachShadow({ mode: "open" }));
+  }
+
+  connectedCallback(): void {
+    this.upgrade(...PROPERTIES);
+    this.#controls.connect();
+    if (this.#playback === null) this.#queueLoad();
+  }
+
+  disconnectedCallback(): void {
+    // A node that is moved is taken out and put in again at once: only one that stays out is closed.
+    queueMicrotask(() => {
+      if (this.isConnected) return;
+      this.#startAt = this.currentTime;
+      this.#controls.disconnect();
+      this.#close();
+      this.#view?.dispose();
+      this.#view = null;
+    });
+  }
+
+  attributeChangedCallback(name: string, before: string | null, after: string | null): void {
+    if (name === "src") {
+      this.#source = null;
+      this.#startAt = 0;
+      if (this.isConnected) this.#queueLoad();
+    } else if (before !== after) {
+      this.#apply(name);
+    }
+    this.#controls.refresh();
+  }
+
+  // What a media element has -------------------------------------------------------------------------------------
+
+  /** Opens a file, or without one what was open before, from its start. */
+  load(file?: Blob): void {
+    if (file) this.#source = file;
+    this.#startAt = 0;
+    this.#open();
+  }
+
+  /** Plays. Rejects where there is nothing to play. */
+  async play(): Promise<void> {
+    if (this.#playback === null && this.isConnected) this.#open();
+    if (this.#playback === null) throw this.#error ?? new DOMException("there is nothing to play: set src", "NotSupportedError");
+    this.#view?.wake();
+    await this.#play(this.#playback);
+  }
+
+  pause(): void {
+    this.#wished = false;
+    this.#playback?.pause();
+  }
+
+  get currentTime(): number {
+    return this.#playback?.info ? this.#playback.currentTime : this.#startAt;
+  }
+  set currentTime(seconds: number) {
+    if (!Number.isFinite(seconds)) throw new TypeError(`currentTime ${seconds}: a finite number of seconds is needed`);
+    this.#startAt = Math.max(0, seconds);
+    if (this.#playback) this.#playback.currentTime = this.#startAt;
+    this.#view?.wake();
+  }
+
+  get duration(): number {
+    return this.#playback?.info ? this.#playback.duration : NaN;
+  }
+  get paused(): boolean {
+    return this.#playback?.paused ?? true;
+  }
+  get ended(): boolean {
+    return this.#playback?.ended ?? false;
+  }
+  get seeking(): boolean {
+    return this.#playback?.seeking ?? false;
+  }
+  get error(): Error | null {
+    return this.#error;
+  }
+  get currentSrc(): string {
+    return this.#source ? "" : this.src;
+  }
+  /** 0 nothing, 1 the head, 2 this frame, 4 the next ones too: as HTMLMediaElement.readyState. */
+  get readyState(): 0 | 1 | 2 | 4 {
+    if (!this.#playback?.info) return 0;
+    if (!this.#playable) return 1;
+    return this.#waiting || this.seeking ? 2 : 4;
+  }
+  get buffered(): Ranges {
+    const ahead = this.#playback?.stats.bufferedSeconds ?? 0;
+    return ranges(this.currentTime, Math.min(this.duration, this.currentTime + ahead));
+  }
+  get seekable(): Ranges {
+    return ranges(0, this.duration);
+  }
+
+  // What it has besides ------------------------------------------------------------------------------------------
+
+  get info(): Info | null {
+    return this.#playback?.info ?? null;
+  }
+  get currentFrame(): number {
+    return this.#playback?.currentFrame ?? 0;
+  }
+  /** Where the camera is, as text that the attribute `camera` takes. */
+  get camera(): string {
+    return this.#view?.stage.camera ?? this.getAttribute("camera") ?? "";
+  }
+  set camera(value: string) {
+    this.setAttribute("camera", value);
+  }
+  /** True while frames or bytes are waited for. */
+  get waiting(): boolean {
+    return this.#playback !== null && this.#error === null && (this.#waiting || this.seeking);
+  }
+  get statistics(): Statistics | null {
+    if (!this.#playback || !this.#view) return null;
+    return { ...this.#playback.stats, ...this.#view.stage.stats, fps: this.#view.fps, frameMs: this.#view.frameMs, drawn: this.#view.drawn };
+  }
+  /** Pauses and shows the frame so many further; negative goes back. */
+  step(frames: number): void {
+    this.#wished = false;
+    this.#playback?.step(frames);
+    this.#view?.wake();
+  }
+  /** Looks at the whole scene. */
+  fit(): void {
+    this.#view?.stage.fit();
+  }
+  /** Turns the camera about what it looks at, in radians to the right and up, and brings it so many times closer. */
+  orbit(right: number, up: number, closer = 1): void {
+    this.#view?.stage.orbit(right, up, closer);
+  }
+  /** A PNG of the picture as it is seen now. */
+  async screenshot(): Promise<Blob> {
+    if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
+    return this.#view.picture();
+  }
+  /** Opens once more what failed, where it stopped. */
+  retry(): void {
+    const wished = this.#wished;
+    this.#startAt = this.currentTime;
+    this.#open();
+    if (wished) this.play().catch(() => undefined); // its error event tells
+  }
+  async vrSupported(): Promise<boolean> {
+    return vrSupported();
+  }
+  /** Shows the scene in the headset; to be called from a click. */
+  async enterVr(): Promise<void> {
+    if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
+    await this.#view.enterVr({
+      toggle: () => (this.paused ? void this.play().catch(() => undefined) : this.pause()),
+      step: (frames) => this.step(frames),
+      seekBy: (seconds) => (this.currentTime += seconds),
+    });
+  }
+  exitVr(): void {
+    this.#view?.stage.exitVr();
+  }
+  get presenting(): boolean {
+    return this.#view?.stage.presenting ?? false;
+  }
+  /** Lets a bench collect from now on what is decoded and drawn; what is given back ends that. Error where nothing is open. */
+  measure(bench: Bench): () => void {
+    if (!this.#view || !this.#playback) throw new DOMException("there is nothing to measure: set src", "InvalidStateError");
+    return this.#view.measure(this.#playback, bench);
+  }
+
+  // Inside -------------------------------------------------------------------------------------------------------
+
+  #queueLoad(): void {
+    if (this.#queued) return;
+    this.#queued = true;
+    queueMicrotask(() => {
+      this.#queued = false;
+      if (!this.isConnected) return;
+      if (this.preload === "none" && !this.autoplay && !this.#source) this.#close();
+      else this.#open();
+      this.#controls.refresh();
+    });
+  }
+
+  #open(): void {
+    this.#close();
+    this.#error = null;
+    this.#controls.refresh();
+    const source = this.#source ?? this.src;
+    if (source === "") return;
+    let playback: Playback;
+    let view: View;
+    try {
+      view = this.#view ??= this.#makeView();
+      playback = this.#playback = MeshreelPlayer.engine.open(source, this);
+    } catch (error) {
+      this.#fail(error instanceof Error ? error : new Error(String(error)));
+      return;
+    }
+    if (this.#startAt > 0) playback.currentTime = this.#startAt;
+    this.#waiting = true;
+    this.#listen(playback);
+    this.dispatchEvent(new Event("loadstart"));
+    view.show(playback);
+    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    if (this.autoplay && !still) this.#play(playback).catch(() => undefined); // its error event tells
+  }
+
+  #play(playback: Playback): Promise<void> {
+    this.#wished = true;
+    return playback.play();
+  }
+
+  #close(): void {
+    if (this.#playback === null) return;
+    this.#view?.show(null);
+    this.#playback.dispose(); // tells what to release
+    this.#passing.abort();
+    this.#playback = null;
+    this.#waiting = this.#playable = this.#wished = false;
+    this.dispatchEvent(new Event("emptied"));
+  }
+
+  #makeView(): View {
+    const { picture, cover } = this.#controls;
+    const view = new View(MeshreelPlayer.engine, picture, cover, (event) => this.#onView(event));
+    view.stage.mode = this.mode;
+    view.stage.background = this.#controls.background;
+    return view;
+  }
+
+  #listen(playback: Playback): void {
+    this.#passing = new AbortController();
+    const { signal } = this.#passing;
+    for (const type of PASSED) playback.addEventListener(type, (event) => this.#onPlayback(event), { signal });
+    playback.addEventListener("ready", (event) => this.#onReady((event as CustomEvent<Packed>).detail), { signal });
+    playback.addEventListener("release", (event) => this.#view?.stage.release((event as CustomEvent<Packed>).detail), { signal });
+  }
+
+  #onReady(packed: Packed): void {
+    if (!this.#view) return;
+    try {
+      this.#view.stage.prepare(packed);
+    } catch (error) {
+      this.#onPlayback(new CustomEvent("warning", { detail: error }));
+    }
+    this.#view.wake(); // it may be what is waited for
+  }
+
+  #onPlayback(event: Event): void {
+    const detail: unknown = event instanceof CustomEvent ? event.detail : undefined;
+    if (event.type === "loadedmetadata") this.#begin();
+    if (event.type === "canplay") this.#playable = true;
+    if (["canplay", "playing", "seeked"].includes(event.type)) this.#waiting = false;
+    if (event.type === "waiting") this.#waiting = true;
+    if (event.type === "pause" && this.#playable) this.#waiting = false;
+    if (event.type === "ended") this.#wished = false;
+    if (event.type === "error") {
+      this.#fail(detail instanceof Error ? detail : new Error("unknown"));
+      return;
+    }
+    this.dispatchEvent(detail === undefined ? new Event(event.type) : new CustomEvent(event.type, { detail }));
+    if (event.type === "warning" && detail instanceof Error) this.#controls.warn(detail.message);
+    this.#view?.wake();
+    this.#controls.refresh();
+  }
+
+  #begin(): void {
+    const info = this.#playback?.info;
+    if (!info || !this.#view) return;
+    this.#view.stage.begin(info);
+    const camera = this.getAttribute("camera");
+    if (camera) this.#view.stage.camera = camera;
+  }
+
+  #fail(error: Error): void {
+    this.#error = error;
+    this.#waiting = false;
+    this.dispatchEvent(new CustomEvent("error", { detail: error }));
+    this.#controls.refresh();
+  }
+
+  #onView(event: Event): void {
+    if (event.type === "drawn") {
+      if (this.#view?.shows) this.#controls.drawn();
+    } else {
+      if (event.type !== "change") this.dispatchEvent(new Event(event.type));
+      this.#controls.onStage(event.type);
+    }
+  }
+
+  #apply(name: string): void {
+    if (this.#playback) applyToPlayback(name, this, this.#playback);
+    if (this.#view) applyToStage(name, this, this.#view.stage);
+    if (name === "background" || name === "theme") this.applyBackground();
+    this.#view?.refresh();
+  }
+
+  /** Takes the background's colour from the styles again. */
+  applyBackground(): void {
+    const colour = this.#controls.background;
+    if (!this.#view || this.#view.stage.background === colour) return;
+    this.#view.stage.background = colour;
+    this.#view.refresh();
+  }
+}

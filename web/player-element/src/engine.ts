@@ -1,0 +1,87 @@
+// The real engine: recordings come from the network or from files, workers decode them, three.js draws them.
+
+import { BlobSource, HttpSource, Player, WorkerPool, type WorkerLike } from "@meshreel/player-core";
+import type { Engine, Settings, Stage } from "./stage.ts";
+import { ThreeStage } from "./stage_three.ts";
+
+/** Where the built player's other files lie. */
+export interface Files {
+  readonly worker: URL;
+  readonly core: URL;
+  readonly draco: URL;
+}
+
+const POOL_KEPT = 1000; // ms that workers are kept after the last player is closed: a change of `src` needs them again
+
+/** Workers, and how many players use them. */
+interface Shared {
+  readonly workers: WorkerPool;
+  users: number;
+}
+
+export class RealEngine implements Engine {
+  readonly #files: Files;
+  #shared: Shared | null = null; // what the next player gets
+
+  constructor(files: Files) {
+    this.#files = files;
+  }
+
+  open(source: string | Blob, { quality, interpolate, loop, playbackRate }: Settings): Player {
+    const { worker, core, draco } = this.#files;
+    const create = (): WorkerLike => openWorker(worker);
+    const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: core.href, draco: draco.href }), users: 0 });
+    shared.users++;
+    const player = new PooledPlayer({
+      source: typeof source === "string" ? new HttpSource(source) : new BlobSource(source),
+      workers: shared.workers,
+    });
+    player.leave = () => this.#leave(shared);
+    // Workers that could not be started are not tried again by their pool: whoever tries again gets new ones.
+    player.addEventListener("error", () => this.#forget(shared));
+    Object.assign(player, { quality, interpolate, loop, playbackRate });
+    player.load().catch(() => undefined); // its error event tells
+    return player;
+  }
+
+  stage(canvas: HTMLCanvasElement): Stage {
+    return new ThreeStage(canvas);
+  }
+
+  #leave(shared: Shared): void {
+    shared.users--;
+    setTimeout(() => {
+      if (shared.users > 0) return;
+      this.#forget(shared);
+      shared.workers.dispose();
+    }, POOL_KEPT);
+  }
+
+  #forget(shared: Shared): void {
+    if (this.#shared === shared) this.#shared = null;
+  }
+}
+
+/** A player that tells when it no longer needs the pool. */
+class PooledPlayer extends Player {
+  leave: (() => void) | null = null;
+
+  override dispose(): void {
+    super.dispose();
+    this.leave?.();
+    this.leave = null;
+  }
+}
+
+/**
+ * A worker of a module. Browsers start workers only from the page's own origin: of any other, a worker made here imports the module,
+ * which that origin must allow by CORS.
+ */
+export function openWorker(module: URL): WorkerLike {
+  if (module.origin === location.origin) return new Worker(module, { type: "module" }) as WorkerLike;
+  const address = URL.createObjectURL(new Blob([`import ${JSON.stringify(module.href)};`], { type: "text/javascript" }));
+  const worker = new Worker(address, { type: "module" });
+  // The address is needed until the worker has read it, and a worker does not tell when; it answers its first message after that.
+  worker.addEventListener("message", () => URL.revokeObjectURL(address), { once: true });
+  return worker as WorkerLike;
+}

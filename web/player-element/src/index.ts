@@ -1,0 +1,14 @@
+// The package: importing it defines <meshreel-player>.
+
+import { MeshreelPlayer } from "./element.ts";
+import { RealEngine } from "./engine.ts";
+
+export { MeshreelPlayer };
+
+// Files beside the built module. The addresses are made in two steps because the bundler takes what it sees for modules of its own.
+const beside = (name: string): URL => new URL(name, import.meta.url);
+
+if (globalThis.customElements && !customElements.get("meshreel-player")) {
+  MeshreelPlayer.engine = new RealEngine({ worker: beside("worker.js"), core: beside("core.wasm"), draco: beside("draco.wasm") });
+  customElements.define("meshreel-player", MeshreelPlayer);
+}

@@ -1,0 +1,34 @@
+// What an address asks of the page: ?src, ?t, ?autoplay, ?loop, ?stats, ?mode, ?quality, ?camera, ?speed, ?theme, ?background, ?poster,
+// ?interpolate, ?controls, ?bench. All but t and bench are attributes of the element.
+
+export interface Parameters {
+  /** Attributes to set; null to take one away. */
+  readonly attributes: ReadonlyMap<string, string | null>;
+  readonly time: number; // s; 0 where none is asked for
+  readonly bench: boolean;
+}
+
+const TEXTS = ["src", "mode", "quality", "camera", "speed", "theme", "background", "poster", "interpolate"];
+const FLAGS = ["autoplay", "loop", "stats", "controls"];
+
+/** Reads `location.search`; what is not known is passed over. */
+export function readParameters(search: string): Parameters {
+  const given = new URLSearchParams(search);
+  const attributes = new Map<string, string | null>();
+  for (const name of TEXTS) {
+    const text = given.get(name);
+    if (text !== null && text !== "") attributes.set(name, text);
+  }
+  for (const name of FLAGS) if (given.has(name)) attributes.set(name, isOn(given.get(name)) ? "" : null);
+  return { attributes, time: readTime(given.get("t")), bench: isOn(given.get("bench")) };
+}
+
+function isOn(text: string | null): boolean {
+  return text !== null && !["0", "false", "off", "no"].includes(text.toLowerCase());
+}
+
+/** Seconds of "12.5" or "1:05.5"; 0 of anything else. */
+export function readTime(text: string | null): number {
+  if (text === null || !/^(\d+:){0,2}\d+(\.\d+)?s?$/.test(text)) return 0;
+  return text.replace("s", "").split(":").reduce((seconds, part) => seconds * 60 + Number(part), 0);
+}

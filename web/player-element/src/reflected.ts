@@ -1,0 +1,117 @@
+// Properties that are attributes: the attribute is the one place where a setting is kept, so HTML, scripts and controls agree.
+
+import * as parse from "./attributes.ts";
+
+// Pages that are made on a server import this where there are no elements.
+const Element = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
+
+/** The base class of the element, with nothing but its reflected properties. */
+export class Reflected extends Element {
+  /** Properties set on the node before the element was defined hide the accessors; this sets them again. */
+  protected upgrade(...names: string[]): void {
+    for (const name of names) {
+      if (!Object.hasOwn(this, name)) continue;
+      const value = Reflect.get(this, name);
+      Reflect.deleteProperty(this, name);
+      Reflect.set(this, name, value);
+    }
+  }
+
+  get src(): string {
+    const text = this.getAttribute("src");
+    return text === null ? "" : new URL(text, document.baseURI).href;
+  }
+  set src(value: string) {
+    this.setAttribute("src", value);
+  }
+
+  get poster(): string {
+    return this.getAttribute("poster") ?? "";
+  }
+  set poster(value: string) {
+    this.setAttribute("poster", value);
+  }
+
+  /** "none" waits with fetching until somebody plays. */
+  get preload(): "auto" | "none" {
+    return this.getAttribute("preload") === "none" ? "none" : "auto";
+  }
+  set preload(value: "auto" | "none") {
+    this.setAttribute("preload", value);
+  }
+
+  get controls(): boolean {
+    return parse.parseFlag(this.getAttribute("controls"));
+  }
+  set controls(value: boolean) {
+    this.toggleAttribute("controls", value);
+  }
+
+  get autoplay(): boolean {
+    return parse.parseFlag(this.getAttribute("autoplay"));
+  }
+  set autoplay(value: boolean) {
+    this.toggleAttribute("autoplay", value);
+  }
+
+  get loop(): boolean {
+    return parse.parseFlag(this.getAttribute("loop"));
+  }
+  set loop(value: boolean) {
+    this.toggleAttribute("loop", value);
+  }
+
+  /** Whether the statistics are shown. */
+  get stats(): boolean {
+    return parse.parseFlag(this.getAttribute("stats"));
+  }
+  set stats(value: boolean) {
+    this.toggleAttribute("stats", value);
+  }
+
+  /** Layers beyond the first, or "auto". */
+  get quality(): parse.Quality {
+    return parse.parseQuality(this.getAttribute("quality"));
+  }
+  set quality(value: parse.Quality) {
+    this.setAttribute("quality", String(value));
+  }
+
+  /** 0.1 to 4; the attribute is `speed`, and `playbackrate` is taken too. */
+  get playbackRate(): number {
+    return parse.parseSpeed(this.getAttribute("speed") ?? this.getAttribute("playbackrate"));
+  }
+  set playbackRate(value: number) {
+    this.setAttribute("speed", String(parse.parseSpeed(String(value))));
+  }
+
+  /** Whether motion is blended between frames. */
+  get interpolate(): boolean {
+    return parse.parseInterpolate(this.getAttribute("interpolate"));
+  }
+  set interpolate(value: boolean) {
+    this.setAttribute("interpolate", value ? "on" : "off");
+  }
+
+  get mode(): parse.Mode {
+    return parse.parseMode(this.getAttribute("mode"));
+  }
+  set mode(value: parse.Mode) {
+    this.setAttribute("mode", value);
+  }
+
+  get theme(): parse.Theme {
+    return parse.parseTheme(this.getAttribute("theme"));
+  }
+  set theme(value: parse.Theme) {
+    this.setAttribute("theme", value);
+  }
+
+  /** A CSS colour behind the scene; "" for the theme's. */
+  get background(): string {
+    return this.getAttribute("background") ?? "";
+  }
+  set background(value: string) {
+    this.setAttribute("background", value);
+  }
+}

@@ -1,0 +1,55 @@
+// What the element needs of something that draws, and of something that opens files. The element knows no WebGL.
+
+import type { Info, Packed, Playback, Shown } from "@meshreel/player-core/types";
+import type { VrActions } from "@meshreel/xr";
+import type { Mode, Quality } from "./attributes.ts";
+
+/** Numbers of the picture, for the overlay. */
+export interface PictureStats {
+  readonly triangles: number; // of the last picture
+  readonly gpuBytes: number; // of buffers and textures
+}
+
+/**
+ * Draws packed groups into a canvas and moves a camera. Events:
+ * `change` (a picture is wanted: the camera moved, a texture came), `camerachange`, `lost` and `restored` (the GPU's context),
+ * `vrstart` and `vrend`.
+ */
+export interface Stage extends EventTarget {
+  readonly canvas: HTMLCanvasElement;
+  readonly stats: PictureStats;
+  readonly presenting: boolean; // to a headset
+  mode: Mode;
+  background: string; // a CSS colour
+  camera: string; // as the attribute has it; "" fits the view
+  /** A new recording: forgets the last one's groups, fits the view. */
+  begin(info: Info): void;
+  prepare(packed: Packed): void;
+  release(packed: Packed): void;
+  /** Draws; true where the next picture will differ though time stands still (the camera glides). */
+  draw(shown: Shown | null): boolean;
+  /** All in CSS pixels; the lowest `covered` of them lie under the bar, and what is looked at is put into the middle of the others. */
+  resize(width: number, height: number, pixelRatio: number, covered: number): void;
+  fit(): void;
+  /** Turns the camera by radians, and brings it so many times closer. */
+  orbit(right: number, up: number, closer: number): void;
+  picture(): Promise<Blob>; // PNG
+  /** From then on `draw` is called by the headset's frames, not by the page's. */
+  enterVr(frame: (now: number) => void, actions: VrActions): Promise<void>;
+  exitVr(): void;
+  dispose(): void;
+}
+
+export interface Settings {
+  readonly quality: Quality;
+  readonly interpolate: boolean;
+  readonly loop: boolean;
+  readonly playbackRate: number;
+}
+
+/** Where playbacks and stages come from; tests put others in. */
+export interface Engine {
+  open(source: string | Blob, settings: Settings): Playback;
+  /** Throws where there is no WebGL 2. */
+  stage(canvas: HTMLCanvasElement): Stage;
+}

@@ -1,0 +1,227 @@
+// A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
+
+import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
+import { ReelScene } from "@meshreel/player-three";
+import { VrSession } from "@meshreel/xr";
+import type { VrActions } from "@meshreel/xr";
+import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import type { Mode } from "./attributes.ts";
+import type { PictureStats, Stage } from "./stage.ts";
+
+const FOV = 45; // degrees, of the picture's height
+const FROM = new Vector3(0.25, 0.25, 1).normalize(); // where a view that fits looks from
+const SHUN = 1.05; // of the distance at which everything just fits
+const STEEPEST = 0.01; // radians from straight above or below
+const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
+const FARTHEST = 20; // of its size: how far the camera goes
+const NEAR = 0.002; // of the camera's distance: what it sees. A background may reach far beyond the recording's box.
+const FAR = 50;
+
+export class ThreeStage extends EventTarget implements Stage {
+  readonly canvas: HTMLCanvasElement;
+  readonly #renderer: WebGLRenderer;
+  readonly #scene = new Scene();
+  readonly #content = new Group(); // what a headset moves
+  readonly #eye = new PerspectiveCamera(FOV, 1, 0.01, 1000);
+  readonly #orbit: OrbitControls;
+  readonly #stop = new AbortController();
+  #reel = new ReelScene();
+  #info: Info | null = null;
+  #shown: Shown | null = null;
+  #mode: Mode = "shaded";
+  #background = "";
+  #free = 1; // of the picture's height: what the bar leaves
+  #isFit = true; // nobody has moved the camera: it fits again when the picture's size changes
+  #session: VrSession | null = null;
+
+  constructor(canvas: HTMLCanvasElement) {
+    super();
+    this.canvas = canvas;
+    this.#renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.#scene.add(this.#content);
+    this.#content.add(this.#reel);
+    const { signal } = this.#stop;
+    canvas.addEventListener("webglcontextlost", () => this.dispatchEvent(new Event("lost")), { signal });
+    canvas.addEventListener("webglcontextrestored", () => this.dispatchEvent(new Event("restored")), { signal });
+    this.#orbit = new OrbitControls(this.#eye, canvas);
+    this.#orbit.enableDamping = glides();
+    this.#orbit.addEventListener("start", () => void (this.#isFit = false));
+    this.#orbit.addEventListener("change", () => this.#moved());
+  }
+
+  get stats(): PictureStats {
+    return { triangles: this.#shown ? this.#reel.triangles : 0, gpuBytes: this.#reel.gpuBytes };
+  }
+
+  get presenting(): boolean {
+    return this.#renderer.xr.isPresenting;
+  }
+
+  get mode(): Mode {
+    return this.#mode;
+  }
+
+  set mode(mode: Mode) {
+    this.#mode = this.#reel.mode = mode;
+  }
+
+  get background(): string {
+    return this.#background;
+  }
+
+  set background(colour: string) {
+    this.#background = colour;
+    this.#scene.background = new Color(colour); // not a clear colour: that would be lost with the context
+  }
+
+  get camera(): string {
+    return [...this.#eye.position.toArray(), ...this.#orbit.target.toArray()].map((value) => value.toFixed(3)).join(",");
+  }
+
+  set camera(text: string) {
+    const values = text.split(",").map(Number);
+    if (values.length !== 6 || !values.every(Number.isFinite)) {
+      this.fit();
+      return;
+    }
+    this.#look(new Vector3(...values.slice(0, 3)), new Vector3(...values.slice(3)));
+  }
+
+  begin(info: Info): void {
+    this.exitVr(); // a session's place is that of one recording
+    this.#reel.removeFromParent();
+    this.#reel.dispose();
+    this.#reel = new ReelScene();
+    this.#reel.mode = this.#mode;
+    this.#content.add(this.#reel);
+    this.#info = info;
+    this.#shown = null;
+    this.fit();
+  }
+
+  prepare(packed: Packed): void {
+    this.#reel.prepare(packed, this.#renderer);
+  }
+
+  release(packed: Packed): void {
+    this.#reel.release(packed);
+  }
+
+  draw(shown: Shown | null): boolean {
+    this.#shown = shown;
+    if (shown) this.#reel.show(shown);
+    this.#reel.visible = shown !== null;
+    const moves = !this.presenting && this.#orbit.update();
+    this.#renderer.render(this.#scene, this.#eye);
+    return moves;
+  }
+
+  resize(width: number, height: number, pixelRatio: number, covered: number): void {
+    if (this.presenting) return; // the headset has its own size
+    this.#renderer.setPixelRatio(pixelRatio);
+    this.#renderer.setSize(width, height, false);
+    this.#eye.aspect = width / height;
+    this.#free = Math.max(0.2, 1 - covered / height);
+    this.#eye.setViewOffset(width, height, 0, ((1 - this.#free) * height) / 2, width, height);
+    if (this.#isFit) this.fit();
+  }
+
+  fit(): void {
+    if (!this.#info) return;
+    const { middle } = this.#ball();
+    const half = Math.tan((FOV * Math.PI) / 360);
+    const distance = SHUN * distanceOf(this.#info.box, half * this.#eye.aspect, half * this.#free);
+    this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
+    this.#isFit = true;
+  }
+
+  orbit(right: number, up: number, closer: number): void {
+    const { target, minDistance, maxDistance } = this.#orbit;
+    const place = new Spherical().setFromVector3(this.#eye.position.clone().sub(target));
+    place.theta += right;
+    place.phi = Math.min(Math.PI - STEEPEST, Math.max(STEEPEST, place.phi - up));
+    place.radius = Math.min(maxDistance, Math.max(minDistance, place.radius / closer));
+    this.#look(new Vector3().setFromSpherical(place).add(target), target);
+  }
+
+  picture(): Promise<Blob> {
+    this.draw(this.#shown); // what was drawn before is gone with the picture that showed it
+    return new Promise((done, fail) => this.canvas.toBlob((blob) => (blob ? done(blob) : fail(new Error("no picture"))), "image/png"));
+  }
+
+  async enterVr(frame: (now: number) => void, actions: VrActions): Promise<void> {
+    if (this.#session !== null || !this.#info) return;
+    const { box } = this.#info;
+    const onend = (): void => {
+      this.#session = null;
+      this.dispatchEvent(new Event("vrend"));
+    };
+    const [renderer, camera, content] = [this.#renderer, this.#eye, this.#content];
+    this.#session = await VrSession.enter({ renderer, camera, content, box, actions, frame, onend });
+    this.dispatchEvent(new Event("vrstart"));
+  }
+
+  exitVr(): void {
+    void this.#session?.end();
+  }
+
+  dispose(): void {
+    this.exitVr();
+    this.#stop.abort();
+    this.#orbit.dispose();
+    this.#reel.dispose();
+    this.#renderer.dispose();
+    this.#renderer.forceContextLoss();
+  }
+
+  /** Around the whole recording. */
+  #ball(): { middle: Vector3; radius: number } {
+    const { minimum, size } = this.#info!.box;
+    const middle = new Vector3(...minimum).addScaledVector(new Vector3(...size), 0.5);
+    return { middle, radius: Math.hypot(...size) / 2 || 1 };
+  }
+
+  #look(eye: Vector3, target: Vector3): void {
+    this.#isFit = false;
+    this.#orbit.enableDamping = false; // a view that is asked for is there at once
+    this.#eye.position.copy(eye);
+    this.#orbit.target.copy(target);
+    this.#orbit.update();
+    this.#orbit.enableDamping = glides();
+    this.#moved();
+  }
+
+  /** Near and far follow the camera, so that depth has its precision where the recording is. */
+  #moved(): void {
+    if (this.#info && !this.presenting) {
+      const { middle, radius } = this.#ball();
+      const distance = this.#eye.position.distanceTo(middle);
+      this.#orbit.minDistance = CLOSEST * radius;
+      this.#orbit.maxDistance = FARTHEST * radius;
+      this.#eye.near = NEAR * Math.max(distance, radius);
+      this.#eye.far = FAR * Math.max(distance, radius);
+      this.#eye.updateProjectionMatrix();
+    }
+    this.dispatchEvent(new Event("change"));
+    this.dispatchEvent(new Event("camerachange"));
+  }
+}
+
+/** How far from a box's middle, in the direction FROM, all its corners are seen; tangents of half the angles of view are given. */
+function distanceOf({ size }: Box, wide: number, high: number): number {
+  const right = new Vector3(0, 1, 0).cross(FROM).normalize();
+  const up = FROM.clone().cross(right);
+  let distance = 0;
+  for (let k = 0; k < 8; k++) {
+    const corner = new Vector3(...size).multiply(new Vector3(k & 1 ? 0.5 : -0.5, k & 2 ? 0.5 : -0.5, k & 4 ? 0.5 : -0.5));
+    const aside = Math.max(Math.abs(corner.dot(right)) / wide, Math.abs(corner.dot(up)) / high);
+    distance = Math.max(distance, corner.dot(FROM) + aside);
+  }
+  return distance;
+}
+
+/** Whether the camera comes to rest softly. */
+function glides(): boolean {
+  return !matchMedia("(prefers-reduced-motion: reduce)").matches;
+}

@@ -1,0 +1,29 @@
+// The numbers of the statistics overlay, as lines of a name and a value.
+
+import type { Info, Stats } from "@meshreel/player-core/types";
+import { formatAmount, formatCount, formatRate } from "./format.ts";
+import type { PictureStats } from "./stage.ts";
+
+export interface Statistics extends Stats, PictureStats {
+  readonly fps: number; // pictures in the last second
+  readonly frameMs: number; // JavaScript for a picture on the main thread, median
+  readonly drawn: number; // pictures since the view was made
+}
+
+/** Lines of the overlay; `frame` counts from 0. */
+export function statisticsLines(stats: Statistics, info: Info | null, frame: number): (readonly [string, string])[] {
+  const most = info?.mostQuality ?? 0;
+  return [
+    ["Frame", info ? `${frame + 1} of ${info.frameCount}, ${Number(info.frameRate.toFixed(2))} fps` : "none yet"],
+    ["Rate", stats.mbps > 0 ? formatRate(stats.mbps) : "not known yet"],
+    ["Bandwidth", stats.bandwidthMbps > 0 ? formatRate(stats.bandwidthMbps) : "not known yet"],
+    ["Fetched", info ? `${formatAmount(stats.fetchedBytes, "B")} of ${formatAmount(info.size, "B")}` : formatAmount(stats.fetchedBytes, "B")],
+    ["Decode", `${stats.decodeMs.toFixed(1)} ms a group, load ${(stats.decodeLoad * 100).toFixed(0)} %`],
+    ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
+    ["Quality", most > 0 ? `${stats.quality} of ${most}` : "one only"],
+    ["Triangles", formatCount(stats.triangles)],
+    ["Display", stats.fps > 0 ? `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each` : "still"],
+    ["GPU memory", formatAmount(stats.gpuBytes, "B")],
+    ["Skipped groups", formatCount(stats.skippedGroups)],
+  ];
+}

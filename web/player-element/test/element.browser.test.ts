@@ -1,0 +1,163 @@
+// The element as HTML and scripts see it: its life, its events, its properties.
+
+import { expect, test } from "vitest";
+import { describeOnPage } from "./fixture.ts";
+
+describeOnPage("<meshreel-player>", (on) => {
+  test("nothing is asked of the GPU while it is paused, and a change draws once", async () => {
+    await on.shown();
+    await on.eventually((player) => player.statistics!.drawn > 0);
+    const count = () => on.page.evaluate(() => [engine.stages[0]!.draws, engine.playbacks[0]!.updates]);
+    const isStill = async () => {
+      const before = await count();
+      await on.page.waitForTimeout(300);
+      return (await count()).join() === before.join();
+    };
+    await expect.poll(isStill, { timeout: 10_000 }).toBe(true);
+    const before = await count();
+    await on.get((player) => player.fit());
+    await expect.poll(async () => (await count())[0]! - before[0]!).toBe(1);
+    await on.page.waitForTimeout(100);
+    expect((await count())[0]! - before[0]!).toBe(1);
+  });
+
+  test("a src that changes ends what was open before", async () => {
+    await on.shown();
+    await on.get((player) => void (player.src = "other.reel"));
+    await on.eventually((player) => player.readyState === 4 && player.currentSrc.endsWith("other.reel"));
+    expect(await on.page.evaluate(() => engine.playbacks.map(({ disposed }) => disposed))).toEqual([true, false]);
+    expect(await on.page.evaluate(() => engine.stages.length)).toBe(1);
+    await on.get((player) => player.removeAttribute("src"));
+    await on.eventually((player) => player.readyState === 0);
+    expect(await on.page.evaluate(() => engine.playbacks.every(({ disposed }) => disposed))).toBe(true);
+  });
+
+  test("removal disposes everything, a move nothing, and it works when put in again", async () => {
+    await on.put('<section></section><meshreel-player src="walk.reel" controls stats></meshreel-player>');
+    const disposed = () => on.page.evaluate(() => [...engine.playbacks, ...engine.stages].map((one) => one.disposed));
+    await on.get((player) => document.querySelector("section")!.append(player));
+    await on.page.evaluate(() => new Promise((done) => setTimeout(done)));
+    expect(await disposed()).toEqual([false, false]);
+    await on.get((player) => void (player.currentTime = 1));
+    await on.eventually((player) => !player.seeking);
+    await on.get((player) => {
+      Object.assign(globalThis, { kept: player });
+      player.remove();
+    });
+    await on.page.evaluate(() => new Promise((done) => setTimeout(done)));
+    expect(await disposed()).toEqual([true, true]);
+    expect(await on.page.evaluate("kept.shadowRoot.querySelectorAll('canvas').length")).toBe(0);
+    await on.page.evaluate("document.body.append(kept)");
+    await on.eventually((player) => player.readyState === 4);
+    expect(await on.get((player) => [player.currentTime, player.paused])).toEqual([1, true]);
+    await on.press("k");
+    await on.eventually((player) => player.currentTime > 1);
+  });
+
+  test("a player that was taken out leaves nothing behind", async () => {
+    const players = await on.page.evaluate(async () => {
+      document.body.replaceChildren();
+      const refs: WeakRef<Element>[] = [];
+      for (let i = 0; i < 5; i++) {
+        const player = document.createElement("meshreel-player");
+        Object.assign(player, { src: `gone${i}.reel`, controls: true, stats: true });
+        document.body.append(player);
+        await new Promise((done) => setTimeout(done, 60));
+        player.remove();
+        refs.push(new WeakRef(player));
+      }
+      engine.playbacks = [];
+      engine.stages = [];
+      Object.assign(globalThis, { refs });
+      return refs.length;
+    });
+    const devtools = await on.page.context().newCDPSession(on.page);
+    const alive = async () => {
+      await devtools.send("HeapProfiler.collectGarbage");
+      return on.page.evaluate("refs.filter((ref) => ref.deref()).length");
+    };
+    expect(players).toBe(5);
+    await expect.poll(alive, { timeout: 10_000 }).toBe(0);
+  });
+
+  test("two players on a page know nothing of each other", async () => {
+    await on.put('<meshreel-player id="a" src="a.reel" controls></meshreel-player><meshreel-player id="b" src="b.reel" controls></meshreel-player>');
+    await on.page.locator("#b .picture").focus();
+    await on.page.keyboard.press("k");
+    await on.page.keyboard.press("l");
+    const states = await on.page.evaluate(() => [...document.querySelectorAll("meshreel-player")].map((player) => [player.paused, player.loop]));
+    expect(states).toEqual([[true, false], [false, true]]);
+  });
+
+  test("autoplay plays, but not for those who want less motion", async () => {
+    await on.put('<meshreel-player src="walk.reel" autoplay></meshreel-player>');
+    expect(await on.get((player) => player.paused)).toBe(false);
+    await on.page.emulateMedia({ reducedMotion: "reduce" });
+    await on.put('<meshreel-player src="walk.reel" autoplay></meshreel-player>');
+    expect(await on.get((player) => player.paused)).toBe(true);
+  });
+
+  test("events come as a media element gives them", async () => {
+    await on.put('<meshreel-player></meshreel-player>', false);
+    await on.get((player) => {
+      const told: string[] = [];
+      Object.assign(globalThis, { told });
+      for (const type of ["loadstart", "loadedmetadata", "canplay", "play", "playing", "pause", "seeking", "seeked", "ended", "emptied"]) {
+        player.addEventListener(type, () => told.push(type));
+      }
+      player.src = "walk.reel";
+    });
+    await on.eventually((player) => player.readyState === 4);
+    await on.get((player) => void (player.currentTime = 1.9));
+    await on.eventually((player) => !player.seeking);
+    await on.get((player) => player.play());
+    await on.eventually((player) => player.ended);
+    await on.get((player) => player.load());
+    expect(await on.page.evaluate("told.join(' ')")).toMatch(
+      /^loadstart loadedmetadata canplay seeking seeked play playing pause ended emptied loadstart/, // it may be further by now
+    );
+    expect(await on.page.locator("button.play").count()).toBe(1);
+  });
+
+  test("at its end it offers to play again", async () => {
+    await on.shown();
+    await on.get((player) => void (player.currentTime = 1.95));
+    await on.press("k");
+    await on.eventually((player) => player.ended);
+    await expect.poll(() => on.page.locator("button.play").getAttribute("aria-label")).toBe("Play again");
+    await on.page.locator("button.play").click();
+    await on.eventually((player) => !player.ended && player.currentTime < 1);
+  });
+
+  test("properties set before the element is defined or the source is there are kept", async () => {
+    await on.put('<meshreel-player src="walk.reel" speed="2" quality="1" interpolate="off" loop mode="normal" t></meshreel-player>');
+    const { playbackRate, quality, interpolate, loop } = await on.page.evaluate(() => engine.playbacks[0]!);
+    expect({ playbackRate, quality, interpolate, loop }).toEqual({ playbackRate: 2, quality: 1, interpolate: false, loop: true });
+    expect(await on.page.evaluate(() => engine.stages[0]!.mode)).toBe("normal");
+    const time = await on.page.evaluate(async () => {
+      const player = document.createElement("meshreel-player");
+      player.currentTime = 0.5;
+      player.src = "walk.reel";
+      player.currentTime = 0.75;
+      document.body.append(player);
+      await new Promise((done) => player.addEventListener("canplay", done));
+      return player.currentTime;
+    });
+    expect(time).toBe(0.75);
+  });
+
+  test("playing without a source is refused with a reason", async () => {
+    await on.put("<meshreel-player></meshreel-player>", false);
+    expect(await on.get((player) => player.play().catch((error: Error) => error.message))).toContain("set src");
+    expect(await on.get((player) => [player.duration, player.paused, player.readyState])).toEqual([NaN, true, 0]);
+    expect(await on.get((player) => player.screenshot().catch((error: Error) => error.message))).toContain("no picture");
+  });
+
+  test("preload=none fetches only when somebody plays", async () => {
+    await on.put('<meshreel-player src="walk.reel" preload="none" controls></meshreel-player>', false);
+    await on.page.waitForTimeout(100);
+    expect(await on.page.evaluate(() => engine.playbacks.length)).toBe(0);
+    await on.page.locator("button.big").click();
+    await on.eventually((player) => !player.paused && player.readyState === 4);
+  });
+});

@@ -1,0 +1,308 @@
+// The built player with real recordings, as it is embedded: in pages, frames, under strict policies, from another origin.
+
+import { readdirSync, readFileSync } from "node:fs";
+import { join } from "node:path";
+import { gzipSync } from "node:zlib";
+import type { Frame, Page } from "playwright-core";
+import { afterAll, beforeAll, expect, test } from "vitest";
+import { describeInBrowser } from "../../test/browser.ts";
+import { buildPlayer, Site } from "./product.ts";
+
+const PLAYER = '<meshreel-player src="scene.reel" controls style="width:320px;height:240px;aspect-ratio:auto"></meshreel-player>';
+const SCRIPT = '<script type="module" src="player/meshreel-player.js"></script>';
+const STRICT = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' data:; connect-src 'self'";
+
+const ready = (page: Page | Frame) =>
+  page.waitForFunction(() => document.querySelector("meshreel-player")!.readyState >= 2 && document.querySelector("meshreel-player")!.statistics!.triangles > 0);
+const ended = (page: Page | Frame) => page.waitForFunction(() => document.querySelector("meshreel-player")!.ended);
+
+describeInBrowser("the built player", () => {
+  const site = new Site();
+  beforeAll(() => site.open(), 120_000);
+  afterAll(() => site.close());
+
+  /** How many of the picture's pixels are not its background. */
+  async function covered(page: Page | Frame): Promise<number> {
+    return page.evaluate(async () => {
+      const picture = await createImageBitmap(await document.querySelector("meshreel-player")!.screenshot());
+      const context = new OffscreenCanvas(picture.width, picture.height).getContext("2d")!;
+      context.drawImage(picture, 0, 0);
+      const { data } = context.getImageData(0, 0, picture.width, picture.height);
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4) if (data[i] !== data[0] || data[i + 1] !== data[1] || data[i + 2] !== data[2]) count++;
+      return count / (data.length / 4);
+    });
+  }
+
+  /** The rows and columns of the picture between which it is not white. */
+  async function extent(page: Page): Promise<{ top: number; bottom: number; left: number; right: number }> {
+    return page.evaluate(async () => {
+      const picture = await createImageBitmap(await document.querySelector("meshreel-player")!.screenshot());
+      const { width, height } = picture;
+      const context = new OffscreenCanvas(width, height).getContext("2d")!;
+      context.drawImage(picture, 0, 0);
+      const { data } = context.getImageData(0, 0, width, height);
+      const found = { top: height, bottom: -1, left: width, right: -1 };
+      for (let i = 0; i < width * height; i++) {
+        if (Math.min(data[4 * i]!, data[4 * i + 1]!, data[4 * i + 2]!) > 250) continue;
+        const [x, y] = [i % width, Math.floor(i / width)];
+        Object.assign(found, {
+          top: Math.min(found.top, y), bottom: Math.max(found.bottom, y), left: Math.min(found.left, x), right: Math.max(found.right, x),
+        });
+      }
+      return found;
+    });
+  }
+
+  test("its page plays the recording that the address names", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/scene.reel&autoplay&stats");
+    await ready(page);
+    expect(await page.title()).toBe("scene · meshreel");
+    expect(await covered(page)).toBeGreaterThan(0.02);
+    await ended(page);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  for (const name of ["layers", "mixed", "laplacian", "draco"]) {
+    test(`plays ${name}.reel to its end`, async () => {
+      const { page, errors } = await site.visit(`player/index.html?src=/${name}.reel&autoplay`);
+      await ready(page);
+      await ended(page);
+      expect(await page.evaluate(() => document.querySelector("meshreel-player")!.statistics!.skippedGroups)).toBe(0);
+      expect(errors).toEqual([]);
+      await page.close();
+    });
+  }
+
+  test("?bench tells what was decoded and drawn, as text and as JSON", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&bench=2");
+    const text = await page.waitForFunction(() => {
+      const said = document.querySelector("pre")?.textContent ?? "";
+      return said.includes("{") ? said : null;
+    });
+    const said = (await text.jsonValue())!;
+    expect(said).toContain("JavaScript a picture");
+    const report = JSON.parse(said.slice(said.indexOf("{")));
+    expect(report.pictures).toBeGreaterThan(0);
+    expect(report.scriptMs.median).toBeGreaterThan(0);
+    expect(report.triangles).toBeGreaterThan(0);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("the address sets time, shading and camera", async () => {
+    const { page } = await site.visit("player/index.html?src=/scene.reel&t=0.1&mode=normal&quality=0&loop");
+    await ready(page);
+    const state = await page.evaluate(() => {
+      const { currentTime, mode, quality, loop, paused } = document.querySelector("meshreel-player")!;
+      return { currentTime, mode, quality, loop, paused };
+    });
+    expect(state).toEqual({ currentTime: 0.1, mode: "normal", quality: 0, loop: true, paused: true });
+    await page.close();
+  });
+
+  test("a view that fits lies above the bar, in any shape, until somebody moves the camera", async () => {
+    const { page } = await site.visit("player/index.html?src=/layers.reel&background=white");
+    await ready(page);
+    const bar = (await page.locator(".bar").boundingBox())!;
+    for (const [width, height] of [[320, 240], [240, 400], [640, 200]] as const) {
+      await page.setViewportSize({ width, height });
+      await page.waitForFunction(([w, h]) => document.querySelector("meshreel-player")!.shadowRoot!.querySelector("canvas")!.width === w && innerHeight === h, [width, height] as const);
+      const { top, bottom, left, right } = await extent(page);
+      expect([top > 0, bottom < height - bar.height, left > 0, right < width - 1], `${width} x ${height}: ${[top, bottom, left, right]}`).toEqual([true, true, true, true]);
+    }
+    await page.locator(".picture").press("Shift+ArrowUp");
+    const moved = await page.evaluate(() => document.querySelector("meshreel-player")!.camera);
+    await page.setViewportSize({ width: 320, height: 240 });
+    await page.waitForTimeout(300);
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.camera)).toBe(moved);
+    await page.close();
+  });
+
+  test("the quality that is chosen is shown, also while it is paused", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&quality=0");
+    await ready(page);
+    const shown = (quality: number) =>
+      page.waitForFunction((wanted) => document.querySelector("meshreel-player")!.statistics!.quality === wanted, quality);
+    await shown(0);
+    const most = await page.evaluate(() => document.querySelector("meshreel-player")!.info!.mostQuality);
+    expect(most).toBeGreaterThan(0);
+    await page.locator("button.more").click();
+    await page.getByLabel("Quality").selectOption({ label: "Full" });
+    await shown(most);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("a file that is not there is told", async () => {
+    const { page } = await site.visit("player/index.html?src=/none.reel");
+    await page.getByRole("alert").waitFor();
+    expect(await page.getByRole("alert").textContent()).toContain("The recording was not found");
+    await page.close();
+  });
+
+  test("a file that is no .reel is told", async () => {
+    site.write("text.reel", "this is a text, and it is long enough to have had a head if it had been one".repeat(9));
+    const { page } = await site.visit("player/index.html?src=/text.reel");
+    await page.getByRole("alert").waitFor();
+    expect(await page.getByRole("alert").textContent()).toContain("This is not a .reel file");
+    await page.close();
+  });
+
+  test("a local file is opened and played", async () => {
+    const { page } = await site.visit("player/index.html");
+    await page.locator("input[type=file]").setInputFiles(join(site.folder, "layers.reel"));
+    await ready(page);
+    await ended(page);
+    await page.close();
+  });
+
+  test("a strict content security policy lets it play", async () => {
+    site.write("strict.html", `<!doctype html><link rel="icon" href="data:,">${SCRIPT}<meshreel-player src="scene.reel" controls autoplay></meshreel-player>`);
+    const url = await site.serveAgain({ "Content-Security-Policy": STRICT });
+    const { page, errors } = await site.visit(`${url}strict.html`);
+    await ready(page);
+    await ended(page);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("it plays in a frame without rights, and offers no full screen there", async () => {
+    site.write("inner.html", `<!doctype html>${SCRIPT}${PLAYER}`);
+    const frameOf = `<iframe src="inner.html" sandbox="allow-scripts allow-same-origin" allow="fullscreen 'none'" width="340" height="260"></iframe>`;
+    site.write("frame.html", `<!doctype html><link rel="icon" href="data:,">${frameOf}`);
+    const { page, errors } = await site.visit("frame.html");
+    const frame = page.frame({ url: /inner/ })!;
+    await frame.waitForFunction(() => customElements.get("meshreel-player"));
+    await ready(frame);
+    await frame.locator("button.play").click();
+    await ended(frame);
+    expect(await frame.locator("button.fullscreen").isVisible()).toBe(false);
+    expect(await covered(frame)).toBeGreaterThan(0.02);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("player and recording may come from another origin", async () => {
+    const url = await site.serveAgain({ "Access-Control-Allow-Origin": "*", "Access-Control-Expose-Headers": "Content-Range, ETag" });
+    site.write("far.html", `<!doctype html><link rel="icon" href="data:,"><script type="module" src="${url}player/meshreel-player.js"></script>
+      <meshreel-player src="${url}scene.reel" controls autoplay></meshreel-player>`);
+    const { page, errors } = await site.visit("far.html");
+    await ready(page);
+    await ended(page);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("a GPU context that is lost comes back with the picture", async () => {
+    const { page } = await site.visit("player/index.html?src=/scene.reel");
+    await ready(page);
+    const before = await covered(page);
+    await page.evaluate(async () => {
+      const player = document.querySelector("meshreel-player")!;
+      const gl = player.shadowRoot!.querySelector("canvas")!.getContext("webgl2")!;
+      const loss = gl.getExtension("WEBGL_lose_context")!;
+      const told = (type: string) => new Promise((done) => player.addEventListener(type, done, { once: true }));
+      const [lost, restored] = [told("lost"), told("restored")];
+      loss.loseContext();
+      await lost;
+      await new Promise((done) => setTimeout(done, 100)); // it cannot be asked back within the event
+      loss.restoreContext();
+      await restored;
+    });
+    expect(await page.locator(".toast").textContent()).toContain("graphics card");
+    await expect.poll(() => covered(page)).toBeCloseTo(before, 2);
+    await page.close();
+  });
+
+  test("two players share the workers, and none is left when both are gone", async () => {
+    site.write("two.html", `<!doctype html><link rel="icon" href="data:,">${SCRIPT}${PLAYER}${PLAYER}`);
+    const { page, errors } = await site.visit("two.html");
+    await page.waitForFunction(() => [...document.querySelectorAll("meshreel-player")].every((player) => player.readyState >= 2));
+    const many = page.workers().length;
+    expect(many).toBeGreaterThan(0);
+    await page.evaluate(() => document.querySelector("meshreel-player")!.remove());
+    await page.waitForTimeout(1500);
+    expect(page.workers().length).toBe(many);
+    await page.evaluate(() => document.querySelector("meshreel-player")!.remove());
+    await expect.poll(() => page.workers().length, { timeout: 5000 }).toBe(0);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test("nothing of a player that was taken out stays in memory", async () => {
+    site.write("many.html", `<!doctype html><link rel="icon" href="data:,">${SCRIPT}`);
+    const { page, errors } = await site.visit("many.html");
+    await page.evaluate(() => customElements.whenDefined("meshreel-player").then(() => undefined));
+    const refs = await page.evaluateHandle(async () => {
+      const refs: WeakRef<object>[] = [];
+      for (let i = 0; i < 20; i++) { // more than a browser has WebGL contexts
+        const player = document.createElement("meshreel-player");
+        Object.assign(player, { src: "scene.reel", controls: true });
+        document.body.append(player);
+        await new Promise((done) => player.addEventListener("canplay", done, { once: true }));
+        refs.push(new WeakRef(player), new WeakRef(player.shadowRoot!.querySelector("canvas")!));
+        player.remove();
+      }
+      return refs;
+    });
+    const devtools = await page.context().newCDPSession(page);
+    await expect.poll(async () => {
+      await devtools.send("HeapProfiler.collectGarbage");
+      return refs.evaluate((all) => all.filter((ref) => ref.deref()).length);
+    }, { timeout: 15_000 }).toBe(0);
+    expect(errors).toEqual([]);
+    await page.close();
+  }, 90_000);
+
+  test("twenty loops leave heap and GPU memory as they were", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/scene.reel&autoplay&loop&speed=4");
+    await ready(page);
+    const devtools = await page.context().newCDPSession(page);
+    const loops = (count: number) => page.evaluate((wanted) => new Promise<void>((done) => {
+      const player = document.querySelector("meshreel-player")!;
+      let [before, seen] = [player.currentTime, 0];
+      const look = () => {
+        if (player.currentTime < before) seen++;
+        before = player.currentTime;
+        if (seen < wanted) requestAnimationFrame(look);
+        else done();
+      };
+      look();
+    }), count);
+    const memory = async () => {
+      await devtools.send("HeapProfiler.collectGarbage");
+      const { usedSize } = await devtools.send("Runtime.getHeapUsage");
+      return { heap: usedSize, gpu: await page.evaluate(() => document.querySelector("meshreel-player")!.statistics!.gpuBytes) };
+    };
+    await loops(40); // until the browser has compiled what runs often, which takes memory once
+    const before = await memory();
+    await loops(20);
+    const after = await memory();
+    expect(after.heap / before.heap).toBeLessThan(1.05);
+    expect(after.gpu / before.gpu).toBeLessThan(1.05);
+    expect(errors).toEqual([]);
+    await page.close();
+  }, 60_000);
+
+  test("two builds give the same bytes, without maps and without addresses of others", async () => {
+    await buildPlayer(join(site.folder, "again"));
+    const files = readdirSync(join(site.folder, "player")).sort();
+    expect(readdirSync(join(site.folder, "again")).sort()).toEqual(files);
+    expect(files).toEqual(["LICENSES.txt", "core.wasm", "draco.wasm", "index.html", "meshreel-player.js", "page.css", "page.js", "worker.js"]);
+    for (const name of files) {
+      const bytes = readFileSync(join(site.folder, "player", name));
+      expect(bytes.equals(readFileSync(join(site.folder, "again", name))), name).toBe(true);
+      if (name.endsWith(".js")) expect(bytes.toString(), name).not.toMatch(/sourceMappingURL|\beval\(|new Function\(|fetch\(["'`]https?:/);
+    }
+    const licences = readFileSync(join(site.folder, "player/LICENSES.txt"), "utf8");
+    for (const text of ["three.js", "The MIT License", "draco3d", "Apache License", "Eigen"]) expect(licences).toContain(text);
+  }, 60_000);
+
+  test("the player is small enough for a page", () => {
+    const size = (name: string) => gzipSync(readFileSync(join(site.folder, "player", name))).length;
+    expect(size("meshreel-player.js")).toBeLessThan(220_000);
+    expect(size("worker.js") + size("core.wasm") + size("draco.wasm")).toBeLessThan(250_000);
+  });
+});

@@ -1,0 +1,201 @@
+import { describe, expect, test } from "vitest";
+import * as parse from "../src/attributes.ts";
+import { modeChoices, nextMode, qualityChoices, qualityValue, speedChoices } from "../src/controls/choices.ts";
+import { chosenFile } from "../src/drop.ts";
+import { formatAmount, formatRate, formatSpeed, formatTime, recordingName, speakTime } from "../src/format.ts";
+import { actionOf, KEYS, seekStep, takesKey } from "../src/keyboard.ts";
+import { explain } from "../src/messages.ts";
+import { readParameters, readTime } from "../src/parameters.ts";
+import { ranges } from "../src/ranges.ts";
+import { statisticsLines } from "../src/stats.ts";
+import { differs, goesOn } from "../src/view.ts";
+import { FakePlayback, INFO } from "./fake.ts";
+
+describe("attributes", () => {
+  test("a speed is held between 0.1 and 4, and is 1 where it is no number", () => {
+    expect(["0.5", "9", "-2", "fast", "", null, "NaN", "Infinity"].map(parse.parseSpeed)).toEqual([0.5, 4, 0.1, 1, 1, 1, 1, 1]);
+  });
+  test("a quality is a whole number from 0, else auto", () => {
+    expect(["0", " 3 ", "auto", "-1", "1.5", "", null].map(parse.parseQuality)).toEqual([0, 3, "auto", "auto", "auto", "auto", "auto"]);
+  });
+  test("a mode that is not known is shaded", () => {
+    expect(["normal", "WIREFRAME", "color", "colour", "x", null].map(parse.parseMode)).toEqual([
+      "normal", "wireframe", "colour", "colour", "shaded", "shaded",
+    ]);
+  });
+  test("interpolation is on unless it is switched off", () => {
+    expect([null, "", "on", "off", "false", "0"].map(parse.parseInterpolate)).toEqual([true, true, true, false, false, false]);
+  });
+  test("a flag that says false is off, as those who write it mean", () => {
+    expect([null, "", "loop", "false"].map(parse.parseFlag)).toEqual([false, true, true, false]);
+  });
+  test("a theme is light, dark or the system's", () => {
+    expect(["light", "Dark", "pink", null].map(parse.parseTheme)).toEqual(["light", "dark", "auto", "auto"]);
+  });
+});
+
+describe("numbers as text", () => {
+  test("times have minutes, hours where needed, and tenths where wanted", () => {
+    expect([0, 9.99, 65, 3600 + 125].map((seconds) => formatTime(seconds))).toEqual(["0:00", "0:09", "1:05", "1:02:05"]);
+    expect([0, 3.25, 59.99].map((seconds) => formatTime(seconds, true))).toEqual(["0:00.0", "0:03.2", "0:59.9"]);
+  });
+  test("a time just below a tenth by rounding is that tenth", () => {
+    expect(formatTime(0.1 + 0.2 - 4e-17, true)).toBe("0:00.3");
+    expect(formatTime(7 / 10 - 1e-12, true)).toBe("0:00.7");
+  });
+  test("times that are none are zero", () => {
+    expect([NaN, -3, Infinity].map((seconds) => formatTime(seconds))).toEqual(["0:00", "0:00", "0:00"]);
+  });
+  test("times are spoken with units", () => {
+    expect([0, 1, 61.5, 120].map(speakTime)).toEqual(["0 seconds", "1 second", "1 minute 1.5 seconds", "2 minutes 0 seconds"]);
+  });
+  test("amounts have three digits and a power of 1000", () => {
+    expect([0, 999, 1000, 12_340, 999_600, 1.5e9].map((value) => formatAmount(value, "B"))).toEqual([
+      "0 B", "999 B", "1.00 kB", "12.3 kB", "1.00 MB", "1.50 GB",
+    ]);
+    expect(formatRate(2.414)).toBe("2.41 Mbit/s");
+  });
+  test("a recording's name is the last of its address without its ending", () => {
+    expect(["https://a.b/c/walk%20one.reel?x=1#t", "", "https://a.b/%ZZ.reel"].map(recordingName)).toEqual(["walk one", "meshreel", "%ZZ"]);
+    expect(formatSpeed(0.25)).toBe("0.25×");
+  });
+});
+
+describe("keys", () => {
+  test("each key of the help overlay has its action, in upper case too", () => {
+    for (const [name, action] of KEYS.flatMap(({ keys }) => Object.entries(keys))) {
+      const shiftKey = name.startsWith("Shift+");
+      const key = name.replace("Shift+", "");
+      expect(actionOf({ key, shiftKey })).toBe(action);
+      if (key.length === 1) expect(actionOf({ key: key.toUpperCase(), shiftKey: true })).toBe(action);
+      else expect(actionOf({ key, shiftKey: !shiftKey })).not.toBe(action);
+    }
+  });
+  test("keys with Ctrl, Alt or Meta belong to the browser", () => {
+    for (const modifier of ["ctrlKey", "altKey", "metaKey"]) expect(actionOf({ key: "f", [modifier]: true })).toBeNull();
+    expect(actionOf({ key: "q" })).toBeNull();
+  });
+  test("a form field keeps its keys, a button its Space, the seek bar none", () => {
+    expect(takesKey({ localName: "input", type: "text" }, "k")).toBe(true);
+    expect(takesKey({ localName: "input", type: "range" }, "ArrowLeft")).toBe(false);
+    expect(takesKey({ localName: "textarea" }, "f")).toBe(true);
+    expect(takesKey({ localName: "select" }, "ArrowDown")).toBe(true);
+    expect(takesKey({ localName: "div", isContentEditable: true }, "f")).toBe(true);
+    expect([" ", "k"].map((key) => takesKey({ localName: "button" }, key))).toEqual([true, false]);
+    expect(takesKey({ localName: "div" }, " ")).toBe(false);
+  });
+  test("an arrow seeks a tenth of a short recording and five seconds of a long one", () => {
+    expect([2, 600].map(seekStep)).toEqual([0.2, 5]);
+  });
+});
+
+describe("menus", () => {
+  test("a speed that is none of the usual stands among them", () => {
+    expect(speedChoices(1).map(({ value }) => value)).not.toContain("0.6");
+    expect(speedChoices(0.6).map(({ value }) => value).slice(2, 5)).toEqual(["0.5", "0.6", "0.75"]);
+  });
+  test("qualities go from full to lowest below auto", () => {
+    const choices = qualityChoices(INFO.mostQuality, "auto");
+    expect(choices.map(({ value }) => value)).toEqual(["auto", "3", "2", "1", "0"]);
+    expect(choices.map(({ text }) => text)).toEqual(["Auto", "Full", "Level 2 of 3", "Level 1 of 3", "Lowest"]);
+  });
+  test("of many qualities some are offered, and always the one that is set", () => {
+    const values = qualityChoices(40, 7).map(({ value }) => value);
+    expect(values).toHaveLength(8);
+    expect(values).toContain("7");
+    expect(values.slice(0, 2)).toEqual(["auto", "40"]);
+    expect(values.at(-1)).toBe("0");
+  });
+  test("a quality beyond the richest is the richest", () => {
+    expect(qualityValue(3, 9)).toBe("3");
+    expect(qualityValue(3, "auto")).toBe("auto");
+    expect(qualityChoices(0, 9).map(({ value }) => value)).toEqual(["auto", "0"]);
+  });
+  test("the next mode of the last is the first", () => {
+    const all = modeChoices().map(({ value }) => value);
+    let mode = parse.MODES[0] as parse.Mode;
+    for (const expected of [...all.slice(1), all[0]]) expect((mode = nextMode(mode))).toBe(expected);
+  });
+});
+
+describe("messages", () => {
+  const error = (name: string, message: string) => Object.assign(new Error(message), { name });
+  test("errors are told in plain words with the exact ones below", () => {
+    const message = explain(error("SourceError", "http://x/a.reel: not found (404), check the address"));
+    expect(message.title).toBe("The recording was not found");
+    expect(message.detail).toContain("404");
+    expect(message.retry).toBe(true);
+  });
+  test("each kind of failure has its own words", () => {
+    const kinds = [
+      error("FormatError", "not a .reel file: the signature is missing"), error("FormatError", "format version 9: this player knows version 1, update it"),
+      error("FormatError", "the head is damaged: its checksum does not match"), error("SourceError", "http://x: no answer"),
+      error("SourceError", "http://x: the server answers 503, not the file"), error("Error", "WebGL 2 is not available"), error("Error", "else"),
+    ];
+    expect(new Set(kinds.map((kind) => explain(kind).title)).size).toBe(kinds.length);
+    expect(explain(kinds[1]!).retry).toBe(false);
+  });
+  test("digits of an address are no status", () => {
+    expect(explain(error("FormatError", "http://x:404/503.reel: 12 bytes too many")).title).toBe("This file is damaged");
+  });
+});
+
+describe("drawing only what changed", () => {
+  const shown = { frame: 3, blend: 0.5, groups: [null], background: null };
+  test("the same frame and blend of the same groups is no new picture", () => {
+    expect(differs(shown, { ...shown })).toBe(false);
+    expect(differs(null, shown)).toBe(false);
+    expect(differs(shown, null)).toBe(true);
+    expect(differs({ ...shown, blend: 0.6 }, shown)).toBe(true);
+    expect(differs({ ...shown, groups: [{} as never] }, shown)).toBe(true);
+    expect(differs({ ...shown, background: {} as never }, shown)).toBe(true);
+  });
+  test("a paused playback that has shown something needs no pictures", () => {
+    const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
+    expect(goesOn(playback, null)).toBe(true);
+    expect(goesOn(playback, shown)).toBe(false);
+    playback.seeking = true;
+    expect(goesOn(playback, shown)).toBe(true);
+    playback.seeking = playback.paused = false;
+    expect(goesOn(playback, shown)).toBe(true);
+    playback.info = { ...INFO, frameCount: 0 };
+    expect(goesOn(playback, null)).toBe(false);
+    playback.dispose();
+  });
+});
+
+describe("small parts", () => {
+  test("of dropped files the first .reel is taken", () => {
+    expect(chosenFile([{ name: "a.txt" }, { name: "b.REEL" }])?.name).toBe("b.REEL");
+    expect(chosenFile([{ name: "a.txt" }])?.name).toBe("a.txt");
+    expect(chosenFile([])).toBeUndefined();
+  });
+  test("ranges are as those of a media element", () => {
+    const span = ranges(1, 2);
+    expect([span.length, span.start(0), span.end(0)]).toEqual([1, 1, 2]);
+    expect(() => span.start(1)).toThrow(/range 1 of 1/);
+    expect([ranges(2, 2).length, ranges(0, NaN).length]).toEqual([0, 0]);
+  });
+  test("the statistics name what the overlay must show", () => {
+    const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
+    const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
+    expect(Object.fromEntries(lines)).toMatchObject({
+      Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Quality: "3 of 3",
+      "Skipped groups": "0", Display: "60 fps, 0.4 ms each",
+    });
+    playback.dispose();
+  });
+});
+
+describe("the address of the page", () => {
+  test("parameters are attributes; flags that say no take them away", () => {
+    const { attributes, time, bench } = readParameters("?src=a%20b.reel&loop&autoplay=1&controls=0&mode=normal&quality=2&evil=1&speed=&t=1:05.5&bench");
+    expect([...attributes]).toEqual([
+      ["src", "a b.reel"], ["mode", "normal"], ["quality", "2"], ["autoplay", ""], ["loop", ""], ["controls", null],
+    ]);
+    expect([time, bench]).toEqual([65.5, true]);
+  });
+  test("a time that is none is the start", () => {
+    expect(["", "12.5", "2s", "1:00:01", "-4", "1e9", "x", null].map(readTime)).toEqual([0, 12.5, 2, 3601, 0, 0, 0, 0]);
+  });
+});

@@ -1,0 +1,75 @@
+// Materials: one set of uniforms for each part of the scene, one program for each way its vertices come.
+
+import { DoubleSide, GLSL3, RawShaderMaterial } from "three";
+import type { DataTexture, IUniform } from "three";
+import { EDGE_COLOR } from "./colors.ts";
+import type { Vector } from "./octahedral.ts";
+import { surfaceVertex, SURFACE_FRAGMENT } from "./shaders.ts";
+import type { Feed } from "./shaders.ts";
+
+/** Lit clay; rgb = (n + 1) / 2; lit clay with its triangles' edges; an unlit colour of each track. */
+export const MODES = ["shaded", "normal", "wireframe", "colour"] as const;
+export type Mode = (typeof MODES)[number];
+
+/** Uniforms that all parts share. */
+export interface Look {
+  readonly mode: IUniform<number>;
+  readonly flatNormals: IUniform<boolean>;
+}
+
+export function makeLook(): Look {
+  return { mode: { value: MODES.indexOf("shaded") }, flatNormals: { value: false } };
+}
+
+/** Uniforms of a part: which vertices of which frames it shows. Names as in shaders.ts. */
+export interface PartUniforms {
+  readonly boxMinimum: IUniform<Vector>;
+  readonly boxSize: IUniform<Vector>;
+  readonly vertices: IUniform<DataTexture | null>;
+  readonly movingCount: IUniform<number>;
+  readonly here: IUniform<number>;
+  readonly next: IUniform<number>;
+  readonly behind: IUniform<number>;
+  readonly blend: IUniform<number>;
+}
+
+export function makeUniforms(): PartUniforms {
+  return {
+    boxMinimum: { value: [0, 0, 0] },
+    boxSize: { value: [0, 0, 0] },
+    vertices: { value: null },
+    movingCount: { value: 0 },
+    here: { value: 0 },
+    next: { value: 0 },
+    behind: { value: 0 },
+    blend: { value: 0 },
+  };
+}
+
+export interface Paint {
+  readonly clay: Vector;
+  readonly color: Vector;
+}
+
+/** A material that draws what `uniforms` say; its own values change with them, it need not be told. */
+export function surfaceMaterial(feed: Feed, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
+  return new RawShaderMaterial({
+    name: `meshreel ${feed}`,
+    glslVersion: GLSL3,
+    vertexShader: surfaceVertex(feed),
+    fragmentShader: SURFACE_FRAGMENT,
+    defines: {
+      NORMAL_MODE: MODES.indexOf("normal"),
+      COLOUR_MODE: MODES.indexOf("colour"),
+      ...(feed === "corner" ? { EDGES: 1 } : {}),
+    },
+    uniforms: {
+      ...look,
+      ...uniforms,
+      clay: { value: paint.clay },
+      color: { value: paint.color },
+      edgeColor: { value: EDGE_COLOR },
+    },
+    side: DoubleSide,
+  });
+}

@@ -1,0 +1,99 @@
+// A part of the scene: a track, or the background. Its two meshes stay; what they show is swapped.
+
+import { BufferGeometry, Group, Mesh } from "three";
+import type { RawShaderMaterial } from "three";
+import type { PackedGroup } from "@meshreel/player-core/types";
+import { makeUniforms, surfaceMaterial } from "./materials.ts";
+import type { Look, Paint, PartUniforms } from "./materials.ts";
+import { localFrame } from "./ranges.ts";
+import type { Feed } from "./shaders.ts";
+import type { Upload } from "./upload.ts";
+
+const NOTHING = new BufferGeometry();
+
+/** Shows one upload at a time. After the first picture of an upload nothing is allocated. */
+export class Part extends Group {
+  readonly #uniforms: PartUniforms = makeUniforms();
+  readonly #plain: RawShaderMaterial;
+  readonly #edged: RawShaderMaterial;
+  readonly #faces: Mesh<BufferGeometry, RawShaderMaterial>;
+  readonly #extra: Mesh<BufferGeometry, RawShaderMaterial>;
+  #edges = false;
+  #upload: Upload | null = null;
+
+  constructor(feed: Feed, look: Look, paint: Paint) {
+    super();
+    this.#plain = surfaceMaterial(feed, look, this.#uniforms, paint);
+    this.#edged = surfaceMaterial("corner", look, this.#uniforms, paint);
+    this.#faces = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, this.#plain);
+    this.#extra = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, this.#plain);
+    this.add(this.#faces, this.#extra);
+    this.visible = false;
+  }
+
+  get upload(): Upload | null {
+    return this.#upload;
+  }
+
+  /** Whether the edges of triangles are drawn, from the next `show` on. */
+  set edges(edges: boolean) {
+    if (edges === this.#edges) return;
+    this.hide();
+    this.#edges = edges;
+    this.#faces.material = this.#extra.material = edges ? this.#edged : this.#plain;
+  }
+
+  /** Shows nothing, and keeps no reference to what it showed. */
+  hide(): void {
+    if (this.#upload === null) return;
+    this.visible = false;
+    this.#upload = null;
+    this.#faces.geometry = this.#extra.geometry = NOTHING;
+    this.#uniforms.vertices.value = null;
+  }
+
+  /** Shows a frame of the recording and what is `blend` of the way to the next one. */
+  show(upload: Upload, frame: number, blend: number): void {
+    if (upload !== this.#upload) this.#take(upload);
+    if (upload.packed.kind === "static") return;
+    const extra = this.#extra.geometry === NOTHING ? null : this.#extra.geometry;
+    this.#extra.visible = setFrame(this.#uniforms, extra, upload.packed, frame, blend);
+  }
+
+  override dispose(): void {
+    super.dispose();
+    this.hide();
+    this.#plain.dispose();
+    this.#edged.dispose();
+  }
+
+  #take(upload: Upload): void {
+    this.#upload = upload;
+    this.visible = true;
+    this.#faces.geometry = upload.faces(this.#edges);
+    this.#extra.geometry = upload.extra(this.#edges) ?? NOTHING;
+    this.#extra.visible = false;
+    setUpload(this.#uniforms, upload);
+  }
+}
+
+/** What is the same in all frames. To be called after the upload's geometry was asked for, which may make the texture. */
+export function setUpload(uniforms: PartUniforms, upload: Upload): void {
+  uniforms.boxMinimum.value = upload.packed.box.minimum;
+  uniforms.boxSize.value = upload.packed.box.size;
+  uniforms.vertices.value = upload.texture;
+  uniforms.movingCount.value = upload.packed.vertexCount;
+}
+
+/** Sets the frame, and the range of what single frames show besides; true where this frame shows any. */
+export function setFrame(uniforms: PartUniforms, extra: BufferGeometry | null, group: PackedGroup, frame: number, blend: number): boolean {
+  const { frameCount, vertexCount, extraStarts } = group;
+  const t = localFrame(group, frame);
+  uniforms.here.value = t * vertexCount;
+  uniforms.next.value = Math.min(t + 1, frameCount - 1) * vertexCount;
+  uniforms.behind.value = (frameCount - 1) * vertexCount;
+  uniforms.blend.value = blend;
+  const count = extraStarts[t + 1] - extraStarts[t];
+  extra?.setDrawRange(extraStarts[t], count);
+  return count > 0;
+}

@@ -1,0 +1,160 @@
+// The scene of a recording: takes packed values ahead of time, shows any of them with a few uniforms.
+
+import { Group } from "three";
+import type { WebGLRenderer } from "three";
+import type { Packed, Shown } from "@meshreel/player-core/types";
+import { BACKGROUND_CLAY, BACKGROUND_COLOR, trackClay, trackColor } from "./colors.ts";
+import { makeLook, MODES } from "./materials.ts";
+import type { Mode } from "./materials.ts";
+import { Part } from "./part.ts";
+import { triangleCount } from "./ranges.ts";
+import { readPositions } from "./readback.ts";
+import { Upload } from "./upload.ts";
+import { Warmer } from "./warmer.ts";
+
+/**
+ * A recording in a three.js scene, in the recording's own space. Call `prepare` when a value arrives, `show` once a picture,
+ * `release` when a value will not be shown again soon, `dispose` at the end. The arrays of prepared values must stay as they are:
+ * a lost context is filled from them again.
+ */
+export class ReelScene extends Group {
+  readonly #look = makeLook();
+  readonly #uploads = new Map<Packed, Upload>();
+  readonly #tracks: Part[] = [];
+  readonly #background = new Part("attribute", this.#look, { clay: BACKGROUND_CLAY, color: BACKGROUND_COLOR });
+  readonly #warmer = new Warmer(this.#look);
+  #renderer: WebGLRenderer | null = null;
+  #triangles = 0;
+
+  constructor() {
+    super();
+    this.#background.renderOrder = 1; // most of it is hidden behind what moves
+    this.add(this.#background);
+  }
+
+  /** Bytes of textures and buffers that it has on the GPU, without the picture's own. */
+  get gpuBytes(): number {
+    let bytes = 0;
+    for (const upload of this.#uploads.values()) bytes += upload.bytes;
+    return bytes;
+  }
+
+  /** Triangles of what `show` was last told. */
+  get triangles(): number {
+    return this.#triangles;
+  }
+
+  /** How surfaces look. To be seen from the next `show` on. */
+  get mode(): Mode {
+    return MODES[this.#look.mode.value];
+  }
+
+  set mode(mode: Mode) {
+    if (mode === this.mode) return;
+    this.#look.mode.value = MODES.indexOf(mode);
+    for (const part of this.#parts()) part.edges = this.#edges;
+    if (!this.#edges) for (const upload of this.#uploads.values()) upload.dropEdges();
+  }
+
+  /** One normal a triangle instead of one a vertex. */
+  get flat(): boolean {
+    return this.#look.flatNormals.value;
+  }
+
+  set flat(flat: boolean) {
+    this.#look.flatNormals.value = flat;
+  }
+
+  /** Uploads a value's vertices and triangles now, so that showing it later costs nothing. Error where the GPU cannot hold it. */
+  prepare(packed: Packed, renderer: WebGLRenderer): void {
+    this.#listen(renderer);
+    checkSize(packed, renderer);
+    this.#warmer.warm(this.#uploadOf(packed), this.#edges, renderer);
+  }
+
+  /** Once a picture: what to draw. Values that were not prepared are uploaded as they are drawn. */
+  show(shown: Shown): void {
+    this.#triangles = 0;
+    while (this.#tracks.length < shown.groups.length) this.#addTrack();
+    for (let track = 0; track < this.#tracks.length; track++) {
+      this.#showPart(this.#tracks[track], shown.groups[track] ?? null, shown);
+    }
+    this.#showPart(this.#background, shown.background, shown);
+  }
+
+  /** Frees what the GPU holds of a value. Its arrays are no longer referred to. */
+  release(packed: Packed): void {
+    const upload = this.#uploads.get(packed);
+    if (upload === undefined) return;
+    for (const part of this.#parts()) if (part.upload === upload) part.hide();
+    this.#uploads.delete(packed);
+    upload.dispose();
+  }
+
+  /** Positions of a value's vertices as the vertex shader sees them; see readback.ts. */
+  readPositions(packed: Packed, renderer: WebGLRenderer, frame = 0, blend = 0): Float32Array {
+    this.prepare(packed, renderer);
+    return readPositions(this.#uploadOf(packed), renderer, frame, blend);
+  }
+
+  override dispose(): void {
+    super.dispose();
+    for (const packed of [...this.#uploads.keys()]) this.release(packed);
+    for (const part of this.#parts()) part.dispose();
+    this.#warmer.dispose();
+    this.#renderer?.domElement.removeEventListener("webglcontextrestored", this.#refill);
+    this.#renderer = null;
+  }
+
+  get #edges(): boolean {
+    return this.mode === "wireframe";
+  }
+
+  #parts(): readonly Part[] {
+    return [...this.#tracks, this.#background];
+  }
+
+  #showPart(part: Part, packed: Packed | null, shown: Shown): void {
+    if (packed === null) {
+      part.hide();
+      return;
+    }
+    part.show(this.#uploadOf(packed), shown.frame, shown.blend);
+    this.#triangles += triangleCount(packed, shown.frame);
+  }
+
+  #uploadOf(packed: Packed): Upload {
+    let upload = this.#uploads.get(packed);
+    if (upload === undefined) this.#uploads.set(packed, (upload = new Upload(packed)));
+    return upload;
+  }
+
+  #addTrack(): void {
+    const track = this.#tracks.length;
+    const part = new Part("texture", this.#look, { clay: trackClay(track), color: trackColor(track) });
+    part.edges = this.#edges;
+    this.#tracks.push(part);
+    this.add(part);
+  }
+
+  #listen(renderer: WebGLRenderer): void {
+    if (renderer === this.#renderer) return;
+    this.#renderer?.domElement.removeEventListener("webglcontextrestored", this.#refill);
+    this.#renderer = renderer;
+    renderer.domElement.addEventListener("webglcontextrestored", this.#refill); // after three's own, which makes its state new
+  }
+
+  #refill = (): void => {
+    if (this.#renderer === null) return;
+    for (const upload of this.#uploads.values()) this.#warmer.warm(upload, this.#edges, this.#renderer);
+  };
+}
+
+function checkSize(packed: Packed, renderer: WebGLRenderer): void {
+  if (packed.kind === "static") return;
+  const { textureWidth, textureHeight, texels } = packed;
+  const most = renderer.capabilities.maxTextureSize;
+  const size = `a texture of ${textureWidth} x ${textureHeight}`;
+  if (Math.max(textureWidth, textureHeight) > most) throw new RangeError(`group of chunk ${packed.chunk}: ${size}, the GPU's largest is ${most}; choose a lower quality`);
+  if (texels.length !== 4 * textureWidth * textureHeight) throw new RangeError(`group of chunk ${packed.chunk}: ${texels.length / 4} texels for ${size}`);
+}

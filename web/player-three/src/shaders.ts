@@ -1,0 +1,186 @@
+// GLSL ES 3.00. A vertex is four uint16, as `PackedVertices` in player-core/src/types.ts has them.
+
+/** Where a vertex comes from: an attribute; the texture at gl_VertexID; the texture at an attribute, corner by corner. */
+export type Feed = "attribute" | "texture" | "corner";
+
+const PRECISION = /* glsl */ `
+precision highp float;
+precision highp int;
+precision highp usampler2D;
+`;
+
+const POSITION = /* glsl */ `
+uniform vec3 boxMinimum;
+uniform vec3 boxSize;
+
+vec3 positionOf(uvec4 texel) {
+  return boxMinimum + boxSize * (vec3(texel.xyz) / 65535.0);
+}
+`;
+
+const NORMAL = /* glsl */ `
+vec3 normalOf(uvec4 texel) {
+  vec2 code = vec2(float(texel.w & 255u), float(texel.w >> 8u)) / 127.5 - 1.0;
+  vec3 n = vec3(code, 1.0 - abs(code.x) - abs(code.y));
+  float fold = max(-n.z, 0.0);
+  n.x += n.x >= 0.0 ? -fold : fold;
+  n.y += n.y >= 0.0 ? -fold : fold;
+  return normalize(n);
+}
+`;
+
+const FROM_ATTRIBUTE = /* glsl */ `
+in uvec4 texel;
+
+int vertexNumber() { return gl_VertexID; }
+
+void readVertex(int vertex, out vec3 position, out vec3 normal) {
+  position = positionOf(texel);
+  normal = normalOf(texel);
+}
+`;
+
+// here and next: the texels of vertex 0 in the two frames between which `blend` lies; behind: added to the number of a vertex that
+// does not move.
+const FROM_TEXTURE = /* glsl */ `
+uniform usampler2D vertices;
+uniform int movingCount;
+uniform int here;
+uniform int next;
+uniform int behind;
+uniform float blend;
+
+uvec4 texelAt(int number) {
+  int width = textureSize(vertices, 0).x;
+  return texelFetch(vertices, ivec2(number % width, number / width), 0);
+}
+
+void readVertex(int vertex, out vec3 position, out vec3 normal) {
+  bool moves = vertex < movingCount;
+  uvec4 first = texelAt(vertex + (moves ? here : behind));
+  position = positionOf(first);
+  normal = normalOf(first);
+  if (moves && blend > 0.0) {
+    uvec4 second = texelAt(vertex + next);
+    position = mix(position, positionOf(second), blend);
+    normal = mix(normal, normalOf(second), blend);
+  }
+}
+`;
+
+const AT_VERTEX = /* glsl */ `
+int vertexNumber() { return gl_VertexID; }
+`;
+
+const AT_CORNER = /* glsl */ `
+in uint corner;
+
+int vertexNumber() { return int(corner); }
+`;
+
+const FEEDS: Readonly<Record<Feed, string>> = {
+  attribute: FROM_ATTRIBUTE,
+  texture: FROM_TEXTURE + AT_VERTEX,
+  corner: FROM_TEXTURE + AT_CORNER,
+};
+
+const SURFACE_VERTEX = /* glsl */ `
+uniform mat4 modelViewMatrix;
+uniform mat4 projectionMatrix;
+out vec3 scenePosition;
+out vec3 sceneNormal;
+out vec3 toEye; // in the scene's own axes, any length
+#ifdef EDGES
+out vec3 barycentric;
+#endif
+
+void main() {
+  readVertex(vertexNumber(), scenePosition, sceneNormal);
+  vec4 seen = modelViewMatrix * vec4(scenePosition, 1.0);
+  toEye = -(seen.xyz * mat3(modelViewMatrix));
+  gl_Position = projectionMatrix * seen;
+#ifdef EDGES
+  int k = gl_VertexID % 3;
+  barycentric = vec3(k == 0, k == 1, k == 2);
+#endif
+}
+`;
+
+/** Vertex shader of what is drawn. With `corner`, three vertices a triangle and the distances to its edges. */
+export function surfaceVertex(feed: Feed): string {
+  return PRECISION + POSITION + NORMAL + FEEDS[feed] + SURFACE_VERTEX;
+}
+
+// The face's own normal comes from the picture: it looks at the viewer however the face is wound, which makes shading two-sided.
+export const SURFACE_FRAGMENT = `${PRECISION}
+uniform int mode; // the number of a Mode in materials.ts
+uniform bool flatNormals;
+uniform vec3 clay; // of a lit surface
+uniform vec3 color; // of an unlit one
+uniform vec3 edgeColor;
+in vec3 scenePosition;
+in vec3 sceneNormal;
+in vec3 toEye;
+#ifdef EDGES
+in vec3 barycentric;
+#endif
+out vec4 fragment;
+
+vec3 shaded(vec3 n) {
+  float head = max(dot(n, normalize(toEye)), 0.0);
+  float sky = 0.5 + 0.5 * n.y;
+  return clay * (0.22 + 0.2 * sky + 0.58 * head);
+}
+
+#ifdef EDGES
+// A line of one pixel; it fades where triangles are no larger than lines.
+float edge() {
+  vec3 width = fwidth(barycentric);
+  vec3 inside = smoothstep(vec3(0.0), width * 1.2, barycentric);
+  float widest = max(width.x, max(width.y, width.z));
+  return (1.0 - min(inside.x, min(inside.y, inside.z))) * (1.0 - smoothstep(0.35, 1.0, widest));
+}
+#endif
+
+void main() {
+  vec3 facing = normalize(cross(dFdx(scenePosition), dFdy(scenePosition)));
+  bool seenFromOutside = dot(facing, sceneNormal) >= 0.0;
+  vec3 n = flatNormals ? (seenFromOutside ? facing : -facing) : normalize(sceneNormal);
+  vec3 result;
+  if (mode == NORMAL_MODE) result = 0.5 * (n + 1.0);
+  else if (mode == COLOUR_MODE) result = color;
+  else result = shaded(seenFromOutside ? n : -n);
+#ifdef EDGES
+  result = mix(result, edgeColor, edge());
+#endif
+  fragment = vec4(result, 1.0);
+}
+`;
+
+/** Vertex shader that draws each vertex as the pixel of its number. */
+export function readbackVertex(feed: Feed): string {
+  return `${PRECISION}${POSITION}${NORMAL}${FEEDS[feed]}
+uniform ivec2 targetSize;
+flat out uvec3 bits;
+
+void main() {
+  vec3 position, normal;
+  int vertex = vertexNumber();
+  readVertex(vertex, position, normal);
+  bits = floatBitsToUint(position);
+  vec2 pixel = vec2(vertex % targetSize.x, vertex / targetSize.x);
+  gl_Position = vec4((pixel + 0.5) / vec2(targetSize) * 2.0 - 1.0, 0.0, 1.0);
+  gl_PointSize = 1.0;
+}
+`;
+}
+
+/** The bits of the position as float32, and a 1 that tells that something was drawn there. */
+export const READBACK_FRAGMENT = `${PRECISION}
+flat in uvec3 bits;
+out uvec4 fragment;
+
+void main() {
+  fragment = uvec4(bits, 1u);
+}
+`;

@@ -1,0 +1,61 @@
+// Uploads ahead of time. three uploads what it draws, so this draws nothing of everything, into a target of one pixel.
+
+import { BufferGeometry, Camera, Mesh, Scene, WebGLRenderTarget } from "three";
+import type { RawShaderMaterial, WebGLRenderer } from "three";
+import { BACKGROUND_CLAY, BACKGROUND_COLOR } from "./colors.ts";
+import { makeUniforms, surfaceMaterial } from "./materials.ts";
+import type { Look } from "./materials.ts";
+import type { Feed } from "./shaders.ts";
+import type { Upload } from "./upload.ts";
+
+const PAINT = { clay: BACKGROUND_CLAY, color: BACKGROUND_COLOR };
+const NOTHING = new BufferGeometry();
+
+export class Warmer {
+  readonly #uniforms = makeUniforms();
+  readonly #materials: Readonly<Record<Feed, RawShaderMaterial>>;
+  readonly #mesh: Mesh<BufferGeometry, RawShaderMaterial>;
+  readonly #scene = new Scene();
+  readonly #camera = new Camera();
+  readonly #target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
+
+  constructor(look: Look) {
+    const material = (feed: Feed) => surfaceMaterial(feed, look, this.#uniforms, PAINT);
+    this.#materials = { attribute: material("attribute"), texture: material("texture"), corner: material("corner") };
+    this.#mesh = new Mesh(NOTHING, this.#materials.texture);
+    this.#mesh.frustumCulled = false;
+    this.#scene.add(this.#mesh);
+  }
+
+  /** Puts textures and buffers of an upload on the GPU, and compiles what draws them. */
+  warm(upload: Upload, edges: boolean, renderer: WebGLRenderer): void {
+    const target = renderer.getRenderTarget();
+    const { enabled } = renderer.xr;
+    renderer.xr.enabled = false; // a headset's session would draw for its eyes
+    renderer.setRenderTarget(this.#target);
+    const feed = upload.packed.kind === "group" ? "texture" : "attribute";
+    this.#mesh.material = this.#materials[edges ? "corner" : feed];
+    for (const geometry of [upload.faces(edges), upload.extra(edges)]) {
+      if (geometry === null) continue;
+      this.#uniforms.vertices.value = upload.texture;
+      this.#draw(geometry, renderer);
+    }
+    this.#mesh.geometry = NOTHING;
+    this.#uniforms.vertices.value = null;
+    renderer.setRenderTarget(target);
+    renderer.xr.enabled = enabled;
+  }
+
+  dispose(): void {
+    for (const material of Object.values(this.#materials)) material.dispose();
+    this.#target.dispose();
+  }
+
+  #draw(geometry: BufferGeometry, renderer: WebGLRenderer): void {
+    const { start, count } = geometry.drawRange;
+    geometry.setDrawRange(0, 0);
+    this.#mesh.geometry = geometry;
+    renderer.render(this.#scene, this.#camera);
+    geometry.setDrawRange(start, count);
+  }
+}

@@ -1,0 +1,98 @@
+// A controller: what is drawn of it and what it does.
+
+import { BoxGeometry, CylinderGeometry, Mesh, MeshBasicMaterial } from "three";
+import type { BufferGeometry, Object3D, Vector3, WebXRManager, WebXRSpaceEventMap } from "three";
+import { Stick } from "./stick.ts";
+import type { StickActions } from "./stick.ts";
+
+export interface HandActions extends StickActions {
+  select(): void;
+}
+
+const RAY = { length: 0.8, radius: 0.0015 } as const; // m
+const GRIP = { width: 0.03, length: 0.1 } as const; // m
+const FREE = 0xd8dde6;
+const HOLDING = 0x4da3ff;
+const STICK_BUTTON = 3; // of the mapping xr-standard
+const STICK_X = 2;
+
+export class Hand {
+  readonly #pointing: ReturnType<WebXRManager["getController"]>;
+  readonly #grip: ReturnType<WebXRManager["getControllerGrip"]>;
+  readonly #material = new MeshBasicMaterial({ color: FREE });
+  readonly #ray = new Mesh(rayGeometry(), this.#material);
+  readonly #body = new Mesh(new BoxGeometry(GRIP.width, GRIP.width, GRIP.length), this.#material);
+  readonly #actions: HandActions;
+  readonly #stick: Stick;
+  #source: XRInputSource | null = null;
+  #squeezes = false;
+
+  /** To be made before the session starts, so that three gives it the controller. `room` is where the tracking space is drawn. */
+  constructor(xr: WebXRManager, index: number, room: Object3D, actions: HandActions) {
+    this.#actions = actions;
+    this.#stick = new Stick(actions);
+    this.#pointing = xr.getController(index);
+    this.#grip = xr.getControllerGrip(index);
+    this.#pointing.add(this.#ray);
+    this.#grip.add(this.#body);
+    room.add(this.#pointing, this.#grip);
+    this.#pointing.addEventListener("connected", this.#connect);
+    this.#pointing.addEventListener("disconnected", this.#disconnect);
+    this.#pointing.addEventListener("select", this.#select);
+    this.#pointing.addEventListener("squeezestart", this.#squeeze);
+    this.#pointing.addEventListener("squeezeend", this.#letGo);
+  }
+
+  /** Where it holds the recording, in the room's space; null where it does not, or is not seen. */
+  get holds(): Vector3 | null {
+    return this.#squeezes && this.#grip.visible ? this.#grip.position : null;
+  }
+
+  /** Once a picture, with milliseconds. */
+  update(now: number): void {
+    const gamepad = this.#source?.gamepad;
+    if (gamepad) this.#stick.update(gamepad.axes[STICK_X] ?? gamepad.axes[0] ?? 0, gamepad.buttons[STICK_BUTTON]?.pressed ?? false, now);
+  }
+
+  dispose(): void {
+    this.#pointing.removeEventListener("connected", this.#connect);
+    this.#pointing.removeEventListener("disconnected", this.#disconnect);
+    this.#pointing.removeEventListener("select", this.#select);
+    this.#pointing.removeEventListener("squeezestart", this.#squeeze);
+    this.#pointing.removeEventListener("squeezeend", this.#letGo);
+    for (const mesh of [this.#ray, this.#body]) {
+      mesh.removeFromParent();
+      mesh.geometry.dispose();
+    }
+    this.#material.dispose();
+    this.#pointing.removeFromParent();
+    this.#grip.removeFromParent();
+  }
+
+  #connect = (event: WebXRSpaceEventMap["connected"]): void => {
+    this.#source = event.data;
+  };
+
+  #disconnect = (): void => {
+    this.#source = null;
+    this.#stick.reset();
+    this.#letGo();
+  };
+
+  #select = (): void => this.#actions.select();
+
+  #squeeze = (): void => {
+    this.#squeezes = true;
+    this.#material.color.setHex(HOLDING);
+  };
+
+  #letGo = (): void => {
+    this.#squeezes = false;
+    this.#material.color.setHex(FREE);
+  };
+}
+
+function rayGeometry(): BufferGeometry {
+  const ray = new CylinderGeometry(0, RAY.radius, RAY.length, 6, 1, true); // thinner away from the hand
+  return ray.translate(0, RAY.length / 2, 0).rotateX(-Math.PI / 2);
+}

@@ -1,0 +1,62 @@
+// Where the recording stands in the room. Room: metres, y up, y = 0 on the floor, as WebXR's local-floor has it.
+
+import { Quaternion, Vector3 } from "three";
+import type { Object3D } from "three";
+import type { Box } from "@meshreel/player-core/types";
+
+export const SCALES = { least: 0.05, most: 20 } as const;
+
+const DISTANCE = 1.5; // m from the viewer to the middle of the recording
+const ROOM = 3; // m; what is larger is stood in, not looked at
+const UP = new Vector3(0, 1, 0);
+
+/** A similarity that keeps the vertical. */
+export interface Pose {
+  readonly position: Vector3; // m, of the recording's own zero
+  turn: number; // rad about the vertical, counter-clockwise from above
+  scale: number;
+}
+
+/** The viewer on the floor. */
+export interface Viewer {
+  x: number; // m
+  z: number; // m
+  turn: number; // rad about the vertical; 0 looks along -z
+}
+
+export function makePose(): Pose {
+  return { position: new Vector3(), turn: 0, scale: 1 };
+}
+
+export function copyPose(from: Pose, to: Pose): void {
+  to.position.copy(from.position);
+  to.turn = from.turn;
+  to.scale = from.scale;
+}
+
+export function applyPose(pose: Pose, object: Object3D): void {
+  object.position.copy(pose.position);
+  object.quaternion.setFromAxisAngle(UP, pose.turn);
+  object.scale.setScalar(pose.scale);
+}
+
+/** Stands the recording in front of the viewer, or around them where it is a room: at true scale, its lowest point on the floor. */
+export function place(box: Box, viewer: Viewer, pose: Pose): void {
+  const distance = Math.max(box.size[0], box.size[2]) > ROOM ? 0 : DISTANCE;
+  const [sin, cos] = [Math.sin(viewer.turn), Math.cos(viewer.turn)];
+  const [x, z] = [box.minimum[0] + box.size[0] / 2, box.minimum[2] + box.size[2] / 2];
+  pose.turn = viewer.turn;
+  pose.scale = 1;
+  pose.position.set(viewer.x - distance * sin - (cos * x + sin * z), -box.minimum[1], viewer.z - distance * cos - (cos * z - sin * x));
+}
+
+/** Where a head is, and which way it looks, seen from above. */
+export function setViewer(viewer: Viewer, position: DOMPointReadOnly, orientation: DOMPointReadOnly): void {
+  const rotation = new Quaternion(orientation.x, orientation.y, orientation.z, orientation.w);
+  const forward = new Vector3(0, 0, -1).applyQuaternion(rotation);
+  const steep = Math.hypot(forward.x, forward.z) < 0.2; // up or down: then the top of the head tells the way
+  const told = steep ? new Vector3(0, -Math.sign(forward.y), 0).applyQuaternion(rotation) : forward;
+  viewer.x = position.x;
+  viewer.z = position.z;
+  viewer.turn = Math.atan2(-told.x, -told.z);
+}

@@ -1,0 +1,161 @@
+// A session in a headset, from the click to the moment at which the page is as it was.
+
+import type { Object3D, PerspectiveCamera, WebGLRenderer } from "three";
+import type { Box } from "@meshreel/player-core/types";
+import { Grab } from "./grab.ts";
+import { Hand } from "./hand.ts";
+import { keep } from "./keep.ts";
+import { applyPose, makePose, place, setViewer } from "./pose.ts";
+import type { Viewer } from "./pose.ts";
+
+export interface VrActions {
+  /** Plays, or pauses. */
+  toggle(): void;
+  step(frames: number): void;
+  seekBy(seconds: number): void;
+}
+
+export interface VrOptions {
+  readonly renderer: WebGLRenderer;
+  readonly camera: PerspectiveCamera; // without a parent; the one that `frame` draws with
+  /** Stands in a scene that has no transformation. The session sets its own one; what is below it stays. */
+  readonly content: Object3D;
+  readonly box: Box; // around the content, y up
+  readonly actions: VrActions;
+  /** Draws a picture, with a clock's milliseconds. Must not set the renderer's size or the camera. */
+  frame(now: number): void;
+  /** The session is over, whoever ended it, and everything is as before. */
+  onend(): void;
+}
+
+const RATE = 72; // Hz: what every Quest has, and leaves the most time for a picture
+const NEAR = 0.05; // m
+const FAR = 1000; // m
+const SEEK = 1; // s, each time that a held thumbstick repeats
+const INIT: XRSessionInit = { requiredFeatures: ["local-floor"], optionalFeatures: ["bounded-floor", "layers"] };
+
+/** Whether there is a headset that can show it. Never rejects. */
+export async function vrSupported(): Promise<boolean> {
+  return navigator.xr?.isSessionSupported("immersive-vr").catch(() => false) ?? false;
+}
+
+/** The recording in a headset, at true scale in front of the viewer. */
+export class VrSession {
+  readonly #options: VrOptions;
+  readonly #session: XRSession;
+  readonly #restore: () => void;
+  readonly #hands: readonly Hand[];
+  readonly #pose = makePose();
+  readonly #grab = new Grab();
+  readonly #viewer: Viewer = { x: 0, z: 0, turn: 0 };
+  readonly #over: Promise<void>;
+  #resolve!: () => void;
+  #foveation: number | undefined;
+  #placed = false;
+  #entered = false;
+  #closed = false;
+
+  /**
+   * Must be called in answer to a user's gesture. The page's animation loop stands still until the end, that of three by itself, one
+   * of `requestAnimationFrame` by its owner. Rejects where there is no headset, or the viewer declines; all is then as before.
+   */
+  static async enter(options: VrOptions): Promise<VrSession> {
+    const { xr } = navigator;
+    if (xr === undefined) throw new Error("this browser has no WebXR here; it needs https, or localhost");
+    if (options.content.parent === null) throw new Error("the content is in no scene; add it to one first");
+    const entered = new VrSession(options, await xr.requestSession("immersive-vr", INIT));
+    await entered.#begin();
+    return entered;
+  }
+
+  private constructor(options: VrOptions, session: XRSession) {
+    const { renderer, camera, content, actions } = options;
+    this.#options = options;
+    this.#session = session;
+    this.#over = new Promise((resolve) => (this.#resolve = resolve));
+    this.#restore = keep(renderer, camera, content);
+    const handActions = {
+      select: () => actions.toggle(),
+      tap: (side: number) => actions.step(side),
+      hold: (side: number) => actions.seekBy(SEEK * side),
+      click: () => this.#place(),
+    };
+    const room = content.parent!;
+    this.#hands = [0, 1].map((index) => new Hand(renderer.xr, index, room, handActions));
+  }
+
+  /** Pictures a second of the headset; 0 where it does not tell. */
+  get rate(): number {
+    return this.#session.frameRate ?? 0;
+  }
+
+  /** Resolves when everything is as before. */
+  async end(): Promise<void> {
+    this.#session.end().catch(() => undefined); // it may have ended already
+    await this.#over;
+  }
+
+  async #begin(): Promise<void> {
+    const { renderer, camera } = this.#options;
+    const { xr } = renderer;
+    xr.addEventListener("sessionend", this.#close); // after three has put back what is its own
+    try {
+      xr.enabled = true;
+      xr.setReferenceSpaceType("local-floor");
+      camera.near = NEAR;
+      camera.far = FAR;
+      xr.setAnimationLoop(this.#frame); // of the headset alone: the page's own stays with the renderer
+      await xr.setSession(this.#session);
+      if (this.#closed) throw new Error("the headset ended the session");
+      this.#foveation = xr.getFoveation();
+      xr.setFoveation(1);
+      this.#askForRate();
+      this.#entered = true;
+    } catch (error) {
+      await this.#session.end().catch(() => undefined); // it may have ended already
+      this.#close();
+      throw error;
+    }
+  }
+
+  #askForRate(): void {
+    const session = this.#session;
+    if (session.supportedFrameRates?.includes(RATE)) session.updateTargetFrameRate(RATE).catch(() => undefined); // its own rate does too
+  }
+
+  /** Nothing is allocated here. */
+  #frame = (now: number): void => {
+    const left = this.#hands[0];
+    const right = this.#hands[1];
+    if (!this.#placed) this.#place();
+    left.update(now);
+    right.update(now);
+    this.#grab.follow(this.#pose, left.holds, right.holds);
+    applyPose(this.#pose, this.#options.content);
+    this.#options.frame(now);
+  };
+
+  /** In front of where the viewer is now. Until the headset knows, of where the room has its zero. */
+  #place(): void {
+    const { xr } = this.#options.renderer;
+    const space = xr.getReferenceSpace();
+    const head = space === null ? undefined : xr.getFrame().getViewerPose(space)?.transform;
+    this.#placed = head !== undefined;
+    if (head !== undefined) setViewer(this.#viewer, head.position, head.orientation);
+    place(this.#options.box, this.#viewer, this.#pose);
+    this.#grab.release();
+  }
+
+  #close = (): void => {
+    if (this.#closed) return;
+    this.#closed = true;
+    const { renderer, onend } = this.#options;
+    renderer.xr.removeEventListener("sessionend", this.#close);
+    renderer.xr.setAnimationLoop(null);
+    if (this.#foveation !== undefined) renderer.xr.setFoveation(this.#foveation);
+    for (const hand of this.#hands) hand.dispose();
+    this.#restore();
+    this.#resolve();
+    if (this.#entered) onend();
+  };
+}

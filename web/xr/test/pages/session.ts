@@ -1,0 +1,157 @@
+// The page of session.browser.test.ts: a canvas of 640 x 320, a recording, and a headset that is simulated.
+
+import { metaQuest3, XRDevice } from "iwer";
+import { Group, PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import type { Box } from "@meshreel/player-core/types";
+import { ReelScene } from "@meshreel/player-three";
+import { makeFloor, makeGroup } from "../../../player-three/test/analytic.ts";
+import { vrSupported, VrSession } from "../../src/index.ts";
+
+const [WIDTH, HEIGHT] = [640, 320];
+const BOX: Box = { minimum: [-1, -0.5, -1], size: [2, 1.3, 2] }; // the sphere's way and the floor below it
+
+const device = new XRDevice(metaQuest3, { stereoEnabled: true });
+
+const renderer = new WebGLRenderer({ antialias: false });
+renderer.setPixelRatio(2);
+renderer.setSize(WIDTH / 2, HEIGHT / 2);
+renderer.setClearColor(0x203040);
+document.body.append(renderer.domElement);
+const camera = new PerspectiveCamera(50, 2, 0.1, 20);
+camera.position.set(0.5, 1, 3);
+camera.lookAt(0, 0, 0);
+const root = new Scene();
+const content = new Group();
+content.position.set(0.1, 0.2, 0.3);
+const reel = new ReelScene();
+content.add(reel);
+root.add(content);
+
+const [group, floor] = [makeGroup({ center: (t) => [-0.3 + 0.2 * t, 0, 0] }).packed, makeFloor(4).packed];
+for (const packed of [group, floor]) reel.prepare(packed, renderer);
+
+let vr: VrSession | null = null;
+let pictures = 0;
+let pageFrames = 0;
+let told: string[] = [];
+let wanted: ((picture: string) => void) | null = null;
+renderer.setAnimationLoop(() => pageFrames++);
+
+function frame(): void {
+  pictures++;
+  reel.show({ frame: 2, blend: 0, groups: [group], background: floor });
+  renderer.render(root, camera);
+  wanted?.(renderer.domElement.toDataURL()); // only now: the next frame clears it
+  wanted = null;
+}
+
+/** What one eye sees of the recording: shares of its pixels, and where on average, 0 left to 1 right. */
+interface Seen {
+  readonly sphere: number;
+  readonly floor: number;
+  readonly middle: number;
+}
+
+/** The sphere is yellow, the floor grey, what is behind them blue and dark. */
+function seenBy(eye: 0 | 1, picture: ImageData): Seen {
+  const { data, width, height } = picture;
+  const half = width / 2;
+  let [sphere, floor, sum] = [0, 0, 0];
+  for (let y = 0; y < height; y++) {
+    for (let x = 0; x < half; x++) {
+      const at = 4 * (y * width + eye * half + x);
+      const [red, blue] = [data[at], data[at + 2]];
+      if (red - blue > 30) {
+        sphere++;
+        sum += x / half;
+      } else if (red > 100 && red < 190 && blue - red < 30) floor++;
+    }
+  }
+  return { sphere: sphere / (half * height), floor: floor / (half * height), middle: sum / Math.max(sphere, 1) };
+}
+
+async function pixelsOf(picture: string): Promise<ImageData> {
+  const bitmap = await createImageBitmap(await (await fetch(picture)).blob());
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+  if (context === null) throw new Error("no 2D canvas");
+  context.drawImage(bitmap, 0, 0);
+  return context.getImageData(0, 0, bitmap.width, bitmap.height);
+}
+
+const api = {
+  supported: vrSupported,
+  install: () => device.installRuntime({ forceInstall: true }),
+  /** The session comes, its space does not. */
+  async enterWithoutSpace(): Promise<void> {
+    const { prototype } = XRSession;
+    const own = prototype.requestReferenceSpace;
+    prototype.requestReferenceSpace = () => Promise.reject(new Error("no floor"));
+    await api.enter().finally(() => (prototype.requestReferenceSpace = own));
+  },
+  async enter(): Promise<void> {
+    told = [];
+    vr = await VrSession.enter({
+      renderer, camera, content, box: BOX, frame,
+      actions: {
+        toggle: () => told.push("toggle"),
+        step: (frames) => told.push(`step ${frames}`),
+        seekBy: (seconds) => told.push(`seek ${seconds}`),
+      },
+      onend: () => told.push(`end ${renderer.xr.isPresenting}`),
+    });
+  },
+  end: async (): Promise<void> => vr?.end(),
+  /** As when the viewer presses the headset's own button. */
+  endFromDevice: async (): Promise<void> => device.activeSession?.end(),
+  /** Lets the headset ask for so many pictures. */
+  async frames(count: number): Promise<void> {
+    const until = pictures + count;
+    while (pictures < until) await new Promise((done) => setTimeout(done, 5));
+  },
+  /** What both eyes see, and the picture. */
+  async eyes(): Promise<{ left: Seen; right: Seen; picture: string }> {
+    const picture = await new Promise<string>((done) => (wanted = done));
+    const pixels = await pixelsOf(picture);
+    return { left: seenBy(0, pixels), right: seenBy(1, pixels), picture };
+  },
+  pose(hand: "left" | "right", x: number, y: number, z: number): void {
+    device.controllers[hand]?.position.set(x, y, z);
+  },
+  button(hand: "left" | "right", id: string, value: number): void {
+    device.controllers[hand]?.updateButtonValue(id, value);
+  },
+  stick(hand: "left" | "right", x: number): void {
+    device.controllers[hand]?.updateAxes("thumbstick", x, 0);
+  },
+  head(x: number, y: number, z: number): void {
+    device.position.set(x, y, z);
+  },
+  /** What a session must leave as it was. */
+  state() {
+    const { position, quaternion, fov, zoom, near, far, projectionMatrix } = camera;
+    return {
+      content: content.matrixWorld.toArray(), camera: [...position.toArray(), ...quaternion.toArray(), fov, zoom, near, far],
+      projection: projectionMatrix.toArray(), pixelRatio: renderer.getPixelRatio(), width: renderer.domElement.width,
+      height: renderer.domElement.height, enabled: renderer.xr.enabled, presenting: renderer.xr.isPresenting,
+      children: root.children.length, target: renderer.getRenderTarget() === null,
+    };
+  },
+  drawOnPage(): void {
+    frame();
+  },
+  memory: () => ({ ...renderer.info.memory }),
+  content: () => ({ position: content.position.toArray(), scale: content.scale.x, turn: content.rotation.y }),
+  /** What the actions were told since the last call. */
+  told: (): string[] => told.splice(0),
+  active: (): boolean => device.activeSession !== undefined,
+  pageFrames: () => pageFrames,
+  rate: (): number => vr?.rate ?? 0,
+};
+
+export type SessionApi = typeof api;
+declare global {
+  interface Window {
+    vr: SessionApi;
+  }
+}
+window.vr = api;
