@@ -127,6 +127,14 @@ def test_a_report_without_rows_is_empty(tmp_path):
     assert (tmp_path / "results.md").read_text() == "\n"
 
 
+def test_comparisons_come_before_the_points_that_they_are_made_of(tmp_path):
+    chosen = experiment()
+    chosen["made up"].comparisons = lambda _rows: iter(["A comparison."])
+    write_report([row("dancer", "draco", 1.0, 60.0)], chosen, tmp_path)
+    text = (tmp_path / "results.md").read_text()
+    assert text.index("quality against rate") < text.index("A comparison.\n\n| codec") < text.index("# How this")
+
+
 def test_it_says_how_it_was_made(tmp_path):
     made = {"meshreel": "0.1.0", "commit": "abc", "platform": "P", "python": "3.12", "cores": 2}
     write_report([row("dancer", "draco", 1.0, 60.0, made_by=made)], experiment(), tmp_path)

@@ -12,6 +12,7 @@ from meshreel.evaluation.report.looks import KNOWN, direction, in_order, looks_o
 from meshreel.evaluation.report.tables import (
     DAGGER,
     NEAR,
+    Told,
     common_rate,
     failure_table,
     maker_table,
@@ -48,6 +49,13 @@ def test_what_is_not_measured_or_not_in_a_group_has_no_rank_and_one_number_alone
     lines = ranked_table(["x", "y"], rows, [1, 1], ["a", "a", None, "b", "b"])
     assert [cells(line)[0] for line in lines[2:]] == ["*1*", "**2**", "9", "*3*", "**4**"]
     assert [line.split("|")[2].strip() for line in lines[2:]] == ["5", "", "", "1", ""]
+
+
+def test_what_stands_around_a_number_is_not_ranked_and_not_marked():
+    rows = [[Told(2.00001, "≤ ", " (x 2)")], [Told(1.0)], ["- (up to 3)"], [Told(2.0, "", " (x 1)")], [None]]
+    column = [cells(line)[0] for line in ranked_table(["x"], rows, [-1])[2:]]
+    assert column[:4] == ["≤ *2* (x 2)", "**1**", "- (up to 3)", "*2* (x 1)"] and not column[4].strip("| ")
+    assert cells(ranked_table(["x"], [[Told(1.5, "a ")]], [0])[2]) == ["a 1.5"]
 
 
 def test_codecs_at_a_rate_are_shown_by_their_nearest_point_and_far_ones_are_not_ranked():

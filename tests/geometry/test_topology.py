@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.geometry.topology import (
+    blend,
     clean,
     components,
     concatenate,
@@ -65,6 +66,30 @@ def test_normals_have_unit_length_and_are_zero_without_area() -> None:
     np.testing.assert_array_equal(areas, [3, 0])
     np.testing.assert_array_equal(vertex_normals(flat)[[0, 1, 2]], [[0, 0, 1]] * 3)
     np.testing.assert_array_equal(vertex_normals(flat)[[3, 4]], np.zeros((2, 3)))
+
+
+def test_normals_are_bit_by_bit_those_of_the_vector_formula() -> None:
+    rng = np.random.default_rng(0)
+    mesh = Mesh.of(rng.normal(size=(200, 3)) * 10.0 ** rng.integers(-6, 6, (200, 1)), rng.integers(0, 200, (2000, 3)))
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1)
+    normals, areas = face_normals(mesh)
+    assert normals.tobytes() == (cross / np.where(length > 0, length, 1.0)[:, None]).tobytes()
+    assert areas.tobytes() == (length / 2).tobytes()
+    assert [part.shape for part in face_normals(Mesh.empty())] == [(0, 3), (0,)]
+
+
+def test_a_blend_of_corners_is_the_corner_the_middle_or_any_affine_field_between() -> None:
+    rng = np.random.default_rng(0)
+    weights = np.concatenate([np.eye(3), np.full((1, 3), 1 / 3), rng.dirichlet(np.ones(3), 100)])
+    corners = np.concatenate([SOLID.faces[:1]] * 4 + [SOLID.faces[rng.integers(0, 4, 100)]])
+    points = blend(CORNERS, corners, weights)
+    np.testing.assert_array_equal(points[:3], CORNERS[SOLID.faces[0]])
+    np.testing.assert_allclose(points[3], CORNERS[SOLID.faces[0]].mean(axis=0), rtol=1e-15)
+    turn, shift = rng.normal(size=(3, 3)), rng.normal(size=3)
+    np.testing.assert_allclose(blend(CORNERS @ turn + shift, corners, weights), points @ turn + shift, atol=1e-12)
+    assert blend(CORNERS, np.zeros((0, 3), np.int32), np.zeros((0, 3))).shape == (0, 3)
 
 
 def test_vertex_normals_weigh_faces_by_area() -> None:

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.errors import InputError
-from meshreel.metrics.bd_rate import Curve, bd_bound, bd_rate, beats, gain_end, hull
+from meshreel.metrics.bd_rate import Curve, RateAt, bd_bound, bd_rate, beats, gain_end, hull, rate_at, reach
 
 # The points of VCEG-M33's often reprinted example, and those in the README of FAU's `bjontegaard` package.
 VCEG = (
@@ -196,3 +196,39 @@ def test_an_overlap_that_is_too_small_decides_nothing_by_itself():
     flat, anchor = _curve("flat", [0.2, 0.4], [55.08, 55.09]), _curve("a", [2, 4], [50, 60])
     assert beats(flat, anchor) is True and beats(flat, anchor, least=0.5) is True  # at 50, for less
     assert beats(_curve("b", [3, 3.5], [55.08, 55.09]), _curve("a", [2, 4], [54, 60]), least=0.5) is None
+
+
+def test_a_rate_at_a_quality_is_exact_where_its_logarithm_is_linear_and_at_every_point():
+    doubling = Curve("x", [2.0 ** (db / 5) for db in (50, 53, 61, 64)], [50.0, 53.0, 61.0, 64.0])
+    for db in (50.0, 50.1, 53.0, 57.77, 63.9, 64.0):
+        found = rate_at(doubling, db)
+        assert found.rate == pytest.approx(2 ** (db / 5), rel=1e-12) and not found.at_most
+    for rate, db in zip(VCEG[0].rates, VCEG[0].qualities, strict=True):
+        assert rate_at(VCEG[0], db).rate == pytest.approx(rate, rel=1e-12)
+
+
+def test_a_rate_between_points_is_that_of_the_curve_that_bd_rates_integrate():
+    anchor, test = X265
+    low, high = max(min(c.qualities) for c in X265), min(max(c.qualities) for c in X265)
+    at = np.linspace(low, high, 2001)
+    rates = [[rate_at(curve, quality).rate for quality in at.tolist()] for curve in (anchor, test)]
+    gain = np.trapezoid(np.log(rates[1]) - np.log(rates[0]), at) / (high - low)
+    assert 100 * np.expm1(gain) == pytest.approx(bd_rate(anchor, test).percent, abs=1e-4)
+
+
+def test_nothing_is_extrapolated_for_a_rate():
+    curve = Curve("x", [1.0, 2.0], [60.0, 65.0])
+    assert rate_at(curve, 65.001) == RateAt(None)
+    assert rate_at(curve, 59.999) == RateAt(1.0, at_most=True) and rate_at(curve, 60.0) == RateAt(1.0)
+    point = Curve("x", [3.0], [62.0])
+    assert [rate_at(point, db) for db in (61.0, 62.0, 63.0)] == [RateAt(3.0, True), RateAt(3.0), RateAt(None)]
+    assert rate_at(Curve("x", [], []), 60.0) == RateAt(None) and reach(Curve("x", [], [])) is None
+
+
+def test_points_that_another_beats_change_no_rate_and_no_end():
+    curve = Curve("x", [1.0, 2.0, 4.0], [60.0, 65.0, 70.0])
+    more = Curve("x", [4.0, 1.5, 3.0, 1.0, 9.0, 2.0, 1.0], [70.0, 59.0, 64.0, 60.0, 70.0, 65.0, 58.0])
+    assert reach(more) == reach(curve) == ((60.0, 1.0), (70.0, 4.0))
+    assert [rate_at(more, db) for db in (58.0, 62.0, 67.0, 71.0)] == [
+        rate_at(curve, db) for db in (58.0, 62.0, 67.0, 71.0)
+    ]

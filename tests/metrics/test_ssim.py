@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from meshreel.metrics import render
 from meshreel.metrics.cameras import Box, ViewOptions, parallel_views_around, views_around
 from meshreel.metrics.render import Window, look, render_normals
 from meshreel.metrics.ssim import ssim_map, ssim_normals
@@ -71,6 +72,14 @@ def test_a_larger_background_flatters_the_whole_form_and_not_the_masked_one():
     wide = ssim_normals(a, b, parallel_views_around(Box(np.full(3, -2.0), np.full(3, 2.0)), 400))
     assert wide.whole > tight.whole + 0.03
     assert wide.masked == pytest.approx(tight.masked, abs=0.02)
+
+
+def test_normals_are_found_once_for_all_views(monkeypatch):
+    own, found = render.welded_normals, []
+    monkeypatch.setattr(render, "welded_normals", lambda mesh: found.append(mesh) or own(mesh))
+    body = sphere(levels=2)
+    ssim_normals(body, noisy(body, 0.01), _views(body))
+    assert len(found) == 2 and len(_views(body)) == 4
 
 
 def test_empty_frames():

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 
 from .. import __version__
 from .rows import Row
@@ -38,8 +39,13 @@ def _git(folder: Path, *words: str) -> str:
     return answer.stdout.strip()
 
 
+def sources(package: ModuleType) -> list[Path]:
+    """The files of a package, in order."""
+    return sorted(path for folder in package.__path__ for path in Path(folder).glob("*.py"))
+
+
 @cache
-def _cpu() -> str | None:
+def cpu() -> str | None:
     """The processor's model, where the system tells it."""
     with suppress(OSError):
         told = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")  # Linux
@@ -52,7 +58,7 @@ def _cpu() -> str | None:
 def made_by() -> Row:
     """For a row: version, commit, and the machine."""
     machine = {"platform": platform.platform(), "python": platform.python_version()}
-    return {MADE_BY: {"meshreel": __version__, "commit": commit()} | machine | {"cpu": _cpu(), "cores": os.cpu_count()}}
+    return {MADE_BY: {"meshreel": __version__, "commit": commit()} | machine | {"cpu": cpu(), "cores": os.cpu_count()}}
 
 
 def makers(rows: Sequence[Row]) -> list[str]:

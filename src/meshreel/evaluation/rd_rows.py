@@ -16,6 +16,7 @@ from typing import Any
 
 from ..derived import Chosen
 from ..errors import InputError
+from ..metrics.render import Visible
 from ..metrics.report import compare_sequences
 from ..metrics.truth import Scene, scene_means, scene_row
 from ..types import Frames, MeshSequence, evenly
@@ -27,6 +28,7 @@ from .datasets import Dataset, open_known
 from .filenames import file_name
 from .fresh import peak_rss_mb
 from .groups import group_records
+from .originals import KEPT_PICTURES, KeptPictures
 from .peers import measure_fresh_decode
 from .pictures import draw_decoded, draw_original
 from .rows import Point, Row
@@ -116,7 +118,8 @@ def _floor(known: Dataset, numbers: Sequence[int], bench: Bench) -> Row:
 
 def _to_input(known: Dataset, numbers: Sequence[int], shown: Frames, bench: Bench) -> Row:
     options = replace(bench.comparison, cameras=known.cameras or bench.comparison.cameras)
-    row = compare_sequences(Chosen(known.sequence, numbers), shown, options).to_row()
+    seen = Visible if bench.cache is None else KeptPictures(bench.cache / KEPT_PICTURES)
+    row = compare_sequences(Chosen(known.sequence, numbers), shown, options, seen).to_row()
     row["per_frame"] = [{key: frame[key] for key in KEPT if key in frame} for frame in row["per_frame"]]
     row.pop("cameras")
     return row

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 from jaxtyping import Bool
@@ -35,6 +34,7 @@ from ..io.meshes import read_mesh
 from ..io.write import make_folder, replacing, write_mesh
 from ..types import Mesh, MeshSequence, evenly
 from .captured import Captured
+from .provenance import sources
 from .rooms import SPEEDS, RoomOptions, simulate_room
 
 SCENES = tuple(SPEEDS)
@@ -129,14 +129,9 @@ def _kept_as(source: str) -> str:
     if source != FOUND:
         return source
     digest = hashlib.sha256(repr(SegmentOptions()).encode())
-    for path in (path for package in (segmenter, geometry) for path in _sources(package)):
+    for path in (*sources(segmenter), *sources(geometry)):
         digest.update(path.read_bytes())
     return f"{FOUND}-{digest.hexdigest()[:12]}"
-
-
-def _sources(package: ModuleType) -> list[Path]:
-    """The files of a package, in order."""
-    return sorted(path for folder in package.__path__ for path in Path(folder).glob("*.py"))
 
 
 def _find_labels(meshes: MeshSequence, path: Path) -> None:

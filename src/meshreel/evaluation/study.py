@@ -18,6 +18,7 @@ from .codecs import make_codec
 from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
 from .rd_rows import FLOOR, RATED, SAMPLED, TRUTH_ITSELF
+from .report.equal import rate_table
 from .report.tables import bd_table, comparable_table, text
 from .rows import Point, Row, select
 
@@ -117,7 +118,8 @@ class Study:
         return [*left, *(self.goals(rows) if self.goals else ())]
 
     def comparisons(self, rows: Sequence[Row]) -> Iterator[str]:
-        """BD-rates on the rows of one sequence."""
+        """Rates at equal quality, and BD-rates, on the rows of one sequence."""
+        yield from (*rate_table(rows, self.best, PROMISED), "") if self.best else ()
         measures = [each for each in MEASURES if any(value(row, each.key) is not None for row in rows)]
         yield from bd_table(rows, self.best, measures) if self.best else ()
         yield from bd_table(rows, self.anchor, measures, is_anchor=True) if self.anchor else ()

@@ -6,12 +6,13 @@ Queries run in float32 inside Open3D: give coordinates near the origin.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ..types import Mesh
-from .topology import border_mask, face_normals, unique_edges
+from .topology import blend, border_mask, face_normals, unique_edges
 
 _AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
 
@@ -33,24 +34,37 @@ class Surface:
 
         assert not mesh.is_empty, "closest points need a surface"
         self.mesh = mesh
-        self.normals, self.areas = face_normals(mesh)
-        self._scene = o3d.t.geometry.RaycastingScene()
-        self._scene.add_triangles(
+        self.scene = o3d.t.geometry.RaycastingScene()  # Open3D's own, also for `raycast`
+        self.scene.add_triangles(
             o3d.core.Tensor.from_numpy(mesh.vertices.astype(np.float32)),
             o3d.core.Tensor.from_numpy(mesh.faces.astype(np.uint32)),
         )
+
+    @property
+    def normals(self) -> Float64[np.ndarray, "F 3"]:
+        """Of the faces, of unit length."""
+        return self._oriented[0]
+
+    @property
+    def areas(self) -> Float64[np.ndarray, " F"]:
+        """Of the faces, squared units of the vertices."""
+        return self._oriented[1]
+
+    @cached_property
+    def _oriented(self) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]:
+        return face_normals(self.mesh)  # when they are first asked for: most callers want points only
 
     def closest(self, queries: Float64[np.ndarray, "N 3"]) -> Hits:
         """The closest point of the surface to each query, its face and its barycentric weights."""
         import open3d as o3d
 
         points = o3d.core.Tensor.from_numpy(queries.astype(np.float32))
-        answer = self._scene.compute_closest_points(points, nthreads=1)  # more cost a tenth of the time and win nothing
+        answer = self.scene.compute_closest_points(points, nthreads=1)  # more cost a tenth of the time and win nothing
         faces = answer["primitive_ids"].numpy().astype(np.int64)
         uv = answer["primitive_uvs"].numpy().astype(np.float64)
         barycentric = np.stack([1 - uv[:, 0] - uv[:, 1], uv[:, 0], uv[:, 1]], axis=1)
-        corners = self.mesh.vertices[self.mesh.faces[faces]]  # float64 again
-        return Hits(np.einsum("nk,nkd->nd", barycentric, corners), faces, barycentric)
+        found = blend(self.mesh.vertices, self.mesh.faces[faces], barycentric)  # float64 again
+        return Hits(found, faces, barycentric)
 
 
 def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndarray, " N"]:

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
 from ..types import Mesh
 from .cameras import PinholeCamera
+from .nearest import Surface
 from .topology import face_normals
 
 
@@ -43,10 +45,17 @@ class Rays:
         self._tensor = o3d.core.Tensor.from_numpy
         self._scene = o3d.t.geometry.RaycastingScene()
         self._origin = _middle(mesh) if origin is None else origin
-        self._normals = face_normals(mesh)[0]
+        self._mesh = mesh
         if not mesh.is_empty:
             vertices = (mesh.vertices - self._origin).astype(np.float32)
             self._scene.add_triangles(self._tensor(vertices), self._tensor(mesh.faces.astype(np.uint32)))
+
+    @staticmethod
+    def of(surface: Surface) -> Rays:
+        """For a mesh that is prepared for closest points, about 0: what has been built for these serves rays, too."""
+        rays = Rays(Mesh.empty(), np.zeros(3))
+        rays._mesh, rays._scene = surface.mesh, surface.scene
+        return rays
 
     def cast(self, origins: Float64[np.ndarray, "N 3"], directions: Float64[np.ndarray, "N 3"]) -> Hit:
         """What N rays meet first."""
@@ -66,11 +75,15 @@ class Rays:
 
     def backs(self, camera: PinholeCamera, seen: Seen) -> Bool[np.ndarray, "H W"]:
         """Where a camera sees the back of a face; `seen` is what it sees."""
-        if not len(self._normals):
+        if self._mesh.is_empty:
             return np.zeros(seen.faces.shape, bool)
         normals = self._normals[seen.faces]  # of some face where none is seen
         along = sum(normals[..., axis] * ways for axis, ways in enumerate(_ways(camera)))
         return (along > 0) & (seen.faces >= 0)
+
+    @cached_property
+    def _normals(self) -> Float64[np.ndarray, "F 3"]:
+        return face_normals(self._mesh)[0]
 
     def _cast(self, origins: np.ndarray, directions: np.ndarray) -> dict:
         rays = np.concatenate([origins - self._origin, directions], axis=1).astype(np.float32)

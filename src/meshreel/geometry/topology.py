@@ -64,10 +64,23 @@ def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
 
 def face_normals(mesh: Mesh) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]:
     """Unit normals and areas (squared units of the vertices) of the faces; zero normals for zero areas."""
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)
-    length = np.linalg.norm(cross, axis=1)
-    return cross / np.where(length > 0, length, 1.0)[:, None], length / 2
+    axes = [np.ascontiguousarray(axis) for axis in mesh.vertices.T]  # one by one: half the time, the same sums
+    a, b, c = (np.ascontiguousarray(corner) for corner in mesh.faces.T)
+    (ux, uy, uz), (vx, vy, vz) = ([axis[to] - axis[a] for axis in axes] for to in (b, c))
+    cross = (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
+    length = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
+    divisor = np.where(length > 0, length, 1.0)
+    return np.stack([along / divisor for along in cross], axis=1), length / 2
+
+
+def blend(
+    values: Float64[np.ndarray, "V 3"], corners: Int32[np.ndarray, "N 3"], weights: Float64[np.ndarray, "N 3"]
+) -> Float64[np.ndarray, "N 3"]:
+    """Values of vertices inside faces that are given by their three corners, by barycentric weights."""
+    a, b, c = (np.ascontiguousarray(corner) for corner in corners.T)
+    u, v, w = (np.ascontiguousarray(weight) for weight in weights.T)
+    axes = (np.ascontiguousarray(axis) for axis in values.T)  # one by one: no N x 3 x 3 numbers in memory
+    return np.stack([u * axis[a] + v * axis[b] + w * axis[c] for axis in axes], axis=1)
 
 
 def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:

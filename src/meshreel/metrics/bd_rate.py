@@ -94,6 +94,30 @@ def bd_bound(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
 
 
 @dataclass(frozen=True, slots=True)
+class RateAt:
+    """The rate that a curve needs for a quality."""
+
+    rate: float | None  # None: none of its points is as good
+    at_most: bool = False  # `rate` is that of its cheapest point, which is better still
+
+
+def rate_at(curve: Curve, quality: float) -> RateAt:
+    """The rate for a quality, interpolated as for `bd_rate`; nothing is extrapolated."""
+    ends = reach(curve)
+    if ends is None or quality > ends[1][0]:
+        return RateAt(None)
+    if quality <= ends[0][0]:
+        return RateAt(ends[0][1], at_most=quality < ends[0][0])
+    return RateAt(math.exp(_log_rate(_front(curve), np.array([quality]))[0]))
+
+
+def reach(curve: Curve) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """(quality, rate) of the worst and of the best of the points that no other beats; None where there are none."""
+    points = _best(curve)
+    return (points[0], points[-1]) if points else None
+
+
+@dataclass(frozen=True, slots=True)
 class GainEnd:
     """Up to which quality a codec needs less rate than its anchor, going down from the best that both reach."""
 

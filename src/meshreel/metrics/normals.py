@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
-from ..geometry.topology import vertex_normals
+from ..geometry.topology import blend, vertex_normals
 from ..types import Mesh
 
 WORST_ANGLE = 180.0  # degrees; the error where one of the two meshes is empty
@@ -20,6 +20,8 @@ def welded_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
     if len(mesh.vertices) == 0:
         return np.zeros((0, 3))
     representative = _first_at_position(mesh.vertices)
+    if representative is None:
+        return vertex_normals(mesh)
     return vertex_normals(Mesh.of(mesh.vertices, representative[mesh.faces]))[representative]
 
 
@@ -27,7 +29,7 @@ def interpolate(
     normals: Float64[np.ndarray, "V 3"], corners: Int32[np.ndarray, "N 3"], weights: Float64[np.ndarray, "N 3"]
 ) -> Float64[np.ndarray, "N 3"]:
     """Unit normals inside faces given by their three corners; zero where the corners' normals cancel."""
-    return unit(np.einsum("nk,nkd->nd", weights, normals[corners]))
+    return unit(blend(normals, corners, weights))
 
 
 def unit(vectors: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
@@ -47,12 +49,14 @@ def angles(a: Float64[np.ndarray, "N 3"], b: Float64[np.ndarray, "N 3"]) -> Floa
     return np.where(undefined, WORST_ANGLE, np.degrees(2 * np.arctan2(apart, along)))
 
 
-def _first_at_position(vertices: Float64[np.ndarray, "V 3"]) -> Int64[np.ndarray, " V"]:
-    """For each vertex the index of one vertex that stands for its position."""
+def _first_at_position(vertices: Float64[np.ndarray, "V 3"]) -> Int64[np.ndarray, " V"] | None:
+    """For each vertex the index of one vertex that stands for its position; None where no two are at one."""
     order = np.lexsort(vertices.T)
     ordered = vertices[order]
     new = np.ones(len(order), dtype=bool)
     new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    if new.all():
+        return None
     representative = np.empty(len(order), dtype=np.int64)
     representative[order] = order[np.flatnonzero(new)[np.cumsum(new) - 1]]
     return representative

@@ -8,11 +8,14 @@ background of Open3D's viewer. Faces are seen from both sides, each with the mes
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
 
 from ..geometry.raycast import Rays
+from ..geometry.topology import blend
 from ..types import Mesh
 from .cameras import Camera
 from .normals import interpolate, welded_normals
@@ -42,8 +45,15 @@ class View:
 
     window: Window
     covered: Bool[np.ndarray, "H W"]
-    points: Float64[np.ndarray, "N 3"]  # m, world: where the rays of the covered pixels end, row by row
+    mesh: Mesh
+    corners: Int32[np.ndarray, "N 3"]  # vertices of the faces that the covered pixels see, row by row
+    weights: Float64[np.ndarray, "N 3"]  # barycentric, of where their rays end
     normals: Float64[np.ndarray, "N 3"]
+
+    @property
+    def points(self) -> Float64[np.ndarray, "N 3"]:
+        """Where the rays of the covered pixels end: m, world."""
+        return blend(self.mesh.vertices, self.corners, self.weights)
 
     @property
     def colors(self) -> Float32[np.ndarray, "H W 3"]:
@@ -79,17 +89,64 @@ def window_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Window:
 
 def look(mesh: Mesh, camera: Camera, window: Window) -> View:
     """What the camera sees of the mesh in the window."""
-    mesh = used_surface(mesh)
-    height, width = window.shape
-    nothing = np.zeros((0, 3))
-    if mesh.is_empty or height == 0 or width == 0:
-        return View(window, np.zeros((height, width), dtype=bool), nothing, nothing)
-    rows, columns = np.mgrid[window.top : window.bottom, window.left : window.right]
-    origins, directions = camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
-    hit, faces, weights = _cast(_to_camera(mesh.vertices, camera), mesh.faces, origins, directions)
-    corners = mesh.faces[faces]
-    points = np.einsum("nk,nkd->nd", weights, mesh.vertices[corners])
-    return View(window, hit.reshape(height, width), points, interpolate(welded_normals(mesh), corners, weights))
+    return Visible(mesh).look(Pixels(camera, window))
+
+
+@runtime_checkable
+class Picture(Protocol):
+    """Normals as colors in a window."""
+
+    @property
+    def covered(self) -> Bool[np.ndarray, "H W"]:
+        """Where a mesh is seen."""
+        ...
+
+    @property
+    def colors(self) -> Float32[np.ndarray, "H W 3"]:
+        """0 to 1."""
+        ...
+
+
+@runtime_checkable
+class Looked(Protocol):
+    """A mesh that can be looked at."""
+
+    def look(self, pixels: Pixels) -> Picture:
+        """What a camera sees of it in a window."""
+        ...
+
+
+class Pixels:
+    """A camera's window, and the rays through its pixels, for all that is looked at there."""
+
+    def __init__(self, camera: Camera, window: Window) -> None:
+        self.camera, self.window = camera, window
+
+    @cached_property
+    def rays(self) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
+        """Origins and unit directions, camera frame, row by row."""
+        window = self.window
+        rows, columns = np.mgrid[window.top : window.bottom, window.left : window.right]
+        return self.camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
+
+
+class Visible:
+    """A mesh that is looked at several times: its surface and its normals are found once."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = used_surface(mesh)
+        self._normals = welded_normals(self.mesh)
+
+    def look(self, pixels: Pixels) -> View:
+        """What a camera sees of it in a window."""
+        mesh, window = self.mesh, pixels.window
+        if mesh.is_empty or 0 in window.shape:
+            covered, nothing = np.zeros(window.shape, dtype=bool), np.zeros((0, 3))
+            return View(window, covered, mesh, nothing.astype(np.int32), nothing, nothing)
+        hit, faces, weights = _cast(_to_camera(mesh.vertices, pixels.camera), mesh.faces, *pixels.rays)
+        corners = mesh.faces[faces]
+        normals = interpolate(self._normals, corners, weights)
+        return View(window, hit.reshape(window.shape), mesh, corners, weights, normals)
 
 
 def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: Camera) -> Float64[np.ndarray, "V 3"]:

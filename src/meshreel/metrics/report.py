@@ -10,7 +10,7 @@ How frames are put together: the mean of the frames' values (PSNR: mean of dB, a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from .cameras import (
     views_around,
 )
 from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
+from .render import Looked, Visible
 from .ssim import ssim_normals
 
 Row = dict[str, Any]
@@ -84,9 +85,15 @@ class Comparison:
 
 
 def compare_sequences(
-    originals: Iterable[Mesh], decoded: Iterable[Mesh], options: ComparisonOptions | None = None
+    originals: Iterable[Mesh],
+    decoded: Iterable[Mesh],
+    options: ComparisonOptions | None = None,
+    seen: Callable[[Mesh], Looked] = Visible,
 ) -> Comparison:
-    """Every metric of `decoded` against `originals`, frame by frame (two MeshSequences of equal length)."""
+    """Every metric of `decoded` against `originals`, frame by frame (two MeshSequences of equal length).
+
+    `seen` renders originals, for who has done so before.
+    """
     options = options or ComparisonOptions()
     cameras: Cameras = _cameras(originals, options) if options.ssim else []
     rows: list[Row] = []
@@ -96,7 +103,7 @@ def compare_sequences(
         other = next(others, None)
         if other is None:
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
-        rows.append(frame_row(mesh, other, cameras))
+        rows.append(frame_row(mesh, other, cameras, seen))
         empty.append(mesh.is_empty and other.is_empty)
     if next(others, None) is not None:
         raise InputError(f"the original sequence ends after {len(rows)} frames and the decoded one does not")
@@ -105,11 +112,11 @@ def compare_sequences(
     return Comparison(tuple(rows), tuple(empty), tuple(cameras), tuple(options.keys))
 
 
-def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras) -> Row:
+def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras, seen: Callable[[Mesh], Looked] = Visible) -> Row:
     """The metrics of one frame by name; SSIM where there are cameras."""
     row = _distance_row(surface_errors(original, decoded))
     if cameras:
-        ssim = ssim_normals(original, decoded, cameras)
+        ssim = ssim_normals(original, decoded, cameras, seen)
         row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}
     return row
 

@@ -42,11 +42,7 @@ class Matches:
 
 
 def sample_pair(original: Mesh, decoded: Mesh) -> tuple[Samples, Samples]:
-    """Samples of two meshes that both have a surface, moved so that the original's bounding box is around 0.
-
-    Zero-area faces and vertices that no face uses are no surface and are left out.
-    """
-    original, decoded = used_surface(original), used_surface(decoded)
+    """Samples of two meshes that are all surface (`used_surface`), moved so that the original's box is around 0."""
     center = box_center(original)
     return _sample(_moved(original, -center)), _sample(_moved(decoded, -center))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
-from ..geometry.topology import face_normals
+from ..geometry.topology import blend, face_normals
 from ..types import Mesh
 
 _R2 = np.array([0.7548776662466927, 0.5698402909980532])  # 1 / g and 1 / g^2, where g^3 = g + 1
@@ -41,8 +41,7 @@ def scatter(mesh: Mesh, chosen: Bool[np.ndarray, " F"], count: int) -> Scatter:
     at = np.searchsorted(ends, (steps + 0.5) * (area / count), side="right")
     faces = which[np.minimum(at, len(which) - 1)]
     weights = _in_triangle((0.5 + _R2 * (steps[:, None] + 1)) % 1)
-    points = np.einsum("nk,nkd->nd", weights, mesh.vertices[mesh.faces[faces]])
-    return Scatter(points, faces, weights, area)
+    return Scatter(blend(mesh.vertices, mesh.faces[faces], weights), faces, weights, area)
 
 
 def _in_triangle(square: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, "N 3"]:

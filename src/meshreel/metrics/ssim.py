@@ -7,7 +7,7 @@ mesh covers. Only the window around the meshes is rendered and filtered: outside
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from jaxtyping import Float64
 
 from ..types import Mesh
 from .cameras import Camera
-from .render import look, window_of
+from .render import Looked, Pixels, Visible, window_of
 
 _SIDE = 7  # pixels, side of the SSIM window
 BORDER = _SIDE // 2
@@ -31,18 +31,25 @@ class NormalSsim:
     masked_by_view: tuple[float | None, ...]  # None where a view sees neither mesh
 
 
-def ssim_normals(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> NormalSsim:
-    """SSIM between the normal-colored renders of two meshes from every camera (paper, section 4: four views)."""
-    scores = [_ssim_view(original, decoded, camera) for camera in cameras]
+def ssim_normals(
+    original: Mesh, decoded: Mesh, cameras: Sequence[Camera], seen: Callable[[Mesh], Looked] = Visible
+) -> NormalSsim:
+    """SSIM between the normal-colored renders of two meshes from every camera (paper, section 4: four views).
+
+    `seen` renders the original, for who has done so before.
+    """
+    pair = seen(original), Visible(decoded)
+    windows = [window_of([original, decoded], camera, border=2 * _SIDE) for camera in cameras]
+    scores = [_ssim_view(*pair, Pixels(camera, window)) for camera, window in zip(cameras, windows, strict=True)]
     whole = tuple(score[0] for score in scores)
     masked = tuple(score[1] for score in scores)
-    seen = [value for value in masked if value is not None]
-    return NormalSsim(float(np.mean(whole)), float(np.mean(seen)) if seen else 1.0, whole, masked)
+    counted = [value for value in masked if value is not None]
+    return NormalSsim(float(np.mean(whole)), float(np.mean(counted)) if counted else 1.0, whole, masked)
 
 
-def _ssim_view(original: Mesh, decoded: Mesh, camera: Camera) -> tuple[float, float | None]:
-    window = window_of([original, decoded], camera, border=2 * _SIDE)
-    a, b = look(original, camera, window), look(decoded, camera, window)
+def _ssim_view(original: Looked, decoded: Looked, pixels: Pixels) -> tuple[float, float | None]:
+    camera, window = pixels.camera, pixels.window
+    a, b = original.look(pixels), decoded.look(pixels)
     interior = np.zeros((camera.height, camera.width), dtype=bool)
     interior[BORDER:-BORDER, BORDER:-BORDER] = True
     inside = interior[window.top : window.bottom, window.left : window.right]

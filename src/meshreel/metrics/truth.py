@@ -128,7 +128,7 @@ class Scene:
     @cached_property
     def rays(self) -> Rays:
         """For ray casting, about `origin`."""
-        return Rays(self.mesh, np.zeros(3))
+        return Rays(self.mesh, np.zeros(3)) if self.mesh.is_empty else Rays.of(self.surface)
 
 
 def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:

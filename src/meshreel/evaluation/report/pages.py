@@ -116,7 +116,7 @@ def _part(part: Part, shots: Mapping[str, Shots | None]) -> Iterator[str]:
         if len(made := makers(own)) > 1:
             yield from (f"Rows of more than one version: {text(', '.join(made))}.", "")
         shown = part.chosen.shown(own)
-        yield from (*(point_table(shown) if shown else ()), "", *part.chosen.comparisons(own))
+        yield from (*part.chosen.comparisons(own), "", *(point_table(shown) if shown else ()))
         if (found := shots[sequence]) is not None:
             yield from ("", *_sheet(part, found))
     yield from part.chosen.sections(part.rows)

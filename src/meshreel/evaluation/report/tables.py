@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import compress
 from math import exp, log
 from statistics import median
@@ -24,7 +25,18 @@ NEAR = 1.25  # factor of a rate within which points are compared
 NEAR_DB = 1.0  # of a PSNR
 DAGGER = "†"
 DECODE = "decode"  # the key of a row whose times count
-Cell = str | float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A number that is ranked, between two pieces of Markdown."""
+
+    number: float
+    before: str = ""
+    after: str = ""
+
+
+Cell = str | float | Told | None
 _UNKNOWN = "not recorded"
 
 
@@ -64,12 +76,12 @@ def ranked_table(
     cells = [[_shown(cell) for cell in row] for row in rows]
     for column, sign in enumerate(directions):
         for group in dict.fromkeys(groups) if sign else ():
-            own = [i for i, g in enumerate(groups) if g == group and g is not None and _is_number(rows[i][column])]
-            printed = {i: float(cells[i][column]) for i in own}
+            own = [i for i, g in enumerate(groups) if g == group and g is not None]
+            numbers = {i: _number(rows[i][column]) for i in own}
+            printed = {i: float(_shown(number)) for i, number in numbers.items() if number is not None}
             best = sorted(set(printed.values()), reverse=sign > 0)
-            for i, number in printed.items() if len(own) > 1 else ():
-                mark = {0: "**", 1: "*"}.get(best.index(number), "")
-                cells[i][column] = f"{mark}{cells[i][column]}{mark}"
+            for i, number in printed.items() if len(printed) > 1 else ():
+                cells[i][column] = _shown(rows[i][column], {0: "**", 1: "*"}.get(best.index(number), ""))
     return table([head + arrow(sign) for head, sign in zip(heads, directions, strict=True)], cells)
 
 
@@ -271,11 +283,15 @@ def _group_sizes(row: Row) -> str:
     return "+".join(sizes) if len(sizes) < 8 else f"{len(sizes)} groups"
 
 
-def _is_number(cell: Cell) -> bool:
-    return isinstance(cell, (int, float))
+def _number(cell: Cell) -> float | None:
+    """What a cell is ranked by; None for texts."""
+    if isinstance(cell, Told):
+        return cell.number
+    return cell if isinstance(cell, (int, float)) else None
 
 
-def _shown(cell: Cell) -> str:
-    if cell is None or isinstance(cell, str):
-        return cell or ""
-    return f"{cell:.4g}"
+def _shown(cell: Cell, mark: str = "") -> str:
+    """A cell, and the mark around its number."""
+    if isinstance(cell, Told):
+        return f"{cell.before}{_shown(cell.number, mark)}{cell.after}"
+    return cell or "" if cell is None or isinstance(cell, str) else f"{mark}{cell:.4g}{mark}"
