@@ -40,8 +40,9 @@ struct Buffer {
 void check(int status) {
     if (status == MR_LAPLACIAN_OK) return;
     if (status == MR_LAPLACIAN_NO_MEMORY) throw std::bad_alloc();
-    throw nb::value_error(status == MR_LAPLACIAN_SINGULAR ? "a connected component has no anchor"
-                                                          : "an index is out of range or a coordinate is not finite");
+    throw nb::value_error(status == MR_LAPLACIAN_SINGULAR
+                              ? "a connected component has no anchor"
+                              : "an index is out of range, anchors do not ascend, or a coordinate is not finite");
 }
 
 void expect(bool fits) {

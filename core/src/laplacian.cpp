@@ -99,8 +99,38 @@ bool good_input(const double* positions, int64_t vertices, const int32_t* faces,
     for (int64_t k = 0; k < 3 * face_count; ++k)
         if (faces[k] < 0 || faces[k] >= vertices) return false;
     for (int64_t k = 0; k < anchor_count; ++k)
-        if (anchors[k] < 0 || anchors[k] >= vertices) return false;
+        if (anchors[k] < (k ? anchors[k - 1] + 1 : 0) || anchors[k] >= vertices) return false;
     return true;
+}
+
+// (L*)^T deltas, row by row.
+std::vector<double> transposed(const mr_laplacian& system, const double* deltas, int64_t columns) {
+    const SparseRows& r = system.rows;
+    const int64_t n = system.vertices;
+    std::vector<double> product(deltas, deltas + n * columns);
+    for (int64_t i = 0; i < n; ++i) {
+        const double* y = deltas + i * columns;
+        for (int64_t p = r.starts[i]; p < r.starts[i + 1]; ++p) {
+            double* x = product.data() + r.columns[p] * columns;
+            for (int64_t k = 0; k < columns; ++k) x[k] -= r.values[p] * y[k];
+        }
+    }
+    for (size_t a = 0; a < system.anchors.size(); ++a) {
+        double* x = product.data() + system.anchors[a] * columns;
+        const double* y = deltas + (n + static_cast<int64_t>(a)) * columns;
+        for (int64_t k = 0; k < columns; ++k) x[k] += system.anchor_weight * y[k];
+    }
+    return product;
+}
+
+// What a solver leaves of `right` for want of digits, solved for and added.
+void refine(const mr_laplacian& system, const std::vector<double>& right, int64_t columns, double* weights) {
+    std::vector<double> fitted((system.vertices + system.anchors.size()) * columns);
+    mr_laplacian_forward(&system, weights, columns, fitted.data());
+    std::vector<double> left = transposed(system, fitted.data(), columns);
+    for (size_t k = 0; k < left.size(); ++k) left[k] = right[k] - left[k];
+    solve_normal(system, left, columns);
+    for (size_t k = 0; k < left.size(); ++k) weights[k] += left[k];
 }
 
 }  // namespace
@@ -163,22 +193,11 @@ int mr_laplacian_forward(const mr_laplacian* system, const double* weights, int6
 int mr_laplacian_inverse(mr_laplacian* system, const double* deltas, int64_t columns, double* weights) {
     return guarded(MR_LAPLACIAN_NO_MEMORY, MR_LAPLACIAN_BAD_INPUT, [&] {
         if (!factor_normal(*system)) return int(MR_LAPLACIAN_SINGULAR);
-        const SparseRows& r = system->rows;
-        const int64_t n = system->vertices;
-        std::vector<double> right(deltas, deltas + n * columns);  // (L*)^T deltas, row by row
-        for (int64_t i = 0; i < n; ++i) {
-            const double* y = deltas + i * columns;
-            for (int64_t p = r.starts[i]; p < r.starts[i + 1]; ++p) {
-                double* x = right.data() + r.columns[p] * columns;
-                for (int64_t k = 0; k < columns; ++k) x[k] -= r.values[p] * y[k];
-            }
-        }
-        for (size_t a = 0; a < system->anchors.size(); ++a) {
-            double* x = right.data() + system->anchors[a] * columns;
-            const double* y = deltas + (n + static_cast<int64_t>(a)) * columns;
-            for (int64_t k = 0; k < columns; ++k) x[k] += system->anchor_weight * y[k];
-        }
-        system->normal->solve(right.data(), columns, weights);
+        const std::vector<double> right = transposed(*system, deltas, columns);
+        std::vector<double> found = right;
+        solve_normal(*system, found, columns);
+        std::copy(found.begin(), found.end(), weights);
+        if (system->solver) refine(*system, right, columns, weights);  // four digits, which the ground costs
         return int(MR_LAPLACIAN_OK);
     });
 }

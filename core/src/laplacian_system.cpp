@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/SparseCore>
+
 #include "meshreel/laplacian.h"
 
 using Sparse = Eigen::SparseMatrix<double>;  // by columns, 32-bit indices
@@ -36,55 +38,24 @@ Sparse transposed_system(const mr_laplacian& system) {
 
 }  // namespace
 
-bool Factor::compute(const Sparse& lower) {
-    Eigen::SimplicialLDLT<Sparse, Eigen::Lower, Eigen::AMDOrdering<int>> ldlt;
-    ldlt.compute(lower);
-    if (ldlt.info() != Eigen::Success) return false;
-    const Eigen::Index n = lower.rows();
-    const auto& l = ldlt.matrixL().nestedExpression();
-    starts.assign(l.outerIndexPtr(), l.outerIndexPtr() + n + 1);
-    rows.assign(l.innerIndexPtr(), l.innerIndexPtr() + l.nonZeros());
-    values.assign(l.valuePtr(), l.valuePtr() + l.nonZeros());
-    pivots.resize(n);
-    order.resize(n);
-    for (Eigen::Index k = 0; k < n; ++k) {
-        pivots[k] = ldlt.vectorD()[k];
-        if (!(pivots[k] > 1e-14)) return false;
-        order[ldlt.permutationP().indices()[k]] = static_cast<int32_t>(k);
-    }
-    return true;
-}
-
-void Factor::solve(const double* right, int64_t columns, double* out) const {
-    const int64_t n = static_cast<int64_t>(order.size());
-    std::vector<double> x(static_cast<size_t>(n * columns));
-    for (int64_t k = 0; k < n; ++k) std::copy_n(right + order[k] * columns, columns, x.data() + k * columns);
-    for (int64_t k = 0; k < n; ++k) {
-        const double* from = x.data() + k * columns;
-        for (int32_t p = starts[k]; p < starts[k + 1]; ++p) {
-            double* to = x.data() + rows[p] * columns;
-            for (int64_t c = 0; c < columns; ++c) to[c] -= values[p] * from[c];
-        }
-    }
-    for (int64_t k = n - 1; k >= 0; --k) {
-        double* to = x.data() + k * columns;
-        for (int64_t c = 0; c < columns; ++c) to[c] /= pivots[k];
-        for (int32_t p = starts[k]; p < starts[k + 1]; ++p) {
-            const double* from = x.data() + rows[p] * columns;
-            for (int64_t c = 0; c < columns; ++c) to[c] -= values[p] * from[c];
-        }
-        std::copy_n(to, columns, out + order[k] * columns);
-    }
-}
-
 bool factor_normal(mr_laplacian& system) {
-    if (system.normal) return true;
+    if (system.solver || system.normal) return true;
+    auto solver = std::make_unique<GroundedSolver>();
+    const auto outcome = solver->compute(system.rows, system.anchors, system.anchor_weight);
+    if (outcome == GroundedSolver::Outcome::kReady) system.solver = std::move(solver);
+    if (outcome != GroundedSolver::Outcome::kTooManyAnchors) return outcome == GroundedSolver::Outcome::kReady;
     const Sparse t = transposed_system(system);
     const Sparse gram = (t * Sparse(t.transpose())).triangularView<Eigen::Lower>();
     auto factor = std::make_unique<Factor>();
     if (!factor->compute(gram)) return false;
     system.normal = std::move(factor);
     return true;
+}
+
+void solve_normal(const mr_laplacian& system, std::vector<double>& x, int64_t columns) {
+    if (system.solver) return system.solver->solve(x, columns);
+    const std::vector<double> right = x;
+    system.normal->solve(right.data(), columns, x.data());
 }
 
 // The error that symbols' rounding e leaves in the weights is the least g with L* g = e, of squared length

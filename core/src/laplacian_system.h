@@ -6,38 +6,24 @@
 #include <memory>
 #include <vector>
 
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
-
-struct SparseRows {  // compressed rows, columns ascending
-    std::vector<int64_t> starts;
-    std::vector<int32_t> columns;
-    std::vector<double> values;
-};
-
-// P A P^T = L D L^T, solved for all right-hand sides side by side.
-class Factor {
-  public:
-    bool compute(const Eigen::SparseMatrix<double>& lower);
-    void solve(const double* right, int64_t columns, double* out) const;
-
-    std::vector<int32_t> order;      // order[k] is the unknown eliminated k-th
-    std::vector<int32_t> starts;     // L by columns, unit diagonal left out
-    std::vector<int32_t> rows;
-    std::vector<double> values;
-    std::vector<double> pivots;      // D
-};
+#include "factor.h"
+#include "grounded_solver.h"
+#include "sparse_rows.h"
 
 struct mr_laplacian {
     int64_t vertices = 0;
     SparseRows rows;  // -L off the diagonal; the diagonal is 1
     std::vector<int32_t> anchors;
     double anchor_weight = 1.0;
-    std::unique_ptr<Factor> normal;   // (L*)^T L*
-    std::unique_ptr<Factor> shaping;  // L* (L*)^T, regularised
+    std::unique_ptr<GroundedSolver> solver;  // of (L*)^T L*
+    std::unique_ptr<Factor> normal;          // the same, where components have many anchors
+    std::unique_ptr<Factor> shaping;         // L* (L*)^T, regularised
 };
 
+// For `solve_normal`, once; false where a component has no anchor.
 bool factor_normal(mr_laplacian& system);
+// x <- ((L*)^T L*)^-1 x in place.
+void solve_normal(const mr_laplacian& system, std::vector<double>& x, int64_t columns);
 bool factor_shaping(mr_laplacian& system);
 void shape(const Factor& factor, const double* deltas, int64_t columns, const double* steps, const double* prices,
            int32_t* symbols);

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -77,12 +79,37 @@ def test_inverse_after_forward_is_the_identity(base: Mesh, rule: AnchorRule) -> 
     np.testing.assert_allclose(back, weights, atol=1e-9)
 
 
-def test_inverse_is_the_least_squares_solution() -> None:
-    base = icosahedron(1)
-    indices = laplacian.anchors(AnchorRule.FARTHEST, 5, base.faces, len(base.vertices))
-    deltas = np.random.default_rng(1).normal(size=(len(base.vertices) + len(indices), 3))
-    expected = np.linalg.lstsq(dense(base, indices), deltas, rcond=None)[0]
-    np.testing.assert_allclose(inverse(deltas, base, indices), expected, atol=1e-10)
+LONE = len(spoiled().vertices) - 1  # a vertex without faces
+
+
+@pytest.mark.parametrize("weight", [1, 4, 255])
+@pytest.mark.parametrize(
+    "anchors", [[0, 200], [5, 9, 77, 161, 162, 300], [2, 180, LONE], range(LONE)], ids=["two", "some", "lone", "all"]
+)
+def test_inverse_is_the_least_squares_solution(anchors: Sequence[int], weight: int) -> None:
+    """Of two components: an anchor in each, several, one at a vertex without faces, and more than pay."""
+    base = spoiled()
+    system = laplacian.System(base, np.array(anchors, np.int32), weight)
+    deltas = np.random.default_rng(1).normal(size=(len(base.vertices) + len(anchors), 3))
+    matrix = system.forward(np.eye(len(base.vertices)))
+    expected = np.linalg.lstsq(matrix, deltas, rcond=None)[0]
+    np.testing.assert_allclose(system.inverse(deltas), expected, atol=1e-9)
+
+
+def test_digits_do_not_run_out_on_many_vertices() -> None:
+    base = icosahedron(6)
+    indices = laplacian.anchors(AnchorRule.FARTHEST, 6, base.faces, len(base.vertices))
+    weights = np.random.default_rng(4).normal(size=(len(base.vertices), 2))
+    assert len(base.vertices) > 40_000
+    np.testing.assert_allclose(inverse(forward(weights, base, indices), base, indices), weights, atol=2e-8)
+
+
+@pytest.mark.parametrize("anchors", [[0, 5], [], [0, LONE], range(162)], ids=str)
+def test_a_component_without_anchors_is_refused(anchors: Sequence[int]) -> None:
+    base = spoiled()
+    system = laplacian.System(base, np.array(anchors, np.int32))
+    with pytest.raises(ValueError, match="anchor"):
+        system.inverse(np.zeros((len(base.vertices) + len(anchors), 1)))
 
 
 def test_a_column_does_not_depend_on_the_others() -> None:
@@ -145,6 +172,8 @@ def test_bad_indices_and_coordinates_are_refused() -> None:
         laplacian.System(Mesh(base.vertices, base.faces + 1), none)
     with pytest.raises(ValueError, match="out of range"):
         laplacian.System(base, np.array([-1], np.int32))
+    with pytest.raises(ValueError, match="ascend"):
+        laplacian.System(base, np.array([3, 3], np.int32))
     with pytest.raises(ValueError, match="finite"):
         laplacian.System(Mesh(base.vertices * np.nan, base.faces), none)
     with pytest.raises(ValueError, match="anchor"):

@@ -1,5 +1,5 @@
 // Laplacian coordinates on a triangle mesh (paper, section 3.3.3, eqs. 11-13): the extended operator L*, its forward
-// product, its least-squares inverse by sparse LDL^T, and the encoder's quantizer that shapes the noise for that inverse.
+// product, its least-squares inverse by a sparse factor, and the encoder's quantizer that shapes the noise for that inverse.
 //
 // Strict arithmetic: IEEE + - * / sqrt in a fixed order, one thread, no trigonometry; every build gives the same bits.
 #ifndef MESHREEL_LAPLACIAN_H
@@ -15,13 +15,13 @@ typedef struct mr_laplacian mr_laplacian;
 
 enum {
     MR_LAPLACIAN_OK = 0,
-    MR_LAPLACIAN_BAD_INPUT = 1,  // an index out of range, a negative size, a coordinate that is not finite
+    MR_LAPLACIAN_BAD_INPUT = 1,  // an index out of range, anchors that do not ascend, a negative size, a coordinate not finite
     MR_LAPLACIAN_SINGULAR = 2,   // a connected component has no anchor
     MR_LAPLACIAN_NO_MEMORY = 3,
 };
 
 // L* of a mesh: `vertices` rows of mean-value weights (eq. 11), then a row of `anchor_weight` times a unit
-// vector for each anchor.
+// vector for each anchor; anchors ascend.
 int mr_laplacian_create(const double* positions, int64_t vertices, const int32_t* faces, int64_t face_count,
                         const int32_t* anchors, int64_t anchor_count, double anchor_weight,
                         mr_laplacian** out);

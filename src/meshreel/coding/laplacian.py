@@ -1,7 +1,7 @@
 """Laplacian coordinates on the decoded base mesh (paper, section 3.3.3, eqs. 11-13).
 
 In: V x M weights. Out: (V + l) x M deltas, the mean-value Laplacian of the weights and below it the weights of l anchor
-vertices; back by least squares with a sparse Cholesky factorisation that all columns share.
+vertices; back by least squares with a sparse factorisation that all columns share.
 
 Differs from the paper: mean-value weights are bounded so that degenerate faces cannot spoil a row; a vertex without
 faces has the identity for its row; the anchors' rows may weigh more than 1, which buys them a finer step.

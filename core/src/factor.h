@@ -1,0 +1,22 @@
+#ifndef MESHREEL_FACTOR_H
+#define MESHREEL_FACTOR_H
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/SparseCore>
+
+// P A P^T = L D L^T, solved for all right-hand sides side by side.
+class Factor {
+  public:
+    bool compute(const Eigen::SparseMatrix<double>& lower);
+    void solve(const double* right, int64_t columns, double* out) const;
+
+    std::vector<int32_t> order;      // order[k] is the unknown eliminated k-th
+    std::vector<int32_t> starts;     // L by columns, unit diagonal left out
+    std::vector<int32_t> rows;
+    std::vector<double> values;
+    std::vector<double> pivots;      // D
+};
+
+#endif
