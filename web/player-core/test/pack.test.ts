@@ -9,11 +9,11 @@ import type { Tools } from "../src/coding/group.ts";
 import { Video } from "../src/decoder.ts";
 import { FormatError } from "../src/errors.ts";
 import type { Mesh } from "../src/mesh.ts";
-import type { DecodeJob, FromWorker, ToWorker } from "../src/protocol.ts";
-import type { Chunk, Head } from "../src/reader.ts";
+import type { FromWorker, ToWorker } from "../src/protocol.ts";
 import type { PackedGroup, PackedStatic } from "../src/types.ts";
 import { serve } from "../src/worker.ts";
 import type { Scope } from "../src/worker.ts";
+import { jobOf } from "./jobs.ts";
 import { ROOT, coreWasm, dracoWasm, nodeTools } from "./tools.ts";
 
 const FOLDER = `${ROOT}/conformance/v1`;
@@ -26,15 +26,6 @@ beforeAll(async () => {
 
 function load(name: string): Uint8Array {
   return new Uint8Array(readFileSync(`${FOLDER}/${name}`));
-}
-
-function jobOf(head: Head, chunk: Chunk, data: Uint8Array): DecodeJob {
-  const before = chunk.kind === "static" ? head.changedFrom(chunk) : head.groupBefore(chunk);
-  const { number, kind, form, track, firstFrame, frameCount } = chunk;
-  const payload = data.slice(chunk.offset, chunk.offset + chunk.size);
-  const layers = chunk.layers.map(({ size, crc }) => ({ size, crc }));
-  const previous = before?.number ?? null;
-  return { file: 1, chunk: number, kind, form, track, firstFrame, frameCount, payload, layers, quality: null, previous, scale: head.header.scale, stateOnly: false };
 }
 
 /** The corner positions of a frame's triangles, as a shader would see them: nine numbers each. */

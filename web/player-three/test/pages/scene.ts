@@ -1,7 +1,7 @@
 // The page of scene.browser.test.ts: a canvas of 320 x 240, a scene, and what the tests ask of them.
 
 import { Color, PerspectiveCamera, Scene, WebGLRenderer } from "three";
-import type { PackedGroup, PackedStatic, Shown } from "@meshreel/player-core/types";
+import type { Packed, PackedGroup, PackedStatic, Shown } from "@meshreel/player-core/types";
 import { ReelScene } from "../../src/index.ts";
 import type { Mode } from "../../src/index.ts";
 import { makeFloor, makeGroup } from "../analytic.ts";
@@ -62,6 +62,12 @@ const api = {
     const packed = kind === "group" ? texelsOf(0) : prepared.find((other) => other.kind === "static");
     if (packed === undefined) throw new Error("no background");
     return [...scene.readPositions(packed, renderer, frame, blend)].map((value) => (Number.isNaN(value) ? -1e9 : value));
+  },
+  /** Positions of the vertices that a frame of any packed value draws, three numbers each. */
+  readPacked(packed: Packed, frame: number): number[] {
+    const positions = scene.readPositions(packed, renderer, frame);
+    scene.release(packed);
+    return [...positions].filter((value) => !Number.isNaN(value));
   },
   numbers() {
     const { memory, programs } = renderer.info;
