@@ -8,6 +8,7 @@ import type { Mode, Quality } from "./attributes.ts";
 export interface PictureStats {
   readonly triangles: number; // of the last picture
   readonly gpuBytes: number; // of buffers and textures
+  readonly headsetRate: number; // Hz of the headset that shows it; 0 on a page, and where the headset does not tell
 }
 
 /**

@@ -51,7 +51,7 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   get stats(): PictureStats {
-    return { triangles: this.#shown ? this.#reel.triangles : 0, gpuBytes: this.#reel.gpuBytes };
+    return { triangles: this.#shown ? this.#reel.triangles : 0, gpuBytes: this.#reel.gpuBytes, headsetRate: this.#session?.rate ?? 0 };
   }
 
   get presenting(): boolean {

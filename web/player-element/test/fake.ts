@@ -136,7 +136,7 @@ export class FakePlayback extends EventTarget implements Playback {
 /** Draws a turning square and the number of the frame. */
 export class FakeStage extends EventTarget implements Stage {
   readonly canvas: HTMLCanvasElement;
-  readonly stats = { triangles: 41_234, gpuBytes: 12_345_678 };
+  readonly stats = { triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0 };
   presenting = false;
   mode: Mode = "shaded";
   background = "";

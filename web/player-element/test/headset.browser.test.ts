@@ -100,4 +100,14 @@ describeInBrowser("the built player in a headset", () => {
     expect(errors).toEqual([]);
     await page.close();
   }, 60_000);
+
+  test("a bench during which the headset is entered measures the headset alone", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&bench=2", [{ path: IWER }, installHeadset]);
+    await page.waitForFunction(() => !document.querySelector("meshreel-player")!.paused);
+    await page.locator("button.vr").click();
+    const text = await page.waitForFunction(() => document.querySelector("pre")!.textContent!.split("\n").find((line) => line.startsWith("{")));
+    expect(JSON.parse((await text.jsonValue())!)).toMatchObject({ place: "VR", displayRate: 72 });
+    expect(errors).toEqual([]);
+    await page.close();
+  }, 60_000);
 });

@@ -87,6 +87,7 @@ describeInBrowser("the built player", () => {
     expect(report.pictures).toBeGreaterThan(0);
     expect(report.scriptMs.median).toBeGreaterThan(0);
     expect(report.triangles).toBeGreaterThan(0);
+    expect(report).toMatchObject({ place: "page, 320 x 240", gpu: expect.stringContaining("SwiftShader") });
     expect(errors).toEqual([]);
     await page.close();
   });

@@ -178,7 +178,7 @@ describe("small parts", () => {
   });
   test("the statistics name what the overlay must show", () => {
     const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
-    const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
+    const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
     expect(Object.fromEntries(lines)).toMatchObject({
       Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Quality: "3 of 3",
       "Skipped groups": "0", Display: "60 fps, 0.4 ms each",
@@ -193,7 +193,10 @@ describe("the address of the page", () => {
     expect([...attributes]).toEqual([
       ["src", "a b.reel"], ["mode", "normal"], ["quality", "2"], ["autoplay", ""], ["loop", ""], ["controls", null],
     ]);
-    expect([time, bench]).toEqual([65.5, true]);
+    expect([time, bench]).toEqual([65.5, 20]);
+  });
+  test("a bench takes as many seconds as it is asked for, else twenty; none where the address says no", () => {
+    expect(["?bench=5", "?bench=x", "?bench=0", ""].map((search) => readParameters(search).bench)).toEqual([5, 20, null, null]);
   });
   test("a time that is none is the start", () => {
     expect(["", "12.5", "2s", "1:00:01", "-4", "1e9", "x", null].map(readTime)).toEqual([0, 12.5, 2, 3601, 0, 0, 0, 0]);

@@ -4,4 +4,4 @@ export { ReelScene } from "./scene.ts";
 export { MODES } from "./materials.ts";
 export type { Mode } from "./materials.ts";
 export { Bench, formatReport } from "./bench.ts";
-export type { BenchExtra, BenchOptions, BenchReport, Spread } from "./bench.ts";
+export type { BenchExtra, BenchReport, Spread } from "./bench.ts";
