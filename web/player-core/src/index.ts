@@ -7,5 +7,5 @@ export { WorkerPool, type WorkerLike, type WorkerSetup } from "./pool.ts";
 export type { DecodeJob, FromWorker, ToWorker } from "./protocol.ts";
 export { BlobSource, BytesSource, type Source, type SourceWatch, type Take } from "./source.ts";
 export type {
-  Box, Info, Packed, PackedGroup, PackedStatic, PackedVertices, Playback, PlaybackEvents, Shown, Stats,
+  Box, Info, Packed, PackedGroup, PackedStatic, PackedVertices, Playback, PlaybackEvents, Quality, Shown, Stats,
 } from "./types.ts";

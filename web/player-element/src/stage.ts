@@ -1,8 +1,8 @@
 // What the element needs of something that draws, and of something that opens files. The element knows no WebGL.
 
-import type { Info, Packed, Playback, Shown } from "@meshreel/player-core/types";
+import type { Info, Packed, Playback, Quality, Shown } from "@meshreel/player-core/types";
+import type { Mode } from "@meshreel/player-three/modes";
 import type { VrActions } from "@meshreel/xr";
-import type { Mode, Quality } from "./attributes.ts";
 
 /** Numbers of the picture, for the overlay. */
 export interface PictureStats {

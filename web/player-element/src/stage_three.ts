@@ -2,11 +2,11 @@
 
 import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
 import { ReelScene } from "@meshreel/player-three";
+import type { Mode } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
 import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import type { Mode } from "./attributes.ts";
 import type { PictureStats, Stage } from "./stage.ts";
 
 const FOV = 45; // degrees, of the picture's height

@@ -1,7 +1,7 @@
 // A playback and a stage that fetch, decode and draw nothing: what the element does with them can be seen from outside.
 
-import type { Info, Packed, Playback, Shown, Stats } from "@meshreel/player-core/types";
-import type { Mode, Quality } from "../src/attributes.ts";
+import type { Info, Packed, Playback, Quality, Shown, Stats } from "@meshreel/player-core/types";
+import type { Mode } from "@meshreel/player-three/modes";
 import type { Engine, Settings, Stage } from "../src/stage.ts";
 
 export const INFO: Info = {
@@ -24,6 +24,7 @@ export class FakePlayback extends EventTarget implements Playback {
   disposed = false;
   #time = 0;
   #before: number | null = null;
+  #shown: Shown | null = null;
   #timers: ReturnType<typeof setTimeout>[] = [];
   readonly source: string | Blob;
 
@@ -91,7 +92,8 @@ export class FakePlayback extends EventTarget implements Playback {
       if (this.#time >= this.duration) this.#end();
     }
     this.#before = now;
-    return { frame: this.currentFrame, blend: 0, groups: [null], background: null };
+    if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, groups: [null], background: null };
+    return this.#shown;
   }
 
   dispose(): void {
