@@ -34,7 +34,8 @@ export interface Stage extends EventTarget {
   fit(): void;
   /** Turns the camera by radians, and brings it so many times closer. */
   orbit(right: number, up: number, closer: number): void;
-  picture(): Promise<Blob>; // PNG
+  /** Draws, and gives what it drew as a PNG: what was drawn before is gone with the picture that showed it. */
+  picture(shown: Shown | null): Promise<Blob>;
   /** From then on `draw` is called by the headset's frames, not by the page's. */
   enterVr(frame: (now: number) => void, actions: VrActions): Promise<void>;
   exitVr(): void;

@@ -98,8 +98,7 @@ export class View {
   picture(): Promise<Blob> {
     const shown = this.#playback?.update(this.#clock) ?? null; // the clock does not move
     if (shown) this.#last = shown;
-    this.stage.draw(this.#last);
-    return this.stage.picture();
+    return this.stage.picture(this.#last);
   }
 
   async enterVr(actions: VrActions): Promise<void> {

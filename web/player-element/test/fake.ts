@@ -188,8 +188,8 @@ export class FakeStage extends EventTarget implements Stage {
     this.fits++;
     this.dispatchEvent(new Event("change"));
   }
-  picture(): Promise<Blob> {
-    this.draw(this.shown);
+  picture(shown: Shown | null): Promise<Blob> {
+    this.draw(shown);
     return new Promise((done) => this.canvas.toBlob((blob) => done(blob!), "image/png"));
   }
   async enterVr(frame: (now: number) => void): Promise<void> {
