@@ -3,8 +3,8 @@
 import { DoubleSide, GLSL3, RawShaderMaterial } from "three";
 import type { DataTexture, IUniform } from "three";
 import { EDGE_COLOR } from "./colors.ts";
+import type { Vector } from "./colors.ts";
 import { MODES } from "./modes.ts";
-import type { Vector } from "./octahedral.ts";
 import { surfaceVertex, SURFACE_FRAGMENT } from "./shaders.ts";
 import type { Feed } from "./shaders.ts";
 

@@ -4,6 +4,7 @@ import { Camera, GLSL3, NoBlending, Points, RawShaderMaterial, RGBAIntegerFormat
 import type { BufferGeometry, WebGLRenderer } from "three";
 import { makeUniforms } from "./materials.ts";
 import type { PartUniforms } from "./materials.ts";
+import { drawOffscreen } from "./offscreen.ts";
 import { setFrame, setUpload } from "./part.ts";
 import { vertexRoom } from "./ranges.ts";
 import { DRAWN, READBACK_FRAGMENT, readbackVertex } from "./shaders.ts";
@@ -58,14 +59,10 @@ function drawInto(target: WebGLRenderTarget, geometries: readonly BufferGeometry
     points.frustumCulled = false;
     scene.add(points);
   }
-  const before = renderer.getRenderTarget();
-  const { enabled } = renderer.xr;
-  renderer.xr.enabled = false;
-  renderer.setRenderTarget(target);
-  renderer.clear();
-  renderer.render(scene, new Camera());
-  renderer.setRenderTarget(before);
-  renderer.xr.enabled = enabled;
+  drawOffscreen(renderer, target, () => {
+    renderer.clear();
+    renderer.render(scene, new Camera());
+  });
 }
 
 function positionsOf(pixels: Uint32Array, count: number): Float32Array {
