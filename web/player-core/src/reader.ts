@@ -127,7 +127,7 @@ export class Head {
 }
 
 /** "chunk 3 (track 0, frames 10 to 19)", for messages. */
-export function describe(chunk: Chunk): string {
+export function describe(chunk: Pick<Chunk, "number" | "kind" | "track" | "firstFrame" | "frameCount">): string {
   if (chunk.kind === "static") return `chunk ${chunk.number} (static)`;
   return `chunk ${chunk.number} (track ${chunk.track}, frames ${chunk.firstFrame} to ${chunk.firstFrame + chunk.frameCount - 1})`;
 }
