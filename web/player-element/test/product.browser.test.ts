@@ -151,6 +151,18 @@ describeInBrowser("the built player", () => {
     await page.close();
   });
 
+  test("a damaged group is told and skipped, and the rest is played to its end", async () => {
+    const bytes = readFileSync(join(site.folder, "layers.reel"));
+    bytes[bytes.length - 9]! ^= 1; // in the last group
+    site.write("damaged.reel", bytes);
+    const { page, errors } = await site.visit("player/index.html?src=/damaged.reel&autoplay&speed=0.5");
+    await page.locator(".toast").getByText(/^chunk \d+ \(track 0, .* is skipped$/).waitFor();
+    await ended(page);
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.statistics!.skippedGroups)).toBe(1);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
   test("a local file is opened and played", async () => {
     const { page } = await site.visit("player/index.html");
     await page.locator("input[type=file]").setInputFiles(join(site.folder, "layers.reel"));
