@@ -47,18 +47,15 @@ export class ChunkDecoder {
   private readonly states = new Kept<LayersState>(MOST_STATES);
   private readonly statics = new Kept<Mesh>(MOST_STATICS);
 
-  constructor(
-    private readonly tools: Tools,
-    private readonly now: () => number = () => performance.now(),
-  ) {}
+  constructor(private readonly tools: Tools) {}
 
   /** What the job's chunk is, in metres from the header's origin; null where only its state is wanted. */
   decode(job: DecodeJob): Packed | null {
-    const start = this.now();
+    const start = performance.now();
     checkPayload(describe({ ...job, number: job.chunk }), job.form, job.payload, job.layers);
     const place = { scale: job.scale, origin: [0, 0, 0] };
     const made = job.kind === "static" ? this.background(job, place) : this.group(job, place);
-    return made && { ...made, decodeMs: this.now() - start };
+    return made && { ...made, decodeMs: performance.now() - start };
   }
 
   /** Frees what is kept of a file. */

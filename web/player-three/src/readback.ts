@@ -14,7 +14,7 @@ const WIDTH = 2048;
 
 /**
  * Positions of all vertices that the triangles of a frame use, in the order of their numbers, three float32 each; NaN for those
- * that none uses. It waits for the GPU: for tests and measurements, not for playing.
+ * that none uses. It waits for the GPU: for tests and measurements, no part of the built player.
  */
 export function readPositions(upload: Upload, renderer: WebGLRenderer, frame: number, blend: number): Float32Array {
   const count = vertexRoom(upload.packed);
