@@ -1,6 +1,6 @@
 // The public surface of player-core: the player without a picture.
 
-export { FormatError, SourceError } from "./errors.ts";
+export { FormatError, SourceError, type FormatErrorKind, type SourceErrorKind } from "./errors.ts";
 export { HttpSource, type HttpOptions } from "./http_source.ts";
 export { Player, type PlayerOptions } from "./player.ts";
 export { WorkerPool, type WorkerLike, type WorkerSetup } from "./pool.ts";

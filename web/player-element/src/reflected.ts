@@ -19,9 +19,10 @@ export class Reflected extends Element {
     }
   }
 
+  /** A whole address; as it was written where it is none, which opening it then tells. */
   get src(): string {
     const text = this.getAttribute("src");
-    return text === null ? "" : new URL(text, document.baseURI).href;
+    return text !== null && URL.canParse(text, document.baseURI) ? new URL(text, document.baseURI).href : (text ?? "");
   }
   set src(value: string) {
     this.setAttribute("src", value);

@@ -49,9 +49,14 @@ export interface Settings {
   readonly playbackRate: number;
 }
 
+/** This browser cannot draw. */
+export class GraphicsError extends Error {
+  override name = "GraphicsError";
+}
+
 /** Where playbacks and stages come from; tests put others in. */
 export interface Engine {
   open(source: string | Blob, settings: Settings): Playback;
-  /** Throws where there is no WebGL 2. */
+  /** Throws GraphicsError where there is no WebGL 2. */
   stage(canvas: HTMLCanvasElement): Stage;
 }

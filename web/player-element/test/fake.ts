@@ -1,7 +1,9 @@
 // A playback and a stage that fetch, decode and draw nothing: what the element does with them can be seen from outside.
 
+import { SourceError, type SourceErrorKind } from "@meshreel/player-core/errors";
 import type { Info, Packed, Playback, Quality, Shown, Stats } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
+import { GraphicsError } from "../src/stage.ts";
 import type { Engine, Settings, Stage } from "../src/stage.ts";
 
 export const INFO: Info = {
@@ -36,7 +38,7 @@ export class FakePlayback extends EventTarget implements Playback {
     this.interpolate = settings.interpolate;
     this.quality = settings.quality;
     const bad = typeof source === "string" && source.includes("404");
-    this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`) : this.#head()));
+    this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`, "missing") : this.#head()));
   }
 
   get duration(): number {
@@ -102,8 +104,8 @@ export class FakePlayback extends EventTarget implements Playback {
   }
 
   /** Fails as the network does. */
-  fail(message: string): void {
-    const error = Object.assign(new Error(message), { name: "SourceError" });
+  fail(message: string, kind: SourceErrorKind = "unreachable"): void {
+    const error = new SourceError(message, { kind });
     this.dispatchEvent(new CustomEvent("error", { detail: error }));
   }
   warn(message: string): void {
@@ -216,7 +218,7 @@ export class FakeEngine implements Engine {
     return this.playbacks.at(-1)!;
   }
   stage(canvas: HTMLCanvasElement): FakeStage {
-    if (!this.webgl) throw new Error("WebGL 2 is not available");
+    if (!this.webgl) throw new GraphicsError("WebGL 2 is not available");
     this.stages.push(new FakeStage(canvas));
     return this.stages.at(-1)!;
   }

@@ -1,3 +1,4 @@
+import { FormatError, SourceError } from "@meshreel/player-core/errors";
 import { MODES, type Mode } from "@meshreel/player-three/modes";
 import { describe, expect, test } from "vitest";
 import * as parse from "../src/attributes.ts";
@@ -8,6 +9,7 @@ import { actionOf, KEYS, seekStep, takesKey } from "../src/keyboard.ts";
 import { explain } from "../src/messages.ts";
 import { readParameters, readTime } from "../src/parameters.ts";
 import { ranges } from "../src/ranges.ts";
+import { GraphicsError } from "../src/stage.ts";
 import { statisticsLines } from "../src/stats.ts";
 import { goesOn } from "../src/view.ts";
 import { FakePlayback, INFO } from "./fake.ts";
@@ -120,24 +122,17 @@ describe("menus", () => {
 });
 
 describe("messages", () => {
-  const error = (name: string, message: string) => Object.assign(new Error(message), { name });
   test("errors are told in plain words with the exact ones below", () => {
-    const message = explain(error("SourceError", "http://x/a.reel: not found (404), check the address"));
-    expect(message.title).toBe("The recording was not found");
-    expect(message.detail).toContain("404");
-    expect(message.retry).toBe(true);
+    const message = explain(new SourceError("http://x/a.reel: not found (404), check the address", { kind: "missing" }));
+    expect(message).toMatchObject({ title: "The recording was not found", retry: true, detail: expect.stringContaining("404") });
   });
-  test("each kind of failure has its own words", () => {
-    const kinds = [
-      error("FormatError", "not a .reel file: the signature is missing"), error("FormatError", "format version 9: this player knows version 1, update it"),
-      error("FormatError", "the head is damaged: its checksum does not match"), error("SourceError", "http://x: no answer"),
-      error("SourceError", "http://x: the server answers 503, not the file"), error("Error", "WebGL 2 is not available"), error("Error", "else"),
-    ];
-    expect(new Set(kinds.map((kind) => explain(kind).title)).size).toBe(kinds.length);
-    expect(explain(kinds[1]!).retry).toBe(false);
-  });
-  test("digits of an address are no status", () => {
-    expect(explain(error("FormatError", "http://x:404/503.reel: 12 bytes too many")).title).toBe("This file is damaged");
+  test("each kind of failure has its own words, and only a newer file cannot be tried again", () => {
+    const sources = (["missing", "refused", "failing", "unreachable", "foreign", "unusable"] as const).map((kind) => new SourceError("x", { kind }));
+    const formats = (["damaged", "newer"] as const).map((kind) => new FormatError("x", kind));
+    const errors = [...sources, ...formats, new GraphicsError("x"), new Error("x")];
+    expect(new Set(errors.map((error) => explain(error).title)).size).toBe(errors.length);
+    expect(errors.filter((error) => !explain(error).retry)).toEqual([formats[1]]);
+    expect(explain(new FormatError("x", "foreign")).title).toBe(explain(new SourceError("x", { kind: "foreign" })).title);
   });
 });
 
