@@ -7,6 +7,7 @@ import { checkPayload } from "./decoder.ts";
 import type { Mesh, Placement } from "./mesh.ts";
 import { packGroup, packStatic } from "./pack.ts";
 import type { DecodeJob } from "./protocol.ts";
+import { describe } from "./reader.ts";
 import type { Packed } from "./types.ts";
 
 const MOST_STATES = 64; // of groups, of all tracks and files; the oldest goes first
@@ -46,19 +47,15 @@ export class ChunkDecoder {
   private readonly states = new Kept<LayersState>(MOST_STATES);
   private readonly statics = new Kept<Mesh>(MOST_STATICS);
 
-  constructor(
-    private readonly tools: Tools,
-    private readonly now: () => number = () => performance.now(),
-  ) {}
+  constructor(private readonly tools: Tools) {}
 
   /** What the job's chunk is, in metres from the header's origin; null where only its state is wanted. */
   decode(job: DecodeJob): Packed | null {
-    const start = this.now();
-    const name = job.kind === "static" ? `chunk ${job.chunk} (static)` : `chunk ${job.chunk} (track ${job.track}, frames ${job.firstFrame} to ${job.firstFrame + job.frameCount - 1})`;
-    checkPayload(name, job.form, job.payload, job.layers);
+    const start = performance.now();
+    checkPayload(describe({ ...job, number: job.chunk }), job.form, job.payload, job.layers);
     const place = { scale: job.scale, origin: [0, 0, 0] };
     const made = job.kind === "static" ? this.background(job, place) : this.group(job, place);
-    return made && { ...made, decodeMs: this.now() - start };
+    return made && { ...made, decodeMs: performance.now() - start };
   }
 
   /** Frees what is kept of a file. */
@@ -70,7 +67,7 @@ export class ChunkDecoder {
   private group(job: DecodeJob, place: Placement): Packed | null {
     const { file, chunk, track, firstFrame, payload } = job;
     const previous = this.needed(this.states, job);
-    const { group, state } = continueGroup(this.tools, payload, job.frameCount, job.quality, previous, place);
+    const { group, state } = continueGroup(this.tools, payload, { frameCount: job.frameCount, quality: job.quality, previous, place });
     if (state !== null) this.states.set(file, chunk, state);
     if (job.stateOnly) return null;
     const quality = Math.max(0, job.layers.length - 1);

@@ -53,7 +53,8 @@ export class Video {
     const before = this.head.groupBefore(chunk);
     const previous = before === null ? null : this.decoded(before).state;
     const layers = this.quality === null ? chunk.layers.length : this.quality + 1;
-    const made = continueGroup(this.tools, this.payload(chunk, layers), chunk.frameCount, this.quality, previous, this.place);
+    const { quality, place } = this;
+    const made = continueGroup(this.tools, this.payload(chunk, layers), { frameCount: chunk.frameCount, quality, previous, place });
     this.groups.set(chunk.number, made);
     return made;
   }

@@ -5,6 +5,14 @@ import { SourceError } from "./errors.ts";
 /** The connection failed, or the server for now: it may be tried again. */
 export class Lost extends Error {
   override name = "Lost";
+
+  constructor(
+    message: string,
+    options?: ErrorOptions,
+    readonly kind: "unreachable" | "failing" = "unreachable",
+  ) {
+    super(message, options);
+  }
 }
 
 /** What a server has told of the file so far. */
@@ -18,9 +26,9 @@ export interface Known {
 export function checkStatus(response: Response, url: string): void {
   const status = response.status;
   if (status === 200 || status === 206 || status === 416) return;
-  if (status >= 500 || status === 408 || status === 429) throw new Lost(`the server answers ${status}`);
-  if (status === 404 || status === 410) throw new SourceError(`${url}: not found (${status}), check the address`);
-  if (status === 401 || status === 403) throw new SourceError(`${url}: access refused (${status}), ask for permission`);
+  if (status >= 500 || status === 408 || status === 429) throw new Lost(`the server answers ${status}`, {}, "failing");
+  if (status === 404 || status === 410) throw new SourceError(`${url}: not found (${status}), check the address`, { kind: "missing" });
+  if (status === 401 || status === 403) throw new SourceError(`${url}: access refused (${status}), ask for permission`, { kind: "refused" });
   throw new SourceError(`${url}: the server answers ${status}, not the file`);
 }
 
@@ -28,7 +36,7 @@ export function checkStatus(response: Response, url: string): void {
 export function checkIdentity(response: Response, known: Known): void {
   const type = response.headers.get("Content-Type")?.split(";")[0].trim().toLowerCase();
   if (type === "text/html" || type === "application/xhtml+xml") {
-    throw new SourceError(`${known.url}: the server sends a web page (${type}), not the file: check the address`);
+    throw new SourceError(`${known.url}: the server sends a web page (${type}), not the file: check the address`, { kind: "foreign" });
   }
   const etag = response.headers.get("ETag")?.replace(/^W\//, "") ?? null; // null, too, where another origin hides it
   if (etag !== null && known.etag !== null && etag !== known.etag) {

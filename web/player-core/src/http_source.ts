@@ -91,7 +91,7 @@ export class HttpSource implements Source {
     const what = `${this.url}: ${error.message}`;
     if (failures >= (this.#hasAnswered ? TRIES : FIRST_TRIES)) {
       const remedy = this.#hasAnswered ? "check the connection" : "check the address, the connection, and that the server allows this page (CORS)";
-      throw new SourceError(`${what}, tried ${failures} times: ${remedy} and load it again`, { cause: error });
+      throw new SourceError(`${what}, tried ${failures} times: ${remedy} and load it again`, { cause: error, kind: error.kind });
     }
     const delay = this.#options.retryMs * 2 ** Math.min(failures - 1, 5);
     this.watch?.warn(new SourceError(`${what}; trying again in ${delay / 1000} s`, { cause: error }));

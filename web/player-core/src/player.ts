@@ -9,7 +9,8 @@ import type { Share, WorkerSetup } from "./pool.ts";
 import { Session } from "./session.ts";
 import type { Limits } from "./session.ts";
 import type { Source } from "./source.ts";
-import type { Info, Playback, PlaybackEvents, Shown, Stats } from "./types.ts";
+import { PLAYBACK_RATES } from "./types.ts";
+import type { Info, Playback, PlaybackEvents, Quality, Shown, Stats } from "./types.ts";
 
 export interface PlayerOptions extends Partial<Limits> {
   readonly source: Source; // the player's own from here on: `dispose` closes it
@@ -38,7 +39,7 @@ export class Player extends PlaybackTarget implements Playback {
   #start = 0; // s, where to begin once the head is there
   #loop = false;
   #rate = 1;
-  #quality: number | "auto" = "auto";
+  #quality: Quality = "auto";
   #level = NaN; // quality that was told last
   interpolate = true;
 
@@ -117,18 +118,19 @@ export class Player extends PlaybackTarget implements Playback {
   }
 
   set playbackRate(rate: number) {
-    if (!Number.isFinite(rate)) throw new TypeError(`a playback rate of ${rate}: give a number from 0.1 to 4`);
-    this.#rate = Math.min(4, Math.max(0.1, rate));
+    const { least, most } = PLAYBACK_RATES;
+    if (!Number.isFinite(rate)) throw new TypeError(`a playback rate of ${rate}: give a number from ${least} to ${most}`);
+    this.#rate = Math.min(most, Math.max(least, rate));
     if (this.#clock) this.#clock.rate = this.#rate;
     this.dispatchEvent(new Event("ratechange"));
     this.#wake();
   }
 
-  get quality(): number | "auto" {
+  get quality(): Quality {
     return this.#quality;
   }
 
-  set quality(quality: number | "auto") {
+  set quality(quality: Quality) {
     if (quality !== "auto" && !(quality >= 0)) throw new TypeError(`a quality of ${quality}: give "auto" or a number of layers`);
     if (quality === this.#quality) return;
     this.#quality = quality === "auto" ? quality : Math.floor(quality);

@@ -47,11 +47,11 @@ export class Head {
   /** Bytes of the head, from the first 14 bytes of a file. FormatError where it is none, or of an unknown version. */
   static sizeOf(start: Uint8Array): number {
     if (start.length < PREAMBLE_SIZE || !MAGIC.every((byte, k) => start[k] === byte)) {
-      throw new FormatError("not a .reel file: the signature is missing");
+      throw new FormatError("not a .reel file: the signature is missing", "foreign");
     }
     const [preamble] = unpack(Preamble, start);
     if (preamble.version !== VERSION) {
-      throw new FormatError(`format version ${preamble.version}: this player knows version ${VERSION}, update it`);
+      throw new FormatError(`format version ${preamble.version}: this player knows version ${VERSION}, update it`, "newer");
     }
     if (preamble.flags !== 0) throw new FormatError(`flags ${preamble.flags}: version ${VERSION} has none`);
     if (preamble.headSize < PREAMBLE_SIZE + Checksum.least) throw new FormatError(`a head of ${preamble.headSize} bytes: damaged`);
@@ -127,7 +127,7 @@ export class Head {
 }
 
 /** "chunk 3 (track 0, frames 10 to 19)", for messages. */
-export function describe(chunk: Chunk): string {
+export function describe(chunk: Pick<Chunk, "number" | "kind" | "track" | "firstFrame" | "frameCount">): string {
   if (chunk.kind === "static") return `chunk ${chunk.number} (static)`;
   return `chunk ${chunk.number} (track ${chunk.track}, frames ${chunk.firstFrame} to ${chunk.firstFrame + chunk.frameCount - 1})`;
 }

@@ -14,6 +14,7 @@ import type { Chunk, Head } from "./reader.ts";
 import { plan } from "./scheduler.ts";
 import type { Plan, Step } from "./scheduler.ts";
 import type { Source } from "./source.ts";
+import type { Quality } from "./types.ts";
 
 export interface Limits {
   readonly bufferSeconds: number; // of bytes fetched ahead, at normal speed
@@ -26,7 +27,7 @@ export interface Aim {
   readonly time: number; // s
   readonly speed: number; // content seconds a second
   readonly loop: boolean;
-  readonly quality: number | "auto";
+  readonly quality: Quality;
   readonly isWaiting: boolean; // it should play and cannot
 }
 

@@ -1,5 +1,6 @@
 // Where bytes come from: ranges of a file that can be cancelled.
 
+import { joined } from "./bytes.ts";
 import { SourceError } from "./errors.ts";
 
 /** Takes bytes as they come: `bytes` lie at `offset` of the file. The array is its own to keep. */
@@ -32,17 +33,6 @@ export async function readBytes(source: Source, offset: number, length: number, 
   const pieces: Uint8Array[] = [];
   await source.read(offset, length, (bytes) => pieces.push(bytes), signal);
   return joined(pieces);
-}
-
-/** All pieces, one behind the other. */
-export function joined(pieces: readonly Uint8Array[]): Uint8Array<ArrayBuffer> {
-  const all = new Uint8Array(pieces.reduce((sum, piece) => sum + piece.length, 0));
-  let at = 0;
-  for (const piece of pieces) {
-    all.set(piece, at);
-    at += piece.length;
-  }
-  return all;
 }
 
 /** What sources on this machine have in common. */

@@ -54,7 +54,10 @@ export interface PackedStatic extends PackedVertices {
 
 export type Packed = PackedGroup | PackedStatic;
 
-/** What to draw now: a frame, how far to blend towards the next, and what is at hand of it. */
+/**
+ * What to draw now: a frame, how far to blend towards the next, and what is at hand of it. The same object as long as that is the
+ * same; one that was replaced stays as it is until the next is asked for, and may be used again then.
+ */
 export interface Shown {
   readonly frame: number;
   /** 0 to 1 towards frame + 1; 0 where that is in another group in all tracks, or where interpolation is off. A track whose group ends here stands. */
@@ -76,6 +79,12 @@ export interface Info {
   readonly size: number; // bytes
   readonly metadata: Readonly<Record<string, unknown>>;
 }
+
+/** Layers beyond the first that are played; "auto": as many as network and workers bear. */
+export type Quality = number | "auto";
+
+/** What `Playback.playbackRate` may be. */
+export const PLAYBACK_RATES = { least: 0.1, most: 4 } as const;
 
 /** Numbers for the overlay. */
 export interface Stats {
@@ -122,9 +131,9 @@ export interface Playback extends EventTarget {
   readonly stats: Stats;
   currentTime: number; // s from the first frame; setting it seeks
   loop: boolean;
-  playbackRate: number; // 0.1 to 4
+  playbackRate: number; // within PLAYBACK_RATES
   interpolate: boolean; // blend between frames of a group
-  quality: number | "auto"; // layers beyond the first
+  quality: Quality;
   play(): Promise<void>;
   pause(): void;
   /** Pauses and shows the frame so many further; negative goes back. */

@@ -1,6 +1,6 @@
 // What is damaged costs only itself: playback goes on, and says what it skips.
 
-import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { describe, expect, test } from "vitest";
 
 import { FormatError, SourceError } from "../src/errors.ts";
 import { Form } from "../src/layout.gen.ts";
@@ -9,18 +9,13 @@ import { Head } from "../src/reader.ts";
 import { BytesSource } from "../src/source.ts";
 import { FakeWorkers } from "./fake_workers.ts";
 import { background, group, makeReel, stream } from "./reel.ts";
-import { Rig, frames, pass } from "./rig.ts";
+import { frames, pass, useRig } from "./rig.ts";
 import { Viewer } from "./viewer.ts";
 
 const FULL = [400, 800, 1600];
 const FAST = 1e6;
 
-let rig: Rig;
-beforeEach(() => {
-  vi.useFakeTimers();
-  rig = new Rig();
-});
-afterEach(() => rig.end());
+const rig = useRig();
 
 async function play(seconds: number): Promise<void> {
   await Promise.all([rig.player.play(), pass(seconds)]);

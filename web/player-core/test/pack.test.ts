@@ -9,11 +9,13 @@ import type { Tools } from "../src/coding/group.ts";
 import { Video } from "../src/decoder.ts";
 import { FormatError } from "../src/errors.ts";
 import type { Mesh } from "../src/mesh.ts";
-import type { DecodeJob, FromWorker, ToWorker } from "../src/protocol.ts";
-import type { Chunk, Head } from "../src/reader.ts";
+import { packStatic } from "../src/pack.ts";
+import type { FromWorker, ToWorker } from "../src/protocol.ts";
 import type { PackedGroup, PackedStatic } from "../src/types.ts";
 import { serve } from "../src/worker.ts";
 import type { Scope } from "../src/worker.ts";
+import { decodeNormal, encodeNormal } from "../../test/octahedral.ts";
+import { jobOf } from "./jobs.ts";
 import { ROOT, coreWasm, dracoWasm, nodeTools } from "./tools.ts";
 
 const FOLDER = `${ROOT}/conformance/v1`;
@@ -26,15 +28,6 @@ beforeAll(async () => {
 
 function load(name: string): Uint8Array {
   return new Uint8Array(readFileSync(`${FOLDER}/${name}`));
-}
-
-function jobOf(head: Head, chunk: Chunk, data: Uint8Array): DecodeJob {
-  const before = chunk.kind === "static" ? head.changedFrom(chunk) : head.groupBefore(chunk);
-  const { number, kind, form, track, firstFrame, frameCount } = chunk;
-  const payload = data.slice(chunk.offset, chunk.offset + chunk.size);
-  const layers = chunk.layers.map(({ size, crc }) => ({ size, crc }));
-  const previous = before?.number ?? null;
-  return { file: 1, chunk: number, kind, form, track, firstFrame, frameCount, payload, layers, quality: null, previous, scale: head.header.scale, stateOnly: false };
 }
 
 /** The corner positions of a frame's triangles, as a shader would see them: nine numbers each. */
@@ -98,14 +91,6 @@ function normalsOf(mesh: Mesh): (number[] | null)[] {
   return sums.map((sum) => (Math.hypot(...sum) > 0 ? sum.map((value) => value / Math.hypot(...sum)) : null));
 }
 
-function unfolded(code: number): number[] {
-  let [x, y] = [(code & 255) / 127.5 - 1, (code >> 8) / 127.5 - 1];
-  const z = 1 - Math.abs(x) - Math.abs(y);
-  if (z < 0) [x, y] = [(1 - Math.abs(y)) * (x < 0 ? -1 : 1), (1 - Math.abs(x)) * (y < 0 ? -1 : 1)];
-  const length = Math.hypot(x, y, z);
-  return [x / length, y / length, z / length];
-}
-
 test("normals are those of the frame's own faces, to a degree", () => {
   const data = load("layers_patched.reel");
   const video = new Video(tools, data);
@@ -116,10 +101,16 @@ test("normals are those of the frame's own faces, to a degree", () => {
     normalsOf(video.frame(t)).forEach((normal, v) => {
       const texel = v < packed.vertexCount ? t * packed.vertexCount + v : alone++;
       if (normal === null) return;
-      const cosine = unfolded(packed.texels[4 * texel + 3]).reduce((sum, value, k) => sum + value * normal[k], 0);
+      const cosine = decodeNormal(packed.texels[4 * texel + 3]).reduce((sum, value, k) => sum + value * normal[k], 0);
       expect(cosine).toBeGreaterThan(Math.cos(Math.PI / 180));
     });
   }
+});
+
+test("a vertex that no face uses has the normal +z, and its code is that of the tests", () => {
+  const mesh = { vertices: Float64Array.of(0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 5, 5), faces: Int32Array.of(0, 1, 2) };
+  const codes = [...packStatic(tools.core, mesh).texels].filter((_, k) => k % 4 === 3);
+  expect(codes).toEqual([...Array.from({ length: 3 }, () => encodeNormal([0, -1, 0])), encodeNormal([0, 0, 1])]);
 });
 
 test("a chunk whose predecessor is not at hand asks for the chain", () => {

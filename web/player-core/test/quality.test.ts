@@ -1,20 +1,15 @@
 // How many layers are played: as many as network and workers bear, without a frame less.
 
-import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
+import { describe, expect, test } from "vitest";
 
 import { group, makeReel, stream } from "./reel.ts";
-import { Rig, frames, pass } from "./rig.ts";
+import { frames, pass, useRig } from "./rig.ts";
 
 const FULL = [4000, 8000, 16000, 32000]; // bytes a second of each layer
 const RATE = 60_000; // of all
 const BEST = 3;
 
-let rig: Rig;
-beforeEach(() => {
-  vi.useFakeTimers();
-  rig = new Rig();
-});
-afterEach(() => rig.end());
+const rig = useRig();
 
 const seen = (): number[] => rig.viewer.qualities;
 const mean = (values: readonly number[]): number => values.reduce((sum, value) => sum + value, 0) / values.length;

@@ -1,6 +1,6 @@
 // A player with stand-ins for the network, the workers and the display, on a clock that the tests turn.
 
-import { expect, vi } from "vitest";
+import { afterEach, beforeEach, expect, vi } from "vitest";
 
 import { Player } from "../src/player.ts";
 import type { PlayerOptions } from "../src/player.ts";
@@ -9,7 +9,7 @@ import { SlowSource } from "./slow_source.ts";
 import { Viewer } from "./viewer.ts";
 
 export class Rig {
-  readonly workers = new FakeWorkers();
+  workers = new FakeWorkers();
   source!: SlowSource;
   player!: Player;
   viewer!: Viewer;
@@ -31,6 +31,17 @@ export class Rig {
     expect(this.viewer.alive.size).toBe(0);
     expect(this.workers.workers.every(({ isTerminated }) => isTerminated)).toBe(true);
   }
+}
+
+/** A rig that is made anew for each test of a file. */
+export function useRig(): Rig {
+  const rig = new Rig();
+  beforeEach(() => {
+    vi.useFakeTimers();
+    rig.workers = new FakeWorkers();
+  });
+  afterEach(() => rig.end());
+  return rig;
 }
 
 export async function pass(seconds: number): Promise<void> {

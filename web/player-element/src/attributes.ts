@@ -1,12 +1,11 @@
 // Attributes and properties: what a page writes, and what the player takes from it. Nothing here knows the DOM.
 
-export const MODES = ["shaded", "normal", "wireframe", "colour"] as const;
-export type Mode = (typeof MODES)[number];
-export type Quality = number | "auto";
-export type Theme = "auto" | "light" | "dark";
+import { PLAYBACK_RATES } from "@meshreel/player-core/types";
+import type { Quality } from "@meshreel/player-core/types";
+import { MODES } from "@meshreel/player-three/modes";
+import type { Mode } from "@meshreel/player-three/modes";
 
-export const SLOWEST = 0.1;
-export const FASTEST = 4;
+export type Theme = "auto" | "light" | "dark";
 
 /** Attributes whose change the element must hear of. */
 export const OBSERVED = [
@@ -17,7 +16,7 @@ export const OBSERVED = [
 /** A speed from 0.1 to 4; 1 where the text is none. */
 export function parseSpeed(text: string | null): number {
   const speed = text === null || text.trim() === "" ? NaN : Number(text);
-  return Number.isFinite(speed) ? Math.min(FASTEST, Math.max(SLOWEST, speed)) : 1;
+  return Number.isFinite(speed) ? Math.min(PLAYBACK_RATES.most, Math.max(PLAYBACK_RATES.least, speed)) : 1;
 }
 
 /** Layers beyond the first, or "auto" where the text is no whole number from 0. */

@@ -73,8 +73,6 @@ export class MeshreelPlayer extends Reflected {
     this.#controls.refresh();
   }
 
-  // What a media element has -------------------------------------------------------------------------------------
-
   /** Opens a file, or without one what was open before, from its start. */
   load(file?: Blob): void {
     if (file) this.#source = file;
@@ -136,8 +134,6 @@ export class MeshreelPlayer extends Reflected {
   get seekable(): Ranges {
     return ranges(0, this.duration);
   }
-
-  // What it has besides ------------------------------------------------------------------------------------------
 
   get info(): Info | null {
     return this.#playback?.info ?? null;
@@ -209,8 +205,6 @@ export class MeshreelPlayer extends Reflected {
     if (!this.#view || !this.#playback) throw new DOMException("there is nothing to measure: set src", "InvalidStateError");
     return this.#view.measure(this.#playback, bench);
   }
-
-  // Inside -------------------------------------------------------------------------------------------------------
 
   #queueLoad(): void {
     if (this.#queued) return;

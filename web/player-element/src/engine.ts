@@ -1,6 +1,7 @@
 // The real engine: recordings come from the network or from files, workers decode them, three.js draws them.
 
 import { BlobSource, HttpSource, Player, WorkerPool, type WorkerLike } from "@meshreel/player-core";
+import { GraphicsError } from "./stage.ts";
 import type { Engine, Settings, Stage } from "./stage.ts";
 import { ThreeStage } from "./stage_three.ts";
 
@@ -45,7 +46,11 @@ export class RealEngine implements Engine {
   }
 
   stage(canvas: HTMLCanvasElement): Stage {
-    return new ThreeStage(canvas);
+    try {
+      return new ThreeStage(canvas);
+    } catch (error) {
+      throw new GraphicsError(error instanceof Error ? error.message : String(error), { cause: error });
+    }
   }
 
   #leave(shared: Shared): void {

@@ -1,5 +1,7 @@
-// What a viewer is told when something fails: plain words, what can be done, and the exact error below. The patterns are of the
-// messages of player-core (checks.ts, reader.ts, http_answer.ts) and of stage_three.ts.
+// What a viewer is told when something fails: plain words, what can be done, and the exact error below.
+
+import { FormatError, SourceError, type FormatErrorKind, type SourceErrorKind } from "@meshreel/player-core/errors";
+import { GraphicsError } from "./stage.ts";
 
 export interface Message {
   readonly title: string;
@@ -8,25 +10,38 @@ export interface Message {
   readonly retry: boolean; // whether trying again can help
 }
 
-const CASES: readonly { pattern: RegExp; title: string; advice: string; retry: boolean }[] = [
-  { pattern: /webgl/i, title: "This browser cannot draw it", advice: "WebGL 2 is switched off or missing. Switch on graphics acceleration, or use another browser.", retry: true },
-  { pattern: /not found \((404|410)\)/, title: "The recording was not found", advice: "The address may be wrong, or the file was moved.", retry: true },
-  { pattern: /refused \((401|403)\)/, title: "The recording is not open to you", advice: "The server refuses it. Sign in where it is kept, or ask its owner.", retry: true },
-  { pattern: /answers 5\d\d/, title: "The server has a problem", advice: "Try again in a moment.", retry: true },
-  { pattern: /^format version \d/, title: "This file is newer than the player", advice: "Update the player, then open it again.", retry: false },
-  { pattern: /not a \.reel file|sends a web page/, title: "This is not a .reel file", advice: "Open a file that meshreel wrote, or correct the address.", retry: true },
-];
+type Words = Omit<Message, "detail" | "retry">;
+
+const FOREIGN: Words = { title: "This is not a .reel file", advice: "Open a file that meshreel wrote, or correct the address." };
+
+const OF_FORMAT: Readonly<Record<FormatErrorKind, Words>> = {
+  damaged: { title: "This file is damaged", advice: "It ends too early or its bytes were changed. Fetch it again." },
+  foreign: FOREIGN,
+  newer: { title: "This file is newer than the player", advice: "Update the player, then open it again." },
+};
+
+const OF_SOURCE: Readonly<Record<SourceErrorKind, Words>> = {
+  missing: { title: "The recording was not found", advice: "The address may be wrong, or the file was moved." },
+  refused: { title: "The recording is not open to you", advice: "The server refuses it. Sign in where it is kept, or ask its owner." },
+  failing: { title: "The server has a problem", advice: "Try again in a moment." },
+  unreachable: { title: "The recording cannot be fetched", advice: "The server did not answer. Look at your connection." },
+  foreign: FOREIGN,
+  unusable: { title: "The recording cannot be read", advice: "What came does not fit the file. Open it again, or tell its owner what stands below." },
+};
+
+const NO_GRAPHICS: Words = {
+  title: "This browser cannot draw it",
+  advice: "WebGL 2 is switched off or missing. Switch on graphics acceleration, or use another browser.",
+};
+const OTHER: Words = { title: "The recording cannot be played", advice: "Something went wrong in the player." };
 
 /** The message for an error of a source, a file or the GPU. */
 export function explain(error: Error): Message {
-  const detail = error.message;
-  const found = CASES.find(({ pattern }) => pattern.test(detail));
-  if (found) return { title: found.title, advice: found.advice, detail, retry: found.retry };
-  if (error.name === "FormatError") {
-    return { title: "This file is damaged", advice: "It ends too early or its bytes were changed. Fetch it again.", detail, retry: true };
-  }
-  if (error.name === "SourceError" || error instanceof TypeError) {
-    return { title: "The recording cannot be fetched", advice: "The server did not answer. Look at your connection.", detail, retry: true };
-  }
-  return { title: "The recording cannot be played", advice: "Something went wrong in the player.", detail, retry: true };
+  return { ...wordsFor(error), detail: error.message, retry: !(error instanceof FormatError && error.kind === "newer") };
+}
+
+function wordsFor(error: Error): Words {
+  if (error instanceof FormatError) return OF_FORMAT[error.kind];
+  if (error instanceof SourceError) return OF_SOURCE[error.kind];
+  return error instanceof GraphicsError ? NO_GRAPHICS : OTHER;
 }

@@ -14,7 +14,7 @@ function start(): void {
     else player.setAttribute(name, value);
   }
   if (time > 0) player.currentTime = time;
-  if (bench) void runBench(player, Number(new URLSearchParams(location.search).get("bench")) || undefined);
+  if (bench !== null) void runBench(player, bench);
   if (player.src) document.title = `${recordingName(player.src)} · meshreel`;
 }
 

@@ -5,10 +5,11 @@ export interface Parameters {
   /** Attributes to set; null to take one away. */
   readonly attributes: ReadonlyMap<string, string | null>;
   readonly time: number; // s; 0 where none is asked for
-  readonly bench: boolean;
+  readonly bench: number | null; // s to measure for; null where it is not asked for
 }
 
 const TEXTS = ["src", "mode", "quality", "camera", "speed", "theme", "background", "poster", "interpolate"];
+const BENCH = 20; // s, where none are given
 const FLAGS = ["autoplay", "loop", "stats", "controls"];
 
 /** Reads `location.search`; what is not known is passed over. */
@@ -20,7 +21,7 @@ export function readParameters(search: string): Parameters {
     if (text !== null && text !== "") attributes.set(name, text);
   }
   for (const name of FLAGS) if (given.has(name)) attributes.set(name, isOn(given.get(name)) ? "" : null);
-  return { attributes, time: readTime(given.get("t")), bench: isOn(given.get("bench")) };
+  return { attributes, time: readTime(given.get("t")), bench: isOn(given.get("bench")) ? readTime(given.get("bench")) || BENCH : null };
 }
 
 function isOn(text: string | null): boolean {

@@ -1,5 +1,7 @@
 // Properties that are attributes: the attribute is the one place where a setting is kept, so HTML, scripts and controls agree.
 
+import type { Quality } from "@meshreel/player-core/types";
+import type { Mode } from "@meshreel/player-three/modes";
 import * as parse from "./attributes.ts";
 
 // Pages that are made on a server import this where there are no elements.
@@ -17,9 +19,10 @@ export class Reflected extends Element {
     }
   }
 
+  /** A whole address; as it was written where it is none, which opening it then tells. */
   get src(): string {
     const text = this.getAttribute("src");
-    return text === null ? "" : new URL(text, document.baseURI).href;
+    return text !== null && URL.canParse(text, document.baseURI) ? new URL(text, document.baseURI).href : (text ?? "");
   }
   set src(value: string) {
     this.setAttribute("src", value);
@@ -70,10 +73,10 @@ export class Reflected extends Element {
   }
 
   /** Layers beyond the first, or "auto". */
-  get quality(): parse.Quality {
+  get quality(): Quality {
     return parse.parseQuality(this.getAttribute("quality"));
   }
-  set quality(value: parse.Quality) {
+  set quality(value: Quality) {
     this.setAttribute("quality", String(value));
   }
 
@@ -93,10 +96,10 @@ export class Reflected extends Element {
     this.setAttribute("interpolate", value ? "on" : "off");
   }
 
-  get mode(): parse.Mode {
+  get mode(): Mode {
     return parse.parseMode(this.getAttribute("mode"));
   }
-  set mode(value: parse.Mode) {
+  set mode(value: Mode) {
     this.setAttribute("mode", value);
   }
 

@@ -1,13 +1,14 @@
 // What the element needs of something that draws, and of something that opens files. The element knows no WebGL.
 
-import type { Info, Packed, Playback, Shown } from "@meshreel/player-core/types";
+import type { Info, Packed, Playback, Quality, Shown } from "@meshreel/player-core/types";
+import type { Mode } from "@meshreel/player-three/modes";
 import type { VrActions } from "@meshreel/xr";
-import type { Mode, Quality } from "./attributes.ts";
 
 /** Numbers of the picture, for the overlay. */
 export interface PictureStats {
   readonly triangles: number; // of the last picture
   readonly gpuBytes: number; // of buffers and textures
+  readonly headsetRate: number; // Hz of the headset that shows it; 0 on a page, and where the headset does not tell
 }
 
 /**
@@ -33,7 +34,8 @@ export interface Stage extends EventTarget {
   fit(): void;
   /** Turns the camera by radians, and brings it so many times closer. */
   orbit(right: number, up: number, closer: number): void;
-  picture(): Promise<Blob>; // PNG
+  /** Draws, and gives what it drew as a PNG: what was drawn before is gone with the picture that showed it. */
+  picture(shown: Shown | null): Promise<Blob>;
   /** From then on `draw` is called by the headset's frames, not by the page's. */
   enterVr(frame: (now: number) => void, actions: VrActions): Promise<void>;
   exitVr(): void;
@@ -47,9 +49,14 @@ export interface Settings {
   readonly playbackRate: number;
 }
 
+/** This browser cannot draw. */
+export class GraphicsError extends Error {
+  override name = "GraphicsError";
+}
+
 /** Where playbacks and stages come from; tests put others in. */
 export interface Engine {
   open(source: string | Blob, settings: Settings): Playback;
-  /** Throws where there is no WebGL 2. */
+  /** Throws GraphicsError where there is no WebGL 2. */
   stage(canvas: HTMLCanvasElement): Stage;
 }

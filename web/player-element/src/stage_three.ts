@@ -2,16 +2,16 @@
 
 import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
 import { ReelScene } from "@meshreel/player-three";
+import type { Mode } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
 import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
-import type { Mode } from "./attributes.ts";
 import type { PictureStats, Stage } from "./stage.ts";
 
 const FOV = 45; // degrees, of the picture's height
 const FROM = new Vector3(0.25, 0.25, 1).normalize(); // where a view that fits looks from
-const SHUN = 1.05; // of the distance at which everything just fits
+const MARGIN = 1.05; // of the distance at which everything just fits
 const STEEPEST = 0.01; // radians from straight above or below
 const CLOSEST = 1e-3; // of the recording's size: how near the camera comes
 const FARTHEST = 20; // of its size: how far the camera goes
@@ -28,7 +28,6 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #stop = new AbortController();
   #reel = new ReelScene();
   #info: Info | null = null;
-  #shown: Shown | null = null;
   #mode: Mode = "shaded";
   #background = "";
   #free = 1; // of the picture's height: what the bar leaves
@@ -51,7 +50,7 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   get stats(): PictureStats {
-    return { triangles: this.#shown ? this.#reel.triangles : 0, gpuBytes: this.#reel.gpuBytes };
+    return { triangles: this.#reel.visible ? this.#reel.triangles : 0, gpuBytes: this.#reel.gpuBytes, headsetRate: this.#session?.rate ?? 0 };
   }
 
   get presenting(): boolean {
@@ -96,7 +95,6 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#reel.mode = this.#mode;
     this.#content.add(this.#reel);
     this.#info = info;
-    this.#shown = null;
     this.fit();
   }
 
@@ -109,7 +107,6 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   draw(shown: Shown | null): boolean {
-    this.#shown = shown;
     if (shown) this.#reel.show(shown);
     this.#reel.visible = shown !== null;
     const moves = !this.presenting && this.#orbit.update();
@@ -131,7 +128,7 @@ export class ThreeStage extends EventTarget implements Stage {
     if (!this.#info) return;
     const { middle } = this.#ball();
     const half = Math.tan((FOV * Math.PI) / 360);
-    const distance = SHUN * distanceOf(this.#info.box, half * this.#eye.aspect, half * this.#free);
+    const distance = MARGIN * distanceOf(this.#info.box, half * this.#eye.aspect, half * this.#free);
     this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
     this.#isFit = true;
   }
@@ -145,8 +142,8 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#look(new Vector3().setFromSpherical(place).add(target), target);
   }
 
-  picture(): Promise<Blob> {
-    this.draw(this.#shown); // what was drawn before is gone with the picture that showed it
+  picture(shown: Shown | null): Promise<Blob> {
+    this.draw(shown);
     return new Promise((done, fail) => this.canvas.toBlob((blob) => (blob ? done(blob) : fail(new Error("no picture"))), "image/png"));
   }
 

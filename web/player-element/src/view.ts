@@ -98,8 +98,7 @@ export class View {
   picture(): Promise<Blob> {
     const shown = this.#playback?.update(this.#clock) ?? null; // the clock does not move
     if (shown) this.#last = shown;
-    this.stage.draw(this.#last);
-    return this.stage.picture();
+    return this.stage.picture(this.#last);
   }
 
   async enterVr(actions: VrActions): Promise<void> {
@@ -144,7 +143,7 @@ export class View {
     this.#before = now;
     const playback = this.#playback;
     const shown = playback?.update(this.#clock) ?? null;
-    const fresh = this.#dirty || this.stage.presenting || differs(shown, this.#last);
+    const fresh = this.#dirty || this.stage.presenting || (shown !== null && shown !== this.#last);
     const moving = fresh && this.#draw(shown);
     if (shown) this.#last = shown;
     if (fresh) this.#measure(start);
@@ -193,14 +192,6 @@ export class View {
     this.#report(event);
     this.refresh();
   }
-}
-
-/** Whether two pictures of time differ. */
-export function differs(one: Shown | null, other: Shown | null): boolean {
-  if (one === null) return false; // nothing to show: what is there stays
-  if (other === null || one.frame !== other.frame || one.blend !== other.blend) return true;
-  if (one.background !== other.background || one.groups.length !== other.groups.length) return true;
-  return one.groups.some((group, track) => group !== other.groups[track]);
 }
 
 /** Whether the next picture may differ though nobody does anything: it plays, seeks, or has shown nothing yet. */

@@ -153,6 +153,12 @@ describeOnPage("<meshreel-player>", (on) => {
     expect(await on.get((player) => player.screenshot().catch((error: Error) => error.message))).toContain("no picture");
   });
 
+  test("an address that is none is told as any other that does not lead to a file", async () => {
+    await on.put('<meshreel-player src="http://[404" controls></meshreel-player>', false);
+    await on.page.getByRole("alert").waitFor();
+    expect(await on.get((player) => [player.src, player.error!.message])).toEqual(["http://[404", "http://[404: not found (404), check the address"]);
+  });
+
   test("preload=none fetches only when somebody plays", async () => {
     await on.put('<meshreel-player src="walk.reel" preload="none" controls></meshreel-player>', false);
     await on.page.waitForTimeout(100);

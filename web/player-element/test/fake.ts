@@ -1,7 +1,9 @@
 // A playback and a stage that fetch, decode and draw nothing: what the element does with them can be seen from outside.
 
-import type { Info, Packed, Playback, Shown, Stats } from "@meshreel/player-core/types";
-import type { Mode, Quality } from "../src/attributes.ts";
+import { SourceError, type SourceErrorKind } from "@meshreel/player-core/errors";
+import type { Info, Packed, Playback, Quality, Shown, Stats } from "@meshreel/player-core/types";
+import type { Mode } from "@meshreel/player-three/modes";
+import { GraphicsError } from "../src/stage.ts";
 import type { Engine, Settings, Stage } from "../src/stage.ts";
 
 export const INFO: Info = {
@@ -24,6 +26,7 @@ export class FakePlayback extends EventTarget implements Playback {
   disposed = false;
   #time = 0;
   #before: number | null = null;
+  #shown: Shown | null = null;
   #timers: ReturnType<typeof setTimeout>[] = [];
   readonly source: string | Blob;
 
@@ -35,7 +38,7 @@ export class FakePlayback extends EventTarget implements Playback {
     this.interpolate = settings.interpolate;
     this.quality = settings.quality;
     const bad = typeof source === "string" && source.includes("404");
-    this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`) : this.#head()));
+    this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`, "missing") : this.#head()));
   }
 
   get duration(): number {
@@ -91,7 +94,8 @@ export class FakePlayback extends EventTarget implements Playback {
       if (this.#time >= this.duration) this.#end();
     }
     this.#before = now;
-    return { frame: this.currentFrame, blend: 0, groups: [null], background: null };
+    if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, groups: [null], background: null };
+    return this.#shown;
   }
 
   dispose(): void {
@@ -100,8 +104,8 @@ export class FakePlayback extends EventTarget implements Playback {
   }
 
   /** Fails as the network does. */
-  fail(message: string): void {
-    const error = Object.assign(new Error(message), { name: "SourceError" });
+  fail(message: string, kind: SourceErrorKind = "unreachable"): void {
+    const error = new SourceError(message, { kind });
     this.dispatchEvent(new CustomEvent("error", { detail: error }));
   }
   warn(message: string): void {
@@ -136,7 +140,7 @@ export class FakePlayback extends EventTarget implements Playback {
 /** Draws a turning square and the number of the frame. */
 export class FakeStage extends EventTarget implements Stage {
   readonly canvas: HTMLCanvasElement;
-  readonly stats = { triangles: 41_234, gpuBytes: 12_345_678 };
+  readonly stats = { triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0 };
   presenting = false;
   mode: Mode = "shaded";
   background = "";
@@ -186,8 +190,8 @@ export class FakeStage extends EventTarget implements Stage {
     this.fits++;
     this.dispatchEvent(new Event("change"));
   }
-  picture(): Promise<Blob> {
-    this.draw(this.shown);
+  picture(shown: Shown | null): Promise<Blob> {
+    this.draw(shown);
     return new Promise((done) => this.canvas.toBlob((blob) => done(blob!), "image/png"));
   }
   async enterVr(frame: (now: number) => void): Promise<void> {
@@ -214,7 +218,7 @@ export class FakeEngine implements Engine {
     return this.playbacks.at(-1)!;
   }
   stage(canvas: HTMLCanvasElement): FakeStage {
-    if (!this.webgl) throw new Error("WebGL 2 is not available");
+    if (!this.webgl) throw new GraphicsError("WebGL 2 is not available");
     this.stages.push(new FakeStage(canvas));
     return this.stages.at(-1)!;
   }

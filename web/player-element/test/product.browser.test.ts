@@ -87,6 +87,7 @@ describeInBrowser("the built player", () => {
     expect(report.pictures).toBeGreaterThan(0);
     expect(report.scriptMs.median).toBeGreaterThan(0);
     expect(report.triangles).toBeGreaterThan(0);
+    expect(report).toMatchObject({ place: "page, 320 x 240", gpu: expect.stringContaining("SwiftShader") });
     expect(errors).toEqual([]);
     await page.close();
   });
@@ -147,6 +148,18 @@ describeInBrowser("the built player", () => {
     const { page } = await site.visit("player/index.html?src=/text.reel");
     await page.getByRole("alert").waitFor();
     expect(await page.getByRole("alert").textContent()).toContain("This is not a .reel file");
+    await page.close();
+  });
+
+  test("a damaged group is told and skipped, and the rest is played to its end", async () => {
+    const bytes = readFileSync(join(site.folder, "layers.reel"));
+    bytes[bytes.length - 9]! ^= 1; // in the last group
+    site.write("damaged.reel", bytes);
+    const { page, errors } = await site.visit("player/index.html?src=/damaged.reel&autoplay&speed=0.5");
+    await page.locator(".toast").getByText(/^chunk \d+ \(track 0, .* is skipped$/).waitFor();
+    await ended(page);
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.statistics!.skippedGroups)).toBe(1);
+    expect(errors).toEqual([]);
     await page.close();
   });
 

@@ -46,9 +46,10 @@ export class Site {
     return served.url;
   }
 
-  /** A new page at a path of the site, or at a whole address; its errors are collected. */
-  async visit(path: string): Promise<{ page: Page; errors: string[] }> {
+  /** A new page at a path of the site, or at a whole address, in which these scripts run first; its errors are collected. */
+  async visit(path: string, scripts: readonly Parameters<Page["addInitScript"]>[0][] = []): Promise<{ page: Page; errors: string[] }> {
     const page = await this.browser.newPage({ viewport: { width: 320, height: 240 } });
+    for (const script of scripts) await page.addInitScript(script);
     const errors: string[] = [];
     page.on("pageerror", (error) => errors.push(error.stack ?? String(error)));
     page.on("console", (message) => {

@@ -1,23 +1,18 @@
 // What the player draws is what Python draws of what it decodes: the same surface, the same normals, from the same camera.
 
-import { execFileSync } from "node:child_process";
-import { existsSync } from "node:fs";
 import { join } from "node:path";
-import { fileURLToPath } from "node:url";
 
 import { afterAll, beforeAll, expect, test } from "vitest";
 
 import { describeInBrowser } from "../../test/browser.ts";
+import { hasPython, ROOT, runPython } from "../../test/python.ts";
 import { Site } from "./product.ts";
 
-const ROOT = fileURLToPath(new URL("../../../", import.meta.url));
-const PYTHON = join(ROOT, process.platform === "win32" ? ".venv/Scripts/python.exe" : ".venv/bin/python");
 const [WIDTH, HEIGHT, FOV] = [320, 240, 45];
 
 function renderedByPython(name: string, frame: number, camera: string): Uint8Array {
-  const script = fileURLToPath(new URL("render.py", import.meta.url));
-  const numbers = [frame, WIDTH, HEIGHT, FOV].map(String);
-  return execFileSync(PYTHON, [script, join(ROOT, `conformance/v1/${name}.reel`), ...numbers, camera], { maxBuffer: 1 << 24 });
+  const script = new URL("render.py", import.meta.url);
+  return runPython(script, join(ROOT, `conformance/v1/${name}.reel`), frame, WIDTH, HEIGHT, FOV, camera);
 }
 
 interface Likeness {
@@ -51,7 +46,7 @@ describeInBrowser("pictures of the player and of Python", () => {
   beforeAll(() => site.open(), 120_000);
   afterAll(() => site.close());
 
-  test.skipIf(!existsSync(PYTHON)).each([
+  test.skipIf(!hasPython).each([
     ["layers", 0, 1.2],
     ["laplacian", 1, 1.2],
     ["scene", 3, 1.0],

@@ -1,3 +1,5 @@
+import { FormatError, SourceError } from "@meshreel/player-core/errors";
+import { MODES, type Mode } from "@meshreel/player-three/modes";
 import { describe, expect, test } from "vitest";
 import * as parse from "../src/attributes.ts";
 import { modeChoices, nextMode, qualityChoices, qualityValue, speedChoices } from "../src/controls/choices.ts";
@@ -7,8 +9,9 @@ import { actionOf, KEYS, seekStep, takesKey } from "../src/keyboard.ts";
 import { explain } from "../src/messages.ts";
 import { readParameters, readTime } from "../src/parameters.ts";
 import { ranges } from "../src/ranges.ts";
+import { GraphicsError } from "../src/stage.ts";
 import { statisticsLines } from "../src/stats.ts";
-import { differs, goesOn } from "../src/view.ts";
+import { goesOn } from "../src/view.ts";
 import { FakePlayback, INFO } from "./fake.ts";
 
 describe("attributes", () => {
@@ -113,43 +116,28 @@ describe("menus", () => {
   });
   test("the next mode of the last is the first", () => {
     const all = modeChoices().map(({ value }) => value);
-    let mode = parse.MODES[0] as parse.Mode;
+    let mode: Mode = MODES[0];
     for (const expected of [...all.slice(1), all[0]]) expect((mode = nextMode(mode))).toBe(expected);
   });
 });
 
 describe("messages", () => {
-  const error = (name: string, message: string) => Object.assign(new Error(message), { name });
   test("errors are told in plain words with the exact ones below", () => {
-    const message = explain(error("SourceError", "http://x/a.reel: not found (404), check the address"));
-    expect(message.title).toBe("The recording was not found");
-    expect(message.detail).toContain("404");
-    expect(message.retry).toBe(true);
+    const message = explain(new SourceError("http://x/a.reel: not found (404), check the address", { kind: "missing" }));
+    expect(message).toMatchObject({ title: "The recording was not found", retry: true, detail: expect.stringContaining("404") });
   });
-  test("each kind of failure has its own words", () => {
-    const kinds = [
-      error("FormatError", "not a .reel file: the signature is missing"), error("FormatError", "format version 9: this player knows version 1, update it"),
-      error("FormatError", "the head is damaged: its checksum does not match"), error("SourceError", "http://x: no answer"),
-      error("SourceError", "http://x: the server answers 503, not the file"), error("Error", "WebGL 2 is not available"), error("Error", "else"),
-    ];
-    expect(new Set(kinds.map((kind) => explain(kind).title)).size).toBe(kinds.length);
-    expect(explain(kinds[1]!).retry).toBe(false);
-  });
-  test("digits of an address are no status", () => {
-    expect(explain(error("FormatError", "http://x:404/503.reel: 12 bytes too many")).title).toBe("This file is damaged");
+  test("each kind of failure has its own words, and only a newer file cannot be tried again", () => {
+    const sources = (["missing", "refused", "failing", "unreachable", "foreign", "unusable"] as const).map((kind) => new SourceError("x", { kind }));
+    const formats = (["damaged", "newer"] as const).map((kind) => new FormatError("x", kind));
+    const errors = [...sources, ...formats, new GraphicsError("x"), new Error("x")];
+    expect(new Set(errors.map((error) => explain(error).title)).size).toBe(errors.length);
+    expect(errors.filter((error) => !explain(error).retry)).toEqual([formats[1]]);
+    expect(explain(new FormatError("x", "foreign")).title).toBe(explain(new SourceError("x", { kind: "foreign" })).title);
   });
 });
 
 describe("drawing only what changed", () => {
   const shown = { frame: 3, blend: 0.5, groups: [null], background: null };
-  test("the same frame and blend of the same groups is no new picture", () => {
-    expect(differs(shown, { ...shown })).toBe(false);
-    expect(differs(null, shown)).toBe(false);
-    expect(differs(shown, null)).toBe(true);
-    expect(differs({ ...shown, blend: 0.6 }, shown)).toBe(true);
-    expect(differs({ ...shown, groups: [{} as never] }, shown)).toBe(true);
-    expect(differs({ ...shown, background: {} as never }, shown)).toBe(true);
-  });
   test("a paused playback that has shown something needs no pictures", () => {
     const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
     expect(goesOn(playback, null)).toBe(true);
@@ -178,7 +166,7 @@ describe("small parts", () => {
   });
   test("the statistics name what the overlay must show", () => {
     const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
-    const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
+    const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
     expect(Object.fromEntries(lines)).toMatchObject({
       Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Quality: "3 of 3",
       "Skipped groups": "0", Display: "60 fps, 0.4 ms each",
@@ -193,7 +181,10 @@ describe("the address of the page", () => {
     expect([...attributes]).toEqual([
       ["src", "a b.reel"], ["mode", "normal"], ["quality", "2"], ["autoplay", ""], ["loop", ""], ["controls", null],
     ]);
-    expect([time, bench]).toEqual([65.5, true]);
+    expect([time, bench]).toEqual([65.5, 20]);
+  });
+  test("a bench takes as many seconds as it is asked for, else twenty; none where the address says no", () => {
+    expect(["?bench=5", "?bench=x", "?bench=0", ""].map((search) => readParameters(search).bench)).toEqual([5, 20, null, null]);
   });
   test("a time that is none is the start", () => {
     expect(["", "12.5", "2s", "1:00:01", "-4", "1e9", "x", null].map(readTime)).toEqual([0, 12.5, 2, 3601, 0, 0, 0, 0]);

@@ -12,11 +12,13 @@ export interface BenchExtra {
   readonly triangles: number; // of a picture
   readonly userAgent: string;
   readonly place?: string; // where it was drawn, such as "page, 1280 x 720" or "VR"
+  /** Hz, where it is known. Else the shortest intervals tell: a display that is never kept up with is not seen. */
+  readonly displayRate?: number;
   readonly gpu?: string;
   readonly recording?: string;
 }
 
-export interface BenchReport extends BenchExtra {
+export interface BenchReport extends Omit<BenchExtra, "displayRate"> {
   readonly pictures: number;
   readonly seconds: number; // of the intervals between pictures
   readonly displayRate: number | null; // Hz
@@ -28,13 +30,6 @@ export interface BenchReport extends BenchExtra {
   readonly decodeLoad: number | null; // decoding time over playing time; above 1 is too slow
 }
 
-export interface BenchOptions {
-  /** Hz of the display, as a headset tells it. Without it the shortest intervals do: a display that is never kept up with is not seen. */
-  readonly displayRate?: number;
-  /** Pictures that are kept; the last ones. */
-  readonly capacity?: number;
-}
-
 const CAPACITY = 20_000; // 4 minutes at 90 Hz
 const GROUPS = 4096;
 
@@ -43,16 +38,14 @@ export class Bench {
   readonly #script: Ring;
   readonly #intervals: Ring;
   readonly #decoding = new Ring(GROUPS);
-  readonly #given: number | null;
   #decodeMs = 0;
   #playedMs = 0;
   #groups = 0;
   #pictures = 0;
   #began = NaN;
 
-  constructor(options: BenchOptions = {}) {
-    const { displayRate = null, capacity = CAPACITY } = options;
-    this.#given = displayRate;
+  /** `capacity`: pictures that are kept, the last ones. */
+  constructor(capacity = CAPACITY) {
     this.#script = new Ring(capacity);
     this.#intervals = new Ring(capacity);
   }
@@ -82,7 +75,7 @@ export class Bench {
 
   report(extra: BenchExtra): BenchReport {
     const intervals = this.#intervals.sorted();
-    const displayRate = this.#given ?? estimateRate(intervals);
+    const displayRate = extra.displayRate ?? estimateRate(intervals);
     return {
       ...extra,
       pictures: this.#pictures,

@@ -1,6 +1,7 @@
 // Colours: of tracks, of the background, of edges. All are as the screen shows them (sRGB), none is linear.
 
-import type { Vector } from "./octahedral.ts";
+/** Three numbers: a colour, or a place. */
+export type Vector = readonly [number, number, number];
 
 /** Okabe and Ito's palette, which people with any colour vision can tell apart, less its black. */
 const PALETTE = [0xe69f00, 0x56b4e9, 0x009e73, 0xf0e442, 0x0072b2, 0xd55e00, 0xcc79a7] as const;

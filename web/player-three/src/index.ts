@@ -1,7 +1,7 @@
 // Draws recordings with three.js.
 
 export { ReelScene } from "./scene.ts";
-export { MODES } from "./materials.ts";
-export type { Mode } from "./materials.ts";
+export { MODES } from "./modes.ts";
+export type { Mode } from "./modes.ts";
 export { Bench, formatReport } from "./bench.ts";
-export type { BenchExtra, BenchOptions, BenchReport, Spread } from "./bench.ts";
+export type { BenchExtra, BenchReport, Spread } from "./bench.ts";

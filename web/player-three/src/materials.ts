@@ -3,13 +3,10 @@
 import { DoubleSide, GLSL3, RawShaderMaterial } from "three";
 import type { DataTexture, IUniform } from "three";
 import { EDGE_COLOR } from "./colors.ts";
-import type { Vector } from "./octahedral.ts";
+import type { Vector } from "./colors.ts";
+import { MODES } from "./modes.ts";
 import { surfaceVertex, SURFACE_FRAGMENT } from "./shaders.ts";
 import type { Feed } from "./shaders.ts";
-
-/** Lit clay; rgb = (n + 1) / 2; lit clay with its triangles' edges; an unlit colour of each track. */
-export const MODES = ["shaded", "normal", "wireframe", "colour"] as const;
-export type Mode = (typeof MODES)[number];
 
 /** Uniforms that all parts share. */
 export interface Look {

@@ -4,6 +4,7 @@ import { Camera, GLSL3, NoBlending, Points, RawShaderMaterial, RGBAIntegerFormat
 import type { BufferGeometry, WebGLRenderer } from "three";
 import { makeUniforms } from "./materials.ts";
 import type { PartUniforms } from "./materials.ts";
+import { drawOffscreen } from "./offscreen.ts";
 import { setFrame, setUpload } from "./part.ts";
 import { vertexRoom } from "./ranges.ts";
 import { DRAWN, READBACK_FRAGMENT, readbackVertex } from "./shaders.ts";
@@ -13,7 +14,7 @@ const WIDTH = 2048;
 
 /**
  * Positions of all vertices that the triangles of a frame use, in the order of their numbers, three float32 each; NaN for those
- * that none uses. It waits for the GPU: for tests and measurements, not for playing.
+ * that none uses. It waits for the GPU: for tests and measurements, no part of the built player.
  */
 export function readPositions(upload: Upload, renderer: WebGLRenderer, frame: number, blend: number): Float32Array {
   const count = vertexRoom(upload.packed);
@@ -58,14 +59,10 @@ function drawInto(target: WebGLRenderTarget, geometries: readonly BufferGeometry
     points.frustumCulled = false;
     scene.add(points);
   }
-  const before = renderer.getRenderTarget();
-  const { enabled } = renderer.xr;
-  renderer.xr.enabled = false;
-  renderer.setRenderTarget(target);
-  renderer.clear();
-  renderer.render(scene, new Camera());
-  renderer.setRenderTarget(before);
-  renderer.xr.enabled = enabled;
+  drawOffscreen(renderer, target, () => {
+    renderer.clear();
+    renderer.render(scene, new Camera());
+  });
 }
 
 function positionsOf(pixels: Uint32Array, count: number): Float32Array {

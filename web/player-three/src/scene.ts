@@ -4,11 +4,11 @@ import { Group } from "three";
 import type { WebGLRenderer } from "three";
 import type { Packed, Shown } from "@meshreel/player-core/types";
 import { BACKGROUND_CLAY, BACKGROUND_COLOR, trackClay, trackColor } from "./colors.ts";
-import { makeLook, MODES } from "./materials.ts";
-import type { Mode } from "./materials.ts";
+import { makeLook } from "./materials.ts";
+import { MODES } from "./modes.ts";
+import type { Mode } from "./modes.ts";
 import { Part } from "./part.ts";
 import { triangleCount } from "./ranges.ts";
-import { readPositions } from "./readback.ts";
 import { Upload } from "./upload.ts";
 import { Warmer } from "./warmer.ts";
 
@@ -65,11 +65,13 @@ export class ReelScene extends Group {
     this.#look.flatNormals.value = flat;
   }
 
-  /** Uploads a value's vertices and triangles now, so that showing it later costs nothing. Error where the GPU cannot hold it. */
-  prepare(packed: Packed, renderer: WebGLRenderer): void {
+  /** Uploads a value's vertices and triangles now, so that showing it later costs nothing. RangeError where the GPU cannot hold it. */
+  prepare(packed: Packed, renderer: WebGLRenderer): Upload {
     this.#listen(renderer);
     checkSize(packed, renderer);
-    this.#warmer.warm(this.#uploadOf(packed), this.#edges, renderer);
+    const upload = this.#uploadOf(packed);
+    this.#warmer.warm(upload, this.#edges, renderer);
+    return upload;
   }
 
   /** Once a picture: what to draw. Values that were not prepared are uploaded as they are drawn. */
@@ -89,12 +91,6 @@ export class ReelScene extends Group {
     for (const part of this.#parts()) if (part.upload === upload) part.hide();
     this.#uploads.delete(packed);
     upload.dispose();
-  }
-
-  /** Positions of a value's vertices as the vertex shader sees them; see readback.ts. */
-  readPositions(packed: Packed, renderer: WebGLRenderer, frame = 0, blend = 0): Float32Array {
-    this.prepare(packed, renderer);
-    return readPositions(this.#uploadOf(packed), renderer, frame, blend);
   }
 
   override dispose(): void {

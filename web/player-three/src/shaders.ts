@@ -113,7 +113,7 @@ export function surfaceVertex(feed: Feed): string {
 
 // The face's own normal comes from the picture: it looks at the viewer however the face is wound, which makes shading two-sided.
 export const SURFACE_FRAGMENT = `${PRECISION}
-uniform int mode; // the number of a Mode in materials.ts
+uniform int mode; // the number of a Mode in modes.ts
 uniform bool flatNormals;
 uniform vec3 clay; // of a lit surface
 uniform vec3 color; // of an unlit one

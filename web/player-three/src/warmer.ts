@@ -5,6 +5,7 @@ import type { RawShaderMaterial, WebGLRenderer } from "three";
 import { BACKGROUND_CLAY, BACKGROUND_COLOR } from "./colors.ts";
 import { makeUniforms, surfaceMaterial } from "./materials.ts";
 import type { Look } from "./materials.ts";
+import { drawOffscreen } from "./offscreen.ts";
 import type { Feed } from "./shaders.ts";
 import type { Upload } from "./upload.ts";
 
@@ -29,21 +30,15 @@ export class Warmer {
 
   /** Puts textures and buffers of an upload on the GPU, and compiles what draws them. */
   warm(upload: Upload, edges: boolean, renderer: WebGLRenderer): void {
-    const target = renderer.getRenderTarget();
-    const { enabled } = renderer.xr;
-    renderer.xr.enabled = false; // a headset's session would draw for its eyes
-    renderer.setRenderTarget(this.#target);
     const feed = upload.packed.kind === "group" ? "texture" : "attribute";
     this.#mesh.material = this.#materials[edges ? "corner" : feed];
-    for (const geometry of [upload.faces(edges), upload.extra(edges)]) {
-      if (geometry === null) continue;
-      this.#uniforms.vertices.value = upload.texture;
-      this.#draw(geometry, renderer);
-    }
+    const geometries = [upload.faces(edges), upload.extra(edges)].filter((geometry) => geometry !== null);
+    this.#uniforms.vertices.value = upload.texture; // which the geometries may have made
+    drawOffscreen(renderer, this.#target, () => {
+      for (const geometry of geometries) this.#draw(geometry, renderer);
+    });
     this.#mesh.geometry = NOTHING;
     this.#uniforms.vertices.value = null;
-    renderer.setRenderTarget(target);
-    renderer.xr.enabled = enabled;
   }
 
   dispose(): void {

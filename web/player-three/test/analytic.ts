@@ -1,8 +1,8 @@
 // Packed values made by hand, whose every position and normal is known.
 
 import type { Box, PackedGroup, PackedStatic } from "@meshreel/player-core/types";
-import { encodeNormal } from "../src/octahedral.ts";
-import type { Vector } from "../src/octahedral.ts";
+import { encodeNormal } from "../../test/octahedral.ts";
+import type { Vector } from "../src/colors.ts";
 
 export interface Surface {
   readonly positions: Vector[];

@@ -1,7 +1,7 @@
 // A picture of 320 x 240 that a page of these tests has drawn, from a camera that looks along -z from (0, 0, 3) with 50 degrees.
 
 import { expect } from "vitest";
-import type { Vector } from "../src/octahedral.ts";
+import type { Vector } from "../src/colors.ts";
 
 const [WIDTH, HEIGHT] = [320, 240];
 const FOCAL = HEIGHT / 2 / Math.tan((25 * Math.PI) / 180); // pixels

@@ -4,8 +4,8 @@ import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
 import { makeFloor, makeGroup, RADIUS, SQUARE } from "./analytic.ts";
 import { trackColor } from "../src/colors.ts";
+import type { Vector } from "../src/colors.ts";
 import { Picture } from "./picture.ts";
-import type { Vector } from "../src/octahedral.ts";
 import type { Mode } from "../src/index.ts";
 import type {} from "./pages/scene.ts";
 
@@ -52,7 +52,6 @@ describeInBrowser("a scene in Chromium", () => {
   const numbers = () => open.page.evaluate(() => window.api.numbers());
   const positions = (kind: "group" | "static", frame: number, blend: number): Promise<number[]> =>
     open.page.evaluate(([k, f, b]) => window.api.read(k, f, b), [kind, frame, blend] as const);
-
 
   test("a sphere is where its frame has it, with its normals as colours", async () => {
     await prepare(false);

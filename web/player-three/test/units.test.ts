@@ -1,30 +1,8 @@
 import { expect, test } from "vitest";
 import { trackColor } from "../src/colors.ts";
-import { decodeNormal, encodeNormal } from "../src/octahedral.ts";
-import type { Vector } from "../src/octahedral.ts";
 import { localFrame, triangleCount, vertexRoom } from "../src/ranges.ts";
 import { Upload } from "../src/upload.ts";
-import { makeFloor, makeGroup, sphere } from "./analytic.ts";
-
-const angle = (a: Vector, b: Vector): number => Math.acos(Math.min(1, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]));
-
-test("octahedral normals are within one degree of what they were made from", () => {
-  const { normals } = sphere([0, 0, 0], 1, 40);
-  for (const normal of normals) expect((angle(decodeNormal(encodeNormal(normal)), normal) * 180) / Math.PI).toBeLessThan(1);
-});
-
-test("the length of a normal does not matter to its code, and no normal is +z", () => {
-  expect(encodeNormal([3e-9, -2e-9, -4e-9])).toBe(encodeNormal([3, -2, -4]));
-  expect(angle(decodeNormal(encodeNormal([0, 0, 0])), [0, 0, 1])).toBeLessThan(0.01);
-});
-
-test("every code is a unit vector, and codes are made again from what they give", () => {
-  for (let code = 0; code < 65536; code += 7) {
-    const normal = decodeNormal(code);
-    expect(Math.hypot(...normal)).toBeCloseTo(1, 12);
-    expect(angle(decodeNormal(encodeNormal(normal)), normal)).toBeLessThan(1e-6);
-  }
-});
+import { makeFloor, makeGroup } from "./analytic.ts";
 
 test("a frame shows the group's triangles and its own, and a frame beside the group its nearest", () => {
   const { packed } = makeGroup({ firstFrame: 10 });

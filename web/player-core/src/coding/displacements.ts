@@ -8,6 +8,7 @@ import type { Mesh } from "../mesh.ts";
 import { unpack } from "../records.ts";
 import { decodeWeights } from "../wasm/entropy.ts";
 import { farthestAnchors, kltInverse, laplacianInverse } from "../wasm/laplacian.ts";
+import type { LaplacianSystem } from "../wasm/laplacian.ts";
 import type { Core } from "../wasm/memory.ts";
 import { causalNeighbours, checkPlausible, decodeIntegers } from "./entropy.ts";
 import { LEVELS, stepOf } from "./steps.ts";
@@ -30,8 +31,9 @@ export function decodeDisplacements(core: Core, data: Uint8Array, base: Mesh, co
   if (head.anchorCount > vertices) throw new FormatError(`displacements: ${head.anchorCount} anchors among ${vertices} vertices`);
   if (3 * head.frames * vertices > MOST_NUMBERS) throw new FormatError(`displacements: ${head.frames} frames of ${vertices} vertices exceed ${MOST_NUMBERS} numbers`);
   const anchors = anchorsOf(core, head, base);
-  const deltas = deltasOf(core, head.components.slice(0, count), data, offset, base, anchors);
-  const weights = laplacianInverse(core, base, anchors, head.anchorWeight, deltas, count); // eq. 13
+  const system = { base, anchors, anchorWeight: head.anchorWeight };
+  const deltas = deltasOf(core, head.components.slice(0, count), data, offset, system);
+  const weights = laplacianInverse(core, system, deltas, count); // eq. 13
   const [mean, vectors] = readBasis(core, head, count);
   return kltInverse(core, weights, vertices, vectors, mean); // eq. 9
 }
@@ -48,7 +50,8 @@ function readHead(data: Uint8Array): [DisplacementHead, number] {
 }
 
 /** Deltas and below them the anchors' values: (V + anchors) rows of a number a component. */
-function deltasOf(core: Core, components: readonly Component[], data: Uint8Array, offset: number, base: Mesh, anchors: Int32Array): Float64Array {
+function deltasOf(core: Core, components: readonly Component[], data: Uint8Array, offset: number, system: LaplacianSystem): Float64Array {
+  const { base, anchors } = system;
   const [vertices, columns] = [vertexCount(base), components.length];
   const streams: Uint8Array[] = [];
   const fixed: Int32Array[] = [];

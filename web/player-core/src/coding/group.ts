@@ -29,24 +29,23 @@ export interface Continued {
   readonly state: LayersState | null;
 }
 
-/**
- * The frames of a group, from a whole payload or a prefix of its layers; with `quality`, from at most so many beyond the
- * first. `previous` is the state that this gave for the group before. FormatError on damaged bytes.
- */
-export function continueGroup(
-  tools: Tools,
-  data: Uint8Array,
-  frameCount: number,
-  quality: number | null,
-  previous: LayersState | null,
-  place: Placement,
-): Continued {
-  const made = data[0] === Form.LAYERS ? decodeLayers(tools, data, quality, previous, place) : decodeAlone(tools, data, frameCount, quality, place);
+/** How a group is decoded, besides its payload. */
+export interface GroupContext {
+  readonly frameCount: number; // as the index has it
+  readonly quality: number | null; // layers beyond the first, at most; null: all
+  readonly previous: LayersState | null; // that the group before gave
+  readonly place: Placement;
+}
+
+/** The frames of a group, from a whole payload or a prefix of its layers. FormatError on damaged bytes. */
+export function continueGroup(tools: Tools, data: Uint8Array, context: GroupContext): Continued {
+  const { frameCount } = context;
+  const made = data[0] === Form.LAYERS ? decodeLayers(tools, data, context) : decodeAlone(tools, data, context);
   if (made.group.frameCount !== frameCount) throw new FormatError(`a group of ${made.group.frameCount} frames where the index says ${frameCount}`);
   return made;
 }
 
-function decodeLayers({ core, draco }: Tools, data: Uint8Array, quality: number | null, previous: LayersState | null, place: Placement): Continued {
+function decodeLayers({ core, draco }: Tools, data: Uint8Array, { quality, previous, place }: GroupContext): Continued {
   const records = readLayers(data, quality);
   const { faces, positions, state } = placeLayers(core, draco, records, previous, place);
   const frameCount = records.head.frames;
@@ -59,7 +58,7 @@ function decodeLayers({ core, draco }: Tools, data: Uint8Array, quality: number 
   return { group: { ...group, dropped, patches: meshes.map((mesh) => placed(mesh, place)) }, state };
 }
 
-function decodeAlone(tools: Tools, data: Uint8Array, frameCount: number, quality: number | null, place: Placement): Continued {
+function decodeAlone(tools: Tools, data: Uint8Array, { frameCount, quality, place }: GroupContext): Continued {
   switch (data[0]) {
     case Form.EMPTY:
       unpackAll(EmptyGroup, data);

@@ -72,12 +72,13 @@ export function placeLayers(core: Core, draco: DecoderModule, records: LayersRec
     const count = vertices + near.level.edges.length / 2;
     if (3 * frames * count > MOST_NUMBERS) throw new FormatError(`${frames} frames of ${near.level.faces.length / 3} faces exceed ${MOST_NUMBERS} numbers`);
     const field = scalarsOf(core, record, near.siblings, frames, previous?.scalars[k] ?? null);
+    const refinement = { level: near.level, field, curvature: record.curvature };
     if (k + 1 < records.levels.length) {
-      const [refined, offsets] = refineField(core, rows, near.level, field, record.curvature);
+      const [refined, offsets] = refineField(core, rows, refinement);
       rows = refined;
       scalars.push(offsets);
     } else {
-      const shown = refineFieldFrames(core, rows, near.level, field, record.curvature, place);
+      const shown = refineFieldFrames(core, rows, refinement, place);
       positions = shown.positions;
       scalars.push(shown.last);
     }

@@ -1,5 +1,6 @@
 // Entropy decoding, as core/include/meshreel/{entropy,field_coder}.h have it. False or null: the stream is damaged.
 
+import { joined } from "../bytes.ts";
 import type { Arena, Core } from "./memory.ts";
 
 /** For each of `starts.length - 1` values the earlier ones that it is near: near[starts[v]] up to near[starts[v + 1]]. */
@@ -50,14 +51,4 @@ function weightsOf(arena: Arena, columns: number, count: number, neighbours: Nei
     ["u32", neighbours.near.length],
   );
   return [symbols, struct];
-}
-
-function joined(streams: readonly Uint8Array[]): Uint8Array {
-  const all = new Uint8Array(streams.reduce((sum, stream) => sum + stream.length, 0));
-  let offset = 0;
-  for (const stream of streams) {
-    all.set(stream, offset);
-    offset += stream.length;
-  }
-  return all;
 }

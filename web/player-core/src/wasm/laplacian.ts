@@ -17,13 +17,20 @@ export function farthestAnchors(core: Core, faces: Int32Array, vertices: number,
   });
 }
 
+/** What the least squares are set up from. */
+export interface LaplacianSystem {
+  readonly base: Mesh;
+  readonly anchors: Int32Array; // vertices, ascending
+  readonly anchorWeight: number;
+}
+
 /** Weights V x `columns` that fit the deltas (V + anchors) x `columns` best in the least-squares sense (eq. 13). */
-export function laplacianInverse(core: Core, base: Mesh, anchors: Int32Array, weight: number, deltas: Float64Array, columns: number): Float64Array {
+export function laplacianInverse(core: Core, { base, anchors, anchorWeight }: LaplacianSystem, deltas: Float64Array, columns: number): Float64Array {
   const vertices = base.vertices.length / 3;
   return core.run((arena) => {
     const made = arena.struct(["u32", 0]);
     const mesh = [arena.put(base.vertices), BigInt(vertices), arena.put(base.faces), BigInt(base.faces.length / 3)] as const;
-    check(core.call("mr_laplacian_create", ...mesh, arena.put(anchors), BigInt(anchors.length), weight, made));
+    check(core.call("mr_laplacian_create", ...mesh, arena.put(anchors), BigInt(anchors.length), anchorWeight, made));
     const system = arena.u32(made);
     try {
       const out = arena.room(8 * vertices * columns);

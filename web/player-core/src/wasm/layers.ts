@@ -114,8 +114,15 @@ export function siblingWeights(core: Core, near: Neighbours, weight: number): Gr
   });
 }
 
+/** What makes a level's new vertices: how it is subdivided, and how far along its normals they lie. */
+export interface Refinement {
+  readonly level: Level;
+  readonly field: FieldValues;
+  readonly curvature: number; // 64ths of the bend of its edges by which midpoints are lifted
+}
+
 /** Rows of the finer level's vertices from the coarser one's, and the last frame's scalars. */
-export function refineField(core: Core, rows: Float64Array, level: Level, field: FieldValues, curvature: number): [Float64Array, Float64Array] {
+export function refineField(core: Core, rows: Float64Array, { level, field, curvature }: Refinement): [Float64Array, Float64Array] {
   const frames = field.means.length;
   const edgeCount = level.edges.length / 2;
   const size = 3 * frames * (level.vertices + edgeCount);
@@ -134,7 +141,7 @@ export interface Refined {
 }
 
 /** The same of a last level, as frames. FormatError where they are not finite. */
-export function refineFieldFrames(core: Core, rows: Float64Array, level: Level, field: FieldValues, curvature: number, place: Placement): Refined {
+export function refineFieldFrames(core: Core, rows: Float64Array, { level, field, curvature }: Refinement, place: Placement): Refined {
   const frames = field.means.length;
   const edgeCount = level.edges.length / 2;
   const size = 3 * frames * (level.vertices + edgeCount);

@@ -1,6 +1,7 @@
 // What the menus offer.
 
-import { MODES, type Mode, type Quality } from "../attributes.ts";
+import type { Quality } from "@meshreel/player-core/types";
+import { MODES, type Mode } from "@meshreel/player-three/modes";
 import { formatSpeed } from "../format.ts";
 import type { Choice } from "./dom.ts";
 

@@ -4,7 +4,7 @@ import { formatTime, speakTime } from "../format.ts";
 import type { MeshreelPlayer } from "../element.ts";
 import { make, setText } from "./dom.ts";
 
-const THUMB = 14; // px; as in styles.ts
+const THUMB = 14; // px; as in styles/bar.ts
 
 export class SeekBar {
   readonly element: HTMLElement;

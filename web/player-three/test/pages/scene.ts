@@ -1,9 +1,10 @@
 // The page of scene.browser.test.ts: a canvas of 320 x 240, a scene, and what the tests ask of them.
 
 import { Color, PerspectiveCamera, Scene, WebGLRenderer } from "three";
-import type { PackedGroup, PackedStatic, Shown } from "@meshreel/player-core/types";
+import type { Packed, PackedGroup, PackedStatic, Shown } from "@meshreel/player-core/types";
 import { ReelScene } from "../../src/index.ts";
 import type { Mode } from "../../src/index.ts";
+import { readPositions } from "../../src/readback.ts";
 import { makeFloor, makeGroup } from "../analytic.ts";
 
 const [WIDTH, HEIGHT] = [320, 240];
@@ -61,7 +62,13 @@ const api = {
   read(kind: "group" | "static", frame: number, blend: number): number[] {
     const packed = kind === "group" ? texelsOf(0) : prepared.find((other) => other.kind === "static");
     if (packed === undefined) throw new Error("no background");
-    return [...scene.readPositions(packed, renderer, frame, blend)].map((value) => (Number.isNaN(value) ? -1e9 : value));
+    return [...readPositions(scene.prepare(packed, renderer), renderer, frame, blend)].map((value) => (Number.isNaN(value) ? -1e9 : value));
+  },
+  /** Positions of the vertices that a frame of any packed value draws, three numbers each. */
+  readPacked(packed: Packed, frame: number): number[] {
+    const positions = readPositions(scene.prepare(packed, renderer), renderer, frame, 0);
+    scene.release(packed);
+    return [...positions].filter((value) => !Number.isNaN(value));
   },
   numbers() {
     const { memory, programs } = renderer.info;

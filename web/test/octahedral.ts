@@ -1,6 +1,6 @@
-// Octahedral normals, as the vertex shader takes them apart (NORMAL in shaders.ts) and as core/src/packing.cpp makes them.
+// Octahedral normals for tests, as core/wasm/packing.cpp makes them and the vertex shader (player-three/src/shaders.ts) takes them apart.
 
-export type Vector = readonly [number, number, number];
+import type { Vector } from "@meshreel/player-three/colors";
 
 /** The code of a normal of any length: 8 bits each, the first number in the low byte. (0, 0, 0) gives +z. */
 export function encodeNormal([x, y, z]: Vector): number {
