@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import meshreel
 from meshreel.coding.intra import encode_intra
 from meshreel.container.writer import ReelWriter
+from meshreel.encoder import encode
 from meshreel.errors import FormatError, InputError
 from meshreel.export import ExportOptions
 from meshreel.export import export as export_file
@@ -89,6 +91,18 @@ def test_fewer_layers_are_exported_as_they_decode(tmp_path, layers):
     for frame, time in enumerate(times(video)):
         shown = seen(PlayedGlb(tmp_path / "a.glb").shown(time))
         assert_shows(shown, parts_of(video, frame), video[frame].diagonal)
+
+
+def test_what_points_up_is_what_the_file_tells(tmp_path):
+    path, options = tmp_path / "a.reel", quick("best")
+    views = replace(options.segment.views, up="-z")
+    encode(MeshList((sphere(),)), path, replace(options, segment=replace(options.segment, views=views)))
+    video = meshreel.open(path)
+    export(video, tmp_path / "told.glb")
+    export(video, tmp_path / "given.glb", options=ExportOptions(up="-z"))
+    export(video, tmp_path / "other.glb", options=ExportOptions(up="y"))
+    told, given, other = ((tmp_path / f"{name}.glb").read_bytes() for name in ("told", "given", "other"))
+    assert told == given != other
 
 
 def test_khronos_finds_nothing_wrong(tmp_path):

@@ -144,7 +144,7 @@ def _encode_bodies(work: Work, path: Path) -> Summary:
             for group in encoded:
                 each = TrackGroup(0, writer.frame_count, group)
                 groups.append(_added(writer, each, [], seen.diagonal))
-        writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups))
+        writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups) | _upright(options))
     return Summary(path.stat().st_size, tuple(groups), _warnings(seen))
 
 
@@ -156,7 +156,7 @@ def _encode_scene(work: Work, path: Path, parts: Parts) -> Summary:
         coded = encode_bodies(work, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
-        writer.header = make_header(sequence.frame_rate, seen, metadata)
+        writer.header = make_header(sequence.frame_rate, seen, metadata | _upright(options))
     measured = evenly(len(sequence), MEASURED)
     psnr = _measured(sequence, path, seen.diagonal, measured)
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
@@ -313,6 +313,12 @@ def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[s
         "d2_psnr_paper": _rounded(sum(g.frame_count * g.quality.psnr for g in groups) / frames),
         "normal_error_deg": _rounded(sum(g.frame_count * g.quality.angle for g in groups) / frames),
     }
+
+
+def _upright(options: EncoderOptions) -> dict[str, Any]:
+    """The axis that points up, for players, where it is not y."""
+    up = options.segment.views.up
+    return {} if up == "y" else {"up": up}
 
 
 def _rounded(value: float) -> float | None:

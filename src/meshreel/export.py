@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import numpy as np
 
@@ -37,7 +37,7 @@ class ExportOptions:
 
     layers: int | None = None  # of a group beyond its first, at most; None: all
     only: Literal["all", "background", "moving"] = "all"
-    up: Up = "y"  # axis of the meshes that points up; +y does in what is written
+    up: Up | None = None  # axis of the meshes that points up, the file's if not given; +y does in what is written
 
     def __post_init__(self) -> None:
         if self.layers is not None and self.layers < 0:
@@ -70,7 +70,7 @@ def export(
     tracks = tuple(Track(reader, number, options.layers) for number in range(len(reader.tracks)))
     source = _Source(reader, tracks, Background(reader), frames)
     written = 0
-    with _writer(path, _animation(reader, frames, options.up)) as writer:
+    with _writer(path, _animation(reader, frames, options.up or cast(Up, reader.up))) as writer:
         if options.only != "moving":
             for shape in _states(source):
                 writer.add(shape)

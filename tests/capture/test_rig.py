@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -33,6 +34,27 @@ def test_what_is_written_is_read(folder):
         assert found.record() == wanted.record()
     for one, depth in rig.depths(1):
         assert np.array_equal(depth, one.in_range(measured(one)))
+
+
+def turned(*rows):
+    pose = np.eye(4)
+    pose[:3, :3] = np.array(rows, dtype=np.float64).T  # right, down and forward of a camera, in the world
+    return camera(camera_to_world=pose)
+
+
+@pytest.mark.parametrize(
+    ("cameras", "up"),
+    [
+        ([camera(), camera("side", 90)], "-y"),  # world as the first camera has it
+        ([turned([1, 0, 0], [0, -0.8, -0.6], [0, 0.6, -0.8])], "y"),
+        ([turned([1, 0, 0], [0, 0, -1], [0, 1, 0])], "z"),
+        ([turned([1, 0, 0], [0, 0, 1], [0, -1, 0])], "-z"),
+        ([turned([0, 0, 1], [-1, 0, 0], [0, -1, 0])], "y"),  # on its side
+    ],
+)
+def test_up_is_what_cameras_have_up(tmp_path, cameras, up):
+    named = [replace(each, name=str(number)) for number, each in enumerate(cameras)]
+    assert read_rig(record(tmp_path / "rig", named, STILL)).up == up
 
 
 def test_a_folder_with_one_camera_is_a_rig(tmp_path):

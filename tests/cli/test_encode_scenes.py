@@ -113,6 +113,21 @@ def test_a_rig_is_fused_on_the_fly_at_its_own_rate(run, rig, tmp_path):
     assert failed(run("encode", rig, "-o", out, "--frames", "3:"), "leave 0")
 
 
+def test_a_file_tells_which_axis_points_up(run, rig, tmp_path):
+    """That of the rig's cameras, also of meshes that `capture` made; or that given; y is not told."""
+    out, scan = tmp_path / "a.reel", tmp_path / "scan"
+    assert run("capture", rig, "-o", scan, "--voxel", "0.06", "--frames", ":1").code == 0
+    for inputs, flags, up in (
+        (rig, (), "-y"),
+        (scan, (), "-y"),
+        (scan, ("--up", "z"), "z"),
+        (scan, ("--up", "y"), None),
+    ):
+        assert run("encode", inputs, "-o", out, "--frames", ":1", "--quality", "0", *flags).code == 0
+        reader = meshreel.open(out).reader
+        assert (reader.metadata.get("up"), reader.up) == (up, up or "y")
+
+
 def test_captured_meshes_have_the_rate_of_their_recording(run, rig, tmp_path):
     scan = tmp_path / "scan"
     assert run("capture", rig, "-o", scan, "--voxel", "0.06").code == 0

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float64, UInt16
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera
+from ..geometry.cameras import UP_AXES, PinholeCamera
 from ..geometry.depth import DepthPicture
 from ..io.depth import picture_size, read_depth
 from ..io.names import last_number
@@ -34,6 +34,7 @@ AWAY = 10.0  # sides that the optical axis may be beside the picture, of one tha
 RATES = (1e-9, 1e9)  # 1/s, as a sequence of meshes may have
 _TEXTS = ("name", "depth", "color")
 _NUMBERS = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m", "depth_min_m", "depth_max_m")
+_UPRIGHT = 0.5  # of the cosine between an axis and what is up in pictures
 _SEE = "see `meshreel capture --help`"
 
 
@@ -113,6 +114,14 @@ class Rig:
     files: tuple[dict[int, Path], ...]  # of each camera
     frame_rate: float  # 1/s
     remarks: tuple[str, ...] = ()  # what a user must know of the description
+
+    @property
+    def up(self) -> str:
+        """The axis that is nearest to up in the cameras' pictures: y, z, -y or -z; y where none is near."""
+        mean = np.mean([-camera.camera_to_world[:3, 1] for camera in self.cameras], axis=0)
+        along = {axis: float(mean @ direction) for axis, direction in UP_AXES.items()}
+        best = max(along, key=along.__getitem__)
+        return best if along[best] > _UPRIGHT else "y"
 
     @property
     def frames(self) -> list[int]:

@@ -85,6 +85,7 @@ def _made(rig: Path, recording: Recording) -> dict[str, Any]:
     return {
         "rig": str(rig.resolve()),
         "frames_per_second": recording.frame_rate,
+        "up": recording.rig.up,
         "frames": recording.numbers,
         "fusion": asdict(recording.options),
         "cameras": cameras,

@@ -128,14 +128,14 @@ def command(
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     parting.check(masking)
-    segment = masking.options(preset_options().segment)
+    source = open_source(inputs, reading)
+    segment = masking.options(preset_options().segment, source)
 
     def options_at(quality: float) -> EncoderOptions:
         return parting.options(coding.options(quality), segment)
 
     goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
-    source = open_source(inputs, reading)
     sequence, masker = source.sequence, masking.masker(len(source.sequence))
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
         encoder = Encoder(sequence, executor, progress, masker)

@@ -27,7 +27,7 @@ def command(
     layers: int | None = None,
     frames: str = ":",
     only: Part = "all",
-    up: Annotated[Up, Parameter(allow_leading_hyphen=True)] = "y",
+    up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
     common: Common = Common(),
 ) -> None:
     """Write a .reel file as one animated file: GLB for viewers and engines, USD for film tools.
@@ -51,7 +51,7 @@ def command(
     only
         Of a scene, what does not move or what moves; all of every frame if not given.
     up
-        The axis of the meshes that points up; in the file it is +y.
+        The axis of the meshes that points up, as the .reel file tells it if not given; in the file written it is +y.
     """
     options = ExportOptions(layers, only, up)
     target = _target(file, output, glb, usd)

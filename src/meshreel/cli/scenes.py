@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 from cyclopts import Parameter
 
@@ -16,7 +16,7 @@ from ..analysis.segment.scene import SegmentOptions
 from ..capture.record import open_recording
 from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
-from ..geometry.cameras import unpack_cameras
+from ..geometry.cameras import UP_AXES, unpack_cameras
 from ..io.sequence import open_sequence
 from ..types import MeshSequence
 from .capture import MADE
@@ -31,6 +31,7 @@ class Source:
 
     sequence: MeshSequence
     remarks: tuple[str, ...] = ()
+    up: Up = "y"  # as the cameras have it, where they are known
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -46,10 +47,12 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
     folder = Path(inputs[0])
     described = any((folder / name).is_file() for name in (RIG, SINGLE))
     if len(inputs) > 1 or not described or any(folder.glob("frame_*.ply")):
-        options = reading.options()
-        if len(inputs) == 1 and reading.fps == _READ.fps:
-            options = replace(options, frame_rate=captured_rate(folder) or options.frame_rate)
-        return Source(open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options))
+        options, made = reading.options(), captured(folder) if len(inputs) == 1 else {}
+        rate, up = made.get("frames_per_second"), made.get("up")
+        if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:
+            options = replace(options, frame_rate=float(rate))
+        sequence = open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options)
+        return Source(sequence, up=cast(Up, up) if up in UP_AXES else "y")
     reading.options()  # refuses what no sequence can have
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
@@ -57,16 +60,16 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
     if reading.fps not in (_READ.fps, recording.frame_rate):
         text = f"--fps {reading.fps:g}: {folder} is a rig of {recording.frame_rate:g} frames a second"
         raise InputError(f"{text}; leave it out, or mend the rig's description")
-    return Source(recording, tuple(remarks))
+    return Source(recording, tuple(remarks), cast(Up, recording.rig.up))
 
 
-def captured_rate(folder: Path) -> float | None:
-    """The frame rate that `capture` has written beside the meshes in a folder, 1/s; None where there is none."""
+def captured(folder: Path) -> dict[str, Any]:
+    """What `capture` has written of a recording beside its meshes; nothing where it has not."""
     try:
-        rate = json.loads((folder / MADE).read_text(encoding="utf-8")).get("frames_per_second")
-    except (OSError, ValueError, AttributeError):
-        return None
-    return float(rate) if isinstance(rate, (int, float)) and rate > 0 else None
+        made = json.loads((folder / MADE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return made if isinstance(made, dict) else {}
 
 
 @Parameter(name="*")
@@ -86,8 +89,9 @@ class Masking:
     """Where SAM3 runs, as torch names it: cpu, cuda, cuda:1."""
     views: Path | None = None
     """A file of Open3D pinhole cameras, all of one size, that look at the scene; placed where it is not given."""
-    up: Annotated[Up, Parameter(allow_leading_hyphen=True)] = "y"
-    """The axis that points up, for placed views: pictures are upright."""
+    up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None
+    """The axis that points up: players stand the recording on it, and pictures of placed views are upright. That of
+    the cameras, where they are known, else y."""
 
     def __post_init__(self) -> None:
         if self.masks is not None and self.sam3 is not None:
@@ -100,11 +104,11 @@ class Masking:
     @property
     def wanted(self) -> bool:
         """True where any flag says something."""
-        return self != Masking()
+        return replace(self, up=None) != Masking()
 
-    def options(self, options: SegmentOptions) -> SegmentOptions:
+    def options(self, options: SegmentOptions, source: Source) -> SegmentOptions:
         """The same with the views that were asked for. Raises InputError where their file is wrong."""
-        options = replace(options, views=replace(options.views, up=self.up))
+        options = replace(options, views=replace(options.views, up=self.up or source.up))
         if self.views is None:
             return options
         try:

@@ -65,8 +65,8 @@ def command(
     if views_only and (masking.masks or masking.sam3):
         raise InputError("--views-only needs no masks; leave out --masks and --sam3")
     options = preset_options()
-    options = replace(options, segment=masking.options(options.segment))
     source = open_source(inputs, reading)
+    options = replace(options, segment=masking.options(options.segment, source))
     masker = masking.masker(len(source.sequence))
     left = _left_over(output, len(source.sequence), views_only, previews)
     if views_only:

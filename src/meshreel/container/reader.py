@@ -14,6 +14,7 @@ from ..errors import FormatError
 from ..format.checks import check_header, check_index, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
+from ..geometry.cameras import UP_AXES
 from .sources import Source
 
 FIRST_REQUEST = 16384  # bytes; the head of some minutes of video
@@ -74,6 +75,12 @@ class ReelReader:
     def frame_rate(self) -> float:
         """Frames per second, 1/s."""
         return self.header.frame_rate
+
+    @property
+    def up(self) -> str:
+        """The axis that points up, for who shows the frames: y, z, -y or -z; y where the file does not tell."""
+        up = self.metadata.get("up")
+        return up if isinstance(up, str) and up in UP_AXES else "y"
 
     @property
     def missing(self) -> tuple[Chunk, ...]:

@@ -61,7 +61,11 @@ class Header:
     scale: Annotated[float, F64, "m, above 0"]
     minimum: Annotated[tuple[float, ...], Array(3, F32), "lower corner of the sequence's bounding box, normalised"]
     maximum: Annotated[tuple[float, ...], Array(3, F32), "upper corner of it"]
-    metadata: Annotated[str, Text(U16), "a JSON object about the encoding (preset, quality ...); not needed to decode"]
+    metadata: Annotated[
+        str,
+        Text(U16),
+        "a JSON object, not needed to decode: `up` (axis; y if not there), preset ...",
+    ]
     first_time: Annotated[int, I64, "time of frame 0, microseconds"] = 0
     intervals: Annotated[
         tuple[int, ...],

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
+from ..decoder import Video
 from ..decoder import open as open_video
 from ..errors import MeshreelError
 from ..types import Mesh
@@ -53,24 +54,21 @@ class Posters:
 
 def _poster(path: Path) -> bytes | None:
     try:
-        mesh = _first(path)
-        return None if mesh is None else _picture(mesh)
+        with open_video(path) as video:
+            mesh = _first(video)
+            return None if mesh is None else _picture(mesh, video.reader.up)
     except (MeshreelError, OSError, ModuleNotFoundError):
         return None
 
 
-def _first(path: Path) -> Mesh | None:
+def _first(video: Video) -> Mesh | None:
     """The first of some frames that has a surface."""
-    with open_video(path) as video:
-        for index in range(min(len(video), LOOKED_AT)):
-            mesh = video[index]
-            if not mesh.is_empty:
-                return mesh
-    return None
+    frames = (video[index] for index in range(min(len(video), LOOKED_AT)))
+    return next((mesh for mesh in frames if not mesh.is_empty), None)
 
 
-def _picture(mesh: Mesh) -> bytes:
-    """A PNG, clear where nothing is; from the front, where no other side shows clearly more than it."""
+def _picture(mesh: Mesh, up: str) -> bytes:
+    """A PNG, upright, clear where nothing is; from the front, where no other side shows clearly more than it."""
     from PIL import Image
 
     from ..geometry.raycast import Rays
@@ -79,11 +77,11 @@ def _picture(mesh: Mesh) -> bytes:
 
     box, rays = Box.of([mesh]), Rays(mesh)
     shown = []  # in each of the four views, pixels with the fronts of faces less those with backs: walls from outside
-    for camera in views_around(box, ViewOptions(WIDTH // 4, HEIGHT // 4, FIELD)):
+    for camera in views_around(box, ViewOptions(WIDTH // 4, HEIGHT // 4, FIELD, up=up)):
         seen = rays.look(camera)
         shown.append(int((seen.faces >= 0).sum()) - 2 * int(rays.backs(camera, seen).sum()))
     best = int(np.argmax(shown)) if max(shown) > 2 * shown[0] else 0
-    view = look(mesh, views_around(box, ViewOptions(WIDTH, HEIGHT, FIELD))[best], Window(0, HEIGHT, 0, WIDTH))
+    view = look(mesh, views_around(box, ViewOptions(WIDTH, HEIGHT, FIELD, up=up))[best], Window(0, HEIGHT, 0, WIDTH))
     picture = np.dstack([view.colors, view.covered])
     out = io.BytesIO()
     Image.fromarray((255 * picture).round().astype(np.uint8)).save(out, "PNG")

@@ -57,7 +57,7 @@ export interface Header {
   readonly scale: number; // m, above 0
   readonly minimum: readonly number[]; // lower corner of the sequence's bounding box, normalised
   readonly maximum: readonly number[]; // upper corner of it
-  readonly metadata: string; // a JSON object about the encoding (preset, quality ...); not needed to decode
+  readonly metadata: string; // a JSON object, not needed to decode: `up` (axis; y if not there), preset ...
   readonly firstTime: number; // time of frame 0, microseconds
   readonly intervals: readonly number[]; // microseconds from each frame but the last to the next, each above 0; none: frame i is at first_time + 10^6 * i / frame_rate
 }

@@ -8,6 +8,7 @@ import type { VrActions } from "@meshreel/xr";
 import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import type { PictureStats, Stage } from "./stage.ts";
+import { stoodUp, turnOf } from "./upright.ts";
 
 const FOV = 45; // degrees, of the picture's height
 const FROM = new Vector3(0.25, 0.25, 1).normalize(); // where a view that fits looks from
@@ -27,7 +28,7 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #orbit: OrbitControls;
   readonly #stop = new AbortController();
   #reel = new ReelScene();
-  #info: Info | null = null;
+  #box: Box | null = null; // of the recording, as it stands
   #mode: Mode = "shaded";
   #background = "";
   #free = 1; // of the picture's height: what the bar leaves
@@ -93,8 +94,9 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#reel.dispose();
     this.#reel = new ReelScene();
     this.#reel.mode = this.#mode;
+    this.#reel.rotation.x = turnOf(info.metadata);
     this.#content.add(this.#reel);
-    this.#info = info;
+    this.#box = stoodUp(info.box, this.#reel.rotation.x);
     this.fit();
   }
 
@@ -125,10 +127,10 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   fit(): void {
-    if (!this.#info) return;
-    const { middle } = this.#ball();
+    if (!this.#box) return;
+    const { middle } = this.#ball(this.#box);
     const half = Math.tan((FOV * Math.PI) / 360);
-    const distance = MARGIN * distanceOf(this.#info.box, half * this.#eye.aspect, half * this.#free);
+    const distance = MARGIN * distanceOf(this.#box, half * this.#eye.aspect, half * this.#free);
     this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
     this.#isFit = true;
   }
@@ -148,8 +150,8 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   async enterVr(frame: (now: number) => void, actions: VrActions): Promise<void> {
-    if (this.#session !== null || !this.#info) return;
-    const { box } = this.#info;
+    const box = this.#box;
+    if (this.#session !== null || !box) return;
     const onend = (): void => {
       this.#session = null;
       this.dispatchEvent(new Event("vrend"));
@@ -173,8 +175,7 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   /** Around the whole recording. */
-  #ball(): { middle: Vector3; radius: number } {
-    const { minimum, size } = this.#info!.box;
+  #ball({ minimum, size }: Box): { middle: Vector3; radius: number } {
     const middle = new Vector3(...minimum).addScaledVector(new Vector3(...size), 0.5);
     return { middle, radius: Math.hypot(...size) / 2 || 1 };
   }
@@ -191,8 +192,8 @@ export class ThreeStage extends EventTarget implements Stage {
 
   /** Near and far follow the camera, so that depth has its precision where the recording is. */
   #moved(): void {
-    if (this.#info && !this.presenting) {
-      const { middle, radius } = this.#ball();
+    if (this.#box && !this.presenting) {
+      const { middle, radius } = this.#ball(this.#box);
       const distance = this.#eye.position.distanceTo(middle);
       this.#orbit.minDistance = CLOSEST * radius;
       this.#orbit.maxDistance = FARTHEST * radius;

@@ -11,8 +11,24 @@ import { readParameters, readTime } from "../src/parameters.ts";
 import { ranges } from "../src/ranges.ts";
 import { GraphicsError } from "../src/stage.ts";
 import { statisticsLines } from "../src/stats.ts";
+import { stoodUp, turnOf } from "../src/upright.ts";
 import { goesOn } from "../src/view.ts";
 import { FakePlayback, INFO } from "./fake.ts";
+
+describe("standing upright", () => {
+  const box = { minimum: [-1, 2, 5], size: [3, 4, 6] } as const;
+  test("what is up in a file is up in the picture, and the box goes along", () => {
+    const boxes = ["y", "-y", "z", "-z", 7, undefined].map((up) => stoodUp(box, turnOf({ up })));
+    expect(boxes[0]).toEqual(box);
+    expect(boxes[1]).toEqual({ minimum: [-1, -6, -11], size: [3, 4, 6] }); // x, -y, -z
+    expect(boxes[2]).toEqual({ minimum: [-1, 5, -6], size: [3, 6, 4] }); // x, z, -y
+    expect(boxes[3]).toEqual({ minimum: [-1, -11, 2], size: [3, 6, 4] }); // x, -z, y
+    expect(boxes.slice(4)).toEqual([box, box]);
+  });
+  test("no other word is taken for an axis", () => {
+    expect(["constructor", "x", "toString"].map((up) => turnOf({ up }))).toEqual([0, 0, 0]);
+  });
+});
 
 describe("attributes", () => {
   test("a speed is held between 0.1 and 4, and is 1 where it is no number", () => {
