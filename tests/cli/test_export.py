@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -67,6 +68,17 @@ def test_what_does_not_agree_is_told(run, tmp_path):
     assert failed(run("export", FILE, "-o", tmp_path / "no" / "a.glb"), "a.glb", "no folder")
     assert failed(run("export", tmp_path / "none.reel", "--glb"), "none.reel")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_is_not_replaced_by_what_it_is_exported_to(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    recording = Path("a.glb")
+    recording.write_bytes(FILE.read_bytes())
+    assert failed(run("export", recording, "--glb"), "a.glb", "the recording itself", "-o")
+    os.link(recording, "b.glb")
+    assert failed(run("export", recording, "-o", "b.glb"), "b.glb", "the recording itself")
+    assert recording.read_bytes() == Path("b.glb").read_bytes() == FILE.read_bytes()
+    assert run("export", recording, "-o", "c.glb").code == 0
 
 
 def test_a_file_in_which_nothing_is_to_be_seen_is_a_warning(run, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -70,6 +71,18 @@ def test_a_folder_that_is_not_there_is_told(tmp_path):
         target = tmp_path / "none" / f"a.{kind}"
         with pytest.raises(InputError, match="cannot be written"), writer(target, animation()):
             pytest.fail("opened")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names are Unicode on this system")
+def test_a_folder_whose_name_is_no_text_is_told_where_usd_cannot_take_it(tmp_path):
+    pytest.importorskip("pxr")
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    folder.mkdir()
+    with pytest.raises(InputError, match="not Unicode text"), animated_usd(folder / "a.usdc", animation()):
+        pytest.fail("opened")
+    with animated_glb(folder / "a.glb", animation()) as writer:
+        writer.add(shape())
+    assert [path.name for path in folder.iterdir()] == ["a.glb"]
 
 
 def test_a_glb_that_would_be_too_long_is_told_before_it_is(tmp_path, monkeypatch):

@@ -80,6 +80,15 @@ def test_a_name_that_is_no_text_is_told_and_breaks_nothing(folder, player):
         Library.of_file(folder / os.fsdecode(b"\xff\xfe.reel"))
 
 
+@pytest.mark.skipif(not BYTES_AS_NAMES, reason="names are Unicode on this system")
+def test_a_folder_whose_name_is_no_text_is_served(folder, player):
+    odd = folder.rename(folder.parent / os.fsdecode(b"caf\xe9"))
+    client = TestClient(make_app(Library(odd), player))
+    page = client.get("/")
+    assert page.status_code == 200 and "caf?" in page.text
+    assert client.get("/files/walk.reel").status_code == 200
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
 def test_a_pipe_is_no_file_to_wait_for(folder):
     os.mkfifo(folder / "pipe.reel")

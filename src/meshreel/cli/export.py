@@ -57,6 +57,8 @@ def command(
     target = _target(file, output, glb, usd)
     wanted = SequenceOptions(frames=frames)
     with open_video(file) as video:
+        if target.exists() and target.samefile(file):  # whatever the recording's name, and behind whatever link
+            raise InputError(f"{target}: is the recording itself, which would be lost; give another name with -o")
         check_part(file, video.reader, only)
         chosen = wanted.chosen(len(video))
         try:

@@ -25,7 +25,7 @@ from starlette.staticfiles import NotModifiedResponse, StaticFiles
 from starlette.types import Scope
 
 from ..errors import InputError
-from .library import Library
+from .library import Library, as_text
 from .pages import PLAIN, POLICY, STYLE, gallery_page, player_page
 from .posters import Posters, poster_tag
 
@@ -146,7 +146,7 @@ class _Pages:
         return HTMLResponse(player_page(name), headers=PAGE)
 
     def _gallery(self) -> str:
-        title = self._library.folder.resolve().name or "meshreel"
+        title = as_text(self._library.folder.resolve().name) or "meshreel"
         return gallery_page(title, [self._library.entry(name) for name in self._library.names()])
 
 

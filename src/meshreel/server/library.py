@@ -79,8 +79,7 @@ class Library:
     def entry(self, name: str) -> Entry:
         """What a file is; damage and absence are told, not raised."""
         if not _is_text(name):
-            shown = name.encode("utf-8", "replace").decode()
-            return Entry(shown, error="the name is no Unicode text, which no address can have: rename the file")
+            return Entry(as_text(name), error="the name is no Unicode text, which no address can have: rename the file")
         path = self.path_of(name)
         if path is None:
             return Entry(name, error="is not there any more")
@@ -95,6 +94,11 @@ class Library:
         return Entry(name, reader.size, reader.frame_count, last + 1 / reader.frame_rate, cut)
 
 
+def as_text(name: str) -> str:
+    """What a page can show of a name; Linux knows file names that are bytes of no encoding."""
+    return name.encode("utf-8", "replace").decode()
+
+
 def _is_plain(name: str) -> bool:
     """Whether a name from an address leads downwards only: no "..", no hidden part, no drive, nothing absolute."""
     if not name.lower().endswith(SUFFIX) or "\\" in name or (os.name == "nt" and ":" in name):
@@ -103,7 +107,7 @@ def _is_plain(name: str) -> bool:
 
 
 def _is_text(name: str) -> bool:
-    """Whether a name can be in a page and in an address; Linux knows file names that are bytes of no encoding."""
+    """Whether a name can be in a page and in an address."""
     try:
         name.encode("utf-8")
     except UnicodeEncodeError:

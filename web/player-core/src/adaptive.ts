@@ -63,12 +63,12 @@ export class Adaptive {
   }
 
   #ratesOf(time: number): number[] {
-    const { starts, frameCount, duration } = this.#timeline;
+    const { frameCount, duration } = this.#timeline;
     const from = Math.min(time, Math.max(0, duration - OUTLOOK));
     const groups = groupsBetween(this.#head, this.#timeline.frameAt(from), this.#timeline.frameAt(from + OUTLOOK));
     const frames = groups.reduce((sum, group) => sum + group.frameCount, 0);
-    const perByte = (8 * this.#head.tracks.length * frameCount) / (frames * starts[frameCount]);
-    const most = Math.max(...groups.map(mostQuality));
+    const perByte = (8 * this.#head.tracks.length * frameCount) / (frames * duration);
+    const most = groups.reduce((found, group) => Math.max(found, mostQuality(group)), 0);
     return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeOfLayers(group, level + 1), 0));
   }
 

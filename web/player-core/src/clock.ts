@@ -3,20 +3,17 @@
 const LONGEST_STEP = 0.5; // s of display time; where nothing was displayed for longer, time stood still
 const ROUNDING = 1e-6; // s; a time that is so little short of a frame's own is that frame's
 
-/** When each frame is shown, s from the first: `starts` has a number for each frame, then the end of the last. */
+/** When each frame is shown, s from the first. No table: a head of some kilobytes may tell of millions of frames. */
 export class Timeline {
-  readonly starts: Float64Array;
+  readonly frameCount: number;
+  readonly duration: number; // s
+  /** When a frame begins; of `frameCount`, the end of the last. */
+  readonly startOf: (frame: number) => number;
 
-  constructor(starts: Float64Array) {
-    this.starts = starts;
-  }
-
-  get frameCount(): number {
-    return this.starts.length - 1;
-  }
-
-  get duration(): number {
-    return this.starts[this.frameCount];
+  constructor(frameCount: number, startOf: (frame: number) => number) {
+    this.frameCount = frameCount;
+    this.startOf = startOf;
+    this.duration = startOf(frameCount);
   }
 
   /** The frame that is shown at a time; the first or the last one outside. */
@@ -24,7 +21,7 @@ export class Timeline {
     let [low, high] = [0, this.frameCount - 1];
     while (low < high) {
       const middle = (low + high + 1) >> 1;
-      if (this.starts[middle] <= time + ROUNDING) low = middle;
+      if (this.startOf(middle) <= time + ROUNDING) low = middle;
       else high = middle - 1;
     }
     return low;
@@ -32,8 +29,8 @@ export class Timeline {
 
   /** How far a time is from a frame's start to its end, 0 to 1. */
   blendAt(time: number, frame: number): number {
-    const start = this.starts[frame];
-    return Math.min(1, Math.max(0, (time - start) / (this.starts[frame + 1] - start)));
+    const start = this.startOf(frame);
+    return Math.min(1, Math.max(0, (time - start) / (this.startOf(frame + 1) - start)));
   }
 
   /** The nearest time from 0 to the end. */

@@ -31,7 +31,7 @@ export class Links {
   /** A chunk and all that cannot be decoded without it. */
   withDependents(number: number): number[] {
     const found = [number];
-    for (const other of found) found.push(...this.#dependents[other]);
+    for (const other of found) for (const dependent of this.#dependents[other]) found.push(dependent);
     return found;
   }
 }

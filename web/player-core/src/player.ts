@@ -188,7 +188,7 @@ export class Player extends PlaybackTarget implements Playback {
     if (this.#clock === null) return;
     const { timeline } = this.#clock;
     const frame = Math.min(Math.max(this.currentFrame + Math.trunc(frames), 0), timeline.frameCount - 1);
-    this.#seek(this.#clock, timeline.starts[frame]);
+    this.#seek(this.#clock, timeline.startOf(frame));
   }
 
   update(now: number): Shown | null {
@@ -326,6 +326,7 @@ export class Player extends PlaybackTarget implements Playback {
     const wasPaused = this.#paused;
     this.#rest(this.#error);
     this.#session?.stop();
+    this.#source.close(); // else a server that ignores ranges sends on, into memory
     if (!wasPaused) this.#tell("pause");
     this.#tell("error", this.#error);
   }

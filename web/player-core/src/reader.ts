@@ -82,13 +82,13 @@ export class Head {
 
   /** The time of a frame, s from the first one. RangeError outside 0 .. frameCount - 1. */
   timestamp(frame: number): number {
-    this.chunkOfFrame(frame, 0);
+    this.checkFrame(frame);
     return this.timestampOf(frame);
   }
 
   /** The group of a track that holds a frame. RangeError outside 0 .. frameCount - 1. */
   chunkOfFrame(frame: number, track: number): Chunk {
-    if (!(frame >= 0 && frame < this.frameCount)) throw new RangeError(`frame ${frame}: the file has frames 0 to ${this.frameCount - 1}`);
+    this.checkFrame(frame);
     const groups = this.tracks[track];
     let [low, high] = [0, groups.length - 1];
     while (low < high) {
@@ -119,6 +119,10 @@ export class Head {
   /** The state that a static chunk of form PATCH changes. */
   changedFrom(chunk: Chunk): Chunk | null {
     return chunk.kind === "static" && chunk.dependsOn.length > 0 ? this.chunks[chunk.dependsOn[0]] : null;
+  }
+
+  private checkFrame(frame: number): void {
+    if (!(frame >= 0 && frame < this.frameCount)) throw new RangeError(`frame ${frame}: the file has frames 0 to ${this.frameCount - 1}`);
   }
 
   private timestampOf(frame: number): number {
@@ -174,7 +178,7 @@ function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, fr
     origin: header.origin as unknown as Info["origin"],
     box: boxOf(header),
     trackCount,
-    mostQuality: Math.max(0, ...scaled.map((chunk) => chunk.layers.length - 1)),
+    mostQuality: scaled.reduce((most, chunk) => Math.max(most, chunk.layers.length - 1), 0),
     size: last.offset + last.size,
     metadata: metadataOf(header.metadata),
   };

@@ -52,6 +52,8 @@ export interface Plan {
   readonly chainCount: number; // that can be decoded beside each other
 }
 
+const MOST_GROUPS = 4096; // of all tracks, ahead or behind: a hostile frame rate has a whole file within a second
+const FEWEST_GROUPS = 64; // of each track, however many there are
 const SURE_GROUPS = 2; // of each track, the shown one and the next: wanted whatever memory they take
 
 /**
@@ -64,14 +66,16 @@ export function plan(head: Head, links: Links, timeline: Timeline, outlook: Outl
   const planner = new Planner(head, links, outlook, holdings);
   const { time, decodeSeconds, behindSeconds } = outlook;
   const now = timeline.frameAt(time);
+  const most = Math.max(FEWEST_GROUPS, Math.floor(MOST_GROUPS / head.tracks.length));
   for (const [first, last] of framesAhead(timeline, outlook)) {
-    for (const group of groupsBetween(head, first, last)) {
+    for (const group of groupsBetween(head, first, last, most)) {
       const frame = Math.max(group.firstFrame, first);
-      const ahead = timeline.starts[frame] - time + (frame < now ? timeline.duration : 0);
+      const ahead = timeline.startOf(frame) - time + (frame < now ? timeline.duration : 0);
       planner.addGroup(group, frame, frame === now ? 0 : ahead, ahead <= decodeSeconds);
     }
   }
-  for (const group of groupsBetween(head, timeline.frameAt(time - behindSeconds), now)) planner.keep.add(group.number);
+  const behind = Math.max(timeline.frameAt(time - behindSeconds), now - most);
+  for (const group of groupsBetween(head, behind, now)) planner.keep.add(group.number);
   return planner.plan();
 }
 
@@ -84,11 +88,11 @@ function framesAhead(timeline: Timeline, { time, loop, fetchSeconds }: Outlook):
   return runs;
 }
 
-/** Groups of all tracks that hold a frame from `first` to `last`, in the order of the file, which is that of time. */
-export function groupsBetween(head: Head, first: number, last: number): Chunk[] {
+/** Groups that hold a frame from `first` to `last`, the first `most` of each track, in the order of the file, which is that of time. */
+export function groupsBetween(head: Head, first: number, last: number, most = Infinity): Chunk[] {
   const groups: Chunk[] = [];
   for (let track = 0; track < head.tracks.length; track++) {
-    for (let frame = first; frame <= last; ) {
+    for (let [frame, count] = [first, 0]; frame <= last && count < most; count++) {
       const group = head.chunkOfFrame(frame, track);
       groups.push(group);
       frame = group.firstFrame + group.frameCount;

@@ -108,12 +108,12 @@ export class Session {
 
   /** Seconds of content from a time on that can be shown; Infinity if that is all. It looks for `most` of them, or some more. */
   readyAhead(time: number, loop: boolean, most: number): number {
-    const { starts, duration, frameCount } = this.timeline;
+    const { duration, frameCount } = this.timeline;
     let frame = this.timeline.frameAt(time);
-    let sum = starts[frame] - time;
+    let sum = this.timeline.startOf(frame) - time;
     while (sum < most && this.picture.isReady(frame)) {
       const next = this.#nextBorder(frame);
-      sum += starts[next] - starts[frame];
+      sum += this.timeline.startOf(next) - this.timeline.startOf(frame);
       frame = next % frameCount;
       if (frame === 0 && (!loop || sum >= duration)) return Infinity;
     }
@@ -203,5 +203,5 @@ export class Session {
 
 function timelineOf(head: Head): Timeline {
   const { frameCount, duration } = head.info;
-  return new Timeline(Float64Array.from({ length: frameCount + 1 }, (_, frame) => (frame < frameCount ? head.timestamp(frame) : duration)));
+  return new Timeline(frameCount, (frame) => (frame < frameCount ? head.timestamp(frame) : duration));
 }

@@ -8,7 +8,7 @@ import { stream } from "./reel.ts";
 
 const LAYERS = [10_000, 20_000, 40_000, 80_000]; // bytes a second
 const HEAD = Head.parse(stream(60, LAYERS));
-const TIMELINE = new Timeline(Float64Array.from({ length: 1501 }, (_, frame) => frame / 25));
+const TIMELINE = new Timeline(1500, (frame) => frame / 25);
 const GOOD: Conditions = { now: 0, time: 0, speed: 1, bandwidth: 1e9, fetched: 10, decoded: 3, load: 0.1, isWaiting: false };
 const bits = (bytes: number): number => 8 * bytes;
 

@@ -2,7 +2,8 @@ import { describe, expect, test } from "vitest";
 
 import { Clock, Timeline } from "../src/clock.ts";
 
-const TIMES = new Timeline(Float64Array.of(0, 0.1, 0.15, 0.4, 0.5));
+const STARTS = [0, 0.1, 0.15, 0.4, 0.5];
+const TIMES = new Timeline(4, (frame) => STARTS[frame]);
 
 describe("a timeline", () => {
   test.each([[-1, 0], [0, 0], [0.0999, 0], [0.1, 1], [0.149, 1], [0.15, 2], [0.3999, 2], [0.4, 3], [0.49, 3], [0.5, 3], [9, 3]])(
@@ -11,7 +12,7 @@ describe("a timeline", () => {
   );
 
   test("shows a frame at its own time, however that was reckoned", () => {
-    const times = new Timeline(Float64Array.from({ length: 1001 }, (_, frame) => frame / 30));
+    const times = new Timeline(1000, (frame) => frame / 30);
     let sum = 0;
     for (let frame = 0; frame < 1000; frame++) {
       expect(times.frameAt(frame / 30)).toBe(frame);
@@ -30,13 +31,13 @@ describe("a timeline", () => {
   });
 
   test("of one frame works", () => {
-    const one = new Timeline(Float64Array.of(0, 0.04));
+    const one = new Timeline(1, (frame) => frame * 0.04);
     expect([one.frameAt(0), one.frameAt(1), one.duration, one.clamp(3)]).toEqual([0, 0, 0.04, 0.04]);
   });
 });
 
 describe("a clock", () => {
-  const TEN = new Timeline(Float64Array.from({ length: 251 }, (_, frame) => frame / 25));
+  const TEN = new Timeline(250, (frame) => frame / 25);
 
   function run(clock: Clock, from: number, to: number, stepMs = 10): void {
     for (let now = from; now <= to; now += stepMs) clock.advance(now);

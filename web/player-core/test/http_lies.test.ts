@@ -4,7 +4,9 @@ import { afterEach, beforeEach, describe, expect, test } from "vitest";
 
 import { SourceError } from "../src/errors.ts";
 import { HttpSource } from "../src/http_source.ts";
+import { Player } from "../src/player.ts";
 import { readBytes } from "../src/source.ts";
+import { FakeWorkers } from "./fake_workers.ts";
 import { FileServer, noise } from "./server.ts";
 import type { Respond } from "./server.ts";
 
@@ -110,6 +112,20 @@ describe("a server that lies or refuses", () => {
     await readBytes(source, 0, 10);
     server.respond = (response) => void response.writeHead(200, { "Content-Length": 5 }).end(noise(5));
     expect((await failure(10, 10)).message).toContain("the file has 5 bytes and had 300000 before");
+  });
+
+  test("by sending another file without end is left when the player has refused it", async () => {
+    server.respond = async (response) => {
+      response.writeHead(200);
+      while (!response.destroyed) {
+        response.write(server.bytes.subarray(0, 20_000));
+        await new Promise((resolve) => setTimeout(resolve, 1));
+      }
+    };
+    const player = new Player({ source, workers: new FakeWorkers().setup() });
+    await expect(player.load()).rejects.toThrow("not a .reel file");
+    await expect.poll(() => server.cut).toBe(1);
+    player.dispose();
   });
 
   test("that has nothing of a range within the file is refused", async () => {

@@ -54,7 +54,7 @@ export function makeReel(chunks: readonly FakeChunk[], { frameRate, intervals = 
   for (const interval of intervals) header.varint(interval);
   const size = 14 + header.bytes.length + index.bytes.length + 4;
   const head = new Writer(82, 69, 69, 76, 13, 10, 26, 10).u8(1).u8(0).u32(size);
-  head.bytes.push(...header.bytes, ...index.bytes);
+  for (const byte of [...header.bytes, ...index.bytes]) head.u8(byte);
   head.u32(crc32(Uint8Array.from(head.bytes)));
   const file = new Uint8Array(size + bodies.reduce((sum, body) => sum + body.length, 0));
   file.set(head.bytes);

@@ -35,7 +35,7 @@ function planned(file: Uint8Array, outlook: Partial<Outlook> = {}, table = new T
 
 function timelineOf(head: Head): Timeline {
   const { frameCount, duration } = head.info;
-  return new Timeline(Float64Array.from({ length: frameCount + 1 }, (_, frame) => (frame < frameCount ? head.timestamp(frame) : duration)));
+  return new Timeline(frameCount, (frame) => (frame < frameCount ? head.timestamp(frame) : duration));
 }
 
 const told = ({ steps }: Plan): [number, number, boolean, boolean][] => steps.map(({ chunk, quality, show, decode }) => [chunk.number, quality, show, decode]);
@@ -65,6 +65,17 @@ describe("ahead", () => {
     const steps = planned(stream(20, [100, 100]), { time: 2.1, behindSeconds: 1, fetchSeconds: 2, decodeSeconds: 1 }, table);
     expect(steps.steps).toEqual([expect.objectContaining({ decode: false })]);
     expect([...steps.keep].sort()).toEqual([2, 3, 4, 5, 6, 7]);
+  });
+
+  test.each([1, 3])("of a frame rate that has the whole file within a second only some groups of %i tracks come, and are kept", (tracks) => {
+    const groups = Array.from({ length: 6000 * tracks }, (_, k) => group(1, [1], { track: k % tracks }));
+    const file = makeReel(groups, { frameRate: 1e5 });
+    const first = planned(file);
+    expect(first.steps).toHaveLength(Math.floor(4096 / tracks) * tracks);
+    expect(numbers(first)).toEqual(Array.from(first.steps, (_, k) => k));
+    const last = planned(file, { time: 5999e-5 });
+    expect(last.keep.size).toBeLessThan(4096 + 2 * tracks);
+    expect(last.keep).toContain(groups.length - 1);
   });
 
   test("memory ends what is decoded ahead, but for the shown group and the next", () => {

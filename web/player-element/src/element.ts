@@ -166,8 +166,9 @@ export class MeshreelPlayer extends Reflected {
   fit(): void {
     this.#view?.stage.fit();
   }
-  /** Turns the camera about what it looks at, in radians to the right and up, and brings it so many times closer. */
+  /** Turns the camera about what it looks at, in radians to the right and up, and brings it so many times closer. TypeError where they are no numbers. */
   orbit(right: number, up: number, closer = 1): void {
+    if (![right, up, closer].every(Number.isFinite) || closer <= 0) throw new TypeError(`orbit(${right}, ${up}, ${closer}): finite numbers are needed, the last above 0`);
     this.#view?.stage.orbit(right, up, closer);
   }
   /** A PNG of the picture as it is seen now. */

@@ -159,6 +159,22 @@ describeOnPage("<meshreel-player>", (on) => {
     expect(await on.get((player) => [player.src, player.error!.message])).toEqual(["http://[404", "http://[404: not found (404), check the address"]);
   });
 
+  test("a turn that is no number is refused, and the camera stays where it is", async () => {
+    await on.shown();
+    const told = await on.get((player) =>
+      [[NaN, 0], [0, Infinity], [0, 0, 0], [0, 0, -1], [0, 0, NaN]].map((turn) => {
+        try {
+          player.orbit(...(turn as [number, number]));
+          return "turned";
+        } catch (error) {
+          return (error as Error).name;
+        }
+      }),
+    );
+    expect(told).toEqual(Array.from({ length: 5 }, () => "TypeError"));
+    expect(await on.page.evaluate(() => engine.stages[0]!.orbits)).toEqual([]);
+  });
+
   test("preload=none fetches only when somebody plays", async () => {
     await on.put('<meshreel-player src="walk.reel" preload="none" controls></meshreel-player>', false);
     await on.page.waitForTimeout(100);

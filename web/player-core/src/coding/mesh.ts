@@ -6,6 +6,7 @@ import { FormatError } from "../errors.ts";
 import { EMPTY, checkFaces, faceCount, vertexCount } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
 import { subdivide } from "../wasm/layers.ts";
+import { CoreStopped } from "../wasm/memory.ts";
 import type { Core } from "../wasm/memory.ts";
 
 const EDGEBREAKER = 1;
@@ -55,7 +56,7 @@ function positionsOf(draco: DecoderModule, decoder: Decoder, mesh: DracoMesh, wh
   const attribute = decoder.GetAttribute(mesh, id);
   const size = 3 * mesh.num_points();
   if (attribute.num_components() !== 3) throw new FormatError(`${what}: positions of ${attribute.num_components()} numbers`);
-  const place = draco._malloc(4 * size);
+  const place = allocated(draco, 4 * size);
   try {
     decoder.GetAttributeDataArrayForAllPoints(mesh, attribute, draco.DT_FLOAT32, 4 * size, place);
     return Float64Array.from(new Float32Array(draco.HEAPF32.buffer, place, size));
@@ -66,13 +67,20 @@ function positionsOf(draco: DecoderModule, decoder: Decoder, mesh: DracoMesh, wh
 
 function facesOf(draco: DecoderModule, decoder: Decoder, mesh: DracoMesh): Int32Array {
   const size = 3 * mesh.num_faces();
-  const place = draco._malloc(4 * size);
+  const place = allocated(draco, 4 * size);
   try {
     decoder.GetTrianglesUInt32Array(mesh, 4 * size, place);
     return new Int32Array(draco.HEAPF32.buffer, place, size).slice();
   } finally {
     draco._free(place);
   }
+}
+
+/** Memory of Draco's. Throws CoreStopped where there is none: it would write over its own. */
+function allocated(draco: DecoderModule, size: number): number {
+  const place = draco._malloc(size);
+  if (place === 0) throw new CoreStopped(`Draco has no memory for ${size} bytes`);
+  return place;
 }
 
 /** FormatError where the head of Draco bytes claims more than they can hold: memory is taken for the claim. */

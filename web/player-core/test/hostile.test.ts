@@ -1,0 +1,87 @@
+// Chunks whose checksums are right and whose content is not: refused in words or decoded, and nothing of them stays behind.
+
+import { readFileSync, readdirSync } from "node:fs";
+
+import { beforeAll, describe, expect, test, vi } from "vitest";
+
+import { ChunkDecoder } from "../src/chunk_decoder.ts";
+import type { Tools } from "../src/coding/group.ts";
+import { crc32 } from "../src/crc.ts";
+import { FormatError } from "../src/errors.ts";
+import { Links } from "../src/links.ts";
+import type { DecodeJob } from "../src/protocol.ts";
+import { Head } from "../src/reader.ts";
+import type { Chunk } from "../src/reader.ts";
+import { CoreStopped } from "../src/wasm/memory.ts";
+import { noise } from "./server.ts";
+import { ROOT, nodeTools } from "./tools.ts";
+
+const FOLDER = `${ROOT}/conformance/v1`;
+const NAMES = readdirSync(FOLDER).filter((name) => name.endsWith(".reel"));
+const TRIES = 40; // of each chunk
+const VALUES = [0, 1, 0x7f, 0x80, 0xff];
+
+let tools: Tools;
+beforeAll(async () => {
+  tools = await nodeTools();
+});
+
+function jobOf(chunk: Chunk, payload: Uint8Array, previous: Chunk | null): DecodeJob {
+  const { number, kind, form, track, firstFrame, frameCount } = chunk;
+  let at = 0;
+  const layers = chunk.layers.map(({ size }) => ({ size, crc: crc32(payload.subarray(at, (at += size))) }));
+  const place = { kind, form, track, firstFrame, frameCount } as const;
+  return { file: 1, chunk: number, ...place, payload, layers, quality: null, previous: previous?.number ?? null, scale: 1, stateOnly: false };
+}
+
+/** With one to four bytes changed, most of them near the start, where sizes and counts are; never the form. */
+function spoiled(payload: Uint8Array, seed: number): Uint8Array {
+  const copy = payload.slice();
+  const random = noise(17, seed);
+  for (let k = 0; k < 1 + (random[0]! & 3); k++) {
+    const [where, high, low, value] = random.subarray(1 + 4 * k, 5 + 4 * k);
+    const range = where! < 160 ? Math.min(60, copy.length) : copy.length;
+    const place = 1 + (((high! << 8) | low!) % Math.max(1, range - 1));
+    if (place < copy.length) copy[place] = VALUES[value! % 6] ?? value! ^ copy[place]!;
+  }
+  return copy;
+}
+
+describe.each(NAMES)("%s", (name) => {
+  const data = new Uint8Array(readFileSync(`${FOLDER}/${name}`));
+  const head = Head.parse(data);
+  const links = new Links(head);
+
+  test("with content that is changed is refused in words or decoded, and decodes as before behind it", () => {
+    const payloadOf = ({ offset, size }: Chunk): Uint8Array => data.slice(offset, offset + size);
+    const decode = (decoder: ChunkDecoder, chunk: Chunk, payload = payloadOf(chunk)): unknown => {
+      const packed = decoder.decode(jobOf(chunk, payload, links.previousOf(chunk)));
+      return packed && { ...packed, decodeMs: 0 };
+    };
+    const sound = new ChunkDecoder(tools);
+    const made = head.chunks.map((chunk) => decode(sound, chunk));
+    for (const chunk of head.chunks) {
+      for (let seed = 1; seed <= TRIES; seed++) {
+        try {
+          decode(sound, chunk, spoiled(payloadOf(chunk), 1000 * chunk.number + seed));
+        } catch (error) {
+          expect(error).toBeInstanceOf(FormatError);
+          expect((error as Error).message).toMatch(/^[^\n]+$/);
+        }
+      }
+      expect(decode(sound, chunk)).toEqual(made[chunk.number]);
+    }
+  });
+});
+
+test("where Draco has no memory the decoder stops, and does not write over what it has", () => {
+  const data = new Uint8Array(readFileSync(`${FOLDER}/draco.reel`));
+  const chunk = Head.parse(data).chunks[0]!;
+  const payload = data.slice(chunk.offset, chunk.offset + chunk.size);
+  const malloc = vi.spyOn(tools.draco, "_malloc").mockReturnValue(0);
+  try {
+    expect(() => new ChunkDecoder(tools).decode(jobOf(chunk, payload, null))).toThrow(CoreStopped);
+  } finally {
+    malloc.mockRestore();
+  }
+});
