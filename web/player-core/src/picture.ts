@@ -40,10 +40,13 @@ export class Picture {
     return background === null || this.#decoding.isSettled(background);
   }
 
-  /** Makes it the picture of a frame, `blend` of the way to the next. False, and as before, where the frame is not ready. */
+  /** Makes it the picture of a frame, `blend` of the way to the next. False, and the frame before, where the frame is not ready. */
   show(frame: number, blend: number): boolean {
     const isSame = frame === this.#shown.frame && this.#decoding.version === this.#version;
-    if (!isSame && !this.isReady(frame)) return false;
+    if (!isSame && !this.isReady(frame)) {
+      this.#renew();
+      return false;
+    }
     const next = this.#spare;
     if (isSame) this.#copy(next);
     else this.#fill(next, frame);
@@ -59,6 +62,18 @@ export class Picture {
     const { groups, background } = this.#shown;
     for (const group of groups) if (group !== null) keep.add(group.chunk);
     if (background !== null) keep.add(background.chunk);
+  }
+
+  /** Takes what came in the place of what is shown, as at another quality: the old is released. */
+  #renew(): void {
+    const { frame, blend } = this.#shown;
+    if (frame < 0 || this.#decoding.version === this.#version) return;
+    const next = this.#spare;
+    this.#fill(next, frame);
+    next.blend = blend;
+    if (!this.#differs(next)) return;
+    this.#spare = this.#shown;
+    this.#shown = next;
   }
 
   #copy(next: Mutable): void {

@@ -183,6 +183,24 @@ describe("a quality by hand", () => {
     expect(rig.workers.begun.map(({ job }) => [job.layers.length, job.quality])).toEqual([[2, null], [1, null], [3, null]]);
   });
 
+  test("that comes while a seek is under way is shown in the place of what it replaces", async () => {
+    rig.begin(stream(60, FULL), 10 * RATE);
+    rig.player.quality = 0;
+    void rig.player.load();
+    await pass(1);
+    rig.workers.msOf = () => 100;
+    rig.source.latencyMs = 500;
+    rig.player.quality = 3;
+    await pass(0.6); // the fine layers are there, and are being decoded
+    const before = rig.viewer.shown;
+    expect(before).toMatchObject({ frame: 0, groups: [{ quality: 0 }] });
+    rig.player.currentTime = 50;
+    await pass(0.3);
+    expect(rig.viewer.shown).toMatchObject({ frame: 0, groups: [{ chunk: 0, quality: 3 }] });
+    await pass(2);
+    expect(rig.viewer.shown).toMatchObject({ frame: 1250, groups: [{ quality: 3 }] });
+  });
+
   test("changed in mid-play many times never breaks a chain", async () => {
     rig.begin(stream(30, FULL, 10), 5 * RATE);
     await play(1);
