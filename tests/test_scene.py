@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import meshreel
+import meshreel.scene as scene
 from meshreel.analysis.background import BackgroundOptions
 from meshreel.analysis.segment.labelling import ByPlace
 from meshreel.analysis.segment.scene import scene_views
@@ -27,7 +28,7 @@ from meshreel.geometry.voxels import Lattice
 from meshreel.parts import Parts, take_apart
 from meshreel.scene import TrackGroup, encode_bodies, encode_static
 from meshreel.types import Mesh, MeshList, Placement
-from meshreel.windows import EncodedGroup, Stages
+from meshreel.windows import EncodedGroup, Stages, target_of
 from meshreel.work import Work
 from tests import small_scene
 from tests.metrics.shapes import moved, plane, sphere
@@ -150,6 +151,19 @@ def test_preset_paper_has_scenes_too(tmp_path):
     video, summary = encoded(ROLLING, tmp_path / "a.reel", options)
     assert summary.scene is not None and len(statics(video)) == 1
     assert_rolls(video)
+
+
+@pytest.mark.parametrize("preset", ["paper", "best"])
+def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, monkeypatch, tmp_path):
+    told, coded = [], scene._coded_runs
+    monkeypatch.setattr(scene, "_coded_runs", lambda runs, work: told.append(work.options) or coded(runs, work))
+    video, _ = encoded(ROLLING, tmp_path / "a.reel", quick_scene(preset, group_size=1))
+    assert told
+    for options in told:
+        noise = options.noise * video.reader.header.scale
+        assert 0.5 * NOISE < noise < 3 * NOISE
+        clean = target_of(ROLLING, replace(options, noise=0.0)).distance
+        assert target_of(ROLLING, options).distance == pytest.approx(np.hypot(clean, options.noise))
 
 
 def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeypatch):

@@ -129,7 +129,7 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
 def encode_bodies(work: Work, parts: Parts) -> CodedBodies:
     """The groups of all tracks; each track has all frames, and no group has frames with surface and without."""
     sequence, stages = work.sequence, work.stages
-    noise = min(parts.noise / parts.seen.unit, MOST_NOISE) if work.options.form == Form.LAYERS else 0.0
+    noise = min(parts.noise / parts.seen.unit, MOST_NOISE)
     options = replace(work.options, noise=noise)
     tracks, found = Tracks(parts.segmentation.cell, options), list[TrackGroup]()
     for frames in segments(sequence, parts.segmentation, options):

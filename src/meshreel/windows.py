@@ -69,7 +69,7 @@ class EncoderOptions:
     template: TemplateOptions = field(default_factory=TemplateOptions)
     layers: LayersOptions = field(default_factory=LayersOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches (form LAYERS)
-    noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture (form LAYERS)
+    noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture
     fused: FusedOptions = field(default_factory=FusedOptions)
     dynamic_only: bool = False  # True: no background is looked for, everything may move
     segment: SegmentOptions = field(default_factory=SegmentOptions)
