@@ -166,6 +166,10 @@ export class MeshreelPlayer extends Reflected {
   fit(): void {
     this.#view?.stage.fit();
   }
+  /** Gives the keyboard to the picture, as the element itself takes no focus. */
+  override focus(options?: FocusOptions): void {
+    this.#controls.picture.focus(options);
+  }
   /** Turns the camera about what it looks at, in radians to the right and up, and brings it so many times closer. */
   orbit(right: number, up: number, closer = 1): void {
     this.#view?.stage.orbit(right, up, closer);

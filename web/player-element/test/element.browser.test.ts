@@ -80,6 +80,13 @@ describeOnPage("<meshreel-player>", (on) => {
     await expect.poll(alive, { timeout: 10_000 }).toBe(0);
   });
 
+  test("focus() gives it the keyboard", async () => {
+    await on.shown();
+    await on.get((player) => player.focus());
+    await on.page.keyboard.press("l");
+    expect(await on.get((player) => [player.loop, player.matches(":focus-within")])).toEqual([true, true]);
+  });
+
   test("two players on a page know nothing of each other", async () => {
     await on.put('<meshreel-player id="a" src="a.reel" controls></meshreel-player><meshreel-player id="b" src="b.reel" controls></meshreel-player>');
     await on.page.locator("#b .picture").focus();

@@ -64,6 +64,21 @@ describeInBrowser("the built player", () => {
     await page.close();
   });
 
+  test("its page takes keys before anybody has clicked, but not from a page around it", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/scene.reel&loop");
+    await ready(page);
+    await page.keyboard.press("k");
+    await page.waitForFunction(() => !document.querySelector("meshreel-player")!.paused);
+    await page.close();
+    site.write("framed.html", '<!doctype html><link rel="icon" href="data:,"><iframe src="player/index.html?src=/scene.reel"></iframe>');
+    const outer = await site.visit("framed.html");
+    await ready(outer.page.frames()[1]!);
+    expect(await outer.page.evaluate(() => document.activeElement === document.body)).toBe(true);
+    expect(await outer.page.frames()[1]!.evaluate(() => document.activeElement === document.body)).toBe(true);
+    expect([...errors, ...outer.errors]).toEqual([]);
+    await outer.page.close();
+  });
+
   for (const name of ["layers", "mixed", "laplacian", "draco"]) {
     test(`plays ${name}.reel to its end`, async () => {
       const { page, errors } = await site.visit(`player/index.html?src=/${name}.reel&autoplay`);
