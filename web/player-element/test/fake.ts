@@ -94,7 +94,7 @@ export class FakePlayback extends EventTarget implements Playback {
       if (this.#time >= this.duration) this.#end();
     }
     this.#before = now;
-    if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, groups: [null], background: null };
+    if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, frames: [this.currentFrame], groups: [null], background: null };
     return this.#shown;
   }
 

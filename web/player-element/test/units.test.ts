@@ -137,7 +137,7 @@ describe("messages", () => {
 });
 
 describe("drawing only what changed", () => {
-  const shown = { frame: 3, blend: 0.5, groups: [null], background: null };
+  const shown = { frame: 3, blend: 0.5, frames: [3], groups: [null], background: null };
   test("a paused playback that has shown something needs no pictures", () => {
     const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
     expect(goesOn(playback, null)).toBe(true);
