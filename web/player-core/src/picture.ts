@@ -1,6 +1,7 @@
 // What is to be shown, in two objects that are used in turn: `update` allocates nothing.
 
 import type { Decoding } from "./decoding.ts";
+import { mostQuality } from "./links.ts";
 import type { Chunk, Head } from "./reader.ts";
 import type { Packed, PackedGroup, PackedStatic, Shown } from "./types.ts";
 
@@ -29,6 +30,12 @@ export class Picture {
   /** The last picture; null before the first. The one before it stays as it is until the next is asked for. */
   get shown(): Shown | null {
     return this.#shown.frame < 0 ? null : this.#shown;
+  }
+
+  /** Layers beyond the first that the richest of the groups shown has in the file. */
+  get wholeQuality(): number {
+    const { chunks } = this.#head;
+    return this.#shown.groups.reduce((most, group) => (group === null ? most : Math.max(most, mostQuality(chunks[group.chunk]))), 0);
   }
 
   /** Whether all that a frame shows is at hand, but for what can never be. */

@@ -98,6 +98,7 @@ export interface Stats {
   readonly bufferedSeconds: number; // decoded ahead of the current time
   readonly fetchedBytes: number;
   readonly quality: number; // layers beyond the first of the groups shown
+  readonly wholeQuality: number; // those that these groups have in the file, where it may have fewer than `Info.mostQuality`
   readonly stalls: number;
   readonly skippedGroups: number; // damaged ones
 }

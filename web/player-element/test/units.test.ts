@@ -175,6 +175,17 @@ describe("small parts", () => {
   });
 });
 
+describe("the quality that is told", () => {
+  test.each([
+    [3, 3, 3, "3 of 3"], [1, 3, 3, "1 of 3"], [0, 0, 3, "3 of 3"], [2, 2, 3, "3 of 3"], [1, 2, 3, "1 of 2"], [0, 0, 0, "one only"],
+  ])("%i layers of the %i there are, of %i in the file: %s", (quality, wholeQuality, mostQuality, text) => {
+    const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
+    const numbers = { ...playback.stats, quality, wholeQuality, triangles: 0, gpuBytes: 0, headsetRate: 0, fps: 0, frameMs: 0, drawn: 0 };
+    expect(Object.fromEntries(statisticsLines(numbers, { ...INFO, mostQuality }, 0)).Quality).toBe(text);
+    playback.dispose();
+  });
+});
+
 describe("the address of the page", () => {
   test("parameters are attributes; flags that say no take them away", () => {
     const { attributes, time, bench } = readParameters("?src=a%20b.reel&loop&autoplay=1&controls=0&mode=normal&quality=2&evil=1&speed=&t=1:05.5&bench");
