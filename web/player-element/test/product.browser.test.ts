@@ -102,6 +102,12 @@ describeInBrowser("the built player", () => {
     expect(report.pictures).toBeGreaterThan(0);
     expect(report.scriptMs.median).toBeGreaterThan(0);
     expect(report.triangles).toBeGreaterThan(0);
+    expect(report.groups).toBeGreaterThan(0); // though all of so short a file is decoded before it plays
+    expect(report.decodeMs.median).toBeGreaterThan(0);
+    expect(report.seeks).toBe(12);
+    expect(report.seekMs.median).toBeGreaterThan(0);
+    expect(report.seekMs.most95).toBeGreaterThanOrEqual(report.seekMs.median);
+    expect(said).toMatch(/^seek: [\d.]+ \/ [\d.]+ ms, 12 seeks$/m);
     expect(report).toMatchObject({ place: "page, 320 x 240", gpu: expect.stringContaining("SwiftShader") });
     expect(errors).toEqual([]);
     await page.close();
