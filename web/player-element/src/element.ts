@@ -67,8 +67,10 @@ export class MeshreelPlayer extends Reflected {
       this.#source = null;
       this.#startAt = 0;
       if (this.isConnected) this.#queueLoad();
-    } else if (before !== after) {
-      this.#apply(name);
+    } else if (before !== after && !this.restoring) {
+      const refusal = this.restore(name, before, after);
+      if (refusal === null) this.#apply(name);
+      else this.#onPlayback(new CustomEvent("warning", { detail: refusal }));
     }
     this.#controls.refresh();
   }

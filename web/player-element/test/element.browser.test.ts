@@ -153,6 +153,30 @@ describeOnPage("<meshreel-player>", (on) => {
     expect(time).toBe(0.75);
   });
 
+  test("a camera, mode or quality that is none leaves what was set, and warns", async () => {
+    await on.put('<meshreel-player src="walk.reel" controls mode="x" quality="1" camera="1,2,3,0,0,0"></meshreel-player>');
+    await on.page.locator(".toast", { hasText: 'mode "x" is passed over' }).waitFor();
+    const told = await on.get((player) => {
+      const messages: string[] = [];
+      player.addEventListener("warning", (event) => messages.push((event as CustomEvent<Error>).detail.message));
+      player.mode = "normal";
+      engine.stages[0]!.camera = "7,7,7,0,0,0"; // somebody has moved it
+      player.setAttribute("camera", "1,2");
+      player.setAttribute("mode", "pink");
+      player.setAttribute("quality", "high");
+      player.quality = NaN;
+      const { mode, quality, camera } = player;
+      return { messages, mode, quality, camera, attributes: ["mode", "quality", "camera"].map((name) => player.getAttribute(name)) };
+    });
+    expect(told.messages.map((message) => message.split(" is passed over: give ")[0])).toEqual(
+      ['camera "1,2"', 'mode "pink"', 'quality "high"', 'quality "NaN"'],
+    );
+    expect(told).toMatchObject({ mode: "normal", quality: 1, camera: "7,7,7,0,0,0", attributes: ["normal", "1", "1,2,3,0,0,0"] });
+    expect(await on.page.evaluate(() => [engine.stages[0]!.mode, engine.playbacks[0]!.quality])).toEqual(["normal", 1]);
+    await on.get((player) => player.removeAttribute("mode"));
+    expect(await on.page.evaluate(() => engine.stages[0]!.mode)).toBe("shaded");
+  });
+
   test("playing without a source is refused with a reason", async () => {
     await on.put("<meshreel-player></meshreel-player>", false);
     expect(await on.get((player) => player.play().catch((error: Error) => error.message))).toContain("set src");

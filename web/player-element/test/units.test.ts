@@ -26,6 +26,18 @@ describe("attributes", () => {
       "normal", "wireframe", "colour", "colour", "shaded", "shaded",
     ]);
   });
+  test("what no camera, mode or quality is, is told with what would be", () => {
+    for (const [name, good, bad] of [
+      ["camera", ["0,1,3,0,1,0", " 1e-3, -2,3,4,5,6 ", ""], ["1,2,3", "1,,3,4,5,6", "a,b,c,d,e,f", "1,2,3,4,5,Infinity"]],
+      ["mode", ["normal", "WIREFRAME", "color", " "], ["x", "shaded,normal"]],
+      ["quality", ["auto", "Auto", " 3 ", "0", ""], ["high", "-1", "1.5", "NaN"]],
+    ] as const) {
+      expect(good.filter((text) => parse.complaint(name, text) !== null)).toEqual([]);
+      expect(bad.filter((text) => parse.complaint(name, text) === null)).toEqual([]);
+    }
+    expect(parse.complaint("quality", "high")).toBe('quality "high" is passed over: give auto, or a whole number of layers from 0');
+    expect(parse.complaint("poster", "high")).toBeNull();
+  });
   test("interpolation is on unless it is switched off", () => {
     expect([null, "", "on", "off", "false", "0"].map(parse.parseInterpolate)).toEqual([true, true, true, false, false, false]);
   });
