@@ -190,6 +190,50 @@ describeOnPage("<meshreel-player>", (on) => {
     expect(await on.get((player) => [player.src, player.error!.message])).toEqual(["http://[404", "http://[404: not found (404), check the address"]);
   });
 
+  test("one that played when it was taken out plays on where it was, with preload=none too", async () => {
+    for (const preload of ["none", "auto"]) {
+      await on.put(`<meshreel-player src="walk.reel" preload="${preload}" controls></meshreel-player>`, false);
+      await on.get((player) => {
+        player.currentTime = 1;
+        return player.play();
+      });
+      await on.eventually((player) => player.readyState === 4 && player.currentTime > 1.1);
+      const left = await on.get(async (player) => {
+        player.remove();
+        await new Promise((done) => setTimeout(done, 50));
+        const { currentTime, paused } = player;
+        document.body.append(player);
+        return { currentTime, paused };
+      });
+      expect(left.paused).toBe(true);
+      expect(left.currentTime).toBeGreaterThan(1.1);
+      await on.eventually((player) => player.readyState === 4 && !player.paused);
+      expect(await on.get((player) => player.currentTime)).toBeGreaterThanOrEqual(left.currentTime);
+    }
+  });
+
+  test("with preload=none one that was open and paused is open again, and one that was not is not", async () => {
+    await on.put('<meshreel-player src="walk.reel" preload="none" controls></meshreel-player>', false);
+    const putAgain = () => on.get(async (player) => {
+      player.remove();
+      await new Promise((done) => setTimeout(done, 50));
+      document.body.append(player);
+      await new Promise((done) => setTimeout(done, 50));
+      return player.readyState;
+    });
+    expect(await putAgain()).toBe(0);
+    await on.get(async (player) => {
+      await player.play();
+      player.pause();
+    });
+    await on.eventually((player) => player.readyState === 4);
+    expect(await putAgain()).toBe(4);
+    expect(await on.get((player) => player.paused)).toBe(true);
+    await on.get((player) => void (player.src = "other.reel"));
+    await on.page.waitForTimeout(50);
+    expect(await on.get((player) => player.readyState)).toBe(0);
+  });
+
   test("preload=none fetches only when somebody plays", async () => {
     await on.put('<meshreel-player src="walk.reel" preload="none" controls></meshreel-player>', false);
     await on.page.waitForTimeout(100);
