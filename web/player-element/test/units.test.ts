@@ -4,7 +4,7 @@ import { describe, expect, test } from "vitest";
 import * as parse from "../src/attributes.ts";
 import { modeChoices, nextMode, qualityChoices, qualityValue, speedChoices } from "../src/controls/choices.ts";
 import { chosenFile } from "../src/drop.ts";
-import { formatAmount, formatRate, formatSpeed, formatTime, recordingName, speakTime } from "../src/format.ts";
+import { formatAmount, formatRate, formatSpeed, formatTime, recordingName, speakTime, timeDigits } from "../src/format.ts";
 import { actionOf, KEYS, seekStep, takesKey } from "../src/keyboard.ts";
 import { explain } from "../src/messages.ts";
 import { readParameters, readTime } from "../src/parameters.ts";
@@ -52,11 +52,19 @@ describe("attributes", () => {
 describe("numbers as text", () => {
   test("times have minutes, hours where needed, and tenths where wanted", () => {
     expect([0, 9.99, 65, 3600 + 125].map((seconds) => formatTime(seconds))).toEqual(["0:00", "0:09", "1:05", "1:02:05"]);
-    expect([0, 3.25, 59.99].map((seconds) => formatTime(seconds, true))).toEqual(["0:00.0", "0:03.2", "0:59.9"]);
+    expect([0, 3.25, 59.99].map((seconds) => formatTime(seconds, 1))).toEqual(["0:00.0", "0:03.2", "0:59.9"]);
+    expect([0, 3.25, 59.999, 61.5].map((seconds) => formatTime(seconds, 2))).toEqual(["0:00.00", "0:03.25", "0:59.99", "1:01.50"]);
   });
   test("a time just below a tenth by rounding is that tenth", () => {
-    expect(formatTime(0.1 + 0.2 - 4e-17, true)).toBe("0:00.3");
-    expect(formatTime(7 / 10 - 1e-12, true)).toBe("0:00.7");
+    expect(formatTime(0.1 + 0.2 - 4e-17, 1)).toBe("0:00.3");
+    expect(formatTime(7 / 10 - 1e-12, 1)).toBe("0:00.7");
+  });
+  test("each frame of a short recording has its own time", () => {
+    for (const rate of [5, 10, 12, 24, 30, 60, 100]) {
+      const texts = Array.from({ length: 2 * rate }, (_, frame) => formatTime(frame / rate, timeDigits(2, rate)));
+      expect(new Set(texts).size, `${rate} fps`).toBe(texts.length);
+    }
+    expect([timeDigits(2, 10), timeDigits(2, 30), timeDigits(60, 30), timeDigits(NaN, 0)]).toEqual([1, 2, 0, 0]);
   });
   test("times that are none are zero", () => {
     expect([NaN, -3, Infinity].map((seconds) => formatTime(seconds))).toEqual(["0:00", "0:00", "0:00"]);
