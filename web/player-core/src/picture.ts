@@ -1,12 +1,14 @@
 // What is to be shown, in two objects that are used in turn: `update` allocates nothing.
 
 import type { Decoding } from "./decoding.ts";
-import type { Head } from "./reader.ts";
-import type { PackedGroup, PackedStatic, Shown } from "./types.ts";
+import { mostQuality } from "./links.ts";
+import type { Chunk, Head } from "./reader.ts";
+import type { Packed, PackedGroup, PackedStatic, Shown } from "./types.ts";
 
 interface Mutable {
   frame: number;
   blend: number;
+  frames: number[];
   groups: (PackedGroup | null)[];
   background: PackedStatic | null;
 }
@@ -21,13 +23,19 @@ export class Picture {
   constructor(head: Head, decoding: Decoding) {
     this.#head = head;
     this.#decoding = decoding;
-    const empty = (): Mutable => ({ frame: -1, blend: 0, groups: head.tracks.map(() => null), background: null });
+    const empty = (): Mutable => ({ frame: -1, blend: 0, frames: head.tracks.map(() => -1), groups: head.tracks.map(() => null), background: null });
     [this.#shown, this.#spare] = [empty(), empty()];
   }
 
   /** The last picture; null before the first. The one before it stays as it is until the next is asked for. */
   get shown(): Shown | null {
     return this.#shown.frame < 0 ? null : this.#shown;
+  }
+
+  /** Layers beyond the first that the richest of the groups shown has in the file. */
+  get wholeQuality(): number {
+    const { chunks } = this.#head;
+    return this.#shown.groups.reduce((most, group) => (group === null ? most : Math.max(most, mostQuality(chunks[group.chunk]))), 0);
   }
 
   /** Whether all that a frame shows is at hand, but for what can never be. */
@@ -77,34 +85,49 @@ export class Picture {
   }
 
   #copy(next: Mutable): void {
-    const { frame, groups, background } = this.#shown;
+    const { frame, frames, groups, background } = this.#shown;
     next.frame = frame;
     next.background = background;
-    for (let track = 0; track < groups.length; track++) next.groups[track] = groups[track];
+    for (let track = 0; track < groups.length; track++) {
+      next.frames[track] = frames[track];
+      next.groups[track] = groups[track];
+    }
   }
 
   #fill(next: Mutable, frame: number): void {
     next.frame = frame;
     for (let track = 0; track < next.groups.length; track++) {
-      next.groups[track] = this.#decoding.packedOf(this.#head.chunkOfFrame(frame, track)) as PackedGroup | null;
+      const chunk = this.#head.chunkOfFrame(frame, track);
+      const own = this.#decoding.packedOf(chunk);
+      const held = own === null ? this.#held(chunk, this.#shown.groups[track]) : null;
+      next.groups[track] = (own ?? held) as PackedGroup | null;
+      next.frames[track] = held === null ? frame : this.#shown.frames[track];
     }
     const background = this.#head.staticOfFrame(frame);
-    next.background = background && (this.#decoding.packedOf(background) as PackedStatic | null);
+    const own = background && this.#decoding.packedOf(background);
+    next.background = (own ?? (background && this.#held(background, this.#shown.background))) as PackedStatic | null;
     this.#version = this.#decoding.version;
   }
 
-  #differs({ frame, blend, groups, background }: Mutable): boolean {
+  /** What is shown in place of a damaged chunk: what was shown before, in the quality that it has now. */
+  #held(chunk: Chunk, before: Packed | null): Packed | null {
+    return before !== null && this.#decoding.isFailed(chunk) ? this.#decoding.packedOf(this.#head.chunks[before.chunk]) : null;
+  }
+
+  #differs({ frame, blend, frames, groups, background }: Mutable): boolean {
     const shown = this.#shown;
     if (frame !== shown.frame || blend !== shown.blend || background !== shown.background) return true;
-    for (let track = 0; track < groups.length; track++) if (groups[track] !== shown.groups[track]) return true;
+    for (let track = 0; track < groups.length; track++) {
+      if (groups[track] !== shown.groups[track] || frames[track] !== shown.frames[track]) return true;
+    }
     return false;
   }
 
   /** Whether a group that is shown has the next frame, too. */
-  #goesOn({ frame, groups }: Mutable): boolean {
+  #goesOn({ frame, frames, groups }: Mutable): boolean {
     for (let track = 0; track < groups.length; track++) {
       const group = groups[track];
-      if (group !== null && frame + 1 < group.firstFrame + group.frameCount) return true;
+      if (group !== null && frames[track] === frame && frame + 1 < group.firstFrame + group.frameCount) return true;
     }
     return false;
   }

@@ -151,6 +151,7 @@ export class Player extends PlaybackTarget implements Playback {
       bufferedSeconds: Math.min(ahead, this.#loop ? this.duration : this.duration - this.currentTime),
       fetchedBytes: this.#bytes,
       quality,
+      wholeQuality: session?.picture.wholeQuality ?? 0,
       stalls: this.#stalls,
       skippedGroups: session?.decoding.failedGroups ?? 0,
     };

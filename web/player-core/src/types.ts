@@ -62,8 +62,11 @@ export interface Shown {
   readonly frame: number;
   /** 0 to 1 towards frame + 1; 0 where that is in another group in all tracks, or where interpolation is off. A track whose group ends here stands. */
   readonly blend: number;
-  /** For each track, its group of this frame; null where it is not at hand (damaged) or empty. */
+  /** For each track the frame that it shows: `frame`, or where that is damaged the one that it showed last. Such a track stands. */
+  readonly frames: readonly number[];
+  /** For each track, the group of its frame; null where it is empty, or damaged and nothing was shown before. */
   readonly groups: readonly (PackedGroup | null)[];
+  /** The state of this frame; where that is damaged the one that was shown last. */
   readonly background: PackedStatic | null;
 }
 
@@ -95,6 +98,7 @@ export interface Stats {
   readonly bufferedSeconds: number; // decoded ahead of the current time
   readonly fetchedBytes: number;
   readonly quality: number; // layers beyond the first of the groups shown
+  readonly wholeQuality: number; // those that these groups have in the file, where it may have fewer than `Info.mostQuality`
   readonly stalls: number;
   readonly skippedGroups: number; // damaged ones
 }

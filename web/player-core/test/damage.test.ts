@@ -32,35 +32,37 @@ function damaged(file: Uint8Array, ...chunks: number[]): Uint8Array {
   return copy;
 }
 
-/** Which frames show track 0 while it plays. */
-function watchTrack(): Map<number, boolean> {
-  const shown = new Map<number, boolean>();
+/** Which frames show an earlier frame of track 0 while it plays, and which one; null where they show none. */
+function watchTrack(): Map<number, number | null> {
+  const held = new Map<number, number | null>();
   const look = rig.viewer.look.bind(rig.viewer);
   rig.viewer.look = () => {
     look();
-    if (rig.viewer.shown) shown.set(rig.viewer.shown.frame, rig.viewer.shown.groups[0] !== null);
+    const { frame, frames: shown, groups } = rig.viewer.shown ?? { frame: 0, frames: [0], groups: [] };
+    if (groups[0] === null) held.set(frame, null);
+    else if (shown[0] !== frame) held.set(frame, shown[0]);
   };
-  return shown;
+  return held;
 }
 
 describe("a damaged group", () => {
   test("is skipped with a warning, and playback goes on", async () => {
     rig.begin(damaged(stream(4, FULL), 3), FAST);
-    const shown = watchTrack();
+    const held = watchTrack();
     await play(6);
     expect(rig.viewer.warnings).toEqual(["chunk 3 (track 0, frames 30 to 39): a layer is damaged; it is skipped"]);
     expect(rig.viewer.frames).toEqual(frames(0, 100));
-    expect([...shown].filter(([, isThere]) => !isThere).map(([frame]) => frame)).toEqual(frames(30, 40));
+    expect([...held]).toEqual(frames(30, 40).map((frame) => [frame, 29]));
     expect(rig.player.stats).toMatchObject({ skippedGroups: 1, stalls: 0 });
     expect(rig.viewer.events).toContain("ended");
   });
 
   test("takes with it those that are predicted from it, up to the next that stands alone", async () => {
     rig.begin(damaged(stream(8, FULL, 5), 6), FAST);
-    const shown = watchTrack();
+    const held = watchTrack();
     await play(10);
     expect(rig.viewer.warnings).toEqual(["chunk 6 (track 0, frames 60 to 69): a layer is damaged; it is skipped, and 3 that need it"]);
-    expect([...shown].filter(([, isThere]) => !isThere).map(([frame]) => frame)).toEqual(frames(60, 100));
+    expect([...held]).toEqual(frames(60, 100).map((frame) => [frame, 59]));
     expect(rig.player.stats.skippedGroups).toBe(4);
     expect(rig.workers.chunks.filter((chunk) => chunk > 6 && chunk < 10)).toEqual([]);
   });
@@ -82,6 +84,21 @@ describe("a damaged group", () => {
     await pass(0.2);
     expect(rig.viewer.shown?.groups[0]).toMatchObject({ chunk: 0, quality: 1 });
     expect(rig.player.stats.skippedGroups).toBe(0);
+  });
+
+  test("that is sought holds the frame that was shown last, still, also from behind and in the next round", async () => {
+    rig.begin(damaged(stream(4, FULL), 0, 3), FAST);
+    rig.player.currentTime = 1.7; // frame 42
+    void rig.player.load();
+    await pass(0.5);
+    rig.player.currentTime = 1.3; // frame 32 and a half
+    await pass(0.5);
+    expect(rig.viewer.shown).toMatchObject({ frame: 32, frames: [42], blend: 0, groups: [{ chunk: 4 }] });
+    rig.player.currentTime = 2;
+    rig.player.loop = true;
+    const held = watchTrack();
+    await play(2.5);
+    expect([...held].slice(0, 10)).toEqual(frames(0, 10).map((frame) => [frame, 99]));
   });
 
   test("may be the first, or all of them", async () => {
@@ -144,7 +161,7 @@ describe("a scene", () => {
     expect(rig.player.stats.stalls).toBe(0);
   });
 
-  test("whose background's change is damaged is shown without it, with all its bodies", async () => {
+  test("whose background's change is damaged keeps the state before, and shows all its bodies", async () => {
     rig.begin(damaged(scene(), 4), FAST);
     rig.player.currentTime = 0.5;
     void rig.player.load();
@@ -153,6 +170,9 @@ describe("a scene", () => {
     expect(rig.viewer.shown?.background).toBeNull();
     expect(rig.viewer.shown?.groups.map((group) => group?.chunk)).toEqual([5, 3]);
     rig.player.currentTime = 0;
+    await pass(1);
+    expect(rig.viewer.shown?.background?.chunk).toBe(0);
+    rig.player.currentTime = 0.5;
     await pass(1);
     expect(rig.viewer.shown?.background?.chunk).toBe(0);
     expect(rig.player.stats.skippedGroups).toBe(0);
@@ -165,12 +185,12 @@ describe("a truncated file", () => {
     const { offset } = Head.parse(file).chunks[12];
     rig.begin(file, FAST);
     rig.source.size = offset + 10;
-    const shown = watchTrack();
+    const held = watchTrack();
     await play(10);
     expect(rig.viewer.warnings).toEqual([
       `truncated, the file ends at byte ${offset + 10} of ${file.length}: chunk 12 (track 0, frames 120 to 129) and all behind it are missing, copy it again`,
     ]);
-    expect([...shown].filter(([, isThere]) => !isThere).map(([frame]) => frame)).toEqual(frames(120, 200));
+    expect([...held]).toEqual(frames(120, 200).map((frame) => [frame, 119]));
     expect(rig.source.reads.every((read) => read.offset + read.length <= offset || read.offset === 0)).toBe(true);
     rig.player.quality = 0;
     await pass(1);

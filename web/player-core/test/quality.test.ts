@@ -213,3 +213,19 @@ describe("a quality by hand", () => {
     expect(rig.viewer.frames.length).toBeGreaterThan(400);
   });
 });
+
+test("how many layers the group shown has is told, as it may have fewer than the file's richest", async () => {
+  rig.begin(makeReel([group(25, [100]), group(25, [100, 100, 100, 100]), group(25, [100, 100])], { frameRate: 25 }), 1e6);
+  void rig.player.load();
+  const told: number[][] = [];
+  for (const quality of [3, 1] as const) {
+    rig.player.quality = quality;
+    for (const time of [0.5, 1.5, 2.5]) {
+      rig.player.currentTime = time;
+      await pass(1);
+      told.push([rig.player.stats.quality, rig.player.stats.wholeQuality]);
+    }
+  }
+  expect(rig.player.info?.mostQuality).toBe(3);
+  expect(told).toEqual([[0, 0], [3, 3], [1, 1], [0, 0], [1, 3], [1, 1]]);
+});

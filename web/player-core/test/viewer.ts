@@ -68,7 +68,8 @@ export class Viewer {
 
   #check(shown: Shown): void {
     shown.groups.forEach((group, track) => {
-      const wanted = this.#head?.chunkOfFrame(shown.frame, track);
+      const wanted = this.#head?.chunkOfFrame(shown.frames[track], track);
+      if (shown.frames[track] !== shown.frame && this.warnings.length === 0) this.offences.push(`frame ${shown.frame} shows frame ${shown.frames[track]}`);
       if (group !== null && !this.alive.has(group)) this.offences.push(`frame ${shown.frame} shows chunk ${group.chunk}, which is not alive`);
       if (group !== null && wanted && group.chunk !== wanted.number) this.offences.push(`frame ${shown.frame} shows chunk ${group.chunk}`);
       const isWhole = this.warnings.length === 0;

@@ -13,6 +13,30 @@ export const OBSERVED = [
   "stats", "background", "theme",
 ] as const;
 
+interface Rule {
+  readonly accepts: (text: string) => boolean;
+  readonly wanted: string; // in words
+}
+
+const isNumber = (text: string): boolean => text.trim() !== "" && Number.isFinite(Number(text));
+
+/** Attributes that keep their value where a new one is none. Text without anything in it is as no attribute. */
+const RULES: Readonly<Record<string, Rule>> = {
+  camera: {
+    accepts: (text) => text.split(",").length === 6 && text.split(",").every(isNumber),
+    wanted: "six numbers with commas, as 0,1,3,0,1,0",
+  },
+  mode: { accepts: (text) => [...MODES, "color"].includes(text.toLowerCase()), wanted: MODES.join(", ") },
+  quality: { accepts: (text) => /^(auto|\d+)$/i.test(text), wanted: "auto, or a whole number of layers from 0" },
+};
+
+/** What is wrong with an attribute's value, in a line; null where nothing is. */
+export function complaint(name: string, text: string): string | null {
+  const rule = RULES[name];
+  if (!rule || text.trim() === "" || rule.accepts(text.trim())) return null;
+  return `${name} "${text}" is passed over: give ${rule.wanted}`;
+}
+
 /** A speed from 0.1 to 4; 1 where the text is none. */
 export function parseSpeed(text: string | null): number {
   const speed = text === null || text.trim() === "" ? NaN : Number(text);

@@ -1,44 +1,67 @@
-// ?bench: plays the recording for a while and shows what this device made of it, as text and as JSON to copy.
+// ?bench: plays the recording for a while, seeks in it, and shows what this device made of it, as text and as JSON to copy.
 
 import { Bench, formatReport } from "@meshreel/player-three/bench"; // not all of it: that is in meshreel-player.js
 import type { BenchReport } from "@meshreel/player-three/bench";
 import type { MeshreelPlayer } from "./index.ts";
 
 const CALIBRATION = 60; // pictures of an idle page, which tell the display's rate
+const SEEKS = 12;
+const APART = (Math.sqrt(5) - 1) / 2; // of the recording from seek to seek, wrapped: far from all places before
 
-/** Plays in a loop; the report is shown below the player and given back. Where a headset is entered or left, it begins anew. */
+/**
+ * Plays in a loop, then seeks; the report is shown below the player and given back. To be called before the recording is opened, so that
+ * what is decoded at once counts too. Where a headset is entered or left, pictures are counted anew.
+ */
 export async function runBench(player: MeshreelPlayer, seconds: number): Promise<BenchReport> {
   const text = document.createElement("pre");
   text.setAttribute("role", "status");
   text.textContent = `Measuring for ${seconds} seconds ...`;
   document.body.append(text);
+  await told(player, "loadstart");
+  const bench = new Bench();
+  const stop = player.measure(bench);
+  const canPlay = told(player, "canplay");
   const pageRate = await rateOfDisplay();
-  if (player.readyState < 2) await new Promise((done) => player.addEventListener("canplay", done, { once: true }));
+  await canPlay;
   player.loop = true;
   await player.play();
-  let bench: Bench | null = null;
-  while (bench === null) bench = await measured(player, seconds);
+  while (!(await passed(player, seconds, bench)));
+  stop();
+  await seek(player, bench);
   const report = reportOf(bench, player, pageRate);
   text.textContent = `${formatReport(report)}\n\n${JSON.stringify(report)}\n`;
   return report;
 }
 
-/** What so many seconds give; null where they were not all on the page, or not all in the headset. */
-async function measured(player: MeshreelPlayer, seconds: number): Promise<Bench | null> {
-  const bench = new Bench();
-  const stop = player.measure(bench);
+function told(player: MeshreelPlayer, ...types: readonly string[]): Promise<void> {
   const listening = new AbortController();
-  const isWhole = await new Promise<boolean>((done) => {
-    const timer = setTimeout(() => done(true), 1000 * seconds);
-    const moved = (): void => {
-      clearTimeout(timer);
-      done(false);
+  return new Promise((done) => {
+    const tell = (): void => {
+      listening.abort();
+      done();
     };
-    for (const type of ["vrstart", "vrend"]) player.addEventListener(type, moved, { signal: listening.signal });
+    for (const type of types) player.addEventListener(type, tell, { signal: listening.signal });
   });
-  listening.abort();
-  stop();
-  return isWhole ? bench : null;
+}
+
+/** Collects pictures for so many seconds; false where these were not all on the page, or not all in the headset. */
+async function passed(player: MeshreelPlayer, seconds: number, bench: Bench): Promise<boolean> {
+  bench.restart();
+  const timer = new Promise<boolean>((done) => setTimeout(() => done(true), 1000 * seconds));
+  return Promise.race([timer, told(player, "vrstart", "vrend").then(() => false)]);
+}
+
+/** Goes to places all over the recording, the same ones each time, and plays on. An error ends it. */
+async function seek(player: MeshreelPlayer, bench: Bench): Promise<void> {
+  player.pause();
+  for (let count = 1; count <= SEEKS && player.error === null; count++) {
+    const sought = told(player, "seeked", "error");
+    const start = performance.now();
+    player.currentTime = player.duration * ((count * APART) % 1);
+    await sought;
+    if (player.error === null) bench.sought(performance.now() - start);
+  }
+  if (player.error === null) await player.play();
 }
 
 function reportOf(bench: Bench, player: MeshreelPlayer, pageRate: number): BenchReport {

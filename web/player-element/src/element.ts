@@ -34,6 +34,7 @@ export class MeshreelPlayer extends Reflected {
   #playable = false;
   #wished = false; // it plays, or would if it could
   #startAt = 0; // s; where to begin once the head is there
+  #left: boolean | null = null; // whether it played when it was taken out of the document; null where it was not open
   #queued = false;
 
   constructor() {
@@ -55,6 +56,7 @@ export class MeshreelPlayer extends Reflected {
     queueMicrotask(() => {
       if (this.isConnected) return;
       this.#startAt = this.currentTime;
+      if (this.#playback !== null) this.#left = this.#wished;
       this.#controls.disconnect();
       this.#close();
       this.#view?.dispose();
@@ -64,11 +66,13 @@ export class MeshreelPlayer extends Reflected {
 
   attributeChangedCallback(name: string, before: string | null, after: string | null): void {
     if (name === "src") {
-      this.#source = null;
+      this.#source = this.#left = null;
       this.#startAt = 0;
       if (this.isConnected) this.#queueLoad();
-    } else if (before !== after) {
-      this.#apply(name);
+    } else if (before !== after && !this.restoring) {
+      const refusal = this.restore(name, before, after);
+      if (refusal === null) this.#apply(name);
+      else this.#onPlayback(new CustomEvent("warning", { detail: refusal }));
     }
     this.#controls.refresh();
   }
@@ -166,6 +170,10 @@ export class MeshreelPlayer extends Reflected {
   fit(): void {
     this.#view?.stage.fit();
   }
+  /** Gives the keyboard to the picture, as the element itself takes no focus. */
+  override focus(options?: FocusOptions): void {
+    this.#controls.picture.focus(options);
+  }
   /** Turns the camera about what it looks at, in radians to the right and up, and brings it so many times closer. TypeError where they are no numbers. */
   orbit(right: number, up: number, closer = 1): void {
     if (![right, up, closer].every(Number.isFinite) || closer <= 0) throw new TypeError(`orbit(${right}, ${up}, ${closer}): finite numbers are needed, the last above 0`);
@@ -178,10 +186,8 @@ export class MeshreelPlayer extends Reflected {
   }
   /** Opens once more what failed, where it stopped. */
   retry(): void {
-    const wished = this.#wished;
     this.#startAt = this.currentTime;
-    this.#open();
-    if (wished) this.play().catch(() => undefined); // its error event tells
+    this.#open(this.#wished);
   }
   async vrSupported(): Promise<boolean> {
     return vrSupported();
@@ -213,15 +219,16 @@ export class MeshreelPlayer extends Reflected {
     queueMicrotask(() => {
       this.#queued = false;
       if (!this.isConnected) return;
-      if (this.preload === "none" && !this.autoplay && !this.#source) this.#close();
-      else this.#open();
+      if (this.#left === null && this.preload === "none" && !this.autoplay && !this.#source) this.#close();
+      else this.#open(this.#left === true);
       this.#controls.refresh();
     });
   }
 
-  #open(): void {
+  /** `wished`: it is to play though it has no `autoplay`. */
+  #open(wished = false): void {
     this.#close();
-    this.#error = null;
+    this.#left = this.#error = null;
     this.#controls.refresh();
     const source = this.#source ?? this.src;
     if (source === "") return;
@@ -239,8 +246,8 @@ export class MeshreelPlayer extends Reflected {
     this.#listen(playback);
     this.dispatchEvent(new Event("loadstart"));
     view.show(playback);
-    const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    if (this.autoplay && !still) this.#play(playback).catch(() => undefined); // its error event tells
+    const plays = wished || (this.autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches);
+    if (plays) this.#play(playback).catch(() => undefined); // its error event tells
   }
 
   #play(playback: Playback): Promise<void> {

@@ -1,13 +1,21 @@
 // Numbers as people read them. All functions take numbers from streams, so none may throw.
 
-/** "1:05", or "0:03.2" with tenths; hours where there are any. */
-export function formatTime(seconds: number, tenths = false): string {
+const SHORT = 60; // s; a longer recording's time is told in whole seconds
+
+/** Digits behind the point of a recording's times: two of a short one whose frames come faster than tenths, so that each has its own. */
+export function timeDigits(duration: number, frameRate: number): number {
+  if (!(duration < SHORT)) return 0;
+  return frameRate > 10 ? 2 : 1;
+}
+
+/** "1:05", or "0:03.25" with digits behind the point; hours where there are any. */
+export function formatTime(seconds: number, digits = 0): string {
   const safe = Number.isFinite(seconds) ? Math.max(0, seconds) : 0;
-  const units = tenths ? Math.floor(safe * 10 + 1e-6) / 10 : Math.floor(safe + 1e-6);
+  const units = Math.floor(safe * 10 ** digits + 1e-6) / 10 ** digits;
   const hours = Math.floor(units / 3600);
   const minutes = Math.floor(units / 60) % 60;
   const rest = units - hours * 3600 - minutes * 60;
-  const text = (tenths ? rest.toFixed(1) : rest.toFixed(0)).padStart(tenths ? 4 : 2, "0");
+  const text = rest.toFixed(digits).padStart(digits > 0 ? digits + 3 : 2, "0");
   return hours > 0 ? `${hours}:${String(minutes).padStart(2, "0")}:${text}` : `${minutes}:${text}`;
 }
 

@@ -15,7 +15,14 @@ function start(): void {
   }
   if (time > 0) player.currentTime = time;
   if (bench !== null) void runBench(player, bench);
+  takeFocus(player);
   if (player.src) document.title = `${recordingName(player.src)} · meshreel`;
+}
+
+/** So that keys act without a click, which would play. A frame of another page leaves the focus where that has it. */
+function takeFocus(player: MeshreelPlayer): void {
+  const isFree = document.activeElement === null || document.activeElement === document.body;
+  if (window.parent === window && isFree) player.focus({ preventScroll: true, focusVisible: false });
 }
 
 start();

@@ -19,6 +19,20 @@ export class Reflected extends Element {
     }
   }
 
+  /** True while an attribute is put back. */
+  protected restoring = false;
+
+  /** Puts an attribute back as it was where its new value is none, and says what is wrong with that; null where it stays. */
+  protected restore(name: string, before: string | null, after: string | null): Error | null {
+    const wrong = after === null ? null : parse.complaint(name, after);
+    if (wrong === null) return null;
+    this.restoring = true;
+    if (before === null) this.removeAttribute(name);
+    else this.setAttribute(name, before);
+    this.restoring = false;
+    return new Error(wrong);
+  }
+
   /** A whole address; as it was written where it is none, which opening it then tells. */
   get src(): string {
     const text = this.getAttribute("src");

@@ -12,7 +12,6 @@ export interface Statistics extends Stats, PictureStats {
 
 /** Lines of the overlay; `frame` counts from 0. */
 export function statisticsLines(stats: Statistics, info: Info | null, frame: number): (readonly [string, string])[] {
-  const most = info?.mostQuality ?? 0;
   return [
     ["Frame", info ? `${frame + 1} of ${info.frameCount}, ${Number(info.frameRate.toFixed(2))} fps` : "none yet"],
     ["Rate", stats.mbps > 0 ? formatRate(stats.mbps) : "not known yet"],
@@ -20,10 +19,16 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
     ["Fetched", info ? `${formatAmount(stats.fetchedBytes, "B")} of ${formatAmount(info.size, "B")}` : formatAmount(stats.fetchedBytes, "B")],
     ["Decode", `${stats.decodeMs.toFixed(1)} ms a group, load ${(stats.decodeLoad * 100).toFixed(0)} %`],
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
-    ["Quality", most > 0 ? `${stats.quality} of ${most}` : "one only"],
+    ["Quality", qualityText(stats, info?.mostQuality ?? 0)],
     ["Triangles", formatCount(stats.triangles)],
     ["Display", stats.fps > 0 ? `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each` : "still"],
     ["GPU memory", formatAmount(stats.gpuBytes, "B")],
     ["Skipped groups", formatCount(stats.skippedGroups)],
   ];
+}
+
+/** Layers beyond the first, of those that there are; all of the file's where nothing of what is shown is left out. */
+function qualityText({ quality, wholeQuality }: Statistics, most: number): string {
+  if (most === 0) return "one only";
+  return quality >= wholeQuality ? `${most} of ${most}` : `${quality} of ${wholeQuality}`;
 }

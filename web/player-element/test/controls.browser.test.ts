@@ -16,6 +16,23 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await on.page.locator("button.play").getAttribute("aria-label")).toBe("Play");
   });
 
+  test("the big button offers the first play only, of each recording", async () => {
+    await on.shown();
+    const big = () => on.page.locator("button.big").isVisible();
+    expect(await big()).toBe(true);
+    await on.get((player) => player.play());
+    await expect.poll(big).toBe(false);
+    await on.get((player) => {
+      player.pause();
+      player.currentTime = 0;
+    });
+    await on.eventually((player) => player.paused && !player.seeking && player.currentTime === 0);
+    await on.page.waitForTimeout(50);
+    expect(await big()).toBe(false);
+    await on.get((player) => void (player.src = "other.reel"));
+    await expect.poll(big).toBe(true);
+  });
+
   test("Space on a focused button presses that button and nothing else", async () => {
     await on.shown();
     await on.page.locator("button.play").focus();
@@ -63,7 +80,7 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     await on.page.mouse.up();
     await on.eventually((player) => !player.paused && !player.seeking);
     expect(await on.get((player) => player.currentTime)).toBeGreaterThan(0.97);
-    expect(await on.page.locator(".tip").textContent()).toBe("0:01.0");
+    expect(await on.page.locator(".tip").textContent()).toBe("0:01.00");
   });
 
   test("the seek bar says its time and shows what is buffered", async () => {
@@ -75,7 +92,8 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await bar.getAttribute("aria-label")).toBe("Seek");
     const style = await on.page.locator(".seek").evaluate((node) => ["--played", "--buffered"].map((name) => Number(node.style.getPropertyValue(name))));
     expect(style).toEqual([0.25, 0.625]);
-    expect(await on.page.locator(".time").textContent()).toBe("0:00.5 / 0:02.0");
+    expect(await on.page.locator(".time").textContent()).toBe("0:00.50 / 0:02.00");
+    expect(await on.page.locator(".time").getAttribute("title")).toBe("Frame 13 of 48");
   });
 
   test("speed, quality and shading are chosen in the settings and are then attributes", async () => {

@@ -80,6 +80,13 @@ describeOnPage("<meshreel-player>", (on) => {
     await expect.poll(alive, { timeout: 10_000 }).toBe(0);
   });
 
+  test("focus() gives it the keyboard", async () => {
+    await on.shown();
+    await on.get((player) => player.focus());
+    await on.page.keyboard.press("l");
+    expect(await on.get((player) => [player.loop, player.matches(":focus-within")])).toEqual([true, true]);
+  });
+
   test("two players on a page know nothing of each other", async () => {
     await on.put('<meshreel-player id="a" src="a.reel" controls></meshreel-player><meshreel-player id="b" src="b.reel" controls></meshreel-player>');
     await on.page.locator("#b .picture").focus();
@@ -146,6 +153,30 @@ describeOnPage("<meshreel-player>", (on) => {
     expect(time).toBe(0.75);
   });
 
+  test("a camera, mode or quality that is none leaves what was set, and warns", async () => {
+    await on.put('<meshreel-player src="walk.reel" controls mode="x" quality="1" camera="1,2,3,0,0,0"></meshreel-player>');
+    await on.page.locator(".toast", { hasText: 'mode "x" is passed over' }).waitFor();
+    const told = await on.get((player) => {
+      const messages: string[] = [];
+      player.addEventListener("warning", (event) => messages.push((event as CustomEvent<Error>).detail.message));
+      player.mode = "normal";
+      engine.stages[0]!.camera = "7,7,7,0,0,0"; // somebody has moved it
+      player.setAttribute("camera", "1,2");
+      player.setAttribute("mode", "pink");
+      player.setAttribute("quality", "high");
+      player.quality = NaN;
+      const { mode, quality, camera } = player;
+      return { messages, mode, quality, camera, attributes: ["mode", "quality", "camera"].map((name) => player.getAttribute(name)) };
+    });
+    expect(told.messages.map((message) => message.split(" is passed over: give ")[0])).toEqual(
+      ['camera "1,2"', 'mode "pink"', 'quality "high"', 'quality "NaN"'],
+    );
+    expect(told).toMatchObject({ mode: "normal", quality: 1, camera: "7,7,7,0,0,0", attributes: ["normal", "1", "1,2,3,0,0,0"] });
+    expect(await on.page.evaluate(() => [engine.stages[0]!.mode, engine.playbacks[0]!.quality])).toEqual(["normal", 1]);
+    await on.get((player) => player.removeAttribute("mode"));
+    expect(await on.page.evaluate(() => engine.stages[0]!.mode)).toBe("shaded");
+  });
+
   test("playing without a source is refused with a reason", async () => {
     await on.put("<meshreel-player></meshreel-player>", false);
     expect(await on.get((player) => player.play().catch((error: Error) => error.message))).toContain("set src");
@@ -173,6 +204,50 @@ describeOnPage("<meshreel-player>", (on) => {
     );
     expect(told).toEqual(Array.from({ length: 5 }, () => "TypeError"));
     expect(await on.page.evaluate(() => engine.stages[0]!.orbits)).toEqual([]);
+  });
+
+  test("one that played when it was taken out plays on where it was, with preload=none too", async () => {
+    for (const preload of ["none", "auto"]) {
+      await on.put(`<meshreel-player src="walk.reel" preload="${preload}" controls></meshreel-player>`, false);
+      await on.get((player) => {
+        player.currentTime = 1;
+        return player.play();
+      });
+      await on.eventually((player) => player.readyState === 4 && player.currentTime > 1.1);
+      const left = await on.get(async (player) => {
+        player.remove();
+        await new Promise((done) => setTimeout(done, 50));
+        const { currentTime, paused } = player;
+        document.body.append(player);
+        return { currentTime, paused };
+      });
+      expect(left.paused).toBe(true);
+      expect(left.currentTime).toBeGreaterThan(1.1);
+      await on.eventually((player) => player.readyState === 4 && !player.paused);
+      expect(await on.get((player) => player.currentTime)).toBeGreaterThanOrEqual(left.currentTime);
+    }
+  });
+
+  test("with preload=none one that was open and paused is open again, and one that was not is not", async () => {
+    await on.put('<meshreel-player src="walk.reel" preload="none" controls></meshreel-player>', false);
+    const putAgain = () => on.get(async (player) => {
+      player.remove();
+      await new Promise((done) => setTimeout(done, 50));
+      document.body.append(player);
+      await new Promise((done) => setTimeout(done, 50));
+      return player.readyState;
+    });
+    expect(await putAgain()).toBe(0);
+    await on.get(async (player) => {
+      await player.play();
+      player.pause();
+    });
+    await on.eventually((player) => player.readyState === 4);
+    expect(await putAgain()).toBe(4);
+    expect(await on.get((player) => player.paused)).toBe(true);
+    await on.get((player) => void (player.src = "other.reel"));
+    await on.page.waitForTimeout(50);
+    expect(await on.get((player) => player.readyState)).toBe(0);
   });
 
   test("preload=none fetches only when somebody plays", async () => {

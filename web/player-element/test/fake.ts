@@ -65,7 +65,7 @@ export class FakePlayback extends EventTarget implements Playback {
   get stats(): Stats {
     return {
       mbps: 2.41, bandwidthMbps: 48.2, decodeMs: 12.3, decodeLoad: 0.08, bufferedSeconds: this.info ? 0.75 : 0, fetchedBytes: 61_000,
-      quality: 3, stalls: 0, skippedGroups: 0,
+      quality: 3, wholeQuality: 3, stalls: 0, skippedGroups: 0,
     };
   }
 
@@ -94,7 +94,7 @@ export class FakePlayback extends EventTarget implements Playback {
       if (this.#time >= this.duration) this.#end();
     }
     this.#before = now;
-    if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, groups: [null], background: null };
+    if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, frames: [this.currentFrame], groups: [null], background: null };
     return this.#shown;
   }
 

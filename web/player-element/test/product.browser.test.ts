@@ -64,6 +64,21 @@ describeInBrowser("the built player", () => {
     await page.close();
   });
 
+  test("its page takes keys before anybody has clicked, but not from a page around it", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/scene.reel&loop");
+    await ready(page);
+    await page.keyboard.press("k");
+    await page.waitForFunction(() => !document.querySelector("meshreel-player")!.paused);
+    await page.close();
+    site.write("framed.html", '<!doctype html><link rel="icon" href="data:,"><iframe src="player/index.html?src=/scene.reel"></iframe>');
+    const outer = await site.visit("framed.html");
+    await ready(outer.page.frames()[1]!);
+    expect(await outer.page.evaluate(() => document.activeElement === document.body)).toBe(true);
+    expect(await outer.page.frames()[1]!.evaluate(() => document.activeElement === document.body)).toBe(true);
+    expect([...errors, ...outer.errors]).toEqual([]);
+    await outer.page.close();
+  });
+
   for (const name of ["layers", "mixed", "laplacian", "draco"]) {
     test(`plays ${name}.reel to its end`, async () => {
       const { page, errors } = await site.visit(`player/index.html?src=/${name}.reel&autoplay`);
@@ -87,6 +102,12 @@ describeInBrowser("the built player", () => {
     expect(report.pictures).toBeGreaterThan(0);
     expect(report.scriptMs.median).toBeGreaterThan(0);
     expect(report.triangles).toBeGreaterThan(0);
+    expect(report.groups).toBeGreaterThan(0); // though all of so short a file is decoded before it plays
+    expect(report.decodeMs.median).toBeGreaterThan(0);
+    expect(report.seeks).toBe(12);
+    expect(report.seekMs.median).toBeGreaterThan(0);
+    expect(report.seekMs.most95).toBeGreaterThanOrEqual(report.seekMs.median);
+    expect(said).toMatch(/^seek: [\d.]+ \/ [\d.]+ ms, 12 seeks$/m);
     expect(report).toMatchObject({ place: "page, 320 x 240", gpu: expect.stringContaining("SwiftShader") });
     expect(errors).toEqual([]);
     await page.close();

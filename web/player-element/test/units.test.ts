@@ -4,7 +4,7 @@ import { describe, expect, test } from "vitest";
 import * as parse from "../src/attributes.ts";
 import { modeChoices, nextMode, qualityChoices, qualityValue, speedChoices } from "../src/controls/choices.ts";
 import { chosenFile } from "../src/drop.ts";
-import { formatAmount, formatRate, formatSpeed, formatTime, recordingName, speakTime } from "../src/format.ts";
+import { formatAmount, formatRate, formatSpeed, formatTime, recordingName, speakTime, timeDigits } from "../src/format.ts";
 import { actionOf, KEYS, seekStep, takesKey } from "../src/keyboard.ts";
 import { explain } from "../src/messages.ts";
 import { readParameters, readTime } from "../src/parameters.ts";
@@ -42,6 +42,18 @@ describe("attributes", () => {
       "normal", "wireframe", "colour", "colour", "shaded", "shaded",
     ]);
   });
+  test("what no camera, mode or quality is, is told with what would be", () => {
+    for (const [name, good, bad] of [
+      ["camera", ["0,1,3,0,1,0", " 1e-3, -2,3,4,5,6 ", ""], ["1,2,3", "1,,3,4,5,6", "a,b,c,d,e,f", "1,2,3,4,5,Infinity"]],
+      ["mode", ["normal", "WIREFRAME", "color", " "], ["x", "shaded,normal"]],
+      ["quality", ["auto", "Auto", " 3 ", "0", ""], ["high", "-1", "1.5", "NaN"]],
+    ] as const) {
+      expect(good.filter((text) => parse.complaint(name, text) !== null)).toEqual([]);
+      expect(bad.filter((text) => parse.complaint(name, text) === null)).toEqual([]);
+    }
+    expect(parse.complaint("quality", "high")).toBe('quality "high" is passed over: give auto, or a whole number of layers from 0');
+    expect(parse.complaint("poster", "high")).toBeNull();
+  });
   test("interpolation is on unless it is switched off", () => {
     expect([null, "", "on", "off", "false", "0"].map(parse.parseInterpolate)).toEqual([true, true, true, false, false, false]);
   });
@@ -56,11 +68,19 @@ describe("attributes", () => {
 describe("numbers as text", () => {
   test("times have minutes, hours where needed, and tenths where wanted", () => {
     expect([0, 9.99, 65, 3600 + 125].map((seconds) => formatTime(seconds))).toEqual(["0:00", "0:09", "1:05", "1:02:05"]);
-    expect([0, 3.25, 59.99].map((seconds) => formatTime(seconds, true))).toEqual(["0:00.0", "0:03.2", "0:59.9"]);
+    expect([0, 3.25, 59.99].map((seconds) => formatTime(seconds, 1))).toEqual(["0:00.0", "0:03.2", "0:59.9"]);
+    expect([0, 3.25, 59.999, 61.5].map((seconds) => formatTime(seconds, 2))).toEqual(["0:00.00", "0:03.25", "0:59.99", "1:01.50"]);
   });
   test("a time just below a tenth by rounding is that tenth", () => {
-    expect(formatTime(0.1 + 0.2 - 4e-17, true)).toBe("0:00.3");
-    expect(formatTime(7 / 10 - 1e-12, true)).toBe("0:00.7");
+    expect(formatTime(0.1 + 0.2 - 4e-17, 1)).toBe("0:00.3");
+    expect(formatTime(7 / 10 - 1e-12, 1)).toBe("0:00.7");
+  });
+  test("each frame of a short recording has its own time", () => {
+    for (const rate of [5, 10, 12, 24, 30, 60, 100]) {
+      const texts = Array.from({ length: 2 * rate }, (_, frame) => formatTime(frame / rate, timeDigits(2, rate)));
+      expect(new Set(texts).size, `${rate} fps`).toBe(texts.length);
+    }
+    expect([timeDigits(2, 10), timeDigits(2, 30), timeDigits(60, 30), timeDigits(NaN, 0)]).toEqual([1, 2, 0, 0]);
   });
   test("times that are none are zero", () => {
     expect([NaN, -3, Infinity].map((seconds) => formatTime(seconds))).toEqual(["0:00", "0:00", "0:00"]);
@@ -153,7 +173,7 @@ describe("messages", () => {
 });
 
 describe("drawing only what changed", () => {
-  const shown = { frame: 3, blend: 0.5, groups: [null], background: null };
+  const shown = { frame: 3, blend: 0.5, frames: [3], groups: [null], background: null };
   test("a paused playback that has shown something needs no pictures", () => {
     const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
     expect(goesOn(playback, null)).toBe(true);
@@ -187,6 +207,17 @@ describe("small parts", () => {
       Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Quality: "3 of 3",
       "Skipped groups": "0", Display: "60 fps, 0.4 ms each",
     });
+    playback.dispose();
+  });
+});
+
+describe("the quality that is told", () => {
+  test.each([
+    [3, 3, 3, "3 of 3"], [1, 3, 3, "1 of 3"], [0, 0, 3, "3 of 3"], [2, 2, 3, "3 of 3"], [1, 2, 3, "1 of 2"], [0, 0, 0, "one only"],
+  ])("%i layers of the %i there are, of %i in the file: %s", (quality, wholeQuality, mostQuality, text) => {
+    const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
+    const numbers = { ...playback.stats, quality, wholeQuality, triangles: 0, gpuBytes: 0, headsetRate: 0, fps: 0, frameMs: 0, drawn: 0 };
+    expect(Object.fromEntries(statisticsLines(numbers, { ...INFO, mostQuality }, 0)).Quality).toBe(text);
     playback.dispose();
   });
 });

@@ -28,16 +28,20 @@ export interface BenchReport extends Omit<BenchExtra, "displayRate"> {
   readonly groups: number; // decoded
   readonly decodeMs: Spread; // a group
   readonly decodeLoad: number | null; // decoding time over playing time; above 1 is too slow
+  readonly seeks: number;
+  readonly seekMs: Spread; // from asking for another place until its picture is at hand
 }
 
 const CAPACITY = 20_000; // 4 minutes at 90 Hz
 const GROUPS = 4096;
+const SEEKS = 256;
 
 /** Collects, pictures between `frameBegin` and `frameEnd`; nothing is allocated for a picture. Times are milliseconds of one clock. */
 export class Bench {
   readonly #script: Ring;
   readonly #intervals: Ring;
   readonly #decoding = new Ring(GROUPS);
+  readonly #seeking = new Ring(SEEKS);
   #decodeMs = 0;
   #playedMs = 0;
   #groups = 0;
@@ -65,6 +69,19 @@ export class Bench {
     this.#began = NaN;
   }
 
+  /** Pictures are collected anew from now on. What was decoded stays: a short recording is not decoded again. */
+  restart(): void {
+    this.#script.clear();
+    this.#intervals.clear();
+    this.#pictures = 0;
+    this.interrupt();
+  }
+
+  /** A seek took so many milliseconds. */
+  sought(ms: number): void {
+    this.#seeking.add(ms);
+  }
+
   /** A group of so many seconds of playing time was decoded in so many milliseconds. */
   decoded(ms: number, seconds: number): void {
     this.#decoding.add(ms);
@@ -75,6 +92,7 @@ export class Bench {
 
   report(extra: BenchExtra): BenchReport {
     const intervals = this.#intervals.sorted();
+    const seeks = this.#seeking.sorted();
     const displayRate = extra.displayRate ?? estimateRate(intervals);
     return {
       ...extra,
@@ -87,13 +105,15 @@ export class Bench {
       groups: this.#groups,
       decodeMs: spreadOf(this.#decoding.sorted()),
       decodeLoad: this.#playedMs > 0 ? this.#decodeMs / this.#playedMs : null,
+      seeks: seeks.length,
+      seekMs: spreadOf(seeks),
     };
   }
 }
 
 /** A report as text to copy, a line a number. */
 export function formatReport(report: BenchReport): string {
-  const { scriptMs, intervalMs, decodeMs } = report;
+  const { scriptMs, intervalMs, decodeMs, seekMs } = report;
   const lines: [string, string][] = [
     ["recording", report.recording ?? "-"],
     ["place", report.place ?? "-"],
@@ -103,6 +123,7 @@ export function formatReport(report: BenchReport): string {
     ["from picture to picture", `${spread(intervalMs)} ms`],
     ["decoding a group", `${spread(decodeMs)} ms, ${report.groups} groups`],
     ["decoding load", report.decodeLoad === null ? "-" : `${round(100 * report.decodeLoad, 1)} % of the playing time`],
+    ["seek", `${spread(seekMs)} ms, ${report.seeks} seeks`],
     ["triangles", String(report.triangles)],
     ["GPU memory", `${round(report.gpuBytes / 2 ** 20, 1)} MiB`],
     ["GPU", report.gpu ?? "-"],
@@ -122,6 +143,10 @@ class Ring {
 
   add(value: number): void {
     this.#values[this.#count++ % this.#values.length] = value;
+  }
+
+  clear(): void {
+    this.#count = 0;
   }
 
   sorted(): Float64Array {

@@ -79,9 +79,10 @@ export class ReelScene extends Group {
     this.#triangles = 0;
     while (this.#tracks.length < shown.groups.length) this.#addTrack();
     for (let track = 0; track < this.#tracks.length; track++) {
-      this.#showPart(this.#tracks[track], shown.groups[track] ?? null, shown);
+      const frame = shown.frames[track] ?? shown.frame;
+      this.#showPart(this.#tracks[track], shown.groups[track] ?? null, frame, frame === shown.frame ? shown.blend : 0);
     }
-    this.#showPart(this.#background, shown.background, shown);
+    this.#showPart(this.#background, shown.background, shown.frame, 0);
   }
 
   /** Frees what the GPU holds of a value. Its arrays are no longer referred to. */
@@ -110,13 +111,13 @@ export class ReelScene extends Group {
     return [...this.#tracks, this.#background];
   }
 
-  #showPart(part: Part, packed: Packed | null, shown: Shown): void {
+  #showPart(part: Part, packed: Packed | null, frame: number, blend: number): void {
     if (packed === null) {
       part.hide();
       return;
     }
-    part.show(this.#uploadOf(packed), shown.frame, shown.blend);
-    this.#triangles += triangleCount(packed, shown.frame);
+    part.show(this.#uploadOf(packed), frame, blend);
+    this.#triangles += triangleCount(packed, frame);
   }
 
   #uploadOf(packed: Packed): Upload {

@@ -65,6 +65,22 @@ test("the load of decoding is its time over what it plays", () => {
   expect(report.groups).toBe(2);
 });
 
+test("begun anew it forgets pictures, and keeps what was decoded", () => {
+  const bench = new Bench();
+  draw(bench, steady(5, 10), 9);
+  bench.decoded(100, 0.4);
+  bench.restart();
+  draw(bench, steady(3, 20).map((t) => t + 1000), 1);
+  expect(bench.report(EXTRA)).toMatchObject({ pictures: 3, scriptMs: { median: 1, most95: 1 }, intervalMs: { median: 20, most95: 20 }, groups: 1 });
+});
+
+test("median and 95 % of what seeks take", () => {
+  const bench = new Bench();
+  expect(bench.report(EXTRA)).toMatchObject({ seeks: 0, seekMs: { median: null, most95: null } });
+  for (const ms of [30, 10, 20]) bench.sought(ms);
+  expect(bench.report(EXTRA)).toMatchObject({ seeks: 3, seekMs: { median: 20, most95: expect.closeTo(29, 9) as number } });
+});
+
 test("the last pictures are kept, and all are counted", () => {
   const bench = new Bench(4);
   draw(bench, steady(10, 10), 9);
@@ -77,7 +93,8 @@ test("the text has every number", () => {
   const bench = new Bench();
   draw(bench, steady(73, 1000 / 72), 0.5);
   bench.decoded(50, 0.4);
+  bench.sought(7);
   const text = formatReport(bench.report({ ...EXTRA, displayRate: 72, place: "VR", recording: "demo.reel", gpu: "a GPU" }));
   for (const part of ["demo.reel", "place: VR", "72.0 Hz", "73 in 1.0 s, 0 dropped", "0.50 / 0.50 ms", "13.89 / 13.89 ms", "50.00 / 50.00 ms, 1 groups",
-    "12.5 %", "triangles: 1234", "3.0 MiB", "GPU: a GPU", "browser: a browser"]) expect(text).toContain(part);
+    "12.5 %", "seek: 7.00 / 7.00 ms, 1 seeks", "triangles: 1234", "3.0 MiB", "GPU: a GPU", "browser: a browser"]) expect(text).toContain(part);
 });

@@ -83,6 +83,18 @@ describeInBrowser("a scene in Chromium", () => {
     expect((await numbers()).drawn).toBe(SPHERE_TRIANGLES);
   });
 
+  test("a track that holds a frame stands in it, whatever the recording's own frame", async () => {
+    const pixels = (): Promise<string> => open.page.evaluate(() => window.api.draw());
+    await prepare(false);
+    await show(1);
+    const still = await pixels();
+    await open.page.evaluate(() => window.api.show(2, 0.5, 1));
+    expect(await pixels()).toEqual(still);
+    expect((await numbers()).triangles).toBe(SPHERE_TRIANGLES);
+    await show(1, 0.5);
+    expect(await pixels()).not.toEqual(still);
+  });
+
   test("positions read back are the decoder's within one step of quantisation", async () => {
     await prepare(true);
     const { packed, positions: truth } = makeGroup();

@@ -1,7 +1,7 @@
 // The bar below the picture: seek bar, buttons, and the settings that open above it.
 
 import type { MeshreelPlayer } from "../element.ts";
-import { formatTime } from "../format.ts";
+import { formatTime, timeDigits } from "../format.ts";
 import type { Action } from "../keyboard.ts";
 import { parseMode, parseQuality } from "../attributes.ts";
 import { modeChoices, qualityChoices, qualityValue, speedChoices } from "./choices.ts";
@@ -25,6 +25,7 @@ export class Bar {
   #acts: BarActs;
   #more: Button;
   #parts: { refresh(): void }[] = [];
+  #time = make("span", { class: "time", part: "time" });
   #now = make("span", { class: "now" });
   #all = make("span", { class: "all" });
 
@@ -38,8 +39,8 @@ export class Bar {
     this.#more = this.#button("more", "", () => ({ icon: "more", label: "Settings" }), () => this.toggleSettings());
     this.#more.element.setAttribute("aria-expanded", "false");
     this.#more.element.setAttribute("aria-controls", "settings");
-    const time = make("span", { class: "time", part: "time" }, this.#now, this.#all);
-    const row = make("div", { class: "row" }, ...this.#transport(), time, make("span", { class: "space" }));
+    this.#time.append(this.#now, this.#all);
+    const row = make("div", { class: "row" }, ...this.#transport(), this.#time, make("span", { class: "space" }));
     row.append(...this.#tools().map((button) => button.element), this.#more.element, ...this.#screens());
     this.element = make("div", { class: "bar", part: "controls", role: "group", "aria-label": "Player controls" }, this.seek.element, row);
   }
@@ -66,10 +67,11 @@ export class Bar {
   /** The part of `refresh` that changes with each frame. */
   refreshTime(): void {
     this.seek.refresh();
-    const { duration, currentTime } = this.#player;
-    const tenths = duration < 60;
-    setText(this.#now, formatTime(currentTime, tenths));
-    setText(this.#all, ` / ${duration > 0 ? formatTime(duration, tenths) : "–"}`);
+    const { duration, currentTime, currentFrame, info } = this.#player;
+    const digits = timeDigits(duration, info?.frameRate ?? 0);
+    setText(this.#now, formatTime(currentTime, digits));
+    setText(this.#all, ` / ${duration > 0 ? formatTime(duration, digits) : "–"}`);
+    this.#time.title = info ? `Frame ${currentFrame + 1} of ${info.frameCount}` : "";
   }
 
   #button(name: string, hint: string, look: () => Look, act: () => void): Button {

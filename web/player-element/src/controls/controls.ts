@@ -144,7 +144,7 @@ export class Controls implements Surface {
       "data-empty": closed && player.src === "",
       "data-error": player.error !== null,
       "data-playing": !player.paused && !player.ended,
-      "data-started": !player.paused || player.currentTime > 0,
+      "data-started": !player.paused || player.currentTime > 0 || (player.readyState > 0 && this.#root.hasAttribute("data-started")),
       "data-waiting": player.waiting,
     };
     for (const [name, holds] of Object.entries(states)) this.#root.toggleAttribute(name, holds);

@@ -1,6 +1,6 @@
 // The seek bar: a range input over a drawn track that shows what was played and what is buffered.
 
-import { formatTime, speakTime } from "../format.ts";
+import { formatTime, speakTime, timeDigits } from "../format.ts";
 import type { MeshreelPlayer } from "../element.ts";
 import { make, setText } from "./dom.ts";
 
@@ -73,6 +73,6 @@ export class SeekBar {
     if (!(duration > 0) || width <= THUMB) return;
     const part = Math.min(1, Math.max(0, (event.clientX - left - THUMB / 2) / (width - THUMB)));
     this.element.style.setProperty("--hover", String(part));
-    setText(this.#tip, formatTime(part * duration, duration < 60));
+    setText(this.#tip, formatTime(part * duration, timeDigits(duration, this.#player.info?.frameRate ?? 0)));
   }
 }

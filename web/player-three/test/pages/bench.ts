@@ -30,7 +30,8 @@ const api = {
     const gl = renderer.getContext();
     const bench = new Bench();
     for (let k = 0; k < FIRST + MEASURED; k++) {
-      const shown: Shown = { frame: Math.floor(k / 3) % FRAMES, blend: (k % 3) / 3, groups: [group], background };
+      const frame = Math.floor(k / 3) % FRAMES;
+      const shown: Shown = { frame, blend: (k % 3) / 3, frames: [frame], groups: [group], background };
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits, so that no call does for the last picture's
       await new Promise(requestAnimationFrame);
       const began = performance.now();

@@ -34,10 +34,10 @@ const api = {
     if (withFloor) prepared.push(makeFloor().packed);
     for (const packed of prepared) scene.prepare(packed, renderer);
   },
-  show(frame: number, blend = 0): void {
+  show(frame: number, blend = 0, held = frame): void {
     const groups = prepared.filter((packed) => packed.kind === "group");
     const background = prepared.find((packed) => packed.kind === "static") ?? null;
-    const shown: Shown = { frame, blend, groups, background };
+    const shown: Shown = { frame, blend, frames: groups.map(() => held), groups, background };
     scene.show(shown);
   },
   look(mode: Mode, flat = false): void {
