@@ -217,7 +217,7 @@ def test_debug_shows_the_traceback(run, tmp_path):
 def test_frames_whose_faces_have_no_area_are_told(run, tmp_path):
     obj(tmp_path, "f0.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
     said = run("encode", tmp_path, "-o", tmp_path / "a.reel")
-    assert said.code == 0 and "1 empty" in said.out
+    assert said.code == 0 and "1 group of form empty" in said.out
     assert "1 frames have faces, but none with an area" in said.err
 
 

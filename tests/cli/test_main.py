@@ -52,6 +52,21 @@ def test_the_handler_of_sigterm_is_given_back(run):
     assert signal.getsignal(signal.SIGTERM) is before
 
 
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("bench", "run", "figure6"), "meshreel bench run: --output is missing: A JSON-lines file"),
+        (("bench", "run", "figure6", "-o"), "meshreel bench run: -o is missing: A JSON-lines file"),
+        (("bench", "run"), "meshreel bench run: EXPERIMENT is missing: Which one"),
+        (("decode", "x.reel"), "meshreel decode: --output is missing"),
+        (("export",), "meshreel export: FILE is missing"),
+    ],
+)
+def test_an_argument_that_is_missing_is_named_with_what_it_is(run, arguments, told):
+    said = run(*arguments)
+    assert failed(said, told, "--help)")
+
+
 def test_a_fault_of_ours_is_one_line_too():
     assert one_line(ValueError("a\nb")).startswith("ValueError: a b; this is a fault of meshreel")
     assert "fewer --jobs" in one_line(MemoryError())

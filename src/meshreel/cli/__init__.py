@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import NoReturn
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, MissingArgumentError
 
 from .. import __version__
 from ..errors import MeshreelError
@@ -98,6 +98,8 @@ def one_line(error: Exception) -> str:
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("meshreel"):
         extra = "play" if error.name in PLAY_NEEDS else "encode"
         return f"{error.name} is missing; install it with: pip install 'meshreel[{extra}]'"
+    if isinstance(error, MissingArgumentError) and error.argument is not None:
+        return _missing(error, " ".join(["meshreel", *(error.command_chain or ())]))
     if isinstance(error, CycloptsError):
         return f"{text} (see meshreel --help)"
     if isinstance(error, BrokenProcessPool):
@@ -107,6 +109,16 @@ def one_line(error: Exception) -> str:
     if isinstance(error, (MeshreelError, OSError)):
         return text
     return f"{type(error).__name__}: {text}; this is a fault of meshreel: please report it with the output of --debug"
+
+
+def _missing(error: MissingArgumentError, command: str) -> str:
+    """Which argument a command lacks, and what it is as the command's own help has it."""
+    assert error.argument is not None
+    arguments = [] if error.app is None else error.app.assemble_argument_collection(parse_docstring=True)
+    helps = {argument.name: argument.parameter.help or "" for argument in arguments}
+    meaning = " ".join(helps.get(error.argument.name, "").split()).split(". ")[0].rstrip(".")
+    told = f": {meaning}" if meaning else ""
+    return f"{command}: {error.keyword or error.argument.name} is missing{told} (see {command} --help)"
 
 
 def _tell(text: str, code: int) -> int:

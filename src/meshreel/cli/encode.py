@@ -207,9 +207,13 @@ def _describe_scene(row: dict[str, Any]) -> str:
 def describe(row: dict[str, Any]) -> str:
     """One line: frames, bytes, rate and forms."""
     forms = [group["form"] for group in row["groups"]]
-    counted = ", ".join(f"{forms.count(form)} {form}" for form in sorted(set(forms)))
+    counted = ", ".join(_count_groups(forms.count(form), form) for form in sorted(set(forms)))
     scene = "" if row["scene"] is None else _describe_scene(row["scene"])
-    return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}groups: {counted}"
+    return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}{counted}"
+
+
+def _count_groups(count: int, form: str) -> str:
+    return f"{count} {'group' if count == 1 else 'groups'} of form {form}"
 
 
 def _reached(row: dict[str, Any]) -> str:
