@@ -17,7 +17,7 @@ bool Factor::compute(const Eigen::SparseMatrix<double>& lower) {
     order.resize(n);
     for (Eigen::Index k = 0; k < n; ++k) {
         pivots[k] = ldlt.vectorD()[k];
-        if (!(pivots[k] > 1e-14)) return false;
+        if (!(pivots[k] > kLeastPivot)) return false;
         order[ldlt.permutationP().indices()[k]] = static_cast<int32_t>(k);
     }
     return true;

@@ -7,22 +7,12 @@
 
 namespace {
 
-constexpr double kLeastPivot = 1e-14;
-
 // The order in which little fills in, by the pattern alone.
 void order_of(const SparseRows& rows, std::vector<int32_t>& order, std::vector<int32_t>& position) {
     const Eigen::Index n = static_cast<Eigen::Index>(rows.starts.size()) - 1;
     Eigen::SparseMatrix<double> pattern(n, n);
     pattern.reserve(static_cast<Eigen::Index>(rows.columns.size()) + n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-        pattern.startVec(i);
-        bool placed = false;
-        for (int64_t p = rows.starts[i]; p < rows.starts[i + 1]; ++p) {
-            if (!placed && rows.columns[p] > i) pattern.insertBack(i, i) = 1.0, placed = true;
-            pattern.insertBack(rows.columns[p], i) = 1.0;
-        }
-        if (!placed) pattern.insertBack(i, i) = 1.0;
-    }
+    append_transposed(rows, pattern);
     pattern.finalize();
     Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> found;
     Eigen::AMDOrdering<int> amd;

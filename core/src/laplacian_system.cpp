@@ -16,18 +16,9 @@ constexpr double kLoading = 1e-6;
 // (L*)^T by columns: column i is row i of L*, so both Gram matrices are plain sparse products.
 Sparse transposed_system(const mr_laplacian& system) {
     const int64_t n = system.vertices, l = static_cast<int64_t>(system.anchors.size());
-    const SparseRows& r = system.rows;
     Sparse t(n, n + l);
-    t.reserve(static_cast<Eigen::Index>(r.columns.size()) + n + l);
-    for (int64_t i = 0; i < n; ++i) {
-        t.startVec(i);
-        bool placed = false;
-        for (int64_t p = r.starts[i]; p < r.starts[i + 1]; ++p) {
-            if (!placed && r.columns[p] > i) t.insertBack(i, i) = 1.0, placed = true;
-            t.insertBack(r.columns[p], i) = -r.values[p];
-        }
-        if (!placed) t.insertBack(i, i) = 1.0;
-    }
+    t.reserve(static_cast<Eigen::Index>(system.rows.columns.size()) + n + l);
+    append_transposed(system.rows, t);
     for (int64_t a = 0; a < l; ++a) {
         t.startVec(n + a);
         t.insertBack(system.anchors[a], n + a) = system.anchor_weight;
@@ -54,8 +45,7 @@ bool factor_normal(mr_laplacian& system) {
 
 void solve_normal(const mr_laplacian& system, std::vector<double>& x, int64_t columns) {
     if (system.solver) return system.solver->solve(x, columns);
-    const std::vector<double> right = x;
-    system.normal->solve(right.data(), columns, x.data());
+    system.normal->solve(x.data(), columns, x.data());
 }
 
 // The error that symbols' rounding e leaves in the weights is the least g with L* g = e, of squared length

@@ -122,11 +122,12 @@ def _write(path: Path, kept: Kept) -> None:
 
 def _has_room(folder: Path) -> bool:
     """Whether one more may be kept; where there are too many, those of other renderers are removed."""
-    if _size(folder.parent) >= MOST:
-        for other in folder.parent.iterdir():
-            if other != folder:
-                shutil.rmtree(other, ignore_errors=True)
-    return _size(folder.parent) < MOST
+    if _size(folder.parent) < MOST:
+        return True
+    for other in folder.parent.iterdir():
+        if other != folder:
+            shutil.rmtree(other, ignore_errors=True)
+    return _size(folder) < MOST
 
 
 def _size(folder: Path) -> int:

@@ -20,6 +20,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from .animation import Animation, Shape, changes, unit_normals
+from .names import is_text
 
 EXTENSIONS = (".usdc", ".usda", ".usdz", ".usd")
 _GREY = (0.8, 0.8, 0.8)
@@ -38,7 +39,7 @@ def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
         from pxr import Tf
     except ImportError as error:
         raise InputError(f"USD needs the extra usd ({error}): pip install 'meshreel[usd]'") from None
-    if not _is_text(str(path)):
+    if not is_text(str(path)):
         raise InputError(f"{path}: USD takes no path that is not Unicode text; choose another folder, or .glb")
     try:
         with tempfile.TemporaryDirectory(".part", ".", path.parent, ignore_cleanup_errors=True) as folder:
@@ -139,15 +140,6 @@ def _codes(animation: Animation) -> list[float]:
     near = np.where(np.abs(exact - whole) <= _ROUNDED * animation.frame_rate, whole, exact)
     codes: list[float] = (near if (np.diff(near) > 0).all() else exact).tolist()
     return codes
-
-
-def _is_text(path: str) -> bool:
-    """Linux knows names that are bytes of no encoding; Python has them as lone surrogates."""
-    try:
-        path.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _identifier(name: str) -> str:

@@ -1,4 +1,4 @@
-"""Which files are the frames of a sequence, and in what order.
+"""Names of files: which are the frames of a sequence, in what order, and which are text at all.
 
 In: a folder, a glob pattern, a file or a list of files. Out: paths in the order of their frame numbers, and remarks.
 """
@@ -16,6 +16,15 @@ from .meshes import EXTENSIONS
 
 _MAGIC = re.compile(r"[*?\[]")
 _LAST = re.compile(r"(\d+)(?!.*\d)")
+
+
+def is_text(name: str) -> bool:
+    """Whether a name is Unicode text. Linux knows names that are bytes of no encoding: lone surrogates in Python."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:

@@ -12,6 +12,7 @@ from pathlib import Path
 from ..container.reader import ReelReader
 from ..container.sources import FileSource
 from ..errors import InputError, MeshreelError
+from ..io.names import is_text
 
 SUFFIX = ".reel"
 HIDDEN = "."  # what such names begin with
@@ -43,7 +44,7 @@ class Library:
     @staticmethod
     def of_file(file: Path) -> Library:
         """That of one file alone, whatever its suffix. Raises InputError where no address can have its name."""
-        if not _is_text(file.name):
+        if not is_text(file.name):
             raise InputError(f"{file}: its name is no Unicode text, which no address can have: rename it")
         return Library(file.parent, file.name)
 
@@ -78,7 +79,7 @@ class Library:
 
     def entry(self, name: str) -> Entry:
         """What a file is; damage and absence are told, not raised."""
-        if not _is_text(name):
+        if not is_text(name):
             return Entry(as_text(name), error="the name is no Unicode text, which no address can have: rename the file")
         path = self.path_of(name)
         if path is None:
@@ -95,7 +96,7 @@ class Library:
 
 
 def as_text(name: str) -> str:
-    """What a page can show of a name; Linux knows file names that are bytes of no encoding."""
+    """What a page can show of a name, whether it is text or not."""
     return name.encode("utf-8", "replace").decode()
 
 
@@ -104,12 +105,3 @@ def _is_plain(name: str) -> bool:
     if not name.lower().endswith(SUFFIX) or "\\" in name or (os.name == "nt" and ":" in name):
         return False
     return not any(part == "" or part.startswith(HIDDEN) for part in name.split("/"))
-
-
-def _is_text(name: str) -> bool:
-    """Whether a name can be in a page and in an address."""
-    try:
-        name.encode("utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True
