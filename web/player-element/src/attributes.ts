@@ -4,64 +4,88 @@ import { PLAYBACK_RATES } from "@meshreel/player-core/types";
 import type { Quality } from "@meshreel/player-core/types";
 import { MODES } from "@meshreel/player-three/modes";
 import type { Mode } from "@meshreel/player-three/modes";
+import type { Up } from "./upright.ts";
 
 export type Theme = "auto" | "light" | "dark";
 
 /** Attributes whose change the element must hear of. */
 export const OBSERVED = [
   "src", "controls", "autoplay", "loop", "poster", "quality", "speed", "playbackrate", "interpolate", "mode", "camera",
-  "stats", "background", "theme",
+  "up", "stats", "background", "theme",
 ] as const;
 
-interface Rule {
-  readonly accepts: (text: string) => boolean;
-  readonly wanted: string; // in words
-}
+/** What a text says, "" taken for nothing; null where it says nothing that the attribute can be. */
+type Reader<T> = (text: string) => T | null;
 
-const isNumber = (text: string): boolean => text.trim() !== "" && Number.isFinite(Number(text));
+const words = <T extends string>(...known: readonly T[]): Reader<T> =>
+  (text) => known.find((word) => word === text.trim().toLowerCase()) ?? null;
+
+const readNumber: Reader<number> = (text) => (text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : null);
+
+const readQuality: Reader<Quality> = (text) => (/^\s*\d+\s*$/.test(text) ? Number(text) : words("auto")(text));
+
+const readMode: Reader<Mode> = (text) => (words("color")(text) ? "colour" : words(...MODES)(text));
+
+const readTheme = words<Theme>("auto", "light", "dark");
+
+const readUp = words<Up>("y", "z", "-y", "-z");
+
+/** Where the camera is and what it looks at: x, y, z each, m. */
+export const readCamera: Reader<readonly number[]> = (text) => {
+  const values = text.split(",").map(readNumber);
+  return values.length === 6 && values.every((value) => value !== null) ? values : null;
+};
+
+const readInterpolate: Reader<boolean> = (text) => {
+  const word = words("on", "true", "yes", "1", "off", "false", "no", "0")(text);
+  return word === null ? null : ["on", "true", "yes", "1"].includes(word);
+};
 
 /** Attributes that keep their value where a new one is none. Text without anything in it is as no attribute. */
-const RULES: Readonly<Record<string, Rule>> = {
-  camera: {
-    accepts: (text) => text.split(",").length === 6 && text.split(",").every(isNumber),
-    wanted: "six numbers with commas, as 0,1,3,0,1,0",
-  },
-  mode: { accepts: (text) => [...MODES, "color"].includes(text.toLowerCase()), wanted: MODES.join(", ") },
-  quality: { accepts: (text) => /^(auto|\d+)$/i.test(text), wanted: "auto, or a whole number of layers from 0" },
+const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>> = {
+  camera: { read: readCamera, wanted: "six numbers with commas, as 0,1,3,0,1,0" },
+  interpolate: { read: readInterpolate, wanted: "on, or off" },
+  mode: { read: readMode, wanted: MODES.join(", ") },
+  playbackrate: { read: readNumber, wanted: "a number" },
+  quality: { read: readQuality, wanted: "auto, or a whole number of layers from 0" },
+  speed: { read: readNumber, wanted: "a number" },
+  theme: { read: readTheme, wanted: "auto, light, dark" },
+  up: { read: readUp, wanted: "y, z, -y, -z" },
 };
 
 /** What is wrong with an attribute's value, in a line; null where nothing is. */
 export function complaint(name: string, text: string): string | null {
   const rule = RULES[name];
-  if (!rule || text.trim() === "" || rule.accepts(text.trim())) return null;
+  if (!rule || text.trim() === "" || rule.read(text) !== null) return null;
   return `${name} "${text}" is passed over: give ${rule.wanted}`;
 }
 
 /** A speed from 0.1 to 4; 1 where the text is none. */
 export function parseSpeed(text: string | null): number {
-  const speed = text === null || text.trim() === "" ? NaN : Number(text);
-  return Number.isFinite(speed) ? Math.min(PLAYBACK_RATES.most, Math.max(PLAYBACK_RATES.least, speed)) : 1;
+  return Math.min(PLAYBACK_RATES.most, Math.max(PLAYBACK_RATES.least, readNumber(text ?? "") ?? 1));
 }
 
 /** Layers beyond the first, or "auto" where the text is no whole number from 0. */
 export function parseQuality(text: string | null): Quality {
-  return text !== null && /^\s*\d+\s*$/.test(text) ? Number(text) : "auto";
+  return readQuality(text ?? "") ?? "auto";
 }
 
 export function parseMode(text: string | null): Mode {
-  const word = text?.trim().toLowerCase() ?? "";
-  if (word === "color") return "colour";
-  return MODES.find((mode) => mode === word) ?? "shaded";
+  return readMode(text ?? "") ?? "shaded";
+}
+
+/** The axis that points up whatever the file says; null where nobody says. */
+export function parseUp(text: string | null): Up | null {
+  return readUp(text ?? "");
 }
 
 /** Interpolation is on unless it is switched off. */
 export function parseInterpolate(text: string | null): boolean {
-  return !["off", "false", "no", "0"].includes(text?.trim().toLowerCase() ?? "");
+  return readInterpolate(text ?? "") ?? true;
 }
 
 export function parseTheme(text: string | null): Theme {
-  const word = text?.trim().toLowerCase() ?? "";
-  return word === "light" || word === "dark" ? word : "auto";
+  return readTheme(text ?? "") ?? "auto";
 }
 
 /** True for an attribute that is there and does not say no; pages write `loop="false"` and mean it. */
@@ -72,5 +96,5 @@ export function parseFlag(text: string | null): boolean {
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
   "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "quality", "playbackRate", "interpolate", "mode", "theme",
-  "background", "camera", "currentTime",
+  "up", "background", "camera", "currentTime",
 ];

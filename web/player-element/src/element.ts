@@ -268,7 +268,7 @@ export class MeshreelPlayer extends Reflected {
   #makeView(): View {
     const { picture, cover } = this.#controls;
     const view = new View(MeshreelPlayer.engine, picture, cover, (event) => this.#onView(event));
-    view.stage.mode = this.mode;
+    for (const name of ["mode", "up"]) applyToStage(name, this, view.stage);
     view.stage.background = this.#controls.background;
     return view;
   }

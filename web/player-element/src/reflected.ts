@@ -3,6 +3,7 @@
 import type { Quality } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import * as parse from "./attributes.ts";
+import type { Up } from "./upright.ts";
 
 // Pages that are made on a server import this where there are no elements.
 const Element = globalThis.HTMLElement ?? (class {} as typeof HTMLElement);
@@ -99,7 +100,7 @@ export class Reflected extends Element {
     return parse.parseSpeed(this.getAttribute("speed") ?? this.getAttribute("playbackrate"));
   }
   set playbackRate(value: number) {
-    this.setAttribute("speed", String(parse.parseSpeed(String(value))));
+    this.setAttribute("speed", String(value));
   }
 
   /** Whether motion is blended between frames. */
@@ -115,6 +116,15 @@ export class Reflected extends Element {
   }
   set mode(value: Mode) {
     this.setAttribute("mode", value);
+  }
+
+  /** The recording's axis that points up; null where the file is to tell. */
+  get up(): Up | null {
+    return parse.parseUp(this.getAttribute("up"));
+  }
+  set up(value: Up | null) {
+    if (value === null) this.removeAttribute("up");
+    else this.setAttribute("up", value);
   }
 
   get theme(): parse.Theme {

@@ -3,6 +3,7 @@
 import type { Info, Packed, Playback, Quality, Shown } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import type { VrActions } from "@meshreel/xr";
+import type { Up } from "./upright.ts";
 
 /** Numbers of the picture, for the overlay. */
 export interface PictureStats {
@@ -23,6 +24,7 @@ export interface Stage extends EventTarget {
   mode: Mode;
   background: string; // a CSS colour
   camera: string; // as the attribute has it; "" fits the view
+  up: Up | null; // the recording's axis that points up; null: as it says itself. A change fits the view.
   /** A new recording: forgets the last one's groups, fits the view. */
   begin(info: Info): void;
   prepare(packed: Packed): void;

@@ -7,8 +7,10 @@ import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
 import { Color, Group, PerspectiveCamera, Scene, Spherical, Vector3, WebGLRenderer } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { readCamera } from "./attributes.ts";
 import type { PictureStats, Stage } from "./stage.ts";
 import { stoodUp, turnOf } from "./upright.ts";
+import type { Up } from "./upright.ts";
 
 const FOV = 45; // degrees, of the picture's height
 const FROM = new Vector3(0.25, 0.25, 1).normalize(); // where a view that fits looks from
@@ -29,6 +31,8 @@ export class ThreeStage extends EventTarget implements Stage {
   readonly #stop = new AbortController();
   #reel = new ReelScene();
   #box: Box | null = null; // of the recording, as it stands
+  #info: Info | null = null; // of the recording
+  #up: Up | null = null;
   #mode: Mode = "shaded";
   #background = "";
   #free = 1; // of the picture's height: what the bar leaves
@@ -80,12 +84,20 @@ export class ThreeStage extends EventTarget implements Stage {
   }
 
   set camera(text: string) {
-    const values = text.split(",").map(Number);
-    if (values.length !== 6 || !values.every(Number.isFinite)) {
-      this.fit();
-      return;
-    }
-    this.#look(new Vector3(...values.slice(0, 3)), new Vector3(...values.slice(3)));
+    const values = readCamera(text);
+    if (values) this.#look(new Vector3(...values.slice(0, 3)), new Vector3(...values.slice(3)));
+    else this.fit();
+  }
+
+  get up(): Up | null {
+    return this.#up;
+  }
+
+  set up(axis: Up | null) {
+    if (axis === this.#up) return;
+    this.#up = axis;
+    this.exitVr(); // it stands on the recording's floor
+    if (this.#info) this.#stand(this.#info);
   }
 
   begin(info: Info): void {
@@ -94,10 +106,8 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#reel.dispose();
     this.#reel = new ReelScene();
     this.#reel.mode = this.#mode;
-    this.#reel.rotation.x = turnOf(info.metadata);
     this.#content.add(this.#reel);
-    this.#box = stoodUp(info.box, this.#reel.rotation.x);
-    this.fit();
+    this.#stand(info);
   }
 
   prepare(packed: Packed): void {
@@ -188,6 +198,14 @@ export class ThreeStage extends EventTarget implements Stage {
     this.#orbit.update();
     this.#orbit.enableDamping = glides();
     this.#moved();
+  }
+
+  /** A recording on its floor, all of it in view. */
+  #stand(info: Info): void {
+    this.#info = info;
+    this.#reel.rotation.x = turnOf(info.metadata, this.#up);
+    this.#box = stoodUp(info.box, this.#reel.rotation.x);
+    this.fit();
   }
 
   /** Near and far follow the camera, so that depth has its precision where the recording is. */

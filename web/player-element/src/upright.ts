@@ -2,12 +2,14 @@
 
 import type { Box, Info } from "@meshreel/player-core/types";
 
-const TURNS: Readonly<Record<string, number>> = { "-y": Math.PI, z: -Math.PI / 2, "-z": Math.PI / 2 };
+export type Up = "y" | "z" | "-y" | "-z";
 
-/** Radians about x that bring the axis of a file's `up` to y; 0 where it tells none that there is. */
-export function turnOf(metadata: Info["metadata"]): number {
-  const { up } = metadata;
-  return typeof up === "string" && Object.hasOwn(TURNS, up) ? TURNS[up] : 0;
+const TURNS: Readonly<Record<Up, number>> = { y: 0, z: -Math.PI / 2, "-y": Math.PI, "-z": Math.PI / 2 };
+
+/** Radians about x that bring what points up to y: the axis that is given, else the one that a file tells, else y. */
+export function turnOf(metadata: Info["metadata"], given: Up | null = null): number {
+  const up = given ?? metadata.up;
+  return typeof up === "string" && Object.hasOwn(TURNS, up) ? TURNS[up as Up] : 0;
 }
 
 /** The box around a box that is turned so, by a multiple of a right angle. */

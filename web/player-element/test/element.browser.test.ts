@@ -153,6 +153,21 @@ describeOnPage("<meshreel-player>", (on) => {
     expect(time).toBe(0.75);
   });
 
+  test("an axis that points up reaches the picture, and is the file's again when it is taken away", async () => {
+    await on.put('<meshreel-player src="walk.reel" up="z"></meshreel-player>');
+    const told = await on.get((player) => {
+      const stage = engine.stages[0]!;
+      const seen = [stage.up];
+      for (const axis of ["-y", "x", null]) {
+        if (axis === null) player.up = null;
+        else player.setAttribute("up", axis);
+        seen.push(stage.up);
+      }
+      return seen;
+    });
+    expect(told).toEqual(["z", "-y", "-y", null]);
+  });
+
   test("a camera, mode or quality that is none leaves what was set, and warns", async () => {
     await on.put('<meshreel-player src="walk.reel" controls mode="x" quality="1" camera="1,2,3,0,0,0"></meshreel-player>');
     await on.page.locator(".toast", { hasText: 'mode "x" is passed over' }).waitFor();

@@ -144,6 +144,7 @@ export class FakeStage extends EventTarget implements Stage {
   presenting = false;
   mode: Mode = "shaded";
   background = "";
+  up: Stage["up"] = null;
   camera = "1,1,1";
   draws = 0;
   fits = 0;

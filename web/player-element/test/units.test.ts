@@ -28,6 +28,9 @@ describe("standing upright", () => {
   test("no other word is taken for an axis", () => {
     expect(["constructor", "x", "toString"].map((up) => turnOf({ up }))).toEqual([0, 0, 0]);
   });
+  test("an axis that is given counts, whatever the file tells", () => {
+    expect((["z", "-y", null] as const).map((given) => turnOf({ up: "-z" }, given))).toEqual([-Math.PI / 2, Math.PI, Math.PI / 2]);
+  });
 });
 
 describe("attributes", () => {
@@ -42,11 +45,19 @@ describe("attributes", () => {
       "normal", "wireframe", "colour", "colour", "shaded", "shaded",
     ]);
   });
-  test("what no camera, mode or quality is, is told with what would be", () => {
+  test("an axis that points up is one of four, or nobody's word", () => {
+    expect(["y", "Z", " -y ", "-z", "x", "", null].map(parse.parseUp)).toEqual(["y", "z", "-y", "-z", null, null, null]);
+  });
+  test("a value that is none is told with what would be one", () => {
     for (const [name, good, bad] of [
       ["camera", ["0,1,3,0,1,0", " 1e-3, -2,3,4,5,6 ", ""], ["1,2,3", "1,,3,4,5,6", "a,b,c,d,e,f", "1,2,3,4,5,Infinity"]],
       ["mode", ["normal", "WIREFRAME", "color", " "], ["x", "shaded,normal"]],
       ["quality", ["auto", "Auto", " 3 ", "0", ""], ["high", "-1", "1.5", "NaN"]],
+      ["speed", ["1", " .5 ", "-2", "9", ""], ["fast", "NaN", "Infinity", "2x"]],
+      ["playbackrate", ["1"], ["fast"]],
+      ["interpolate", ["on", "off", "No", "0", "true", ""], ["maybe", "2"]],
+      ["theme", ["auto", "Dark", "light", ""], ["pink", "constructor"]],
+      ["up", ["y", "-Z", ""], ["x", "up"]],
     ] as const) {
       expect(good.filter((text) => parse.complaint(name, text) !== null)).toEqual([]);
       expect(bad.filter((text) => parse.complaint(name, text) === null)).toEqual([]);
