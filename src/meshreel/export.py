@@ -11,17 +11,18 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from pathlib import Path
-from typing import Literal, cast
+from typing import Literal
 
 import numpy as np
 
+from .axes import Up
 from .container.reader import Chunk, ReelReader
 from .errors import InputError
 from .format.layout import Form
 from .geometry.topology import vertex_normals
 from .io.animated_glb import animated_glb
 from .io.animated_usd import EXTENSIONS, animated_usd
-from .io.animation import Animation, AnimationWriter, Points, Shape, Up, check_target
+from .io.animation import Animation, AnimationWriter, Points, Shape, check_target
 from .tracks import Background, Track
 from .types import Mesh
 
@@ -70,7 +71,7 @@ def export(
     tracks = tuple(Track(reader, number, options.layers) for number in range(len(reader.tracks)))
     source = _Source(reader, tracks, Background(reader), frames)
     written = 0
-    with _writer(path, _animation(reader, frames, options.up or cast(Up, reader.up))) as writer:
+    with _writer(path, _animation(reader, frames, options.up or reader.up)) as writer:
         if options.only != "moving":
             for shape in _states(source):
                 writer.add(shape)

@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from meshreel.axes import UP_AXES
 from meshreel.errors import InputError
-from meshreel.geometry.cameras import UP_AXES
 from meshreel.metrics.cameras import (
     Box,
     ViewOptions,

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64, UInt16
 
+from ..axes import UP_AXES, UPS, Up
 from ..errors import InputError
-from ..geometry.cameras import UP_AXES, PinholeCamera
+from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import DepthPicture
 from ..io.depth import picture_size, read_depth
 from ..io.names import last_number
@@ -116,10 +117,10 @@ class Rig:
     remarks: tuple[str, ...] = ()  # what a user must know of the description
 
     @property
-    def up(self) -> str:
+    def up(self) -> Up:
         """The axis that is nearest to up in the cameras' pictures: y, z, -y or -z; y where none is near."""
         mean = np.mean([-camera.camera_to_world[:3, 1] for camera in self.cameras], axis=0)
-        along = {axis: float(mean @ direction) for axis, direction in UP_AXES.items()}
+        along = {axis: float(mean @ UP_AXES[axis]) for axis in UPS}
         best = max(along, key=along.__getitem__)
         return best if along[best] > _UPRIGHT else "y"
 

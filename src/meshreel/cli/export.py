@@ -7,11 +7,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..axes import Up
 from ..decoder import open as open_video
 from ..errors import FormatError, InputError
 from ..export import ExportOptions, export
 from ..io.animated_usd import EXTENSIONS
-from ..io.animation import Up
 from ..io.sequence import SequenceOptions
 from .console import Common
 from .decode import Part, check_part

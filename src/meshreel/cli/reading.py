@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..axes import Up
 from ..errors import InputError
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions
@@ -33,9 +34,6 @@ class Reading:
     def options(self) -> SequenceOptions:
         """The same for `open_sequence`; vertices that repeat a position are welded."""
         return SequenceOptions(self.fps, self.frames, self.scale, weld)
-
-
-Up = Literal["y", "z", "-y", "-z"]
 
 
 @Parameter(name="*")

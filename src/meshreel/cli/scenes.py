@@ -6,21 +6,22 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from ..analysis.segment.masks import ImageMasks, Masker, one_size
 from ..analysis.segment.sam3 import Sam3Masks, Sam3Options
 from ..analysis.segment.scene import SegmentOptions
+from ..axes import Up, known_up
 from ..capture.record import open_recording
 from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
-from ..geometry.cameras import UP_AXES, unpack_cameras
+from ..geometry.cameras import unpack_cameras
 from ..io.sequence import open_sequence
 from ..types import MeshSequence
 from .capture import MADE
-from .reading import Reading, Up
+from .reading import Reading
 
 _READ = Reading()
 
@@ -48,11 +49,11 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
     described = any((folder / name).is_file() for name in (RIG, SINGLE))
     if len(inputs) > 1 or not described or any(folder.glob("frame_*.ply")):
         options, made = reading.options(), captured(folder) if len(inputs) == 1 else {}
-        rate, up = made.get("frames_per_second"), made.get("up")
+        rate = made.get("frames_per_second")
         if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:
             options = replace(options, frame_rate=float(rate))
         sequence = open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options)
-        return Source(sequence, up=cast(Up, up) if up in UP_AXES else "y")
+        return Source(sequence, up=known_up(made.get("up")))
     reading.options()  # refuses what no sequence can have
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
@@ -60,7 +61,7 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
     if reading.fps not in (_READ.fps, recording.frame_rate):
         text = f"--fps {reading.fps:g}: {folder} is a rig of {recording.frame_rate:g} frames a second"
         raise InputError(f"{text}; leave it out, or mend the rig's description")
-    return Source(recording, tuple(remarks), cast(Up, recording.rig.up))
+    return Source(recording, tuple(remarks), recording.rig.up)
 
 
 def captured(folder: Path) -> dict[str, Any]:

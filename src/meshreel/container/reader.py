@@ -10,11 +10,11 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import accumulate
 
+from ..axes import Up, known_up
 from ..errors import FormatError
 from ..format.checks import check_header, check_index, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
-from ..geometry.cameras import UP_AXES
 from .sources import Source
 
 FIRST_REQUEST = 16384  # bytes; the head of some minutes of video
@@ -77,10 +77,9 @@ class ReelReader:
         return self.header.frame_rate
 
     @property
-    def up(self) -> str:
+    def up(self) -> Up:
         """The axis that points up, for who shows the frames: y, z, -y or -z; y where the file does not tell."""
-        up = self.metadata.get("up")
-        return up if isinstance(up, str) and up in UP_AXES else "y"
+        return known_up(self.metadata.get("up"))
 
     @property
     def missing(self) -> tuple[Chunk, ...]:

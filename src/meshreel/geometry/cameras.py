@@ -20,15 +20,6 @@ _RIGID = 1e-3  # that an entry of R R^T may be off: some tools write few digits
 _LARGEST = 1e9  # of a matrix's numbers: keeps all that is computed from them finite
 
 
-UP_AXES = {"y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0)}  # what is up
-
-
-def check_up(axis: str) -> None:
-    """Raises InputError where no axis that can point up is called so."""
-    if axis not in UP_AXES:
-        raise InputError(f"up axis {axis!r}: give {', '.join(UP_AXES)}")
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PinholeCamera:
     """A perspective camera; equal to one of the same numbers, so that options with cameras can be compared."""

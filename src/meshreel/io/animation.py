@@ -9,16 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int32
 
+from ..axes import Up
 from ..errors import InputError
 
-Up = Literal["y", "z", "-y", "-z"]
-
-_TURNS: dict[str, list[list[int]]] = {  # what turns an axis upwards, to +y
+_TURNS: dict[Up, list[list[int]]] = {  # what turns an axis upwards, to +y
     "y": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
     "z": [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
     "-y": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],

@@ -14,8 +14,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float64
 
+from ..axes import UP_AXES, check_up
 from ..errors import InputError
-from ..geometry.cameras import UP_AXES, PinholeCamera, check_up, pack_cameras, pinhole_record, unpack_cameras
+from ..geometry.cameras import PinholeCamera, pack_cameras, pinhole_record, unpack_cameras
 from ..io.write import replacing
 from ..types import Mesh
 

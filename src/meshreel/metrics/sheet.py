@@ -15,8 +15,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float64
 
+from ..axes import UP_AXES, check_up
 from ..errors import InputError
-from ..geometry.cameras import UP_AXES, PinholeCamera, check_up
+from ..geometry.cameras import PinholeCamera
 from ..geometry.nearest import Surface
 from ..io.write import replacing
 from ..types import Mesh

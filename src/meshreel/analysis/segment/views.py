@@ -17,8 +17,9 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
+from ...axes import UP_AXES, check_up
 from ...errors import InputError
-from ...geometry.cameras import UP_AXES, PinholeCamera, check_up
+from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
 from ...types import Frames, Mesh
