@@ -13,6 +13,7 @@ from meshreel.evaluation.curves import (
     anchor_hull,
     hull_lines,
     on_hull,
+    repeated,
     value,
 )
 
@@ -66,6 +67,12 @@ def test_ssim_without_keys_is_made_of_frames_and_groups():
 
 
 BOUNDS = (Bound("mbps", 0.34, "Mbps", least=False), Bound("d2_psnr_paper", 64.0, "dB"))
+
+
+def test_points_of_a_curve_that_are_the_same_are_counted():
+    curve = [row("tvmc", 1.0, 60.0, options={"qp": qp}) for qp in (5, 7)] + [row("tvmc", 2.0, 60.0)]
+    assert repeated([*curve, *ANCHORS, row("other", 1.0, 60.0)]) == {"tvmc": (2, 3)}
+    assert repeated([*ANCHORS, row("draco", 4.0, 71.0), row("draco", 4.1, 72.0)]) == {}
 
 
 def test_the_cheapest_point_that_keeps_all_bounds_is_told():

@@ -135,6 +135,14 @@ def test_comparisons_come_before_the_points_that_they_are_made_of(tmp_path):
     assert text.index("quality against rate") < text.index("A comparison.\n\n| codec") < text.index("# How this")
 
 
+def test_an_option_that_does_nothing_is_told(tmp_path):
+    """Points of one curve that are all the same are a mistake, of the codec or of who chose them."""
+    rows = [row("walker", "same", 1.0, 60.0), row("walker", "same", 1.0, 60.0), row("walker", "good", 2.0, 60.0)]
+    write_report(rows, experiment(), tmp_path)
+    page = (tmp_path / "results.md").read_text()
+    assert page.count("does nothing here") == 1 and "same: points apart: 1 of 2." in page
+
+
 def test_it_says_how_it_was_made(tmp_path):
     made = {"meshreel": "0.1.0", "commit": "abc", "platform": "P", "python": "3.12", "cores": 2}
     write_report([row("dancer", "draco", 1.0, 60.0, made_by=made)], experiment(), tmp_path)

@@ -88,6 +88,18 @@ def curve_of(row: Row) -> str:
     return ", ".join([name, *told])
 
 
+def repeated(rows: Sequence[Row]) -> dict[str, tuple[int, int]]:
+    """Of the curves of one sequence that have a point twice: how many points are apart, and how many there are.
+
+    An option that changes neither rate nor qualities does nothing there, or not what it should.
+    """
+    points: dict[str, list[tuple[float | None, ...]]] = {}
+    for row in rows:
+        found = (float(row["mbps"]), *(value(row, measure.key) for measure in MEASURES))
+        points.setdefault(curve_of(row), []).append(found)
+    return {name: (len(set(own)), len(own)) for name, own in points.items() if len(set(own)) < len(own)}
+
+
 def anchor_hull(rows: Sequence[Row], measure: Measure) -> Curve:
     """The hull of all anchors among the rows of one sequence."""
     return hull(HULL, [curve([r for r in rows if r["codec"] == name], name, measure) for name in ANCHORS])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...io.write import make_folder, replacing
-from ..curves import curve_of
+from ..curves import curve_of, repeated
 from ..experiment import Experiment
 from ..filenames import file_name
 from ..provenance import makers
@@ -113,13 +113,20 @@ def _part(part: Part, shots: Mapping[str, Shots | None]) -> Iterator[str]:
         own = curve_rows(part.rows, sequence)
         yield from ("", f"## {text(sequence)}, {own[0]['frames']} frames", "")
         yield from (part.link(sequence, "quality against rate"), "")
-        if len(made := makers(own)) > 1:
-            yield from (f"Rows of more than one version: {text(', '.join(made))}.", "")
+        yield from _doubts(own)
         shown = part.chosen.shown(own)
         yield from (*part.chosen.comparisons(own), "", *(point_table(shown) if shown else ()))
         if (found := shots[sequence]) is not None:
             yield from ("", *_sheet(part, found))
     yield from part.chosen.sections(part.rows)
+
+
+def _doubts(rows: Sequence[Row]) -> Iterator[str]:
+    """What a reader must know of the rows of a sequence before believing them."""
+    if len(made := makers(rows)) > 1:
+        yield from (f"Rows of more than one version: {text(', '.join(made))}.", "")
+    for name, (apart, count) in repeated(rows).items():
+        yield from (f"**{text(name)}: points apart: {apart} of {count}.** What is varied does nothing here.", "")
 
 
 def _sheet(part: Part, shots: Shots) -> Iterator[str]:
