@@ -247,7 +247,7 @@ class Tracks:
 
 
 def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
-    return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell)
+    return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell, parts.background)
 
 
 def _apart(mesh: Mesh, small: Mesh) -> float:

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies
+from meshreel.analysis.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies, with_ring
 from meshreel.errors import InputError
-from meshreel.geometry.topology import concatenate
+from meshreel.geometry.topology import concatenate, part_of
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere
 
@@ -154,3 +154,18 @@ def test_a_ring_is_all_around_what_moves_but_for_large_faces():
     )  # two corners only touch by their far halves
     assert not ring(floor, moves, 0.05).any() and not ring(floor, np.zeros_like(moves), 0.1).any()
     assert len(ring(NONE, np.zeros(0, bool), 0.1)) == 0
+
+
+def test_a_ring_goes_on_to_where_the_background_begins_but_not_without_end():
+    """A hole in the background is filled up to its border, not beyond; where there is nothing at all, four faces."""
+    floor, cell = plane(1.0, 20), 0.1
+    middles = floor.vertices[floor.faces].mean(axis=1)[:, :2] - 0.5
+    moves = np.abs(middles).max(axis=1) < 0.05
+    for hole, side in ((0.1, 0.2), (0.15, 0.3), (0.25, 0.5), (0.45, 0.5)):
+        rest = part_of(floor, np.abs(middles).max(axis=1) > hole)
+        found = with_ring(floor, moves, cell, rest)
+        assert np.ptp(found.vertices, axis=0)[:2] == pytest.approx(side), hole
+    narrow = part_of(floor, moves | ring(floor, moves, cell))
+    for background in (floor, NONE):
+        assert len(with_ring(floor, moves, cell, background).faces) == len(narrow.faces)
+    assert with_ring(floor, np.zeros_like(moves), cell, rest).is_empty

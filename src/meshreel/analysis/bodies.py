@@ -15,10 +15,12 @@ from jaxtyping import Bool, Float64, Int64
 
 from ..errors import InputError
 from ..geometry.connected import connected_faces
+from ..geometry.nearest import Surface, past_border
 from ..geometry.topology import concatenate, face_normals, part_of, with_neighbours
 from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
 
+MOST_RINGS = 4  # around what moves, where the background ends short of it
 RING = 2.0  # cells: the longest edges of a body's ring; a wall of a few faces is no part of it
 
 
@@ -70,9 +72,23 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
     return found
 
 
-def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Mesh:
-    """What moves of a frame, as bodies are coded: with its `ring`."""
-    return part_of(mesh, moves | ring(mesh, moves, cell))
+def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Mesh) -> Mesh:
+    """What moves of a frame, as bodies are coded: with its `ring`, and more of them as far as the background ends
+    short of it. A background of depth pictures leaves out some pixels around what moves: coarse ones are wide.
+    """
+    found = moves | ring(mesh, moves, cell)
+    if background.is_empty or not moves.any():
+        return part_of(mesh, found)
+    origin = (background.vertices.min(axis=0) + background.vertices.max(axis=0)) / 2
+    surface = Surface(Mesh(background.vertices - origin, background.faces))
+    for _ in range(MOST_RINGS - 1):
+        more = np.flatnonzero(ring(mesh, found, cell))
+        middles = mesh.vertices[mesh.faces[more]].mean(axis=1) - origin
+        more = more[past_border(surface.mesh, surface.closest(middles))]
+        if not len(more):
+            break
+        found[more] = True
+    return part_of(mesh, found)
 
 
 def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:
