@@ -166,6 +166,6 @@ def test_a_ring_goes_on_to_where_the_background_begins_but_not_without_end():
         found = with_ring(floor, moves, cell, rest)
         assert np.ptp(found.vertices, axis=0)[:2] == pytest.approx(side), hole
     narrow = part_of(floor, moves | ring(floor, moves, cell))
-    for background in (floor, NONE):
+    for background in (floor, NONE, None):
         assert len(with_ring(floor, moves, cell, background).faces) == len(narrow.faces)
     assert with_ring(floor, np.zeros_like(moves), cell, rest).is_empty

@@ -72,12 +72,12 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
     return found
 
 
-def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Mesh) -> Mesh:
+def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Mesh | None = None) -> Mesh:
     """What moves of a frame, as bodies are coded: with its `ring`, and more of them as far as the background ends
     short of it. A background of depth pictures leaves out some pixels around what moves: coarse ones are wide.
     """
     found = moves | ring(mesh, moves, cell)
-    if background.is_empty or not moves.any():
+    if background is None or background.is_empty or not moves.any():
         return part_of(mesh, found)
     origin = (background.vertices.min(axis=0) + background.vertices.max(axis=0)) / 2
     surface = Surface(Mesh(background.vertices - origin, background.faces))
