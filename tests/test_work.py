@@ -11,9 +11,11 @@ from meshreel import windows, work
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.choice import Quality
 from meshreel.encoder import Encoder, encode
+from meshreel.evaluation.codecs.tvmc.tracking import track_sequence
 from meshreel.format.layout import Form
 from meshreel.types import Mesh, MeshList
 from meshreel.work import SpanStore, shared_options
+from tests.scenes import ball, quick_scene, with_room
 from tests.small_options import quick
 
 BODY = tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.04)))
@@ -50,6 +52,26 @@ def test_an_encoder_that_was_prepared_for_other_options_looks_again(looked, tmp_
     prepared.prepare(PAPER)
     prepared.encode(tmp_path / "a.reel", replace(PAPER, group_size=4))
     assert looked == [2, 2, 4]
+
+
+@pytest.mark.parametrize("codec", ["meshreel", "tvmc"])
+def test_the_bodies_of_a_noisy_scene_are_looked_at_once_and_as_noisy_ones(codec, monkeypatch, tmp_path):
+    """Whoever codes them: what `prepare` kept is what `encode` asks for."""
+    told, find = list[float](), windows.find_spans
+    monkeypatch.setattr(
+        work, "find_spans", lambda frames, options, *rest: told.append(options.noise) or find(frames, options, *rest)
+    )
+    options, rolling = quick_scene("paper", group_size=2), with_room([ball(0.5 + 0.35 * t) for t in range(4)])
+    prepared = Encoder(MeshList(tuple(rolling)))
+    prepared.prepare(options)
+    looked = len(told)
+    assert looked >= 2 and min(told) > 0
+    for _ in range(2):
+        if codec == "meshreel":
+            prepared.encode(tmp_path / "a.reel", options)
+        else:
+            assert track_sequence(prepared, options).groups
+    assert len(told) == looked
 
 
 def test_with_workers_nothing_is_looked_at_ahead(looked):

@@ -32,7 +32,7 @@ from .layered import encode_segment
 from .metrics.distance import PSNR_CEILING, psnr
 from .parts import Parts, take_apart
 from .presets import preset_options
-from .scene import Static, TrackGroup, all_windows, encode_bodies, encode_static
+from .scene import Static, TrackGroup, all_windows, encode_bodies, encode_static, options_of
 from .summary import GroupSummary, SceneSummary, Summary
 from .types import Frames, Mesh, MeshSequence, evenly
 from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
@@ -96,7 +96,7 @@ class Encoder:
             self._keep_spans(work, parts)
 
     def _keep_spans(self, work: Work, parts: Parts | None) -> None:
-        options, stages, count = work.options, work.stages, len(work.sequence)
+        options, stages, count = options_of(parts, work.options), work.stages, len(work.sequence)
         seen = survey(work.sequence, stages) if parts is None else parts.seen
         for run in all_windows(work.sequence, seen, parts, options):
             self.spans.keep(run.frames, options, stages if parts is None else None)

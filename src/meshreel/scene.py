@@ -129,8 +129,7 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
 def encode_bodies(work: Work, parts: Parts) -> CodedBodies:
     """The groups of all tracks; each track has all frames, and no group has frames with surface and without."""
     sequence, stages = work.sequence, work.stages
-    noise = min(parts.noise / parts.seen.unit, MOST_NOISE)
-    options = replace(work.options, noise=noise)
+    options = options_of(parts, work.options)
     tracks, found = Tracks(parts.segmentation.cell, options), list[TrackGroup]()
     for frames in segments(sequence, parts.segmentation, options):
         runs = body_runs(sequence, parts, frames, tracks)
@@ -145,6 +144,11 @@ def encode_bodies(work: Work, parts: Parts) -> CodedBodies:
                 stages.add("code", done * len(frames) // count - before * len(frames) // count)
         found += tracks.late(frames)
     return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
+
+
+def options_of(parts: Parts | None, options: EncoderOptions) -> EncoderOptions:
+    """Options for the bodies of a scene, which are as noisy as what stands still; the same without `parts`."""
+    return options if parts is None else replace(options, noise=min(parts.noise / parts.seen.unit, MOST_NOISE))
 
 
 def body_runs(sequence: MeshSequence, parts: Parts, frames: range, tracks: Tracks) -> list[BodyRun]:

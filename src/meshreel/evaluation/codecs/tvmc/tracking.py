@@ -14,7 +14,7 @@ from jaxtyping import Float64
 from ....analysis.survey import Survey, survey
 from ....coding.reference import CodedReference
 from ....encoder import Encoder
-from ....scene import BodyRun, Static, all_windows, encode_static
+from ....scene import BodyRun, Static, all_windows, encode_static, options_of
 from ....windows import EncoderOptions, Span, displacement_field, intra_only
 
 
@@ -61,7 +61,7 @@ def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
     Spans that the encoder prepared are not looked for again.
     """
     sequence, parts, groups = encoder.sequence, encoder.parts(options), list[Tracked | Untracked]()
-    seen = survey(sequence) if parts is None else parts.seen
+    seen, options = survey(sequence) if parts is None else parts.seen, options_of(parts, options)
     for run in all_windows(sequence, seen, parts, options):
         if not run.frames[0].is_empty:
             groups += _groups(run, encoder.spans.find(run.frames, options), options)
