@@ -1,5 +1,10 @@
+import { availableParallelism } from "node:os";
 import { defineConfig } from "vitest/config";
 
 export default defineConfig({
-  test: { include: ["test/*.test.ts", "*/test/**/*.test.ts"], testTimeout: 30_000 },
+  test: {
+    include: ["test/*.test.ts", "*/test/**/*.test.ts"],
+    testTimeout: 30_000,
+    maxWorkers: Math.max(2, availableParallelism() - 1), // two on two cores, too: browsers' tests wait much of the time
+  },
 });
