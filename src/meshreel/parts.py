@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool
@@ -23,7 +24,7 @@ from .derived import ChosenParts
 from .errors import InputError
 from .geometry.connected import connected
 from .geometry.depth import SeesDepth
-from .geometry.nearest import distances
+from .geometry.nearest import Outline, distances
 from .geometry.topology import concatenate, face_normals, part_of
 from .types import Mesh, MeshSequence, evenly
 from .windows import EncoderOptions, Stages
@@ -42,7 +43,7 @@ class Change:
     came: Mesh  # m, what has come to stand
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Parts:
     """What does not change over a scene's segments."""
 
@@ -53,6 +54,11 @@ class Parts:
     noise: float  # m, RMS distance of a frame's still surface from the background, tails and all: what bodies have
     deviation: float  # m, the same by the median, as a standard deviation: without its tails
     astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
+
+    @cached_property
+    def outline(self) -> Outline | None:
+        """Where the background ends; None where there is none."""
+        return None if self.background.is_empty else Outline(self.background)
 
 
 def take_apart(

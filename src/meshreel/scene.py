@@ -251,7 +251,7 @@ class Tracks:
 
 
 def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
-    return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell, parts.background)
+    return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell, parts.outline)
 
 
 def _apart(mesh: Mesh, small: Mesh) -> float:

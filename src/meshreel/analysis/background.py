@@ -15,7 +15,7 @@ from jaxtyping import Float64, Int64
 
 from ..errors import InputError
 from ..geometry.connected import without_fragments
-from ..geometry.nearest import Surface, past_border
+from ..geometry.nearest import Surface
 from ..geometry.tsdf import SIDE, extract, fill_grid
 from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
@@ -125,7 +125,7 @@ class _Sums:
         away = points - hits.points
         along = (away * surface.normals[hits.faces]).sum(axis=1)
         distance = np.linalg.norm(away, axis=1)
-        beyond = past_border(mesh, hits)
+        beyond = surface.past_border(hits)
         aside = np.sqrt(np.maximum(distance**2 - along**2, 0))
         known = (distance <= _REACH * size) & (~beyond | (aside <= self._options.past * size))
         signed = np.where(beyond, along, np.where(along < 0, -distance, distance))

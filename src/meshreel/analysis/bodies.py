@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float64, Int64
 
 from ..errors import InputError
 from ..geometry.connected import connected_faces
-from ..geometry.nearest import Surface, past_border
+from ..geometry.nearest import Outline
 from ..geometry.topology import concatenate, face_normals, part_of, with_neighbours
 from ..geometry.voxels import Lattice, around, distinct, spread
 from ..types import Mesh
@@ -72,19 +72,16 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
     return found
 
 
-def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Mesh | None = None) -> Mesh:
+def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Outline | None = None) -> Mesh:
     """What moves of a frame, as bodies are coded: with its `ring`, and more of them as far as the background ends
     short of it. A background of depth pictures leaves out some pixels around what moves: coarse ones are wide.
     """
     found = moves | ring(mesh, moves, cell)
-    if background is None or background.is_empty or not moves.any():
+    if background is None or not moves.any():
         return part_of(mesh, found)
-    origin = (background.vertices.min(axis=0) + background.vertices.max(axis=0)) / 2
-    surface = Surface(Mesh(background.vertices - origin, background.faces))
     for _ in range(MOST_RINGS - 1):
         more = np.flatnonzero(ring(mesh, found, cell))
-        middles = mesh.vertices[mesh.faces[more]].mean(axis=1) - origin
-        more = more[past_border(surface.mesh, surface.closest(middles))]
+        more = more[background.leaves_out(mesh.vertices[mesh.faces[more]].mean(axis=1))]
         if not len(more):
             break
         found[more] = True

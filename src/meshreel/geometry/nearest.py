@@ -66,23 +66,40 @@ class Surface:
         found = blend(self.mesh.vertices, self.mesh.faces[faces], barycentric)  # float64 again
         return Hits(found, faces, barycentric)
 
+    def past_border(self, hits: Hits) -> Bool[np.ndarray, " N"]:
+        """Where the closest point is on the mesh's border: what it was asked for lies past the surface, not above."""
+        edges, corners = self._border
+        on_edge = edges[hits.faces] & (hits.barycentric[:, [2, 0, 1]] < _AT_BORDER)  # opposite corners
+        on_corner = corners[hits.faces] & (hits.barycentric > 1 - _AT_BORDER)
+        return on_edge.any(axis=1) | on_corner.any(axis=1)
+
+    @cached_property
+    def _border(self) -> tuple[Bool[np.ndarray, "F 3"], Bool[np.ndarray, "F 3"]]:
+        """Which edges (01, 12, 20) and which corners of each face are on the border."""
+        edges, face_edges = unique_edges(self.mesh.faces)
+        border = border_mask(edges, face_edges)
+        ends = np.zeros(len(self.mesh.vertices), bool)
+        ends[edges[border].reshape(-1)] = True
+        return border[face_edges], ends[self.mesh.faces]
+
+
+class Outline:
+    """The border of a mesh that has faces, prepared to be asked often; the mesh may be anywhere in the world."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._origin = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+        self._surface = Surface(Mesh(mesh.vertices - self._origin, mesh.faces))
+
+    def leaves_out(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Which points lie past the border."""
+        return self._surface.past_border(self._surface.closest(points - self._origin))
+
 
 def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndarray, " N"]:
     """How far points are from a mesh that has faces, wherever in the world both are."""
     origin = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     local = points - origin
     return np.linalg.norm(Surface(Mesh(mesh.vertices - origin, mesh.faces)).closest(local).points - local, axis=1)
-
-
-def past_border(mesh: Mesh, hits: Hits) -> Bool[np.ndarray, " N"]:
-    """Where the closest point is on the mesh's border: what it was asked for lies past the surface, not above it."""
-    edges, face_edges = unique_edges(mesh.faces)
-    border = border_mask(edges, face_edges)
-    ends = np.zeros(len(mesh.vertices), bool)
-    ends[edges[border].reshape(-1)] = True
-    on_edge = border[face_edges[hits.faces]] & (hits.barycentric[:, [2, 0, 1]] < _AT_BORDER)  # opposite corners
-    on_corner = ends[mesh.faces[hits.faces]] & (hits.barycentric > 1 - _AT_BORDER)
-    return on_edge.any(axis=1) | on_corner.any(axis=1)
 
 
 def carried_labels(surface: Surface, labels: Bool[np.ndarray, " F"], mesh: Mesh) -> Bool[np.ndarray, " G"]:

@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from ..errors import InputError
-from ..geometry.nearest import Surface, past_border
+from ..geometry.nearest import Surface
 from ..geometry.topology import border_edges, edge_lengths, face_normals, part_of
 from ..geometry.voxels import spread
 from ..types import Mesh
@@ -163,7 +163,7 @@ def _overlaps(place: _Place, background: Mesh, bodies: Mesh) -> Float64[np.ndarr
         hits = still.closest(points)
         doubled = np.linalg.norm(hits.points - points, axis=1) <= place.cell
         doubled &= (face_normals(bodies)[0][faces] * still.normals[hits.faces]).sum(axis=1) >= _SAME_WAY
-        doubled &= ~past_border(background, hits)
+        doubled &= ~still.past_border(hits)
         away, at = place.tree.query(points[doubled])
         of_bodies = place.moves[Surface(place.frame).closest(points[doubled]).faces]
         inside = away <= place.reach

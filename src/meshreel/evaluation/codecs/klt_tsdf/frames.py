@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from ....errors import FormatError, InputError
-from ....geometry.nearest import Surface, past_border
+from ....geometry.nearest import Surface
 from ....types import Mesh
 from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols
 from .grid import SIDE, block_keys, prepared, sample
@@ -117,7 +117,7 @@ def _wrong(mesh: Mesh, decoded: Mesh) -> Int64[np.ndarray, " C"]:
     away = middles - hits.points
     squared = np.einsum("nd,nd->n", away, away)
     along = np.einsum("nd,nd->n", away, surface.normals[hits.faces])
-    past = past_border(mesh, hits) & (squared - along**2 > _PAST**2)
+    past = surface.past_border(hits) & (squared - along**2 > _PAST**2)
     keys, index = np.unique(cells_of(decoded), return_inverse=True)
     share = np.bincount(index, past | (squared > _FAR**2)) / np.bincount(index)
     return keys[share > 0.5]

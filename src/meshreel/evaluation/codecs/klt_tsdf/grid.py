@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ....geometry.inside import winding_inside
-from ....geometry.nearest import Hits, Surface, past_border
+from ....geometry.nearest import Hits, Surface
 from ....geometry.topology import clean, unique_edges, weld
 from ....geometry.voxels import Lattice, around, distinct, spread
 from ....types import Mesh
@@ -90,7 +90,7 @@ def signed_distances(
         distance = np.linalg.norm(away, axis=1)
         along = np.einsum("nd,nd->n", away, surface.normals[hits.faces])
         side = np.einsum("nd,nd->n", away, normals.at(hits))
-        beyond = past_border(mesh, hits)
+        beyond = surface.past_border(hits)
         aside = np.sqrt(np.maximum(distance**2 - along**2, 0))
         values[part] = np.where(beyond, np.copysign(distance, along), np.copysign(distance, side))
         known[part] = ~beyond | (aside <= _ASIDE)
