@@ -2,7 +2,7 @@
 
 In: a point of one of `KINDS`. Out: its row: rate of all bytes, every metric against the input, encode times by stage,
 decode times in a fresh process, and pictures in a folder beside the rows. Bodies are judged by all frames; scenes by
-`MEASURED` of them, from where their cameras stood, and where the truth is known against it too (`truth_`).
+every second of `SOME` frames, from where their cameras stood, and where the truth is known against it too (`truth_`).
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ from .timer import StageTimer
 from .truth import finite, true_scene
 
 RATED = "rated"  # the codec is given the whole sequence
-SAMPLED = "sampled"  # it is given the frames that are measured, for single-frame and slow codecs; the rate is theirs
+SAMPLED = "sampled"  # it is given `SOME` frames of a scene, for single-frame and slow codecs; the rate is theirs
 TRUTH_ITSELF = "the truth itself"  # beyond what it reaches against the input, noise is coded
 FLOOR = "rated floor"  # no codec: what the truth itself reaches against the input
 KINDS = (RATED, SAMPLED, FLOOR)
-MEASURED = 10  # frames of a scene
+SOME = 10  # frames of a scene: what codecs of kind SAMPLED code, and of these every second is measured
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
 TRUTH = ("d2_psnr_backward", "ssim_masked", "normal_error_deg", "people_ssim_masked", "people_normal_error_deg")
 
@@ -49,7 +49,8 @@ def measure_rated(point: Point, bench: Bench) -> Row:
     """The row of a point."""
     known = _opened(point.sequence, bench.data, point.frames, bench.cache)
     count = len(known.sequence)
-    numbers = evenly(count, MEASURED) if known.cameras else list(range(count))
+    some = evenly(count, SOME) if known.cameras else list(range(count))
+    numbers = some[::2] if known.cameras else some
     head: Row = {"sequence": point.sequence, "frames": count, "frame_rate": known.sequence.frame_rate}
     head |= {"measured_frames": numbers}
     if point.kind == FLOOR:
@@ -57,14 +58,14 @@ def measure_rated(point: Point, bench: Bench) -> Row:
     codec = make_codec(point.codec, point.options)
     decoder = decoder_of(codec)
     sampled = point.kind == SAMPLED
-    source = Chosen(known.sequence, numbers) if sampled else known.sequence
+    source = Chosen(known.sequence, some) if sampled else known.sequence
     data, times = _encoded(codec, source, (point.sequence, point.frames, sampled))
     check_told(codec, data)
     head |= coded_row(codec, source, data) | {"coded_frames": len(source)}
     head |= times | {"encode_peak_rss_mb": peak_rss_mb()}
     head |= {"groups": group_records(data) if len(numbers) == count else []}  # which count in frames, as metrics do
     head["decode"], decoded = measure_fresh_decode(data, decoder, decoded_by(decoder, data, codec.name, source))
-    shown = decoded if sampled else Chosen(decoded, numbers)
+    shown = Chosen(decoded, [some.index(number) for number in numbers] if sampled else numbers)
     return head | _metrics(known, numbers, shown, bench) | _pictures(point, known, numbers, (shown, bench))
 
 
@@ -151,7 +152,7 @@ def _opened(name: str, data: Path, frames: int | None, cache: Path | None) -> Da
     return open_known(name, data, frames, cache)
 
 
-@lru_cache(maxsize=MEASURED)
+@lru_cache(maxsize=SOME)
 def _true(known: Dataset, number: int) -> Scene:
     assert known.truth is not None
     return true_scene(known.truth, number)

@@ -18,30 +18,23 @@ from ...container.writer import ReelWriter
 from ...decoder import open as open_video
 from ...encoder import make_header
 from ...geometry.topology import part_of
-from ...parts import Parts, take_apart
+from ...parts import take_apart
 from ...presets import preset_options
 from ...scene import Static, encode_static
 from ...types import Mesh, MeshSequence
 from ...windows import Stages
 from ..codec import Progress
-from .draco import check_point, encode_frame
+from .draco import check_point, decimated, encode_frame
 
 
 @dataclass(frozen=True, slots=True)
 class Still:
-    """What stands still, and what is left of a frame."""
+    """What stands still, and what is left of the frames."""
 
-    sequence: MeshSequence
+    frame_rate: float
     seen: Survey
-    parts: Parts | None  # None: everything may move
     states: Sequence[Static]  # of the background
-
-    def moving(self, number: int) -> Mesh:
-        """What moves in a frame, normalised."""
-        mesh = self.sequence[number]
-        if self.parts is None:
-            return self.seen.normalise(mesh)
-        return self.seen.normalise(part_of(mesh, self.parts.segmentation.moving(number, mesh)))
+    moving: list[Mesh]  # what moves in each frame, normalised
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,22 +67,26 @@ class BackgroundOnceDracoCodec:
         """What stands still. Raises InputError for frames that cannot be used."""
         stages, options = Stages(progress, len(sequence)), preset_options("best")
         if not (len(sequence) and is_scene(sequence)):
-            return Still(sequence, survey(sequence, stages), None, ())
+            seen = survey(sequence, stages)
+            return Still(sequence.frame_rate, seen, (), [seen.normalise(mesh) for mesh in sequence])
         parts = take_apart(sequence, survey(sequence, stages, cleaned=False), options, stages)
         states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
-        return Still(sequence, parts.seen, parts, states)
+        moving = list[Mesh]()
+        for number, mesh in enumerate(sequence):
+            moving.append(parts.seen.normalise(part_of(mesh, parts.segmentation.moving(number, mesh))))
+            stages.add("split", 1)
+        return Still(sequence.frame_rate, parts.seen, states, moving)
 
     def code(self, analysis: Still, progress: Progress | None = None) -> bytes:
         """A .reel file of single frames behind a background."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "anchor.reel"
-            sequence = analysis.sequence
-            with ReelWriter(path, make_header(sequence.frame_rate, analysis.seen, {})) as writer:
+            with ReelWriter(path, make_header(analysis.frame_rate, analysis.seen, {})) as writer:
                 for number, static in enumerate(_written(writer, analysis)):
-                    data = encode_frame(analysis.moving(number), self.qp, self.fraction, self.levels)
+                    data = encode_frame(decimated(analysis.moving[number], self.fraction), self.qp, self.levels)
                     writer.add_group(number, 1, data, (), static)
                     if progress is not None:
-                        progress("code", number + 1, len(sequence))
+                        progress("code", number + 1, len(analysis.moving))
             return path.read_bytes()
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
@@ -104,7 +101,7 @@ class BackgroundOnceDracoCodec:
 def _written(writer: ReelWriter, still: Still) -> Iterator[tuple[int, ...]]:
     """The numbers of the chunks that each frame is shown with; each state is written before its first frame."""
     states, static = list(still.states), tuple[int, ...]()
-    for number in range(len(still.sequence)):
+    for number in range(len(still.moving)):
         while states and states[0].frame <= number:
             state = states.pop(0)
             static = (writer.add_static(state.payload, depends_on=list(static) if state.is_patch else ()),)

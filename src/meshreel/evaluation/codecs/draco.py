@@ -6,12 +6,12 @@ Both write .reel files whose groups are single `draco` frames, so their rate cou
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from ...analysis.survey import survey
+from ...analysis.survey import Survey, survey
 from ...coding.intra import encode_empty, encode_intra
 from ...container.writer import ReelWriter
 from ...decoder import open as open_video
@@ -23,6 +23,15 @@ from ..codec import Progress
 
 LARGE = 100_000  # faces; what has more is decimated in two steps: a number of vertices takes some rounds
 ON_THE_WAY = 3  # times the vertices that are wanted, after the first step
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What a file of single frames says of all of them."""
+
+    frame_rate: float
+    seen: Survey
+    count: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +55,21 @@ class DracoCodec:
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """A .reel file of single frames."""
-        return _encode_frames(sequence, (self.qp, 1.0, 0), progress)
+        seen = survey(sequence)
+        frames = (seen.normalise(frame) for frame in sequence)
+        return _written(frames, Head(sequence.frame_rate, seen, len(sequence)), (self.qp, 0), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, from the bytes alone."""
         return open_video(data)
+
+
+@dataclass(frozen=True, slots=True)
+class Decimated:
+    """A sequence with fewer vertices."""
+
+    head: Head
+    meshes: list[Mesh]  # normalised
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,9 +96,27 @@ class DecimatedDracoCodec:
         """The operating point, ready for JSON."""
         return asdict(self)
 
+    @property
+    def analysis_key(self) -> str:
+        """The same for all operating points with as many vertices."""
+        return f"decimated to {self.fraction!r}"
+
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Decimated:
+        """The decimated frames."""
+        seen, meshes = survey(sequence), list[Mesh]()
+        for frame in sequence:
+            meshes.append(decimated(seen.normalise(frame), self.fraction))
+            if progress is not None:
+                progress("decimate", len(meshes), len(sequence))
+        return Decimated(Head(sequence.frame_rate, seen, len(sequence)), meshes)
+
+    def code(self, analysis: Decimated, progress: Progress | None = None) -> bytes:
+        """A .reel file of single frames."""
+        return _written(analysis.meshes, analysis.head, (self.qp, self.levels), progress)
+
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """A .reel file of single frames."""
-        return _encode_frames(sequence, (self.qp, self.fraction, self.levels), progress)
+        return self.code(self.analyse(sequence, progress), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, from the bytes alone."""
@@ -102,25 +139,31 @@ def lattice_step(extent: float, qp: int) -> float:
     return max(extent, 1e-12) / (2**qp - 3)
 
 
-def _encode_frames(sequence: MeshSequence, point: tuple[int, float, int], progress: Progress | None) -> bytes:
-    seen = survey(sequence)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "anchor.reel"
-        with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-            for i, frame in enumerate(sequence):
-                writer.add_group(i, 1, encode_frame(seen.normalise(frame), *point))
-                if progress is not None:
-                    progress("code", i + 1, len(sequence))
-        return path.read_bytes()
+def decimated(mesh: Mesh, fraction: float) -> Mesh:
+    """The mesh with a fraction of its vertices; large ones in two steps."""
+    if fraction == 1 or mesh.is_empty:
+        return mesh
+    vertices = max(4, round(fraction * len(mesh.vertices)))
+    if len(mesh.faces) > max(LARGE, 2 * ON_THE_WAY * vertices):
+        mesh = decimate_faces(mesh, 2 * ON_THE_WAY * vertices)
+    return decimate(mesh, vertices)
 
 
-def encode_frame(mesh: Mesh, qp: int, fraction: float, levels: int) -> bytes:
+def encode_frame(mesh: Mesh, qp: int, levels: int) -> bytes:
+    """The payload of a frame alone."""
     if mesh.is_empty:
         return encode_empty()
-    if fraction < 1:
-        vertices = max(4, round(fraction * len(mesh.vertices)))
-        if len(mesh.faces) > max(LARGE, 2 * ON_THE_WAY * vertices):
-            mesh = decimate_faces(mesh, 2 * ON_THE_WAY * vertices)
-        mesh = decimate(mesh, vertices)
     extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
     return encode_intra([mesh], lattice_step(extent, qp), levels)
+
+
+def _written(meshes: Iterable[Mesh], head: Head, point: tuple[int, int], progress: Progress | None) -> bytes:
+    """A .reel file of single normalised frames, at `qp` bits and so many `levels` of subdivision."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "anchor.reel"
+        with ReelWriter(path, make_header(head.frame_rate, head.seen, {})) as writer:
+            for i, mesh in enumerate(meshes):
+                writer.add_group(i, 1, encode_frame(mesh, *point))
+                if progress is not None:
+                    progress("code", i + 1, head.count)
+        return path.read_bytes()

@@ -131,7 +131,7 @@ def _encode(
         path = Path(folder) / "anchor.reel"
         with ReelWriter(path, make_header(frames.frame_rate, seen, {})) as writer:
             for i, (mesh, (qp, levels)) in enumerate(zip(meshes, points, strict=True)):
-                writer.add_group(i, 1, encode_frame(seen.normalise(mesh), qp, 1.0, levels))
+                writer.add_group(i, 1, encode_frame(seen.normalise(mesh), qp, levels))
                 if progress is not None:
                     progress("code", i + 1, len(meshes))
         return path.read_bytes()

@@ -38,8 +38,8 @@ SYSTEMS = (
 )
 NOTES = (
     "The rate is that of all bytes of the stream over the time that it plays, a background that is sent once included;",
-    "`scenes` counts it as sent every ten seconds. Of scenes ten frames are measured. Codecs of single frames, NeCGS",
-    "and, in room2, KLT are given these only: NeCGS and KLT share less among frames so than they could. NeCGS is at a",
+    "`scenes` counts it as sent every ten seconds. Of scenes five frames are measured. Codecs of single frames, NeCGS",
+    "and, in room2, KLT are given ten: NeCGS and KLT share less among frames so than they could. NeCGS is at a",
     "small configuration, for a processor. `meshreel paper m` is TSMC as the paper has it: the number m of basis",
     "vectors is varied. *The truth itself* is what the clean meshes reach against the noisy input: beyond it noise",
     "is coded.",

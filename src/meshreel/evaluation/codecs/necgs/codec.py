@@ -9,13 +9,13 @@ from functools import partial
 from typing import Any, overload
 
 import numpy as np
-from jaxtyping import Float32
+from jaxtyping import Bool, Float16, Float32
 
 from ....errors import InputError
 from ....types import Mesh, MeshSequence
 from ...codec import Progress
 from .cubes import extract
-from .grid import box_of, place_grids, truncated_distances
+from .grid import Placement, box_of, place_grids, truncated_distances
 from .shape import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Shape
 from .stream import Coded, decode_stream, encode_stream
 
@@ -45,6 +45,16 @@ FULL: dict[str, Any] = {  # the publication's (section 4.1), for a GPU; its fit 
 }
 MOST_STRUCTURE = 1000.0
 KEPT = 0.1  # share of a frame's inside and of what is decoded as inside; with less in common training has failed
+
+
+@dataclass(frozen=True, slots=True)
+class FittedVolumes:
+    """TSDF-Def volumes of frames, and where their grids are."""
+
+    placement: Placement
+    full: Bool[np.ndarray, " T"]  # which frames have a surface
+    trimmed: bool  # whether some of them is open
+    fitted: list[Float16[np.ndarray, "K K K 4"]]  # of those with a surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +108,15 @@ class NecgsCodec:
         """What the network is made of."""
         return Shape(self.resolution, self.features, self.channels, self.bits)
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """The network and a feature a frame.
+    @property
+    def analysis_key(self) -> str:
+        """The same for all networks on the same volumes."""
+        return f"necgs volumes of {self.resolution}, fitted in {self.fitting}"
 
-        InputError without the extra, for frames that are not finite, and where training ends without a frame's surface.
-        """
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> FittedVolumes:
+        """The volume of each frame. InputError without the extra, and for frames that are not finite."""
         _need_torch()
         from .fit import fit_volume
-        from .train import Training, train
 
         tell = progress or _silent
         boxes = [box_of(_checked(mesh, number)) for number, mesh in enumerate(sequence)]
@@ -117,14 +128,26 @@ class NecgsCodec:
             trimmed |= sheets
             volumes.append(fit_volume(distances, mesh, self.fitting).astype(np.float16))  # half the memory
             tell("volumes", number + 1, len(boxes))
+        return FittedVolumes(placement, full, trimmed, volumes)
+
+    def code(self, analysis: FittedVolumes, progress: Progress | None = None) -> bytes:
+        """The network and a feature a frame. InputError where training ends without a frame's surface."""
+        _need_torch()
+        from .train import Training, train
+
+        volumes = analysis.fitted
         options = Training(self.epochs, self.batch, self.rate, self.structure, self.seed)
         features, parameters = np.zeros((0, self.shape.feature_size), np.int32), list[np.ndarray]()
         if volumes:
-            trained = train(volumes, self.shape, options, self.device, partial(tell, "train"))
+            trained = train(volumes, self.shape, options, self.device, partial(progress or _silent, "train"))
             features, parameters = trained.features, trained.parameters
-        coded = Coded(self.shape, trimmed, full, placement, features, parameters)
+        coded = Coded(self.shape, analysis.trimmed, analysis.full, analysis.placement, features, parameters)
         self._check_surfaces(coded, volumes)
         return encode_stream(coded)
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+        """The network and a feature a frame. InputError as of `analyse` and `code`."""
+        return self.code(self.analyse(sequence, progress), progress)
 
     def _check_surfaces(self, coded: Coded, volumes: Sequence[np.ndarray]) -> None:
         """Refuses a set of which a frame has lost its surface, or has another one: training has failed."""
