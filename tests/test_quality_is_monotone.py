@@ -21,8 +21,8 @@ from meshreel.types import MeshList
 from meshreel.windows import EncoderOptions
 from tests.shared_data import performer
 
-CAPTURED = (0, 20, 40, 60, 80, 100)
-MADE = (0, 35, 70, 100)  # fewer: every encode is one from the start
+CAPTURED = (0, 25, 50, 75, 100)
+MADE = (0, 50, 100)  # fewer: every encode is one from the start
 BETTER = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "ssim_masked")
 WORSE = ("normal_error_deg", "normal_error_at_vertices_deg")
 LOOK = ComparisonOptions(views=ParallelViewOptions())  # of 128 x 128 pixels, SSIM is noise above .99

@@ -28,14 +28,22 @@ from .errors import InputError
 from .format.layout import Form, Header
 from .geometry.nearest import distances
 from .geometry.topology import drop_unreferenced
-from .layered import encode_segment
 from .metrics.distance import PSNR_CEILING, psnr
 from .parts import Parts, take_apart
 from .presets import preset_options
-from .scene import Static, TrackGroup, all_windows, encode_bodies, encode_static, options_of
+from .scene import (
+    Static,
+    TrackGroup,
+    all_windows,
+    encode_bodies,
+    encode_run,
+    encode_run_apart,
+    encode_static,
+    options_of,
+)
 from .summary import GroupSummary, SceneSummary, Summary
 from .types import Frames, Mesh, MeshSequence, evenly
-from .windows import EncodedGroup, EncoderOptions, Progress, Stages, encode_window
+from .windows import EncodedGroup, EncoderOptions, Progress, Stages
 from .work import SpanStore, Work
 
 MEASURED = 4  # frames of a scene that are compared with what is decoded
@@ -260,24 +268,16 @@ def _encoded_windows(work: Work, seen: Survey) -> Iterator[Iterable[EncodedGroup
     windows = (_Normalised(sequence, seen, window) for window in seen.windows(size))
     if executor is None:
         for frames in windows:
-            if layered:
-                yield encode_segment(frames, options, stages)
-            else:
-                yield encode_window(frames, options, stages, work.spans.find)
+            yield encode_run(frames, options, stages, work.spans.find)
         return
     ahead = getattr(executor, "_max_workers", 8)
     waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()
     for frames in windows:
-        waiting.append((len(frames), executor.submit(_encode_all, layered, list(frames), options)))
+        waiting.append((len(frames), executor.submit(encode_run_apart, (list(frames), options))))
         if len(waiting) > ahead:
             yield _arrived(waiting, stages)
     while waiting:
         yield _arrived(waiting, stages)
-
-
-def _encode_all(layered: bool, frames: list[Mesh], options: EncoderOptions) -> list[EncodedGroup]:
-    """In a worker: the groups of a run of frames."""
-    return list(encode_segment(frames, options) if layered else encode_window(frames, options))
 
 
 class _Normalised(Frames):

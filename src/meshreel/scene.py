@@ -29,8 +29,8 @@ from .geometry.decimate import decimate, decimate_faces
 from .geometry.nearest import distances
 from .layered import MOST_EMPTY, encode_segment
 from .parts import Change, Parts
-from .types import Mesh, MeshSequence, Placement
-from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, FindSpans, encode_window, find_spans
+from .types import Frames, Mesh, MeshSequence, Placement
+from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, FindSpans, Stages, encode_window
 from .work import Work
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
@@ -177,19 +177,22 @@ def all_windows(
 def _coded_runs(runs: Sequence[list[Mesh]], work: Work) -> Iterator[Iterable[EncodedGroup]]:
     """The groups of each run, in order."""
     if work.executor is None:
-        return (_groups(frames, work.options, work.spans.find) for frames in runs)
-    return work.executor.map(_encoded, [(frames, work.options) for frames in runs])
+        return (encode_run(frames, work.options, None, work.spans.find) for frames in runs)
+    return work.executor.map(encode_run_apart, [(frames, work.options) for frames in runs])
 
 
-def _groups(frames: list[Mesh], options: EncoderOptions, find: FindSpans) -> Iterable[EncodedGroup]:
+def encode_run(
+    frames: Frames, options: EncoderOptions, stages: Stages | None = None, find: FindSpans | None = None
+) -> Iterable[EncodedGroup]:
+    """The groups of frames that are coded together, in order, in the form that is asked for."""
     if options.form == Form.LAYERS:
-        return encode_segment(frames, options)
-    return encode_window(frames, options, None, find)
+        return encode_segment(frames, options, stages)
+    return encode_window(frames, options, stages, find)
 
 
-def _encoded(task: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
-    """In a worker."""
-    return list(_groups(*task, find_spans))
+def encode_run_apart(task: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
+    """As `encode_run`, in a worker."""
+    return list(encode_run(*task))
 
 
 def segments(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:

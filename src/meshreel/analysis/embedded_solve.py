@@ -236,11 +236,9 @@ def _solved(
 ) -> Float64[np.ndarray, " M"]:
     """x of (rows^T rows + prior) x = right; preconditioned by the inverse of the nodes' blocks of that matrix."""
     back, inverse = sparse.csr_array(rows.T), np.linalg.inv(blocks)
-
-    def multiply(x: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
-        return back @ (rows @ x) + prior * x
-
-    def precondition(r: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
-        return np.matmul(inverse, r.reshape(-1, 6, 1)).reshape(-1)
-
-    return conjugate_gradients(multiply, precondition, right, limits)
+    return conjugate_gradients(
+        lambda x: back @ (rows @ x) + prior * x,
+        lambda r: np.matmul(inverse, r.reshape(-1, 6, 1)).reshape(-1),
+        right,
+        limits,
+    )

@@ -92,17 +92,18 @@ def _solved(
 ) -> Float64[np.ndarray, "V 3"]:
     """x of (matrix + smooth on each axis) x = right; preconditioned by the blocks of the vertices."""
     count = len(right)
-
-    def multiply(x: Float64[np.ndarray, "V 3"]) -> Float64[np.ndarray, "V 3"]:
-        return (matrix @ x.reshape(-1)).reshape(-1, 3) + smooth @ x
-
     rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
     on_diagonal = matrix.indices == rows
     blocks = np.zeros((count, 3, 3))
     blocks[rows[on_diagonal]] = matrix.data[on_diagonal]
     blocks[:, range(3), range(3)] += smooth.diagonal()[:, None]
     inverse = np.linalg.inv(blocks)
-    return conjugate_gradients(multiply, lambda r: np.einsum("vij,vj->vi", inverse, r), right, limits)
+    return conjugate_gradients(
+        lambda x: (matrix @ x.reshape(-1)).reshape(-1, 3) + smooth @ x,
+        lambda r: np.einsum("vij,vj->vi", inverse, r),
+        right,
+        limits,
+    )
 
 
 def _uniform_laplacian(edges: Int64[np.ndarray, "E 2"], count: int) -> sparse.csr_array:
