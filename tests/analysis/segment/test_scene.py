@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from meshreel.analysis.segment import labelling
 from meshreel.analysis.segment.labelling import ByPlace, without_islands
 from meshreel.analysis.segment.places import PlacesOptions
 from meshreel.analysis.segment.scene import SegmentOptions, segment, segment_by
@@ -180,6 +181,23 @@ def test_no_faces_have_no_labels():
     assert ByPlace(1.0, Lattice(np.zeros(3), 1.0), np.zeros(1, np.int64), np.ones(1, bool), Rest.none(1), 0.01).moving(
         0, NONE
     ).shape == (0,)
+
+
+def test_labels_of_a_frame_are_found_once_and_only_the_last_are_kept(rolling, monkeypatch):
+    asked, find = [], labelling.without_islands
+    monkeypatch.setattr(labelling, "without_islands", lambda *given: asked.append(given) or find(*given))
+    monkeypatch.setattr(labelling, "_REMEMBERED", 2)
+    found = replace(rolling)  # which remembers nothing
+    first = found.moving(0, ROLLING[0])
+    assert first.any() and np.array_equal(found.moving(0, ROLLING[0]), first) and len(asked) == 1
+    other = found.moving(0, ROLLING[5])  # another mesh is no answer known
+    assert (
+        len(other) == len(ROLLING[5].faces)
+        and len(asked) == 2
+        and np.array_equal(other, find(ROLLING[5], other, rolling.island))
+    )
+    found.moving(1, ROLLING[1])
+    assert np.array_equal(found.moving(0, ROLLING[0]), first) and len(asked) == 4  # forgotten for the third
 
 
 class Right:

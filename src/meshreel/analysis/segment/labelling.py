@@ -5,7 +5,7 @@ In: a frame's number and mesh. Out: a label a face; and what the room is like wh
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
@@ -22,6 +22,7 @@ from .masks import Masker
 from .settle import Rest
 from .votes import Votes
 
+_REMEMBERED = 600  # frames whose labels by place are kept: with some 50 kB each, a scene of seconds at several rates
 _ELSEWHERE = 2.0  # cells from the middle of the nearest known place, from which on a surface is at none
 
 
@@ -61,6 +62,23 @@ class Segmentation(Protocol):
         ...
 
 
+@dataclass(slots=True)
+class _Answers:
+    """Labels that were asked for before, a bit a face: of the last so many frames, or of all."""
+
+    most: float = np.inf  # frames
+    _known: dict[tuple[int, int, float], UInt8[np.ndarray, " B"]] = field(default_factory=dict, repr=False)
+
+    def of(self, frame: int, mesh: Mesh, find: Callable[[], Bool[np.ndarray, " F"]]) -> Bool[np.ndarray, " F"]:
+        """What `find` says of a frame, which is asked where that is not known."""
+        key = (frame, len(mesh.faces), float(mesh.vertices.sum()))
+        if key not in self._known:
+            if len(self._known) >= self.most:
+                del self._known[next(iter(self._known))]
+            self._known[key] = np.packbits(find())
+        return np.unpackbits(self._known[key], count=len(mesh.faces)).astype(bool)
+
+
 @dataclass(frozen=True, slots=True)
 class ByPlace:
     """What is at a moving place moves, whenever it is there; and what is at none that is known: the room is known."""
@@ -71,6 +89,7 @@ class ByPlace:
     chosen: Bool[np.ndarray, " P"]
     rest: Rest  # when what is there belongs to the room after all
     island: float  # m^2
+    _asked: _Answers = field(default_factory=lambda: _Answers(_REMEMBERED), init=False, repr=False, compare=False)
 
     @property
     def noise(self) -> float:
@@ -84,6 +103,9 @@ class ByPlace:
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """By where the faces are; the frame's number matters where the room changes."""
+        return self._asked.of(frame, mesh, lambda: self._moving(frame, mesh))
+
+    def _moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         chosen = self.chosen & (frame >= self.rest.until) & (frame < self.rest.since)
         return without_islands(mesh, self.faces_at(mesh, chosen, elsewhere=True), self.island)
 
@@ -132,7 +154,7 @@ class ByMasks:
     cell: float  # m
     threshold: float  # share of the pixels that see a face
     island: float  # m^2
-    _known: dict[int, UInt8[np.ndarray, " B"]] = field(default_factory=dict, repr=False)  # a bit a face, by frame
+    _asked: _Answers = field(default_factory=_Answers, init=False, repr=False, compare=False)
 
     @property
     def noise(self) -> float:
@@ -158,9 +180,7 @@ class ByMasks:
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """By the votes of the pixels; faces that no view sees take their neighbours' label. A frame is asked once."""
-        if frame not in self._known:
-            self._known[frame] = np.packbits(self._voted(frame, mesh))
-        return np.unpackbits(self._known[frame], count=len(mesh.faces)).astype(bool)
+        return self._asked.of(frame, mesh, lambda: self._voted(frame, mesh))
 
     def _voted(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         if mesh.is_empty:
