@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from ....errors import InputError
 from ....geometry.inside import winding_numbers
@@ -27,6 +27,7 @@ FARTHEST = 1 << 30  # cells that a frame may be away
 SHEETS = 0.05  # share of a mesh's area from which sheets are kept and trimmed; less of them is left out
 _BLOCK = 4  # points a side of a block that is decided at once where no surface is near
 _PROBE = 0.02  # cells before and behind a face
+_ASKED = 20_000  # faces, at least where there are as many, that tell whether there are sheets
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,13 +104,14 @@ class _Signs:
     def __init__(self, mesh: Mesh) -> None:
         self.surface = Surface(mesh)
         self._closed = not len(border_edges(weld(mesh)))
-        sheet = np.zeros(len(mesh.faces), bool) if self._closed else self._sheet_faces()
-        self.has_sheets = bool(self.surface.areas[sheet].sum() > SHEETS * self.surface.areas.sum())
-        self._sheet = sheet & self.has_sheets  # untrimmed, one loose face would have all that is behind it inside
+        self.has_sheets = not self._closed and self._many_are_sheets()
 
     def inside(self, points: Float64[np.ndarray, "N 3"], hits: Hits) -> Bool[np.ndarray, " N"]:
         """Whether points are inside a body, or behind the sheet that is closest to them."""
-        sheet = self._sheet[hits.faces]
+        sheet = np.zeros(len(points), bool)  # untrimmed, one loose face would have all that is behind it inside
+        if self.has_sheets:
+            asked, which = np.unique(hits.faces, return_inverse=True)
+            sheet = self._sheets(asked)[which]
         behind = np.einsum("nd,nd->n", points - hits.points, self.surface.normals[hits.faces]) < 0
         behind[~sheet] = self._enclosed(points[~sheet])
         return behind
@@ -119,8 +121,14 @@ class _Signs:
         numbers = winding_numbers(self.surface.mesh, points)
         return (np.abs(numbers) if self._closed else numbers) > 0.5
 
-    def _sheet_faces(self) -> Bool[np.ndarray, " F"]:
-        """Faces that have no inside on either side."""
+    def _many_are_sheets(self) -> bool:
+        """Whether they are more than `SHEETS` of the area, by some of the faces."""
+        some = np.arange(0, len(self.surface.mesh.faces), max(1, len(self.surface.mesh.faces) // _ASKED))
+        areas = self.surface.areas[some]
+        return bool(areas[self._sheets(some)].sum() > SHEETS * areas.sum())
+
+    def _sheets(self, faces: Int64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+        """Which of some faces have no inside on either side."""
         mesh = self.surface.mesh
-        middles, offsets = mesh.vertices[mesh.faces].mean(axis=1), _PROBE * self.surface.normals
+        middles, offsets = mesh.vertices[mesh.faces[faces]].mean(axis=1), _PROBE * self.surface.normals[faces]
         return ~(self._enclosed(middles - offsets) | self._enclosed(middles + offsets))
