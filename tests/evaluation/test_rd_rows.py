@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from meshreel.cli.bench import describe
 from meshreel.derived import Chosen
 from meshreel.encoder import encode
 from meshreel.errors import InputError
-from meshreel.evaluation import fresh, peers, rd_rows
+from meshreel.evaluation import fresh, peers, rd_rows, runner
 from meshreel.evaluation.bench import Bench
 from meshreel.evaluation.codec import TwoStepCodec
 from meshreel.evaluation.codecs import CODECS, make_codec
@@ -160,10 +161,26 @@ def test_points_of_one_analysis_are_measured_together_and_analysed_once(bench, m
     assert rows[0]["encode_stages_s"]["track"] == rows[2]["encode_stages_s"]["track"]
 
 
+def test_side_by_side_the_longest_runs_come_first(bench, monkeypatch, tmp_path):
+    came = []
+
+    def measured(point, *_):
+        came.append(point.codec)
+        return {"point": point.key, "codec": point.codec}
+
+    monkeypatch.setattr(runner, "measure_point", measured)
+    draco = [Point("ball", "draco", {"qp": qp}, kind=RATED) for qp in (7, 8)]
+    smaller = [Point("ball", "decimated_draco", {"fraction": 0.2, "qp": qp}, kind=RATED) for qp in (7, 8, 9)]
+    with ThreadPoolExecutor(1) as executor:
+        rows = run_points([*draco, *smaller], tmp_path / "rows.jsonl", bench, lambda *_: None, executor)
+    assert came == ["decimated_draco"] * 3 + ["draco"] * 2
+    assert [row["codec"] for row in rows] == ["draco"] * 2 + ["decimated_draco"] * 3  # told in their order
+
+
 def test_rows_of_an_experiment_that_measures_alike_count(bench, monkeypatch, tmp_path):
     point, file = Point("ball", "draco", {"qp": 7}, kind=RATED), tmp_path / "rows.jsonl"
     [row] = run_points([point], file, bench, lambda *_: None)
-    monkeypatch.setattr(rd_rows, "measure_rated", lambda *_: pytest.fail("measured again"))
+    monkeypatch.setattr(runner, "measure_point", lambda *_: pytest.fail("measured again"))
     other = Bench(bench.data, "table2", QUICK, bench.cache, alike=("figure6", "table2"))
     [again] = run_points([point], file, other, lambda *_: None)
     assert again == row | {"experiment": "table2"} and len(file.read_text().splitlines()) == 2

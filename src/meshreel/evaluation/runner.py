@@ -103,14 +103,14 @@ def _shared(point: Point) -> object:
 
 
 def _side_by_side(runs: Sequence[list[Point]], bench: Bench, executor: Executor) -> Iterator[Row]:
-    """The rows of all runs as they come."""
+    """The rows of all runs as they come; the longest begin first, so that no worker is left with one at the end."""
     arrived: SimpleQueue[Row | Future[None]] = SimpleQueue()
 
     def measure(run: list[Point]) -> None:
         for row in _rows_of(run, bench):
             arrived.put(row)
 
-    waiting = [executor.submit(measure, run) for run in runs]
+    waiting = [executor.submit(measure, run) for run in sorted(runs, key=len, reverse=True)]
     for task in waiting:
         task.add_done_callback(arrived.put)
     done = itertools.count(1)
