@@ -27,8 +27,9 @@ FRAMES = ("--fps", "10")
 def quick_bodies(monkeypatch):
     """Bodies coded frame by frame: what is told of a scene does not depend on how its bodies are coded."""
 
-    def frame_by_frame(frames, options):
-        return [group for frame in frames for group in encode_window([frame], options)]
+    def frame_by_frame(frames, options, stages):
+        windows = [frames] if frames[0].is_empty else [[frame] for frame in frames]
+        return [group for window in windows for group in encode_window(window, options, stages)]
 
     monkeypatch.setattr("meshreel.scene.encode_segment", frame_by_frame)
 
