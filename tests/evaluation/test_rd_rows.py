@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from threading import Event
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from meshreel.derived import Chosen
 from meshreel.encoder import encode
 from meshreel.errors import InputError
 from meshreel.evaluation import fresh, peers, rd_rows, runner
+from meshreel.evaluation.apart import make_apart
 from meshreel.evaluation.bench import Bench
 from meshreel.evaluation.codec import TwoStepCodec
 from meshreel.evaluation.codecs import CODECS, make_codec
@@ -175,6 +177,38 @@ def test_side_by_side_the_longest_runs_come_first(bench, monkeypatch, tmp_path):
         rows = run_points([*draco, *smaller], tmp_path / "rows.jsonl", bench, lambda *_: None, executor)
     assert came == ["decimated_draco"] * 3 + ["draco"] * 2
     assert [row["codec"] for row in rows] == ["draco"] * 2 + ["decimated_draco"] * 3  # told in their order
+
+
+def test_side_by_side_a_sequence_is_made_beside_the_runs_of_others(bench, monkeypatch, tmp_path):
+    """And runs wait for their own, the longest of those that can begin first."""
+    came, begun = [], Event()
+
+    def measured(point, *_):
+        came.append(point.sequence)
+        begun.set()
+        return {"point": point.key, "sequence": point.sequence}
+
+    def make(sequence, frames, _):
+        came.append(f"{sequence} of {frames}")
+        assert begun.wait(60)  # while it is made, others are measured
+
+    monkeypatch.setattr(runner, "measure_point", measured)
+    monkeypatch.setattr(runner, "make_apart", make)
+    rooms = [Point(ROOM, "decimated_draco", {"qp": qp}, FRAMES, RATED) for qp in (7, 8)]
+    ball = Point("ball", "draco", {}, kind=RATED)
+    with ThreadPoolExecutor(2) as executor:
+        rows = run_points([*rooms, ball], tmp_path / "rows.jsonl", bench, lambda *_: None, executor)
+    assert sorted(came[:2]) == ["ball", f"{ROOM} of {FRAMES}"] and came[2:] == [ROOM, ROOM]
+    assert [row["sequence"] for row in rows] == [ROOM, ROOM, "ball"]
+
+
+def test_a_sequence_is_made_in_a_process_and_what_is_missing_is_told(bench, tmp_path):
+    make_apart(ROOM, 2, replace(bench, cache=tmp_path / "rows.cache"))
+    assert (tmp_path / "rows.cache" / f"{ROOM}-2").is_dir()
+    point = Point("room2", "draco", {}, kind=RATED)
+    with pytest.raises(InputError, match="lr_kt2"), ThreadPoolExecutor(1) as executor:
+        run_points([point], tmp_path / "rows.jsonl", bench, lambda *_: None, executor)
+    assert not (tmp_path / "rows.jsonl").exists()
 
 
 def test_rows_of_an_experiment_that_measures_alike_count(bench, monkeypatch, tmp_path):

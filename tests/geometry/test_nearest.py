@@ -16,6 +16,18 @@ def test_distances_are_those_of_all_pairs_wherever_in_the_world(place):
     np.testing.assert_allclose(found, brute_force_distances(points, ball), atol=1e-6)
 
 
+def test_answers_do_not_depend_on_the_order_of_the_queries():
+    ball, rng = Surface(sphere(0.5, 3)), np.random.default_rng(0)
+    points = rng.normal(0, 0.6, (500, 3))
+    hits, mixed = ball.closest(points), rng.permutation(len(points))
+    again, alone = ball.closest(points[mixed]), [ball.closest(point[None]) for point in points]
+    for name in ("points", "faces", "barycentric"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(hits, name)[mixed])
+        np.testing.assert_array_equal(np.concatenate([getattr(one, name) for one in alone]), getattr(hits, name))
+    repeated = ball.closest(np.full((5, 3), 0.7))
+    assert len(set(repeated.faces.tolist())) == 1 and len(ball.closest(np.zeros((0, 3))).faces) == 0
+
+
 def test_what_lies_past_the_border_is_told_from_what_lies_above():
     square, ball = plane(1.0, 4), sphere(0.5, 2)
     points = np.array([[0.5, 0.5, 0.3], [0.98, 0.4, -0.2], [1.1, 0.4, 0.2], [-0.1, -0.1, 0], [0.4, 1.3, 0]])

@@ -2,7 +2,7 @@
 
 In: points, where their sequence is, a limit. Out: their rows, or some that say why there is none (`FAILED`). Points of
 one call have one process, which may share work between them; the one that ends it fails, and the others go on in
-another.
+another. Sequences that take long to make are made in such a process, too.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
+from ..errors import InputError
 from .bench import Bench
 from .provenance import made_by
 from .rows import FAILED, Point, Row
@@ -37,13 +38,11 @@ def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = (
     """The rows of some points, each as it is there; a point may take `bench.limit_s`. `rows` are those before them."""
     left, bench = list(points), bench.absolute()
     while left:
-        with tempfile.TemporaryFile() as said, _folder() as folder:
-            process = _started(said, folder)
+        with _process() as (process, said):
             limit = _Limit(process, bench.limit_s)
             try:
-                for line in _lines(process, (left, bench, list(rows))):
+                for row in _answers(process, (_measured, left, bench, list(rows))):
                     limit.again()
-                    row = dict(json.loads(line))
                     yield row if FAILED not in row else _failed(left[0], bench, row[FAILED])
                     left.pop(0)
                     if not left:
@@ -53,12 +52,35 @@ def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = (
             finally:
                 limit.stop()
                 _end(process)
-                _close(process)
-                _RUNNING.discard(process)
             if left and _ENDED.is_set():
                 raise InterruptedError("the sweep has been ended")
             if left:
                 yield _failed(left.pop(0), bench, limit.reached or last_words(process.returncode, said))
+
+
+def make_apart(sequence: str, frames: int | None, bench: Bench) -> None:
+    """Makes what is kept of a sequence (`open_dataset`). Raises InputError where that is not possible."""
+    with _process() as (process, said):
+        answers = list(_answers(process, (_made, sequence, frames, bench.absolute())))
+        process.wait()
+        if _ENDED.is_set():
+            raise InterruptedError("the sweep has been ended")
+        for answer in answers or [{FAILED: f"{sequence} was not made: {last_words(process.returncode, said)}"}]:
+            if FAILED in answer:
+                raise InputError(answer[FAILED])
+
+
+@contextlib.contextmanager
+def _process() -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes]]]:
+    """A process that waits for its task, and what it says; it has ended afterwards."""
+    with tempfile.TemporaryFile() as said, _folder() as folder:
+        process = _started(said, folder)
+        try:
+            yield process, said
+        finally:
+            _end(process)
+            _close(process)
+            _RUNNING.discard(process)
 
 
 def _folder() -> tempfile.TemporaryDirectory[str]:
@@ -83,13 +105,14 @@ def _started(said: IO[bytes], folder: str) -> subprocess.Popen[bytes]:
     return process
 
 
-def _lines(process: subprocess.Popen[bytes], task: object) -> Iterator[bytes]:
+def _answers(process: subprocess.Popen[bytes], task: tuple[object, ...]) -> Iterator[Row]:
     """What a process answers to its task, line by line; not one that it was ended in."""
     assert process.stdin is not None and process.stdout is not None
     with contextlib.suppress(BrokenPipeError):  # it has ended, and said why
         process.stdin.write(pickle.dumps(task))
         process.stdin.flush()  # and it stays open: its end is ours
-    yield from itertools.takewhile(lambda line: line.endswith(b"\n"), process.stdout)
+    lines = itertools.takewhile(lambda line: line.endswith(b"\n"), process.stdout)
+    return (dict(json.loads(line)) for line in lines)
 
 
 class _Limit:
@@ -158,25 +181,41 @@ def _failed(point: Point, bench: Bench, reason: str) -> Row:
 
 
 def main() -> None:
-    """In the fresh process: a task from standard input, pickled by whoever started it; rows to standard output.
+    """In the fresh process: a task from standard input, pickled by whoever started it; answers to standard output.
 
     What libraries print goes where errors go.
     """
-    rows = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
+    task, *about = pickle.load(sys.stdin.buffer)
+    _end_with_parent()
+    for answer in task(*about):
+        answers.write(answer + "\n")
+        answers.flush()
+
+
+def _measured(points: Sequence[Point], bench: Bench, before: Sequence[Row]) -> Iterator[str]:
+    """The task of `measure_apart`."""
     from .measure import measure_point
 
-    points, bench, before = pickle.load(sys.stdin.buffer)
-    _end_with_parent()
     here = Path.cwd()
     for point in points:
         try:
             os.chdir(here)  # where a codec may have left
-            row = json.dumps(measure_point(point, bench, before), allow_nan=False)
+            yield json.dumps(measure_point(point, bench, before), allow_nan=False)
         except (Exception, SystemExit) as error:  # whatever a codec raises is its row
-            row = json.dumps({FAILED: f"{type(error).__name__}: {error}"[:LONGEST]})
-        rows.write(row + "\n")
-        rows.flush()
+            yield json.dumps({FAILED: f"{type(error).__name__}: {error}"[:LONGEST]})
+
+
+def _made(sequence: str, frames: int | None, bench: Bench) -> Iterator[str]:
+    """The task of `make_apart`."""
+    from .datasets import open_dataset
+
+    try:
+        open_dataset(sequence, bench.data, frames, bench.cache)
+        yield json.dumps({})
+    except InputError as error:
+        yield json.dumps({FAILED: str(error)})
 
 
 def _end_with_parent() -> None:

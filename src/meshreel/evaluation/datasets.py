@@ -35,6 +35,7 @@ BODIES: dict[str, Place] = {  # of SYNTHETIC, m: on one floor, 30 cm apart
 }
 SYNTHETIC_FRAMES = 10
 RECORDINGS = ("living_room",)
+MADE = (*SCENES, PROCEDURAL, *RECORDINGS)  # simulated or fused, and kept: minutes
 PERFORMERS, RECORDED = "performers", "captures"  # folders of the benchmark data
 SCALES = {"basketball_player": 0.1}  # to metres; the others are in metres
 REMESHED = {"crane60": "crane", "samba60": "samba"}  # new connectivity in every frame, from a body that has one

@@ -6,23 +6,23 @@ in measure.py.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from pathlib import Path
-from queue import SimpleQueue
+from queue import PriorityQueue, SimpleQueue
 
-from .apart import measure_apart
+from .apart import make_apart, measure_apart
 from .bench import Bench
 from .codec import TwoStepCodec
 from .codecs import make_codec
-from .datasets import open_dataset
+from .datasets import MADE, open_dataset
 from .measure import measure_point
 from .rd_rows import KINDS as RATED_KINDS
 from .rows import FAILED, Point, Row, append_row, check_appendable, measured_rows, read_rows
 from .scene_rows import KINDS as SCENE_KINDS
 
 AFTER = ("decode",)  # kinds of points that compare with rows measured before
+Source = tuple[str, int | None]  # a sequence, and how many frames of it
 Tell = Callable[[Row, bool], None]  # a row, and whether it is new
 
 
@@ -53,7 +53,7 @@ def run_points(
     missing = [point for point in points if point.key not in known]
     if missing:
         check_appendable(file)
-    _check_sequences(missing, bench)
+    _check_sequences(missing, bench, executor is not None)
     for row in _measured(missing, list(known.values()), bench, executor):
         append_row(file, row)
         known[row["point"]] = row
@@ -103,29 +103,56 @@ def _shared(point: Point) -> object:
 
 
 def _side_by_side(runs: Sequence[list[Point]], bench: Bench, executor: Executor) -> Iterator[Row]:
-    """The rows of all runs as they come; the longest begin first, so that no worker is left with one at the end."""
-    arrived: SimpleQueue[Row | Future[None]] = SimpleQueue()
+    """The rows of all runs as they come; the longest begin first, so that no worker is left with one at the end.
 
-    def measure(run: list[Point]) -> None:
-        for row in _rows_of(run, bench):
+    Runs wait for their own sequence only: one that takes long to make is made beside the runs of others.
+    """
+    arrived: SimpleQueue[Row | Future[None]] = SimpleQueue()
+    ready: PriorityQueue[tuple[int, int]] = PriorityQueue()  # the longest first, then as they are in `runs`
+
+    def submit(task: Callable[..., None], *about: object) -> None:
+        executor.submit(task, *about).add_done_callback(arrived.put)
+
+    def make(source: Source, numbers: list[int]) -> None:
+        make_apart(*source, bench)
+        begin(numbers)
+
+    def begin(numbers: list[int]) -> None:
+        for number in numbers:
+            ready.put((-len(runs[number]), number))
+        for _ in numbers:
+            submit(measure)
+
+    def measure() -> None:
+        for row in _rows_of(runs[ready.get()[1]], bench):
             arrived.put(row)
 
-    waiting = [executor.submit(measure, run) for run in sorted(runs, key=len, reverse=True)]
-    for task in waiting:
-        task.add_done_callback(arrived.put)
-    done = itertools.count(1)
-    while waiting:
+    waiting: dict[Source | None, list[int]] = {}
+    for number, run in enumerate(runs):
+        waiting.setdefault(_made_first(run[0]), []).append(number)
+    there = waiting.pop(None, [])
+    left = len(waiting) + len(runs)
+    for source, numbers in waiting.items():
+        submit(make, source, numbers)
+    begin(there)
+    while left:
         if isinstance(came := arrived.get(), Future):
             came.result()  # raises what went wrong
-            if next(done) == len(waiting):
-                return
+            left -= 1
         else:
             yield came
 
 
-def _check_sequences(points: Sequence[Point], bench: Bench) -> None:
-    """Raises InputError where data are missing: that is no codec's failure."""
-    for sequence, frames in dict.fromkeys((p.sequence, p.frames) for p in points if p.kind not in SCENE_KINDS):
+def _made_first(point: Point) -> Source | None:
+    """What must be made before a point is measured, where that takes long."""
+    return (point.sequence, point.frames) if point.sequence in MADE and point.kind not in SCENE_KINDS else None
+
+
+def _check_sequences(points: Sequence[Point], bench: Bench, side_by_side: bool) -> None:
+    """Raises InputError where data are missing: that is no codec's failure; of what is made first it is told later."""
+    for sequence, frames in dict.fromkeys(
+        (p.sequence, p.frames) for p in points if p.kind not in SCENE_KINDS and not (side_by_side and _made_first(p))
+    ):
         open_dataset(sequence, bench.data, frames, bench.cache)
 
 

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Bool, Float32, Float64, Int64
 
 from ..types import Mesh
 from .topology import blend, border_mask, face_normals, unique_edges
 
 _AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
+_CURVE_BITS = 10  # of each coordinate: cells along a curve that fills space
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +59,12 @@ class Surface:
         """The closest point of the surface to each query, its face and its barycentric weights."""
         import open3d as o3d
 
-        points = o3d.core.Tensor.from_numpy(queries.astype(np.float32))
-        answer = self.scene.compute_closest_points(points, nthreads=1)  # more cost a tenth of the time and win nothing
-        faces = answer["primitive_ids"].numpy().astype(np.int64)
-        uv = answer["primitive_uvs"].numpy().astype(np.float64)
+        points = queries.astype(np.float32)
+        order = _along_curve(points)  # neighbours visit the same boxes: a fifth of the time, two thirds if shuffled
+        sorted_points = o3d.core.Tensor.from_numpy(points[order])
+        answer = self.scene.compute_closest_points(sorted_points, nthreads=1)  # more cost a tenth and win nothing
+        faces, uv = np.empty(len(queries), np.int64), np.empty((len(queries), 2))
+        faces[order], uv[order] = answer["primitive_ids"].numpy(), answer["primitive_uvs"].numpy()
         barycentric = np.stack([1 - uv[:, 0] - uv[:, 1], uv[:, 0], uv[:, 1]], axis=1)
         found = blend(self.mesh.vertices, self.mesh.faces[faces], barycentric)  # float64 again
         return Hits(found, faces, barycentric)
@@ -81,6 +84,18 @@ class Surface:
         ends = np.zeros(len(self.mesh.vertices), bool)
         ends[edges[border].reshape(-1)] = True
         return border[face_edges], ends[self.mesh.faces]
+
+
+def _along_curve(points: Float32[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
+    """An order in which neighbours follow each other: that of Morton codes of the cells they are in."""
+    if len(points) == 0:
+        return np.zeros(0, np.int64)
+    low = points.min(axis=0)
+    extent = float((points.max(axis=0) - low).max()) or 1.0
+    cells = ((points - low) / extent * (2**_CURVE_BITS - 1)).astype(np.uint32)
+    for shift, kept in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):  # bits two apart
+        cells = (cells | cells << np.uint32(shift)) & np.uint32(kept)
+    return np.argsort(cells[:, 0] | cells[:, 1] << np.uint32(1) | cells[:, 2] << np.uint32(2))
 
 
 class Outline:
