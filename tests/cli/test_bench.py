@@ -8,9 +8,11 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+import trimesh
 
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.cli.bench import describe
+from meshreel.evaluation import checksums
 from meshreel.evaluation.experiments import targets
 from meshreel.evaluation.rows import Point
 from meshreel.evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
@@ -46,7 +48,10 @@ def test_a_run_writes_rows_and_goes_on_where_it_was(run, tiny):
     said = run("bench", "report", rows, "-o", tiny / "out", "--json")
     names = ["results.md", "index.html", "tiny-dancer.png", "tiny-dancer.svg"]
     assert [Path(path).name for path in said.row["files"]] == names
-    assert run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--quiet").err == ""
+    assert run("bench", "run", "tiny", "-o", rows, "--data", tiny, "--no-ssim", "--quiet").err == ""
+    assert "was measured without pictures; say --no-ssim" in failed(
+        run("bench", "run", "tiny", "-o", rows, "--data", tiny)
+    )
 
 
 def test_only_some_codecs_may_be_run(run, tiny):
@@ -79,6 +84,34 @@ def test_an_experiment_takes_a_sequence_and_operating_points_more(run, study):
     report = run("bench", "report", rows, "-o", study / "out", "--json")
     assert report.code == 0 and len({Path(path).name for path in report.row["files"]}) == len(report.row["files"])
     assert all(Path(path).is_relative_to(study / "out") for path in report.row["files"])
+
+
+def test_a_path_is_a_path_and_its_rows_are_of_its_content(run, study, monkeypatch):
+    """A folder `ball` of one's own is not the `ball` that the benchmark has, and what changes is another sequence."""
+    mine = study / "mine"
+    (mine / "ball").mkdir(parents=True)
+    for number, mesh in enumerate(sliding_sphere(2, levels=1)):
+        trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).export(mine / "ball" / f"f_{number}.obj")
+    monkeypatch.chdir(mine)
+    rows, common = mine / "r.jsonl", ("--data", study, "--no-ssim", "--quiet", "--on")
+    for name in ("./ball", "./ball/f_*.obj"):
+        assert run("bench", "run", "figure6", "-o", rows, *common, name, "--fps", "10").code == 0
+    found = [json.loads(line) for line in rows.read_text().splitlines()]
+    assert [row["frame_rate"] for row in found] == [10, 10] and found[0]["bytes"] == found[1]["bytes"]
+    assert run("bench", "run", "figure6", "-o", rows, *common, "ball").code == 0
+    assert json.loads(rows.read_text().splitlines()[-1])["bytes"] > found[0]["bytes"]  # finer
+    again = ("bench", "run", "figure6", "-o", rows, *common, "./ball", "--fps")
+    assert "measured of another sequence, frames, scale or rate" in run(*again, "20").err
+    (mine / "ball" / "f_1.obj").write_text((mine / "ball" / "f_0.obj").read_text())
+    checksums.checksum.cache_clear()
+    assert "give another file for the rows" in run(*again, "10").err
+    assert "'./none' at that path or below" in run("bench", "run", "figure6", "-o", rows, *common, "./none").err
+
+
+def test_how_files_are_read_is_about_own_sequences(run, study, monkeypatch):
+    monkeypatch.setattr("meshreel.cli.bench.own_digest", lambda *_: None)
+    said = run("bench", "run", "figure6", "-o", study / "r.jsonl", "--data", study, "--scale", "0.001")
+    assert "the benchmark's sequences are what they are" in said.err
 
 
 @pytest.mark.parametrize(

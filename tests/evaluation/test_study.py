@@ -72,10 +72,20 @@ def test_the_promise_is_kept_only_where_the_best_is_left_of_all():
     best = [row("best", 0.5, 60), row("best", 1.0, 65)]
     other = [row("other", 1.0, 60), row("other", 2.0, 65)]
     [promise] = STUDY.promises([*best, *other])
-    assert promise.met and promise.value == "in 2 of 2 comparisons, 0 undecided"
+    assert (
+        promise.met and promise.value == "in 2 of 2 comparisons, 0 undecided (2 over a common range, 0 point by point)"
+    )
     crossing = [row("third", 0.4, 60), row("third", 2.0, 65)]
     [promise] = STUDY.promises([*best, *other, *crossing])
-    assert promise.met is False and promise.value.startswith("in 2 of 4 comparisons, 0 undecided; not third: D2")
+    assert promise.met is False and promise.value.startswith("in 2 of 4 comparisons, 0 undecided (4 over")
+    assert "; not third: D2" in promise.value and "past" not in promise.value
+    flat, high = [row("best", 0.5, 60), row("best", 1.0, 60.01)], [row("high", 1.0, 59), row("high", 2.0, 70)]
+    [promise] = STUDY.promises([*flat, *high])
+    told = "in 2 of 2 comparisons, 0 undecided (0 over a common range, 2 point by point)"
+    assert (
+        promise.value
+        == f"{told}; past its best point in D2, paper form: high; past its best point in masked SSIM: high"
+    )
     [promise] = STUDY.promises(best)
     assert promise.met is None
     [promise] = STUDY.promises([best[0], other[1]])  # a point each is no range
@@ -92,6 +102,14 @@ def test_an_anchor_is_what_others_are_compared_with():
     table = "\n".join(study.comparisons(rows))
     assert "| against whole | rate at equal D2" in table and "| part | +100.0 % (60 dB to 65 dB) |" in table
     assert "A note." in list(study.sections(rows))
+
+
+def test_what_is_declared_and_not_measured_is_told():
+    points = list(STUDY.points(False))
+    found = "\n".join(STUDY.sections([{"point": points[0].key, "sequence": points[0].sequence}]))
+    left = sum(point.sequence == points[0].sequence for point in points) - 1
+    assert f"Declared and not measured: {points[0].sequence} ({left} points), body (" in found
+    assert "Declared" not in "\n".join(STUDY.sections([{"point": "?", "sequence": "mine"}]))
 
 
 def test_the_floor_is_what_the_truth_reaches():

@@ -16,6 +16,7 @@ from rich.table import Table
 from ..errors import InputError
 from ..evaluation.apart import begin, end_all
 from ..evaluation.bench import Bench
+from ..evaluation.datasets import own_digest
 from ..evaluation.experiment import Experiment
 from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
@@ -27,6 +28,7 @@ from ..evaluation.runner import run_points
 from ..evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from ..evaluation.study import Study
 from .console import Common
+from .reading import Reading
 
 command = App(name="bench", help="Measure codecs against each other, and make tables and plots of the rows.")
 BESIDE = (".cache", ".pictures")  # endings of folders
@@ -123,12 +125,14 @@ def run(
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
     selection: Selection = Selection(),
     running: Running = Running(),
+    reading: Reading = Reading(),
     common: Common = Common(),
 ) -> None:
     """Run an experiment and print what it promised and reached.
 
     Every row is appended to the output as soon as it is there, and rows that are there are not run again. Sequences
-    that take long to make are kept in a folder beside it, whose name ends in `.cache`.
+    that take long to make are kept in a folder beside it, whose name ends in `.cache`. How files are read (`--fps`,
+    `--frames`, `--scale`) is about sequences of your own.
 
     Parameters
     ----------
@@ -144,7 +148,11 @@ def run(
     points = selection.of(chosen, experiment)
     comparison, cache = replace(chosen.COMPARISON, ssim=running.ssim), output.with_suffix(".cache")
     alike = [name for name, other in EXPERIMENTS.items() if isinstance(other, Study) and isinstance(chosen, Study)]
-    bench = Bench(selection.data, experiment, comparison, cache, running.limit, running.retry, tuple(alike))
+    bench = Bench(
+        selection.data, experiment, comparison, cache, running.limit, running.retry, tuple(alike), reading.options()
+    )
+    if reading != Reading() and not any(own_digest(name, bench.data, bench.own) for name in _sequences(points)):
+        raise InputError("--fps, --frames, --scale: the benchmark's sequences are what they are; name one with --on")
     with common.stages(len(points)) as progress, side_by_side(running.jobs) as executor:
 
         def tell(row: Row, new: bool) -> None:

@@ -212,7 +212,7 @@ def _made(sequence: str, frames: int | None, bench: Bench) -> Iterator[str]:
     from .datasets import open_dataset
 
     try:
-        open_dataset(sequence, bench.data, frames, bench.cache)
+        open_dataset(sequence, bench.data, frames, bench.cache, bench.own)
         yield json.dumps({})
     except InputError as error:
         yield json.dumps({FAILED: str(error)})

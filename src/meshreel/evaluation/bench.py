@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ..io.sequence import SequenceOptions
 from ..metrics.report import ComparisonOptions
 
 
@@ -19,6 +20,7 @@ class Bench:
     limit_s: float | None = None  # wall time of a point, which then has a process of its own; None: measured in this
     retry: bool = False  # points that failed before are measured again
     alike: tuple[str, ...] = ()  # experiments that measure in the same way: their rows count, too
+    own: SequenceOptions = field(default_factory=SequenceOptions)  # how files become a sequence that is no benchmark's
 
     def absolute(self) -> Bench:
         """The same wherever a process goes."""

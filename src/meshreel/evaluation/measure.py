@@ -117,7 +117,7 @@ def measure_point(point: Point, bench: Bench, rows: Sequence[Row] = ()) -> Row:
         return head | measure_rated(point, bench)
     if point.kind in SCENE_KINDS:
         return head | measure_scene(point, bench.data, bench.cache)
-    sequence = open_dataset(point.sequence, bench.data, point.frames, bench.cache)
+    sequence = open_dataset(point.sequence, bench.data, point.frames, bench.cache, bench.own)
     if point.kind == "backwards":
         sequence = Backwards(sequence)
     row: Row

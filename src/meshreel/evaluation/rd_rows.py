@@ -16,6 +16,7 @@ from typing import Any
 
 from ..derived import Chosen
 from ..errors import InputError
+from ..io.sequence import SequenceOptions
 from ..metrics.render import Visible
 from ..metrics.report import compare_sequences
 from ..metrics.truth import Scene, scene_means, scene_row
@@ -28,6 +29,7 @@ from .datasets import Dataset, open_known
 from .filenames import file_name
 from .fresh import peak_rss_mb
 from .groups import group_records
+from .identity import identity
 from .originals import KEPT_PICTURES, KeptPictures
 from .peers import measure_fresh_decode
 from .pictures import draw_decoded, draw_original
@@ -47,12 +49,12 @@ TRUTH = ("d2_psnr_backward", "ssim_masked", "normal_error_deg", "people_ssim_mas
 
 def measure_rated(point: Point, bench: Bench) -> Row:
     """The row of a point."""
-    known = _opened(point.sequence, bench.data, point.frames, bench.cache)
+    known = _opened(point.sequence, bench.data, point.frames, bench.cache, bench.own)
     count = len(known.sequence)
     some = evenly(count, SOME) if known.cameras else list(range(count))
     numbers = some[::2] if known.cameras else some
     head: Row = {"sequence": point.sequence, "frames": count, "frame_rate": known.sequence.frame_rate}
-    head |= {"measured_frames": numbers}
+    head |= {"measured_frames": numbers} | identity(point, bench)
     if point.kind == FLOOR:
         return head | {"codec": TRUTH_ITSELF, "options": point.options} | _floor(known, numbers, bench)
     codec = make_codec(point.codec, point.options)
@@ -148,8 +150,8 @@ def _pictures(point: Point, known: Dataset, numbers: Sequence[int], shown: tuple
 
 
 @lru_cache(maxsize=1)
-def _opened(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:
-    return open_known(name, data, frames, cache)
+def _opened(name: str, data: Path, frames: int | None, cache: Path | None, own: SequenceOptions) -> Dataset:
+    return open_known(name, data, frames, cache, own)
 
 
 @lru_cache(maxsize=SOME)

@@ -16,6 +16,7 @@ from .bench import Bench
 from .codec import TwoStepCodec
 from .codecs import make_codec
 from .datasets import MADE, open_dataset
+from .identity import check_same
 from .measure import measure_point
 from .rd_rows import KINDS as RATED_KINDS
 from .rows import FAILED, Point, Row, append_row, check_appendable, measured_rows, read_rows
@@ -44,6 +45,7 @@ def run_points(
     others = {
         row["point"]: row for name in bench.alike for row in measured_rows(_of(stored, name)) if _alike(row, bench)
     }
+    check_same(points, others | known, bench, file)
     for point in points:
         if FAILED in known.get(point.key, {FAILED: "not there"}) and point.key in others:
             known[point.key] = others[point.key] | {"experiment": bench.experiment}
@@ -153,7 +155,7 @@ def _check_sequences(points: Sequence[Point], bench: Bench, side_by_side: bool) 
     for sequence, frames in dict.fromkeys(
         (p.sequence, p.frames) for p in points if p.kind not in SCENE_KINDS and not (side_by_side and _made_first(p))
     ):
-        open_dataset(sequence, bench.data, frames, bench.cache)
+        open_dataset(sequence, bench.data, frames, bench.cache, bench.own)
 
 
 def _rows_of(run: Sequence[Point], bench: Bench, rows: Sequence[Row] = ()) -> Iterator[Row]:

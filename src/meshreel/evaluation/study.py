@@ -7,12 +7,13 @@ those of `rd_rows`.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..errors import InputError
-from ..metrics.bd_rate import Curve, beats
+from ..metrics.bd_rate import Curve, beats, have_range
 from ..metrics.report import ComparisonOptions
 from .codecs import make_codec
 from .curves import Measure, against, curve, curve_of, value
@@ -131,26 +132,42 @@ class Study:
     def sections(self, rows: Sequence[Row]) -> Iterator[str]:
         """What must be known of the numbers, and each codec at the point that can be compared."""
         yield from ("", *self.notes) if self.notes else ()
+        if lacking := self._lacking(rows):
+            yield from ("", f"Declared and not measured: {', '.join(lacking)}.")
         if self.common is not None:
             key, wanted = self.common
             yield from ("", f"## Near {wanted:g} {UNITS[key]}", "", *comparable_table(rows, wanted, key))
 
+    def _lacking(self, rows: Sequence[Row]) -> list[str]:
+        """Sequences with the number of their points that have no row; none where all rows are of other sequences."""
+        there, counts = {row.get("point") for row in rows}, Counter[str]()
+        for point in self.points(small=False):
+            counts[point.sequence] += point.key not in there
+        own = {row["sequence"] for row in rows} & set(counts)
+        return [f"{text(name)} ({count} points)" for name, count in counts.items() if count] if own else []
+
     def _left_of_all(self, rows: Sequence[Row], sequence: str) -> Promise:
         own = [row for kind in (RATED, SAMPLED) for row in select(rows, sequence, kind=kind)]
         promised = f"{text(sequence)}: {self.best} needs less rate than every other codec wherever both reach a quality"
-        told, met = list[str](), list[bool | None]()
+        lost, beyond = list[str](), dict[str, list[str]]()
+        met, ranges = list[bool | None](), 0
         for name in dict.fromkeys(map(curve_of, own)):
             for measure in PROMISED if name != self.best else ():
                 best, other = _curve(own, str(self.best), measure), _curve(own, name, measure)
                 several = min(len(best.rates), len(other.rates)) > 1  # a point is no range
                 left = beats(best, other, measure.least) if several else None
                 met.append(left)
-                told += [f"not {text(name)}: {against(other, best, measure)}"] if left is False else []
+                ranges += left is not None and have_range(best, other, measure.least)
+                lost += [f"not {text(name)}: {against(other, best, measure)}"] if left is False else []
+                if several and max(other.qualities) > max(best.qualities) + measure.least:
+                    beyond.setdefault(measure.name, []).append(text(name))
         decided = [left for left in met if left is not None]
         if not decided:
             return Promise(promised, "in D2 and masked SSIM")
-        found = f"in {sum(decided)} of {len(met)} comparisons, {len(met) - len(decided)} undecided"
-        return Promise(promised, "in D2 and masked SSIM", "; ".join([found, *told]), all(decided))
+        ways = f"{ranges} over a common range, {len(decided) - ranges} point by point"
+        found = f"in {sum(decided)} of {len(met)} comparisons, {len(met) - len(decided)} undecided ({ways})"
+        past = [f"past its best point in {measure}: {', '.join(names)}" for measure, names in beyond.items()]
+        return Promise(promised, "in D2 and masked SSIM", "; ".join([found, *lost, *past]), all(decided))
 
 
 def operating_point(point: str) -> tuple[str, dict[str, Any]]:

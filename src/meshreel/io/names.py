@@ -27,6 +27,11 @@ def is_text(name: str) -> bool:
     return True
 
 
+def is_pattern(name: str) -> bool:
+    """Whether a name may stand for several files."""
+    return _MAGIC.search(name) is not None
+
+
 def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
     """The frame files of a source and remarks about their order. A list keeps its own order."""
     if not isinstance(source, str | Path):
@@ -40,7 +45,7 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, 
         return _ordered(path, _of_one_kind(path))
     if path.exists():
         return (path,), ()
-    if _MAGIC.search(str(source)):
+    if is_pattern(str(source)):
         root, found = _globbed(path)
         if not found:
             raise InputError(f"{source}: no mesh file fits this pattern; check it, or name the folder")

@@ -175,12 +175,17 @@ def beats(test: Curve, anchor: Curve, least: float = 0.0) -> bool | None:
     Where their overlap is not above `least`, points decide: whose are better and cheaper than all that the other has in
     its reach.
     """
-    found = bd_rate(anchor, test)
-    if found.percent is not None and found.high - found.low > least:
+    if have_range(test, anchor, least):
         return gain_end(anchor, test).share == 1.0
     a, b = _front(anchor), _front(test)
     won, lost = _dominates(b, a), _dominates(a, b)
     return won if won != lost else None
+
+
+def have_range(test: Curve, anchor: Curve, least: float = 0.0) -> bool:
+    """Whether two curves have a BD-rate over a range of qualities above `least`."""
+    found = bd_rate(anchor, test)
+    return found.percent is not None and found.high - found.low > least
 
 
 def _dominates(b: Float64[np.ndarray, "N 2"], a: Float64[np.ndarray, "M 2"]) -> bool:

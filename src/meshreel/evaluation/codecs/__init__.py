@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 from ...errors import InputError
@@ -43,8 +43,18 @@ def make_codec(kind: str, options: dict[str, Any]) -> Codec:
         raise InputError(f"codec {kind!r} does not take {options}: {error}") from error
 
 
+def codec_version(kind: str) -> str | None:
+    """The distribution that brings somebody else's codec, and its version; None for ours and where none says so."""
+    entry = None if kind in CODECS else _others().get(kind)
+    return None if entry is None or entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
+
+
+def _others() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+
+
 def _of_another_package(kind: str) -> Callable[..., Codec]:
-    others = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+    others = _others()
     if kind not in others:
         raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted({*CODECS, *others}))}")
     try:
