@@ -105,6 +105,23 @@ def test_a_codec_of_another_package_is_found_and_names_of_ours_stay_ours():
         make_codec("none", {})
 
 
+def test_rows_know_the_version_of_somebody_elses_codec(installed, tmp_path, monkeypatch):
+    points, file = [Point("ball", "raw", {}, kind=RATED)], tmp_path / "rows.jsonl"
+    [row] = run_points(points, file, Bench(installed, comparison=QUICK), lambda *_: None)
+    assert row["codec_version"] == "rawcodec 1.0" and len(row["source"]) == 64
+    monkeypatch.setattr("meshreel.evaluation.identity.codec_version", lambda _: "rawcodec 2.0")
+    with pytest.raises(InputError, match=r"another version of the codec \(rawcodec 1.0, now rawcodec 2.0\)"):
+        run_points(points, file, Bench(installed, comparison=QUICK), lambda *_: None)
+
+
+@pytest.mark.usefixtures("installed")
+@pytest.mark.parametrize("name", ["meshreel best", "draco"])
+def test_a_codec_that_calls_itself_as_one_of_ours_is_refused(name, monkeypatch):
+    monkeypatch.setattr(import_module("rawcodec").Raw, "name", name)
+    with pytest.raises(InputError, match=f"'raw' calls itself '{name}', as one of meshreel's own"):
+        make_codec("raw", {})
+
+
 @pytest.mark.usefixtures("installed")
 def test_a_codec_with_bytes_of_its_own_is_measured_as_ours_are():
     row = run_point("ball", BALLS, make_codec("raw", {}), QUICK)
@@ -133,6 +150,8 @@ def test_what_fails_is_a_row_and_the_others_are_measured(installed, tmp_path):
         rows = run_points(points, file, bench, lambda *_: None, executor)
     for row, (how, words) in zip(rows, ways.items(), strict=False):
         assert words in row[FAILED] and row["options"] == {"how": how} and row["sequence"] == "ball"
+    raised = PLUGIN.splitlines().index('            raise RuntimeError("no idea")') + 1
+    assert rows[1][FAILED] == f"RuntimeError: no idea (rawcodec.py, line {raised})"
     assert FAILED not in rows[-1] and rows[-1]["mbps"] > 0
     assert len(failed_rows(rows)) == 4 and select(rows, "ball", kind="curve") == rows[-1:]
     assert sorted(map(json.dumps, read_rows(file))) == sorted(map(json.dumps, rows))

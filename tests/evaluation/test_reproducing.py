@@ -45,7 +45,17 @@ def test_on_scenes_points_stand_beside_the_best_of_ours():
     rows = [row("room2", "meshreel best", 0.3, 55), row("room2", "draco", 8.0, 50), row("room2", "draco", 12.0, 56)]
     found = [line for line in reproducing_page(rows) if line.startswith("| Draco") and "26.43" in line]
     assert len(found) == 1 and "12 Mbps, 56.00 dB" in found[0]
+    flat = [row("room2", "tvmc", 1.0, 54.95), row("room2", "tvmc", 9.0, 55.1)]  # the dearer one is no better
+    assert "1 Mbps, 54.95 dB" in "\n".join(reproducing_page([*rows, *flat]))
     assert any(line.startswith("| system | paper | here, room2 |") for line in reproducing_page(rows))
+
+
+def test_tsmc_has_two_curves_and_says_where_it_is_set_to():
+    varied = row("synthetic4", "meshreel paper m", 3.0, 64, preset="paper", basis_size=10, quality=50.0)
+    tuned = row("synthetic4", "meshreel paper", 2.0, 65, preset="paper", quality=20.0)
+    assert "(m 10)" in "\n".join(reproducing_page([varied]))
+    page = "\n".join(reproducing_page([varied, tuned]))
+    assert "2 Mbps, 65.00 dB, SSIM 0.650, 2.0 ms (quality 20)" in page and "(m 10)" not in page
 
 
 def test_without_a_sequence_of_the_paper_there_is_no_page():

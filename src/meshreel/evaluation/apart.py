@@ -18,12 +18,14 @@ import subprocess
 import sys
 import tempfile
 import threading
+import traceback
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
 from ..errors import InputError
 from .bench import Bench
+from .codecs import source_of
 from .provenance import made_by
 from .rows import FAILED, Point, Row
 from .said import LONGEST, last_words
@@ -204,7 +206,16 @@ def _measured(points: Sequence[Point], bench: Bench, before: Sequence[Row]) -> I
             os.chdir(here)  # where a codec may have left
             yield json.dumps(measure_point(point, bench, before), allow_nan=False)
         except (Exception, SystemExit) as error:  # whatever a codec raises is its row
-            yield json.dumps({FAILED: f"{type(error).__name__}: {error}"[:LONGEST]})
+            yield json.dumps({FAILED: f"{type(error).__name__}: {error}"[:LONGEST] + _where(point.codec, error)})
+
+
+def _where(codec: str, error: BaseException) -> str:
+    """The line of somebody else's codec that an error came by last; empty for ours."""
+    own = source_of(codec)
+    lines = [
+        each for each in traceback.extract_tb(error.__traceback__) if own and Path(each.filename).is_relative_to(own)
+    ]
+    return f" ({Path(lines[-1].filename).name}, line {lines[-1].lineno})" if lines else ""
 
 
 def _made(sequence: str, frames: int | None, bench: Bench) -> Iterator[str]:

@@ -28,7 +28,7 @@ def commit() -> str | None:
     try:
         head = _git(here, "rev-parse", "HEAD")
         tracked = _git(here, "ls-files", "--error-unmatch", Path(__file__).name)
-        changed = _git(here, "status", "--porcelain", "--untracked-files=no", "--", "..")
+        changed = _git(here, "status", "--porcelain", "--", "..", ":(top)core", ":(top)CMakeLists.txt")
     except (OSError, subprocess.SubprocessError):  # no git, or the package is installed
         return None
     return head[:_DIGITS] + ("+" if changed else "") if tracked else None

@@ -10,14 +10,14 @@ from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
 from .curves import curve_of, value
-from .names import BEST
+from .names import BEST, TSMC, TUNED
 from .published import RELEASED, RELEASED_TVMC, TABLE_1, TABLE_2, Published
 from .rows import Row, curve_rows, measured_rows
 
 NAMES = ("figure6", "table1", "table2")  # experiments whose rows count
 SCENES = ("room2", "living_room", "procedural_room")
 SYNTHETIC = "synthetic4"
-NEAR_DB, FAR = 1.0, " †"  # a point that is farther is marked
+SLACK_DB, SHORT = 0.1, " †"  # a point that is worse by more is marked
 TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each table
 
 
@@ -86,29 +86,34 @@ def _told(row: Row | None) -> str:
     ssim = value(row, "ssim")
     told = [f"{row['mbps']:.3g} Mbps", f"{row['d2_psnr_paper']:.2f} dB"]
     told += [] if ssim is None else [f"SSIM {ssim:.3f}"]
-    return ", ".join([*told, *([] if decode is None else [f"{decode:.1f} ms"])])
+    told += [] if decode is None else [f"{decode:.1f} ms"]
+    return ", ".join(told) + _setting(row)
+
+
+def _setting(row: Row) -> str:
+    """Where TSMC is set to: several of its options choose a rate."""
+    options, curve = row["options"], curve_of(row)
+    if curve == TSMC:
+        return f" (m {options['basis_size']})"
+    return f" (quality {options.get('quality', 50):g})" if curve == TUNED else ""
 
 
 def _of(rows: Sequence[Row], codec: str) -> list[Row]:
-    return sorted((row for row in rows if curve_of(row) == codec), key=lambda row: row["mbps"])
+    """A codec's rows from the cheapest on; of TSMC those of both its curves."""
+    curves = (TSMC, TUNED) if codec == TSMC else (codec,)
+    return sorted((row for row in rows if curve_of(row) in curves), key=lambda row: row["mbps"])
 
 
 def _near_best(rows: Sequence[Row], codec: str) -> str:
-    """The point of a codec that is nearest in D2 to the best of `best`."""
-    best = _of(rows, BEST)
-    if not best:
-        return _told(None)
-    wanted = best[-1]["d2_psnr_paper"]
-    found = min(_of(rows, codec), key=lambda row: abs(row["d2_psnr_paper"] - wanted), default=None)
-    return _told(found) + (FAR if found is not None and abs(found["d2_psnr_paper"] - wanted) > NEAR_DB else "")
+    """The cheapest point of a codec that is as good in D2, but for `SLACK_DB`, as all of `best`; or its best one."""
+    best = [row["d2_psnr_paper"] for row in _of(rows, BEST)]
+    return _as_good(rows, codec, max(best) - SLACK_DB) if best else _told(None)
 
 
 def _as_good(rows: Sequence[Row], codec: str, db: float) -> str:
     """The cheapest point that is as good; the best one, marked, where none is."""
     own = _of(rows, codec)
     good = [row for row in own if row["d2_psnr_paper"] >= db]
-    return (
-        _told(good[0])
-        if good
-        else _told(max(own, key=lambda row: row["d2_psnr_paper"], default=None)) + FAR * bool(own)
-    )
+    if good:
+        return _told(good[0])
+    return _told(max(own, key=lambda row: row["d2_psnr_paper"], default=None)) + SHORT * bool(own)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
@@ -38,15 +40,28 @@ def make_codec(kind: str, options: dict[str, Any]) -> Codec:
     """
     make = CODECS.get(kind) or _of_another_package(kind)
     try:
-        return make(**options)
+        made = make(**options)
     except TypeError as error:
         raise InputError(f"codec {kind!r} does not take {options}: {error}") from error
+    if kind not in CODECS and str(made.name).split()[:1] in [[ours] for ours in CODECS]:
+        raise InputError(f"codec {kind!r} calls itself {made.name!r}, as one of meshreel's own; give it another name")
+    return made
 
 
 def codec_version(kind: str) -> str | None:
     """The distribution that brings somebody else's codec, and its version; None for ours and where none says so."""
     entry = None if kind in CODECS else _others().get(kind)
     return None if entry is None or entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
+
+
+def source_of(kind: str) -> Path | None:
+    """The file or the folder of somebody else's codec, once it is loaded; None for ours."""
+    entry = None if kind in CODECS else _others().get(kind)
+    module = None if entry is None else sys.modules.get(entry.module)
+    file = getattr(module, "__file__", None)
+    if file is None:
+        return None
+    return Path(file).parent if hasattr(module, "__path__") else Path(file)
 
 
 def _others() -> dict[str, EntryPoint]:

@@ -57,7 +57,7 @@ class KltTsdfCodec:
     @property
     def name(self) -> str:
         """What rows and plots call it."""
-        return "klt_tsdf"
+        return "klt_tsdf" if self.basis_in == "stream" else "klt_tsdf, table not counted"
 
     @property
     def options(self) -> dict[str, Any]:
