@@ -165,7 +165,8 @@ def run(
         rows = run_points(points, output, bench, tell, executor)
     failed = failed_rows(rows)
     common.warn(tuple(describe(row) for row in failed))
-    reached = chosen.promises(measured_rows(rows))
+    promises = chosen.promises(measured_rows(rows))
+    reached = [each for each in promises if each.value is not None] or promises  # of a part, what it tells
     told = {"output": str(output), "rows": len(rows), "failed": len(failed)}
     common.result(told | _promised(reached), promise_table(reached))
     if len(failed) == len(rows):

@@ -20,7 +20,7 @@ from .curves import Measure, against, curve, curve_of, value
 from .promises import Promise
 from .rd_rows import FLOOR, RATED, SAMPLED, TRUTH_ITSELF
 from .report.equal import rate_table
-from .report.tables import bd_table, comparable_table, text
+from .report.tables import bd_table, comparable_table, summary_table, text
 from .rows import Point, Row, select
 
 SMALL_SEQUENCE, SMALL_FRAMES = "demo", 3  # procedural: `--small` needs no data
@@ -132,6 +132,8 @@ class Study:
     def sections(self, rows: Sequence[Row]) -> Iterator[str]:
         """What must be known of the numbers, and each codec at the point that can be compared."""
         yield from ("", *self.notes) if self.notes else ()
+        for measure in PROMISED if self.best and len(_sequences(rows)) > 1 else ():
+            yield from ("", *summary_table(rows, str(self.best), measure))
         if lacking := self._lacking(rows):
             yield from ("", f"Declared and not measured: {', '.join(lacking)}.")
         if self.common is not None:

@@ -17,6 +17,7 @@ ROOM = SCENES[0]  # the largest
 PAPER = {"preset": "paper", "centers": 2000, "group_size": 10}
 FRACTIONS = {"fraction": (0.03, 0.08, 0.2, 0.5), "qp": (8, 9, 10, 11)}
 SMALLER = {"fraction": (0.01, 0.03, 0.1), "qp": (9, 10, 11)}
+FEWER = {name: values[:3] for name, values in FRACTIONS.items()}
 OF_SCENES = dict.fromkeys(SCENES, SMALLER)
 VOXELS = {"cells": (64, 96, 128, 192), "basis": (16, 24, 32, 32), "step": (0.1, 0.08, 0.06, 0.04)}
 FINER = {"cells": (128, 192, 288), "basis": (16, 24, 32), "step": (0.1, 0.08, 0.06)}  # for what is larger
@@ -34,8 +35,8 @@ SYSTEMS = (
     Sweep("klt_tsdf", VOXELS, on=LARGE, sampled=(ROOM,), small={"cells": 96}),
     Sweep("necgs", {"channels": (8, 16)}, {"device": "cpu"}, sampled=SCENES, small=QUICK),
     Sweep("decimated_draco", FRACTIONS, on=OF_SCENES, sampled=SCENES),
-    Sweep("decimated_draco", FRACTIONS, {"levels": 1}, only=("synthetic4", *BODIES)),
-    Sweep("background_once_draco", SMALLER, only=SCENES),
+    Sweep("decimated_draco", FRACTIONS, {"levels": 1}, OF_SCENES, ("synthetic4", *SCENES[1:], *BODIES), sampled=SCENES),
+    Sweep("background_once_draco", FRACTIONS, on={ROOM: FEWER}, only=SCENES),
 )
 NOTES = (
     "The rate is that of all bytes of the stream over the time that it plays, a background that is sent once included;",

@@ -19,7 +19,7 @@ from ..reproducing import reproducing_page
 from ..rows import Row, curve_rows, failed_rows, measured_rows
 from .html import html_page
 from .looks import Look, looks_of
-from .plots import plot_curves
+from .plots import METRICS, plot_curves
 from .sheets import Shots, draw_sheet, find_shots
 from .tables import (
     DAGGER,
@@ -114,8 +114,8 @@ def _part(part: Part, shots: Mapping[str, Shots | None]) -> Iterator[str]:
         yield from ("", f"## {text(sequence)}, {own[0]['frames']} frames", "")
         yield from (part.link(sequence, "quality against rate"), "")
         yield from _doubts(own)
-        shown = part.chosen.shown(own)
-        yield from (*part.chosen.comparisons(own), "", *(point_table(shown) if shown else ()))
+        shown, metrics = part.chosen.shown(own), getattr(part.chosen, "METRICS", METRICS)
+        yield from (*part.chosen.comparisons(own), "", *(point_table(shown, metrics) if shown else ()))
         if (found := shots[sequence]) is not None:
             yield from ("", *_sheet(part, found))
     yield from part.chosen.sections(part.rows)
@@ -155,7 +155,11 @@ def _origin(rows: Sequence[Row], experiments: Mapping[str, Experiment]) -> Itera
     yield from ("", "# How this was made", "")
     told = "Of rows, of the pictures that these name, and of nothing else; the names of their files are free:"
     yield from (told, "", "```")
-    yield from (f"meshreel bench run {name} -o {name}.jsonl" for name in names)
+    for name in names:
+        measured = sequences([row for row in rows if row.get("experiment", FIRST) == name])
+        declared = {point.sequence for point in experiments[name].points(False)}
+        some = [] if declared <= set(measured) else ["--on", *measured]  # the others of what it declares have no rows
+        yield " ".join(["meshreel bench run", name, f"-o {name}.jsonl --data DATA", *map(text, some)])
     yield from (f"meshreel bench report {' '.join(f'{name}.jsonl' for name in names)} -o FOLDER", "```", "")
     yield "Lines of plots join a codec's points in the order of their rates."
     yield from ("", *maker_table([row for row in rows if row.get("experiment", FIRST) in names]))

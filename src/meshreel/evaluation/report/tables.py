@@ -170,26 +170,42 @@ def bd_table(rows: Sequence[Row], one: str, measures: Sequence[Measure], is_anch
     return table([*(["sequence"] if len(names) > 1 else []), head, *heads], lines) if lines else []
 
 
+def summary_table(rows: Sequence[Row], one: str, measure: Measure) -> list[str]:
+    """BD-rate of the curve `one` against every other one by one measure: a line a codec, a column a sequence.
+
+    Empty where a sequence has no such curve. No lines where there is no other curve.
+    """
+    names = sequences(rows)
+    curves = {name: set(map(curve_of, curve_rows(rows, name))) for name in names}
+    lines = []
+    for other in in_order(name for found in curves.values() for name in found if name != one):
+        own = [curve_rows(rows, name) if {one, other} <= curves[name] else [] for name in names]
+        lines.append([text(other), *(_bd_cell(found, one, other, measure) if found else "" for found in own)])
+    return table([f"{text(one)} against: rate at equal {measure.name} ↓", *map(text, names)], lines) if lines else []
+
+
 def promise_table(promises: Sequence[Promise]) -> list[str]:
     """Targets."""
     lines = [[p.text, p.bound, p.value or "", p.verdict] for p in promises]  # Markdown already
     return ["| target | bound | measured | |", *table(["", "", "", ""], lines)[1:]]
 
 
-def point_table(rows: Sequence[Row]) -> list[str]:
+def point_table(rows: Sequence[Row], metrics: Sequence[tuple[str, str]] = METRICS) -> list[str]:
     """Operating points: rate, every metric, groups, encode and decode times; below, what all points of a codec share.
 
-    Curve by curve, each from its lowest rate on. Columns of which nothing is known are left out.
+    `metrics` are keys of rows and labels. Curve by curve, each from its lowest rate on. Columns of which nothing is
+    known are left out.
     """
+    metrics = [*metrics, *(each for each in METRICS if each[0] not in dict(metrics))]
     order = in_order(map(curve_of, rows))
     rows = sorted(rows, key=lambda row: (order.index(curve_of(row)), row["mbps"]))
-    heads = ["codec", "operating point", "Mbps", *(label for _, label in METRICS), "worst frame (dB)", "groups"]
+    heads = ["codec", "operating point", "Mbps", *(label for _, label in metrics), "worst frame (dB)", "groups"]
     heads += ["encode (s/frame)", "by stage", "decode (ms/frame)", "/ DracoPy", "decode peak (MB)"]
     lines, shared = list[list[str]](), _shared_options(rows)
     for row in rows:
         stages = ", ".join(f"{k} {v:.2g}" for k, v in row.get("encode_stages_s", {}).items())
         decode = row.get("decode", {})
-        qualities = [_shown(value(row, key)) for key, _ in METRICS]
+        qualities = [_shown(value(row, key)) for key, _ in metrics]
         cells = [text(row["codec"]), text(_point(row, shared[row["codec"]])), _shown(row["mbps"]), *qualities]
         cells += [_shown(row.get("d2_psnr_paper_worst")), _group_sizes(row), _shown(row.get("encode_s")), text(stages)]
         times = (decode.get("frame_ms"), row.get("decode_over_peer"), decode.get("peak_rss_mb"))
