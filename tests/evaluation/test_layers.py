@@ -161,7 +161,10 @@ def test_decoding_is_judged_on_the_row_nearest_to_sixteen_thousand_vertices():
     ):
         found = judged([decoded(**changed), decoded(vertices=5000.0)])[-2:]
         assert [promise.verdict for promise in found] == verdicts
-    assert "A2s at 0.800 Mbps, 64.10 dB" in found[1].value and "with free subdivision 0.67" in found[1].value
+    assert (
+        "Draco, decimated, subdivided at 0.800 Mbps, 64.10 dB" in found[1].value
+        and "with free subdivision 0.67" in found[1].value
+    )
 
 
 def test_the_page_has_every_experiment_with_its_tables(tmp_path):

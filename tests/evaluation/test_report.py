@@ -124,7 +124,7 @@ def test_the_report_is_made_of_the_rows(tmp_path):
     page = (tmp_path / "results.md").read_text()
     assert "meshreel bench run targets" in page
     assert page.count("| met |") == 14 and "MISSED" not in page
-    assert "BD-rate by `d2_psnr_paper`: meshreel paper against decimated_draco_subdivided" in page
+    assert "BD-rate of meshreel paper against decimated_draco_subdivided: D2, paper form" in page
     assert "TSMC, released code: 2.23 Mbps 51.87 dB" in page
     assert all(
         (tmp_path / "results" / f"targets-{name}.png").read_bytes()[:4] == b"\x89PNG" for name in ("dancer", "mitch")

@@ -184,6 +184,7 @@ def report(
     """Write pages, plots and tables from rows, and from nothing else.
 
     `index.html` has all in one file; `results.md` is the same with the plots beside it, as PNG and SVG, in `results/`.
+    Rows on the paper's sequences also make `reproducing.md`: its numbers beside ours.
     Points that failed are listed with their reasons. Same rows, same bytes.
 
     Parameters

@@ -132,7 +132,7 @@ def bd_lines(rows: Sequence[Row]) -> Iterator[str]:
         if ANCHOR in curves:
             for name in names:
                 if name != ANCHOR:
-                    yield f"- BD-rate by `{measure.key}`: {bd_rate(curves[ANCHOR], curves[name])}"
+                    yield f"- BD-rate of {name} against {ANCHOR}: {against(curves[ANCHOR], curves[name], measure)}"
 
 
 def on_hull(rows: Sequence[Row]) -> list[Row]:

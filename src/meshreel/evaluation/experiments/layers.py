@@ -164,7 +164,7 @@ def _small_points() -> Iterator[Point]:
 def _gain(rows: Sequence[Row], body: str, most: float) -> Promise:
     """BD-rate against the hull by distance, normals and pictures; all have to keep the bound."""
     text = f"{body}: BD-rate against the {HULL}"
-    bound = f"<= {most:g} % each" + ("" if most == PROUD else f" (proud of {PROUD:g} %)")
+    bound = f"<= {most:g} % each" + ("" if most == PROUD else f" (aim {PROUD:g} %)")
     found = _against(rows, body)
     if not found:
         return Promise(text, bound)

@@ -215,7 +215,7 @@ def _gain(rows: Sequence[Row], anchor: str) -> Promise:
     """Whether distance and pictures to the input cost so much less; over all qualities where none is below it."""
     limit, proud = GAINS[anchor]
     text = f"{ROOM}: BD-rate against anchor {anchor} (D2 and masked SSIM to the input, below the noise floor)"
-    bound, found = f"<= {limit:g} % each (proud of {proud:g} %)", []
+    bound, found = f"<= {limit:g} % each (aim {proud:g} %)", []
     for measure in JUDGED:
         rate = _against(rows, anchor, measure, True)
         if rate is not None and rate.percent is None:

@@ -30,7 +30,7 @@ ENCODE_S, FRAME_MS, FIRST_MS = 6.0, 5.0, 200.0
 def segmentation_goal(scene: str, rows: Sequence[Row]) -> Promise:
     """IoU of the dynamic faces, and the static ones that are called dynamic."""
     (mean, proud_mean), worst = SEGMENTATION[scene]
-    parts = [f"mean >= {mean:g} (proud of {proud_mean:g})"]
+    parts = [f"mean >= {mean:g} (aim {proud_mean:g})"]
     if worst is not None:
         parts.append(f"worst frame >= {worst[0]:g} ({worst[1]:g})")
         parts.append(f"static called dynamic <= {STATIC_CALLED_DYNAMIC[0]:.2%} ({STATIC_CALLED_DYNAMIC[1]:.2%})")
@@ -67,14 +67,14 @@ def _background(row: Row | None) -> Promise:
         kept = median <= BACKGROUND_MEDIAN[0] and covered >= BACKGROUND_COVERED[0] and 0 < size <= BACKGROUND_BYTES[0]
         return f"{1000 * median:.2f} mm, {covered:.2%}, {size / 1000:.1f} kB", kept
 
-    bound = f"<= {1000 * BACKGROUND_MEDIAN[0]:g} mm (proud of {1000 * BACKGROUND_MEDIAN[1]:g}), "
+    bound = f"<= {1000 * BACKGROUND_MEDIAN[0]:g} mm (aim {1000 * BACKGROUND_MEDIAN[1]:g}), "
     bound += f">= {BACKGROUND_COVERED[0]:.0%} ({BACKGROUND_COVERED[1]:.1%}), "
     bound += f"<= {BACKGROUND_BYTES[0] / 1000:g} kB ({BACKGROUND_BYTES[1] / 1000:g})"
     return of_row("room2: background: median error to the clean room, covered within 20 mm, bytes", bound, row, measure)
 
 
 def _stream(rows: Sequence[Row]) -> Promise:
-    bound = f"{bounds_text(STREAM)} (proud of {PROUD_MBPS:g} Mbps)"
+    bound = f"{bounds_text(STREAM)} (aim {PROUD_MBPS:g} Mbps)"
     text = "room2: rate with the background once in 10 s, D2 and SSIM to the truth"
     return of_rows(text, bound, rows, lambda found: judge(found, STREAM))
 
@@ -95,13 +95,11 @@ def _people(row: Row | None, floor: Row | None) -> list[Promise]:
         return f"{1000 * own:.2f} mm of {1000 * before:.2f}", own <= before + COVERAGE_LOSS
 
     known = row if floor is not None else None
-    better = "better than the input's (proud of 2.2 mm, 16 degrees)"
+    better = "better than the input's (aim 2.2 mm, 16 degrees)"
     return [
         of_row("room2: people to the truth, median distance and normal error", better, known, accuracy),
         of_row("room2: people to the truth, SSIM", f">= the input's + {SSIM_GAIN:g}", known, pictures),
-        of_row(
-            "room2: people's coverage of the truth, RMS", "<= the input's + 1 mm (proud of no loss)", known, coverage
-        ),
+        of_row("room2: people's coverage of the truth, RMS", "<= the input's + 1 mm (aim no loss)", known, coverage),
     ]
 
 
