@@ -20,7 +20,7 @@ from tests.run_page import blocks
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 RUN = [ROOT / "README.md", ROOT / "docs" / "tutorial.md"]
-INTERCHANGE = ROOT / "docs" / "interchange.md"
+INTERCHANGE, CODECS = (ROOT / "docs" / name for name in ("interchange.md", "codecs.md"))
 
 
 def test_the_python_of_the_readme_runs(tmp_path: Path) -> None:
@@ -41,7 +41,7 @@ def test_the_python_of_interchange_runs(tmp_path: Path) -> None:
     assert (tmp_path / "scan.glb").exists()
 
 
-@pytest.mark.parametrize("page", [*RUN, INTERCHANGE], ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*RUN, INTERCHANGE, CODECS], ids=lambda page: page.name)
 def test_the_commands_of_the_docs_parse(page: Path) -> None:
     from meshreel.cli import make_app
 

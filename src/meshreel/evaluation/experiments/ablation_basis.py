@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from ..names import TSMC
 from ..study import Study, Sweep
 
 M = {"basis_size": (1, 2, 3, 5, 8, 10)}
 STUDY = Study(
     sequences=("dancer",),
     sweeps=[Sweep("meshreel", M, {"preset": "paper", "quality": quality}) for quality in (20.0, 50.0, 80.0)],
-    anchor="meshreel paper m, quality 50",
+    anchor=TSMC,
 )

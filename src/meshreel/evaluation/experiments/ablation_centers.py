@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..names import TSMC
 from ..study import Study, Sweep
 
 CENTERS = (1000, 2000, 3000, 4000)
@@ -9,5 +10,5 @@ M = {"basis_size": (2, 5, 10)}
 STUDY = Study(
     sequences=("dancer",),
     sweeps=[Sweep("meshreel", M, {"preset": "paper", "centers": k, "group_size": 10}) for k in CENTERS],
-    anchor="meshreel paper m, quality 50",
+    anchor=TSMC,
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..names import TSMC
 from ..study import Study, Sweep
 
 SIZES = (5, 10, 15)
@@ -10,5 +11,5 @@ STUDY = Study(
     sequences=("crane60",),
     sweeps=[Sweep("meshreel", M, {"preset": "paper", "centers": 2000, "group_size": size}) for size in SIZES],
     frames={"crane60": 30},
-    anchor="meshreel paper m, quality 50",
+    anchor=TSMC,
 )

@@ -45,12 +45,12 @@ def field_of(places: Int64[np.ndarray, "B 3"], symbols: Int32[np.ndarray, "B M"]
     middle = np.clip(symbols.astype(np.float64) * model.step, -LARGEST, LARGEST)
     weights = middle
     for _ in range(model.deblocking if len(places) else 0):
-        weights = _agreed(weights, middle, index, model)
+        weights = agreed(weights, middle, index, model)
     values = _mean(distances(weights, model.basis), index, len(keys))
     return Field(places, keys, index, _closed(places, keys, np.where(values == 0, 1.0, values)))
 
 
-def _agreed(
+def agreed(
     weights: Float64[np.ndarray, "B M"],
     middle: Float64[np.ndarray, "B M"],
     index: Int64[np.ndarray, "B N"],
