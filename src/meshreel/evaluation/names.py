@@ -28,5 +28,9 @@ _TITLES = {
 
 
 def title(name: str) -> str:
-    """What a legend calls a curve."""
-    return _TITLES.get(name, name)
+    """What a legend calls a curve; what a variant changes stays behind the title of what it is a variant of."""
+    known = [base for base in _TITLES if name == base or name.startswith(f"{base}, ")]
+    if not known:
+        return name
+    base = max(known, key=len)
+    return _TITLES[base] + name[len(base) :]
