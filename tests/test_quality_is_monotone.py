@@ -33,7 +33,7 @@ def quicker(options: EncoderOptions) -> EncoderOptions:
     fuse = replace(options.reference.fuse, poisson=replace(options.reference.fuse.poisson, depth=6))
     reference = replace(options.reference, keys=1, canonical_keys=1, trial_depth=5, trial_vertices=150, fuse=fuse)
     track = replace(options.track, centers=150, samples=3000)
-    return replace(options, reference=reference, track=track, intra=IntraOptions(fractions=(0.5,)))
+    return replace(options, reference=reference, track=track, intra=IntraOptions(fractions=(0.5, 1.0)))
 
 
 def walker() -> MeshList:
