@@ -165,3 +165,15 @@ def test_what_is_missing_is_told(run, tmp_path):
     said = run("bench", "run", "figure6", "-o", tmp_path / "r.jsonl", "--on", "room3", "demo", "--small")
     assert failed(said, "--on room3", "it has demo")
     assert failed(run("bench", "report", tmp_path / "none.jsonl", "-o", tmp_path), "none.jsonl", "bench run")
+
+
+def test_a_report_is_not_replaced_by_one_of_nothing(run, tmp_path):
+    rows, report = tmp_path / "rows.jsonl", tmp_path / "results.md"
+    report.write_text("of before")
+    rows.write_text("")
+    assert failed(run("bench", "report", rows, "-o", tmp_path), "rows.jsonl: has no rows", "bench run")
+    rows.write_text(
+        '{"point": "", "kind": "curve", "sequence": "", "codec": "", "options": {}, "failed": "", "experiment": "x"}\n'
+    )
+    assert failed(run("bench", "report", rows, "-o", tmp_path), "line 1: no experiment is called 'x'; known: figure6")
+    assert report.read_text() == "of before"

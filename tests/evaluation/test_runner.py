@@ -222,6 +222,7 @@ def as_line(point, **changed):
         (as_line("b", decode="fast"), "'decode' is 'fast'"),
         (as_line("b", groups=None), "'groups' is None, and not a list"),
         (as_line("b", kind="curve", frames=2), "'mbps' is missing, and not a number above 0"),
+        ("[" * 100_000 + "\n", "recursion"),
         (as_line("b", kind="curve", frames=2, mbps=0.0), "'mbps' is 0.0"),
         (as_line("b", kind="curve", frames=2, mbps="1"), "'mbps' is '1'"),
         (as_line("b", kind="curve", mbps=1.0), "'frames' is missing"),
@@ -268,6 +269,13 @@ def test_where_rows_cannot_be_written_nothing_is_measured(folder, tmp_path, monk
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"rows.jsonl: cannot be written .*choose another file"):
         run_points([Point("ball", "draco", {})], tmp_path / "file" / "rows.jsonl", Bench(folder), lambda *_: None)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes in folders")
+def test_rows_are_not_kept_in_a_pipe(folder, tmp_path):
+    os.mkfifo(tmp_path / "rows.jsonl")
+    with pytest.raises(InputError, match=r"rows\.jsonl: is a pipe"):
+        run_points([Point("ball", "draco", {})], tmp_path / "rows.jsonl", Bench(folder), lambda *_: None)
 
 
 @pytest.mark.parametrize("name", [".", os.devnull])

@@ -23,7 +23,7 @@ from ..evaluation.experiments import experiment as find_experiment
 from ..evaluation.promises import Promise
 from ..evaluation.rd_rows import FLOOR as RATED_FLOOR
 from ..evaluation.report import write_report
-from ..evaluation.rows import FAILED, Point, Row, failed_rows, join_rows, measured_rows, read_rows
+from ..evaluation.rows import FAILED, Point, Row, experiment_of, failed_rows, join_rows, measured_rows, read_rows
 from ..evaluation.runner import run_points
 from ..evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from ..evaluation.study import Study
@@ -195,7 +195,7 @@ def report(
     output
         The folder to write into.
     """
-    joined = join_rows([read_rows(path) for path in rows])
+    joined = join_rows([_reported(path) for path in rows])
     measured = measured_rows(joined)
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
     pictures = [path.with_suffix(".pictures") for path in rows]
@@ -203,10 +203,24 @@ def report(
     reached = [
         promise
         for name, chosen in EXPERIMENTS.items()
-        if (own := [row for row in measured if row.get("experiment", "targets") == name])
+        if (own := [row for row in measured if experiment_of(row) == name])
         for promise in chosen.promises(own)
     ]
     common.result({"files": written} | _promised(reached), promise_table(reached), *written)
+
+
+def _reported(path: Path) -> list[Row]:
+    """The rows of a file. Raises InputError where a report of them would lack all or some of them."""
+    rows = read_rows(path)
+    if not rows:
+        raise InputError(f"{path}: has no rows; make some with `meshreel bench run`")
+    for number, row in enumerate(rows, 1):
+        if (name := experiment_of(row)) not in EXPERIMENTS:
+            known = ", ".join(EXPERIMENTS)
+            raise InputError(
+                f"{path}, line {number}: no experiment is called {name!r}; known: {known}; delete that line"
+            )
+    return rows
 
 
 def describe(row: Row) -> str:

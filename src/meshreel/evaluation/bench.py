@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..io.sequence import SequenceOptions
 from ..metrics.report import ComparisonOptions
+from .rows import FIRST
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +15,7 @@ class Bench:
     """Where a run finds its sequences, and what it compares."""
 
     data: Path  # the folder of the sequences
-    experiment: str = "targets"  # rows of other experiments in the same file are left alone
+    experiment: str = FIRST  # rows of other experiments in the same file are left alone
     comparison: ComparisonOptions = field(default_factory=ComparisonOptions)
     cache: Path | None = None  # sequences that take long to make are kept here
     limit_s: float | None = None  # wall time of a point, which then has a process of its own; None: measured in this

@@ -14,6 +14,7 @@ from ..errors import InputError
 from .locked import locked
 
 Row = dict[str, Any]
+FIRST = "targets"  # the experiment of rows that do not name theirs
 FAILED = "failed"  # of a row: why nothing was measured
 CURVE_KINDS = ("quality", "curve", "floor", "scene", "rated", "sampled")  # rows that have a rate and metrics
 
@@ -61,7 +62,7 @@ def read_rows(path: Path) -> list[Row]:
     for number, line in enumerate(lines, 1):
         try:
             row = json.loads(line, parse_constant=_not_json)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             told = error.msg if isinstance(error, json.JSONDecodeError) else error
             raise InputError(f"{path}, line {number}: not JSON: {told}; delete that line") from error
         if problem := _problem(row):
@@ -99,11 +100,16 @@ def _told(row: Row, key: str) -> str:
     return repr(row[key])[:60] if key in row else "missing"
 
 
+def experiment_of(row: Row) -> str:
+    """The name of the experiment that a row is of."""
+    return str(row.get("experiment", FIRST))
+
+
 def join_rows(files: Sequence[Sequence[Row]]) -> list[Row]:
     """The rows of several files, each point of an experiment once: the first of a point counts that has not failed."""
     rows = [row for file in files for row in file]
     ordered = measured_rows(rows) + failed_rows(rows)
-    joined = {(row.get("experiment", "targets"), row["point"]): row for row in reversed(ordered)}
+    joined = {(experiment_of(row), row["point"]): row for row in reversed(ordered)}
     return list(reversed(joined.values()))
 
 
@@ -127,6 +133,8 @@ def append_row(path: Path, row: Row) -> None:
 
 def check_appendable(path: Path) -> None:
     """Raises InputError where rows could not be written: hours before the first one is there."""
+    if path.is_fifo():  # whoever reads rows back from it waits for ever
+        raise InputError(f"{path}: is a pipe; rows are kept in a file")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("r+b") if path.exists() else tempfile.TemporaryFile(dir=path.parent):
@@ -144,7 +152,7 @@ def _whole(data: bytes) -> int:
     start = data.rfind(b"\n") + 1
     try:
         json.loads(data[start:] or b"0")
-    except ValueError:
+    except (ValueError, RecursionError):
         return start
     return len(data)
 

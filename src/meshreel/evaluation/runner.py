@@ -19,7 +19,7 @@ from .datasets import MADE, open_dataset
 from .identity import check_same
 from .measure import measure_point
 from .rd_rows import KINDS as RATED_KINDS
-from .rows import FAILED, Point, Row, append_row, check_appendable, measured_rows, read_rows
+from .rows import FAILED, Point, Row, append_row, check_appendable, experiment_of, measured_rows, read_rows
 from .scene_rows import KINDS as SCENE_KINDS
 
 AFTER = ("decode",)  # kinds of points that compare with rows measured before
@@ -40,6 +40,7 @@ def run_points(
     of an experiment that measures alike (`bench.alike`) is written again as one of this. With an executor points are
     measured side by side, but for those that compare with other rows (`AFTER`): they come last.
     """
+    check_appendable(file)
     stored = read_rows(file) if file.exists() else []
     known = {row["point"]: row for row in _of(stored, bench.experiment) if not (bench.retry and FAILED in row)}
     others = {
@@ -53,8 +54,6 @@ def run_points(
         if point.key in known:
             tell(known[point.key], False)
     missing = [point for point in points if point.key not in known]
-    if missing:
-        check_appendable(file)
     _check_sequences(missing, bench, executor is not None)
     for row in _measured(missing, list(known.values()), bench, executor):
         append_row(file, row)
@@ -64,7 +63,7 @@ def run_points(
 
 
 def _of(rows: Sequence[Row], experiment: str) -> list[Row]:
-    return [row for row in rows if row.get("experiment", "targets") == experiment]
+    return [row for row in rows if experiment_of(row) == experiment]
 
 
 def _alike(row: Row, bench: Bench) -> bool:

@@ -16,14 +16,13 @@ from ..experiment import Experiment
 from ..filenames import file_name
 from ..provenance import makers
 from ..reproducing import reproducing_page
-from ..rows import Row, curve_rows, failed_rows, measured_rows
+from ..rows import Row, curve_rows, experiment_of, failed_rows, measured_rows
 from .html import html_page
 from .looks import Look, looks_of
 from .plots import METRICS, plot_curves
 from .sheets import Shots, draw_sheet, find_shots
 from .tables import (
     DAGGER,
-    FIRST,
     NEAR,
     failure_table,
     is_near,
@@ -73,7 +72,7 @@ def write_report(
     looks = looks_of(curve_of(row) for row in measured)
     files, lines = list[Path](), list[str]()
     for name, chosen in experiments.items():
-        own = [row for row in measured if row.get("experiment", FIRST) == name]
+        own = [row for row in measured if experiment_of(row) == name]
         if own:
             part = Part(name, chosen, own, folder)
             shots = {sequence: find_shots(curve_rows(own, sequence), pictures) for sequence in sequences(own)}
@@ -148,7 +147,7 @@ def _failures(rows: Sequence[Row]) -> Iterator[str]:
 
 def _origin(rows: Sequence[Row], experiments: Mapping[str, Experiment]) -> Iterator[str]:
     """Command lines, and what made the rows."""
-    found = {row.get("experiment", FIRST) for row in rows}
+    found = {experiment_of(row) for row in rows}
     names = [name for name in experiments if name in found]
     if not names:
         return
@@ -156,10 +155,10 @@ def _origin(rows: Sequence[Row], experiments: Mapping[str, Experiment]) -> Itera
     told = "Of rows, of the pictures that these name, and of nothing else; the names of their files are free:"
     yield from (told, "", "```")
     for name in names:
-        measured = sequences([row for row in rows if row.get("experiment", FIRST) == name])
+        measured = sequences([row for row in rows if experiment_of(row) == name])
         declared = {point.sequence for point in experiments[name].points(False)}
         some = [] if declared <= set(measured) else ["--on", *measured]  # the others of what it declares have no rows
         yield " ".join(["meshreel bench run", name, f"-o {name}.jsonl --data DATA", *map(text, some)])
     yield from (f"meshreel bench report {' '.join(f'{name}.jsonl' for name in names)} -o FOLDER", "```", "")
     yield "Lines of plots join a codec's points in the order of their rates."
-    yield from ("", *maker_table([row for row in rows if row.get("experiment", FIRST) in names]))
+    yield from ("", *maker_table([row for row in rows if experiment_of(row) in names]))

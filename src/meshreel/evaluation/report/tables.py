@@ -16,11 +16,10 @@ from typing import Any
 from ..curves import Measure, against, curve, curve_of, value
 from ..promises import Promise
 from ..provenance import MADE_BY
-from ..rows import CURVE_KINDS, FAILED, Row, curve_rows
+from ..rows import CURVE_KINDS, FAILED, Row, curve_rows, experiment_of
 from .looks import arrow, in_order
 from .plots import METRICS
 
-FIRST = "targets"  # the experiment of rows that do not name theirs
 NEAR = 1.25  # factor of a rate within which points are compared
 NEAR_DB = 1.0  # of a PSNR
 DAGGER = "†"
@@ -222,7 +221,7 @@ def failure_table(rows: Sequence[Row]) -> list[str]:
     heads = ["experiment", "sequence", "codec", "operating point", "kind", "reason"]
     lines = []
     for row in rows:
-        cells = [row.get("experiment", FIRST), row["sequence"], row["codec"], _point(row), row["kind"], row[FAILED]]
+        cells = [experiment_of(row), row["sequence"], row["codec"], _point(row), row["kind"], row[FAILED]]
         lines.append([text(cell) for cell in cells])
     return table(heads, lines)
 
@@ -234,7 +233,7 @@ def maker_table(rows: Sequence[Row]) -> list[str]:
         made = row.get(MADE_BY) or row.get("machine") or {}  # older rows have a machine without a commit
         commit = made.get("commit", _UNKNOWN) or "none: installed"
         told = [made.get(key) or _UNKNOWN for key in ("platform", "cpu", "python", "cores")]
-        key = (row.get("experiment", FIRST), made.get("meshreel") or _UNKNOWN, commit, *told)
+        key = (experiment_of(row), made.get("meshreel") or _UNKNOWN, commit, *told)
         counts[tuple(map(text, key))] = counts.get(tuple(map(text, key)), 0) + 1
     heads = ["experiment", "meshreel", "commit", "platform", "processor", "Python", "cores", "rows"]
     return table(heads, [[*key, str(count)] for key, count in counts.items()])
