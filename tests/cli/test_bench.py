@@ -12,7 +12,6 @@ import trimesh
 
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.cli.bench import describe
-from meshreel.evaluation import checksums
 from meshreel.evaluation.experiments import targets
 from meshreel.evaluation.rows import Point
 from meshreel.evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
@@ -20,6 +19,8 @@ from meshreel.evaluation.study import Study, Sweep
 from tests.cli.conftest import failed
 from tests.evaluation.report_rows import failed as failed_row
 from tests.evaluation.report_rows import pictured, row
+
+BALL = sliding_sphere(1, levels=1)[0]
 
 
 @pytest.fixture
@@ -103,9 +104,28 @@ def test_a_path_is_a_path_and_its_rows_are_of_its_content(run, study, monkeypatc
     again = ("bench", "run", "figure6", "-o", rows, *common, "./ball", "--fps")
     assert "measured of another sequence, frames, scale or rate" in run(*again, "20").err
     (mine / "ball" / "f_1.obj").write_text((mine / "ball" / "f_0.obj").read_text())
-    checksums.checksum.cache_clear()
     assert "give another file for the rows" in run(*again, "10").err
     assert "'./none' at that path or below" in run("bench", "run", "figure6", "-o", rows, *common, "./none").err
+
+
+def test_a_sequence_without_surface_fails_and_others_go_on(run, study):
+    np.savez(study / "point.npz", vertices=[0 * BALL.vertices], faces=BALL.faces)
+    common = ("-o", study / "r.jsonl", "--data", study, "--no-ssim", "--json")
+    for _ in range(2):
+        said = run("bench", "run", "figure6", *common, "--on", "point", "ball")
+        assert said.code == 0 and said.row["failed"] == 1 and "no frame has a face with an area" in said.err
+
+
+def test_rows_of_two_sequences_by_one_name_make_no_report(run, study):
+    for part in ("a", "b"):
+        said = run(
+            "bench", "run", "figure6", "-o", study / f"{part}.jsonl", "--data", study, "--no-ssim", "--on", "ball"
+        )
+        assert said.code == 0
+        np.savez(study / "ball.npz", vertices=[BALL.vertices, BALL.vertices], faces=BALL.faces)
+    said = run("bench", "report", study / "a.jsonl", study / "b.jsonl", "-o", study / "out")
+    assert failed(said, "rows of ball are of sequences of different content", "make a report of each")
+    assert not (study / "out").exists()
 
 
 def test_how_files_are_read_is_about_own_sequences(run, study, monkeypatch):
@@ -142,6 +162,15 @@ def test_a_report_has_what_failed_and_the_pictures_beside_the_rows(run, tiny):
     assert said.code == 0 and "dancer necgs qp 9: failed: too slow" in said.err
     assert "tiny-dancer-sheet.png" in [Path(path).name for path in said.row["files"]]
     assert "| too slow |" in (tiny / "out" / "results.md").read_text()
+
+
+def test_a_row_is_one_line_whatever_is_in_it():
+    row = {"sequence": "a\nb", "codec": "\x1b[31mx", "options": {}, "kind": "curve"}
+    assert describe(row | {"failed": "1\r\n2"}) == "a b ?[31mx : failed: 1 2"
+    told = "0.500 Mbps, no dB, 1.00 degrees, no s/frame; no pictures: full"
+    assert describe(row | {"mbps": 0.5, "d2_psnr_paper": None, "normal_error_deg": 1.0, "unpictured": "full"}).endswith(
+        told
+    )
 
 
 def test_rows_of_scenes_are_told_in_a_line():

@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 from PIL import Image
 
-from meshreel.evaluation.rows import FAILED
+from meshreel.evaluation.row_form import FAILED
 from meshreel.metrics.report import ComparisonOptions
 
 SIZE = 100  # pixels of a side

@@ -20,7 +20,8 @@ from meshreel.evaluation.codec import Codec
 from meshreel.evaluation.codecs import make_codec
 from meshreel.evaluation.measure import run_point
 from meshreel.evaluation.rd_rows import RATED
-from meshreel.evaluation.rows import FAILED, Point, failed_rows, join_rows, read_rows, select
+from meshreel.evaluation.row_form import FAILED
+from meshreel.evaluation.rows import Point, failed_rows, join_rows, read_rows, select
 from meshreel.evaluation.runner import run_points, runs_of
 from meshreel.metrics.report import ComparisonOptions
 

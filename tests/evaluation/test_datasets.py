@@ -31,7 +31,6 @@ def planted(monkeypatch, tmp_path):
         "performers/walker": checksums.checksum(tmp_path / "performers" / "walker"),
     }
     monkeypatch.setattr(checksums, "known_checksums", lambda: known)
-    checksums.checksum.cache_clear()
     return tmp_path
 
 
@@ -54,7 +53,6 @@ def test_data_that_are_not_what_the_name_means_are_refused(planted, name):
     path = planted / "performers" / name
     file = path / "a.obj" if path.is_dir() else path.with_suffix(".npz")
     file.write_bytes(file.read_bytes() + b"\n")
-    checksums.checksum.cache_clear()
     with pytest.raises(InputError, match=rf"{name}.*SHA-256 .* copy it again, or give your own data another name"):
         open_dataset(name, planted)
 
@@ -63,10 +61,8 @@ def test_a_file_more_or_one_by_another_name_is_other_data(planted):
     folder = planted / "performers" / "walker"
     first = checksums.checksum(folder)
     (folder / "b.obj").write_text("")
-    checksums.checksum.cache_clear()
     second = checksums.checksum(folder)
     (folder / "b.obj").rename(folder / "c.obj")
-    checksums.checksum.cache_clear()
     assert len({first, second, checksums.checksum(folder)}) == 3
 
 

@@ -18,7 +18,8 @@ from meshreel.errors import InputError
 from meshreel.evaluation.bench import Bench
 from meshreel.evaluation.codecs import make_codec
 from meshreel.evaluation.rd_rows import RATED
-from meshreel.evaluation.rows import FAILED, Point
+from meshreel.evaluation.row_form import FAILED
+from meshreel.evaluation.rows import Point
 from meshreel.evaluation.runner import run_points, runs_of
 from meshreel.metrics.report import ComparisonOptions
 
@@ -39,6 +40,8 @@ class Hostile:
     def __init__(self, how=""):
         if how == "make":
             raise ValueError("not today")
+        if how == "leave":
+            sys.exit(3)
         self.how, self.name, self.kept = how, 5 if how == "name" else "hostile", []
         self.options = {"how": how} | ({"step": float("nan")} if how == "options" else {})
         if how == "pickle":
@@ -91,6 +94,13 @@ class Hostile:
         tempfile.mkdtemp()
         os._exit(5)
 
+    def do_answers(self):
+        for number in range(3, 20):
+            try:
+                os.write(number, b'{"point": "another"}' + bytes([10]))
+            except OSError:
+                pass
+
     def do_walk(self):
         os.chdir("/")
 
@@ -111,10 +121,15 @@ def site(tmp_path, monkeypatch):
     """A folder with the codec's package and a sequence `ball`; this process, and those it starts, find the package."""
     (tmp_path / "hostile.py").write_text(PLUGIN)
     (tmp_path / "broken.py").write_text("raise RuntimeError('no license')\n")
+    (tmp_path / "leaving.py").write_text("import sys; sys.exit(3)\n")
+    (tmp_path / "lacking.py").write_text("FIVE = 5\ndef nothing():\n    pass\n")
     info = tmp_path / "hostile-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: hostile\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[meshreel.codecs]\nhostile = hostile:Hostile\nbroken = broken:Broken\n")
+    (info / "entry_points.txt").write_text(
+        "[meshreel.codecs]\nhostile = hostile:Hostile\nbroken = broken:Broken\n"
+        "leaving = leaving:X\nfive = lacking:FIVE\nnothing = lacking:nothing\n"
+    )
     np.savez(tmp_path / "ball.npz", vertices=np.stack([mesh.vertices for mesh in BALLS]), faces=BALLS[0].faces)
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]))
@@ -136,7 +151,9 @@ def is_running(pid):
 
 
 WRONG = {
-    "make": "not today",
+    "make": "does not take {'how': 'make'}: ValueError: not today",
+    "leave": "does not take {'how': 'leave'}: SystemExit: 3",
+    "answers": "wrote among the answers of its process",
     "exit": "SystemExit: 3",
     "chatty": "exit code 4: yyy",
     "name": "called 5",
@@ -234,6 +251,20 @@ def wait_until(true, seconds=60):
 def test_a_limit_longer_than_any_clock_is_none():
     [row] = measured("", limit_s=1e300)
     assert row["bytes"] > 0
+
+
+@pytest.mark.usefixtures("site")
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("leaving", r"'leaving' cannot be loaded \(SystemExit: 3\)"),
+        ("five", "'five' is a int; its entry point must name a class or a function"),
+        ("nothing", "'nothing' is a NoneType without name, options, encode, decode"),
+    ],
+)
+def test_what_is_no_codec_is_told(name, words):
+    with pytest.raises(InputError, match=words):
+        make_codec(name, {})
 
 
 @pytest.mark.usefixtures("site")

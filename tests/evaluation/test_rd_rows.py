@@ -168,7 +168,7 @@ def test_side_by_side_the_longest_runs_come_first(bench, monkeypatch, tmp_path):
 
     def measured(point, *_):
         came.append(point.codec)
-        return {"point": point.key, "codec": point.codec}
+        return {"point": point.key, "sequence": point.sequence, "codec": point.codec}
 
     monkeypatch.setattr(runner, "measure_point", measured)
     draco = [Point("ball", "draco", {"qp": qp}, kind=RATED) for qp in (7, 8)]

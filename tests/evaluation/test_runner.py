@@ -213,9 +213,8 @@ def as_line(point, **changed):
     ("text", "words"),
     [
         ("[1]\n", "no JSON object"),
-        ('{"a": 1}\n', "'point' is missing, and not a text"),
+        ('{"a": 1}\n', "'point' is missing"),
         ("{\n", "not JSON"),
-        ("\n", "not JSON"),
         (as_line("b", mean=float("nan")), "NaN is no number"),
         (as_line("b", experiment=["targets"]), "'experiment' is .'targets'., and not a text"),
         (as_line("b", options=None), "'options' is None, and not a JSON object"),
@@ -227,12 +226,44 @@ def as_line(point, **changed):
         (as_line("b", kind="curve", frames=2, mbps="1"), "'mbps' is '1'"),
         (as_line("b", kind="curve", mbps=1.0), "'frames' is missing"),
         (as_line("b", kind="curve", frames=2, mbps=1.0).replace("1.0", "1e999"), "'mbps' is inf"),
+        (as_line("b", kind="curve", frames=2.5, mbps=1.0), "'frames' is 2.5, and not a whole number"),
+        (as_line("b", kind="curve", frames=2, mbps=1e300), "'mbps' is 1e[+]300, and nothing measured is so large"),
+        (as_line("b", encode_s=10**400), "nothing measured is so large"),
+        (as_line("b", d2_psnr_paper=True), "'d2_psnr_paper' is True, and not a number"),
+        (as_line("b", encode_s=-5), "'encode_s' is -5, and not a number from 0"),
+        (as_line("b", decode={"frame_ms": "x"}), "'decode.frame_ms' is 'x', and not a number"),
+        (as_line("b", encode_stages_s={"code": []}), "'encode_stages_s.code' is "),
+        (as_line("b", groups=[{"bytes": 1, "frames": 2}, 5]), "'groups.1.' is 5, and not a JSON object"),
+        (as_line("b", groups=[{"bytes": 1}]), "'groups.0.' has no 'frames'"),
+        (as_line("b", per_frame=[{"ssim": {}}]), "'per_frame.0..ssim' is {}, and not a number"),
+        (as_line("b", measured_frames=[None]), "'measured_frames.0.' is None"),
+        (as_line("b", kind="curve", frames=2, mbps=1.0, per_frame=[]), "'per_frame' is .., and not a list of frames"),
+        (as_line("b", kind="curve", frames=2, mbps=1.0), "'per_frame' is missing"),
+        (as_line("b", encode_stages_s={"code": None}), "'encode_stages_s.code' is None, and not a number"),
     ],
 )
 def test_a_line_that_is_no_row_is_told_by_its_number(tmp_path, text, words):
     (tmp_path / "rows.jsonl").write_text(as_line("a") + text + as_line("c"))
     with pytest.raises(InputError, match=f"line 2: .*{words}.*; delete that line"):
         read_rows(tmp_path / "rows.jsonl")
+
+
+def test_what_is_not_known_may_be_null_and_decibels_below_0(tmp_path):
+    whole = row(
+        "a", kind="curve", frames=2, mbps=1.0, d2_psnr_paper=-3.0, ssim=None, peer=None, per_frame=[{"ssim": None}]
+    )
+    append_row(
+        tmp_path / "rows.jsonl",
+        whole | {"cameras": [{"size": []}], "groups": [{"bytes": 1, "frames": 2, "form": "draco", "key": None}]},
+    )
+    assert read_rows(tmp_path / "rows.jsonl")[0]["d2_psnr_paper"] == -3.0
+
+
+def test_lines_end_where_json_lines_do(tmp_path):
+    """Other programs write texts as they are, a mark of the encoding, or lines without anything."""
+    text = json.dumps(row("a", failed="two\u2028lines\u0085"), ensure_ascii=False)
+    (tmp_path / "rows.jsonl").write_text(f"\ufeff{text}\r\n\n{as_line('b')}", encoding="utf-8", newline="")
+    assert [each["point"] for each in read_rows(tmp_path / "rows.jsonl")] == ["a", "b"]
 
 
 def test_a_row_that_was_not_written_to_its_end_is_passed_over_and_replaced(tmp_path):
@@ -249,7 +280,7 @@ def test_a_row_that_was_not_written_to_its_end_is_passed_over_and_replaced(tmp_p
 def test_rows_of_runs_that_write_one_file_at_once_are_all_there(tmp_path):
     path, points = tmp_path / "rows.jsonl", [f"{number:03}" for number in range(150)]
     with ThreadPoolExecutor(3) as executor:
-        list(executor.map(lambda point: append_row(path, row(point, told="x" * 20_000)), points))
+        list(executor.map(lambda point: append_row(path, row(point, source="x" * 20_000)), points))
     assert sorted(each["point"] for each in read_rows(path)) == points
 
 
@@ -267,8 +298,35 @@ def test_a_row_waits_while_another_run_writes(tmp_path):
 def test_where_rows_cannot_be_written_nothing_is_measured(folder, tmp_path, monkeypatch):
     monkeypatch.setattr("meshreel.evaluation.runner.measure_point", lambda *_: pytest.fail("measured"))
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match=r"rows.jsonl: cannot be written .*choose another file"):
+    with pytest.raises(
+        InputError, match=r"rows.jsonl: cannot be written .*a part of that path is a file.*choose another"
+    ):
         run_points([Point("ball", "draco", {})], tmp_path / "file" / "rows.jsonl", Bench(folder), lambda *_: None)
+
+
+@pytest.mark.parametrize("ending", [".pictures", ".cache"])
+def test_where_pictures_or_sequences_cannot_be_kept_nothing_is_measured(folder, tmp_path, monkeypatch, ending):
+    monkeypatch.setattr("meshreel.evaluation.runner.measure_point", lambda *_: pytest.fail("measured"))
+    (tmp_path / f"rows{ending}").write_text("")
+    bench = Bench(folder, cache=tmp_path / "rows.cache")
+    with pytest.raises(InputError, match=f"rows{ending}: cannot be written .*choose another"):
+        run_points([Point("ball", "draco", {})], tmp_path / "rows.jsonl", bench, lambda *_: None)
+
+
+@pytest.mark.parametrize("spoil", ["remove", "replace"])
+def test_a_sequence_that_changes_under_a_sweep_fails_from_there_on(tmp_path, spoil):
+    path = tmp_path / "ball.npz"
+    np.savez(path, vertices=np.stack([mesh.vertices for mesh in BALLS]), faces=BALLS[0].faces)
+    bench = Bench(tmp_path, comparison=QUICK, limit_s=60)
+    points = [Point("ball", "draco", {"qp": qp}, kind="curve") for qp in (7, 8)]
+
+    def tell(*_):
+        path.unlink(missing_ok=True)
+        if spoil == "replace":
+            np.savez(path, vertices=[BALLS[0].vertices], faces=BALLS[0].faces)
+
+    rows = run_points(points, tmp_path / "rows.jsonl", bench, tell)
+    assert rows[0]["bytes"] > 0 and "the sequence has changed since the sweep began" in rows[1]["failed"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes in folders")

@@ -102,6 +102,19 @@ def test_decibels_and_angles_do_not_depend_on_the_unit(scale: float, seed: int):
     assert other.forward.rms == pytest.approx(one.forward.rms * scale, rel=1e-3)
 
 
+@pytest.mark.parametrize("power", [-60, -25, -9, 7, 12])
+def test_meshes_of_any_size_are_measured_as_those_of_a_metre(power):
+    a, b, scale = sphere(levels=2), noisy(sphere(1.01, levels=2), 0.02), 10.0**power
+    there, here = surface_errors(moved(a, scale=scale), moved(b, scale=scale)), surface_errors(a, b)
+    assert there.d2_psnr_paper == pytest.approx(here.d2_psnr_paper, abs=1e-4)
+    assert there.d2_psnr == pytest.approx(here.d2_psnr, abs=1e-4)
+    assert there.angle == pytest.approx(here.angle, abs=1e-3)
+    for name in ("rms", "hausdorff95", "maximum"):
+        assert getattr(there.backward, name) == pytest.approx(getattr(here.backward, name) * scale, rel=1e-4)
+    assert surface_errors(moved(a, scale=scale), moved(a, scale=scale)).d1_psnr == math.inf
+    assert surface_errors(a, moved(b, scale=scale)).d2_psnr < 20  # no query is lost where sizes are far apart
+
+
 def test_coordinates_around_a_million_keep_their_millimetres():
     a, b = noisy(sphere(), 1e-3, 1), noisy(sphere(), 1e-3, 2)
     near, far = surface_errors(a, b), surface_errors(moved(a, (1e6, -2e6, 5e5)), moved(b, (1e6, -2e6, 5e5)))

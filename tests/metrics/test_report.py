@@ -103,6 +103,13 @@ def test_frames_empty_on_both_sides_say_nothing_and_missing_ones_count():
     assert row["frames_empty"] == 1 and "d2_psnr_paper" not in row
 
 
+def test_faces_without_area_are_as_empty_as_no_faces():
+    line = Mesh.of(BODY.vertices * [1, 0, 0], BODY.faces)
+    row = compare_sequences([line, BODY], [line, BODY], QUICK).to_row()
+    assert row["frames_empty"] == 1 and row["diagonal_m"] == BODY.diagonal
+    assert "d2_psnr_paper" not in compare_sequences([line], [line], QUICK).to_row()
+
+
 def test_frames_are_read_one_at_a_time():
     alive: list[int] = []
 

@@ -20,18 +20,22 @@ from ..evaluation.datasets import own_digest
 from ..evaluation.experiment import Experiment
 from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
+from ..evaluation.identity import check_one_source
+from ..evaluation.pictures import PICTURES
 from ..evaluation.promises import Promise
 from ..evaluation.rd_rows import FLOOR as RATED_FLOOR
 from ..evaluation.report import write_report
-from ..evaluation.rows import FAILED, Point, Row, experiment_of, failed_rows, join_rows, measured_rows, read_rows
+from ..evaluation.row_form import FAILED, UNPICTURED
+from ..evaluation.rows import Point, Row, experiment_of, failed_rows, join_rows, measured_rows, read_rows
 from ..evaluation.runner import run_points
+from ..evaluation.said import one_line
 from ..evaluation.scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
 from ..evaluation.study import Study
 from .console import Common
 from .reading import Reading
 
 command = App(name="bench", help="Measure codecs against each other, and make tables and plots of the rows.")
-BESIDE = (".cache", ".pictures")  # endings of folders
+BESIDE = (".cache", PICTURES)  # endings of folders
 DATA = Path("../shared/data")
 
 
@@ -81,7 +85,8 @@ class Selection:
         points = list(chosen.points(self.small))
         for name, wanted, there in (("--only", self.only, _codecs(points)), ("--on", self.on, _sequences(points))):
             if unknown := [each for each in wanted if each not in there]:
-                told = f"{experiment} has no such points; it has {', '.join(there)}"
+                which = f"{experiment} --small" if self.small else experiment
+                told = f"{which} has no such points; it has {', '.join(there)}"
                 raise InputError(f"{name} {' '.join(unknown)}: {told}")
         found = [
             point
@@ -195,10 +200,12 @@ def report(
     output
         The folder to write into.
     """
-    joined = join_rows([_reported(path) for path in rows])
+    files = [_reported(path) for path in rows]
+    check_one_source([row for file in files for row in measured_rows(file)])
+    joined = join_rows(files)
     measured = measured_rows(joined)
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
-    pictures = [path.with_suffix(".pictures") for path in rows]
+    pictures = [path.with_suffix(PICTURES) for path in rows]
     written = [str(path) for path in write_report(joined, EXPERIMENTS, output, pictures)]
     reached = [
         promise
@@ -226,23 +233,34 @@ def _reported(path: Path) -> list[Row]:
 def describe(row: Row) -> str:
     """A row in one line."""
     options = " ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
-    head = f"{row['sequence']} {row['codec']} {options}:"
+    return one_line(f"{row['sequence']} {row['codec']} {options}: {_measured(row)}")
+
+
+def _measured(row: Row) -> str:
+    """What was measured of a point, or why nothing was."""
     if FAILED in row:
-        return f"{head} failed: {row[FAILED]}"
+        return f"failed: {row[FAILED]}"
     if row["kind"] == "decode":
         peer = f"DracoPy {row['draco_ms']:.2f}, with subdivision {row['subdivided_ms']:.2f}"
-        return f"{head} {row['frame_ms']:.2f} ms/frame, {peer}"
+        return f"{row['frame_ms']:.2f} ms/frame, {peer}"
     if row["kind"] in ("memory", MEMORY):
-        return f"{head} {row['frames']} frames, peak {row['peak_rss_mb']:.0f} MB"
+        return f"{row['frames']} frames, peak {row['peak_rss_mb']:.0f} MB"
     if row["kind"] == SEGMENTATION:
-        return f"{head} IoU {row['iou_mean']:.3f}, worst frame {row['iou_worst']:.3f}"
+        return f"IoU {row['iou_mean']:.3f}, worst frame {row['iou_worst']:.3f}"
     if row["kind"] == RATED_FLOOR:
-        return f"{head} {row['d2_psnr_paper']:.2f} dB to the input"
+        return f"{_told(row, 'd2_psnr_paper', 'dB')} to the input"
     if row["kind"] in (FLOOR, SCENE):
         rate = f"{row['mbps']:.3f} Mbps, " if "mbps" in row else ""
-        return f"{head} {rate}to the truth {row['truth_d2_psnr_backward']:.2f} dB, SSIM {row['truth_ssim_masked']:.3f}"
-    quality = f"{row['d2_psnr_paper']:.2f} dB, {row['normal_error_deg']:.2f} degrees"
-    return f"{head} {row['mbps']:.3f} Mbps, {quality}, {row['encode_s']:.2f} s/frame"
+        return f"{rate}to the truth {row['truth_d2_psnr_backward']:.2f} dB, SSIM {row['truth_ssim_masked']:.3f}"
+    values = (("d2_psnr_paper", "dB"), ("normal_error_deg", "degrees"), ("encode_s", "s/frame"))
+    told = [_told(row, key, unit) for key, unit in values]
+    without = f"; no pictures: {row[UNPICTURED]}" if UNPICTURED in row else ""
+    return f"{row['mbps']:.3f} Mbps, {', '.join(told)}{without}"
+
+
+def _told(row: Row, key: str, unit: str) -> str:
+    """A value with two digits; a metric that is not finite is null in rows."""
+    return f"no {unit}" if row.get(key) is None else f"{row[key]:.2f} {unit}"
 
 
 def promise_table(promises: Sequence[Promise]) -> Table:

@@ -27,8 +27,9 @@ from ..errors import InputError
 from .bench import Bench
 from .codecs import source_of
 from .provenance import made_by
-from .rows import FAILED, Point, Row
-from .said import LONGEST, last_words
+from .row_form import FAILED, problem_of
+from .rows import Point, Row
+from .said import LONGEST, last_words, one_line
 from .timer import ONE_THREAD
 
 _PREFIX = "meshreel-point-"  # of folders for temporary files
@@ -44,8 +45,11 @@ def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = (
             limit = _Limit(process, bench.limit_s)
             try:
                 for row in _answers(process, (_measured, left, bench, list(rows))):
+                    if wrong := _problem(row, left[0]):
+                        limit.reached = wrong
+                        break
                     limit.again()
-                    yield row if FAILED not in row else _failed(left[0], bench, row[FAILED])
+                    yield row if FAILED not in row else failed_row(left[0], bench, row[FAILED])
                     left.pop(0)
                     if not left:
                         break  # and whatever threads it has left do not matter
@@ -57,7 +61,7 @@ def measure_apart(points: Sequence[Point], bench: Bench, rows: Sequence[Row] = (
             if left and _ENDED.is_set():
                 raise InterruptedError("the sweep has been ended")
             if left:
-                yield _failed(left.pop(0), bench, limit.reached or last_words(process.returncode, said))
+                yield failed_row(left.pop(0), bench, limit.reached or last_words(process.returncode, said))
 
 
 def make_apart(sequence: str, frames: int | None, bench: Bench) -> None:
@@ -114,7 +118,26 @@ def _answers(process: subprocess.Popen[bytes], task: tuple[object, ...]) -> Iter
         process.stdin.write(pickle.dumps(task))
         process.stdin.flush()  # and it stays open: its end is ours
     lines = itertools.takewhile(lambda line: line.endswith(b"\n"), process.stdout)
-    return (dict(json.loads(line)) for line in lines)
+    return (_read(line) for line in lines)
+
+
+def _read(line: bytes) -> Row:
+    """One answer; an empty one where it is none."""
+    try:
+        found = json.loads(line)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def _problem(row: Row, point: Point) -> str | None:
+    """Why an answer is none of the point that was asked for: codecs may write anywhere. None where it is one."""
+    if FAILED in row:
+        return None if isinstance(row[FAILED], str) else "wrote among the answers of its process"
+    if row.get("point") != point.key:
+        return "wrote among the answers of its process"
+    wrong = problem_of(row)
+    return wrong and f"has no row that can be kept: {wrong}"
 
 
 class _Limit:
@@ -177,9 +200,10 @@ def _close(process: subprocess.Popen[bytes]) -> None:
                 pipe.close()
 
 
-def _failed(point: Point, bench: Bench, reason: str) -> Row:
+def failed_row(point: Point, bench: Bench, reason: str) -> Row:
+    """The row of a point of which nothing was measured, and why."""
     head: Row = {"point": point.key, "kind": point.kind, "experiment": bench.experiment} | made_by()
-    return head | {"sequence": point.sequence, "codec": point.codec, "options": point.options, FAILED: reason}
+    return head | {"sequence": point.sequence, "codec": point.codec, "options": point.options, FAILED: one_line(reason)}
 
 
 def main() -> None:

@@ -7,16 +7,30 @@ from __future__ import annotations
 
 import json
 import pickle
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..derived import DerivedSequence
 from ..errors import InputError
-from ..types import Mesh, MeshSequence
+from ..io.meshes import FARTHEST
+from ..metrics.render import Looked, Visible
+from ..metrics.report import ComparisonOptions, compare_sequences
+from ..types import Frames, Mesh, MeshSequence
 from .codec import Codec
 from .fresh import digest
+from .rows import Row
+
+
+def compared(
+    originals: Frames, decoded: Frames, options: ComparisonOptions, seen: Callable[[Mesh], Looked] = Visible
+) -> Row:
+    """Every metric, as a row has it. Raises InputError where no frame of either has surface."""
+    row = compare_sequences(originals, decoded, options, seen).to_row()
+    if row["frames_empty"] == row["frames_compared"]:
+        raise InputError("no frame has a face with an area; give a sequence with surface")
+    return row
 
 
 def decoder_of(codec: Codec) -> bytes:
@@ -100,6 +114,8 @@ def _problem(mesh: object) -> str | None:
             return f"{name} of shape {found.shape} and type {found.dtype} (Mesh.of makes (N, 3), {np.dtype(dtype)})"
     if not np.isfinite(mesh.vertices).all():
         return "coordinates that are not finite"
+    if len(mesh.vertices) and np.abs(mesh.vertices).max() > FARTHEST:
+        return f"coordinates beyond {FARTHEST:g}"
     if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices):
         return f"faces of vertices {mesh.faces.min()} to {mesh.faces.max()}, and {len(mesh.vertices)} vertices,"
     return None

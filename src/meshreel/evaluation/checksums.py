@@ -37,14 +37,28 @@ def known_checksums() -> dict[str, str]:
     return table
 
 
-@cache
 def checksum(path: Path) -> str:
-    """SHA-256 of a file, or of the names and contents of all files below a folder, in the order of their names."""
+    """SHA-256 of a file, or of the names and contents of all files below a folder, in the order of their names.
+
+    Files are read again where their sizes or times have changed. Raises InputError where one cannot be read.
+    """
+    try:
+        files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+        stamps = [(file, file.stat()) for file in files]
+        return _checksum(path, tuple((file, stat.st_size, stat.st_mtime_ns) for file, stat in stamps))
+    except OSError as error:
+        raise InputError(
+            f"{error.filename}: cannot be read ({error.strerror}); check the path and its rights"
+        ) from None
+
+
+@cache
+def _checksum(path: Path, stamps: tuple[tuple[Path, int, int], ...]) -> str:
     digest = hashlib.sha256()
     if path.is_file():
         digest.update(path.read_bytes())
         return digest.hexdigest()
-    for file in sorted(p for p in path.rglob("*") if p.is_file()):
+    for file, _, _ in stamps:
         data = file.read_bytes()
         digest.update(f"{file.relative_to(path).as_posix()} {len(data)}\n".encode())
         digest.update(data)

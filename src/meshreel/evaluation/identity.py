@@ -13,7 +13,8 @@ from ..errors import InputError
 from .bench import Bench
 from .codecs import codec_version
 from .datasets import own_digest
-from .rows import FAILED, Point, Row
+from .row_form import FAILED
+from .rows import Point, Row
 
 SOURCE, VERSION = "source", "codec_version"  # of a row
 _SHOWN = 20  # characters of a digest or a version
@@ -23,6 +24,30 @@ def identity(point: Point, bench: Bench) -> Row:
     """What a row says of its sequence and codec, where names do not say it."""
     found = {SOURCE: own_digest(point.sequence, bench.data, bench.own), VERSION: codec_version(point.codec)}
     return {key: told for key, told in found.items() if told is not None}
+
+
+def changed(row: Row, expected: Mapping[str, str | None], bench: Bench) -> str | None:
+    """Why a row that has come is not of the sequence that its sweep began with (its digest by name); None if it is."""
+    began = expected.get(row["sequence"])
+    if began is None:
+        return None
+    try:
+        now = own_digest(row["sequence"], bench.data, bench.own)
+    except InputError as error:
+        return f"the sequence has changed since the sweep began: {error}"
+    if now == began == row.get(SOURCE, began):
+        return None
+    return f"the sequence has changed since the sweep began ({began[:_SHOWN]}, now {str(now)[:_SHOWN]})"
+
+
+def check_one_source(rows: Sequence[Row]) -> None:
+    """Raises InputError where rows of one name are of sequences of different content, which share no curve."""
+    sources: dict[str, str] = {}
+    for row in rows:
+        if (found := row.get(SOURCE)) and sources.setdefault(row["sequence"], found) != found:
+            told = f"rows of {row['sequence']} are of sequences of different content, or read in different ways"
+            digests = f"{SOURCE} {sources[row['sequence']][:_SHOWN]} and {found[:_SHOWN]}"
+            raise InputError(f"{told} ({digests}); make a report of each, or delete the lines of one")
 
 
 def check_same(points: Sequence[Point], known: Mapping[str, Row], bench: Bench, file: Path) -> None:

@@ -17,11 +17,11 @@ import numpy as np
 from ..coding.mesh import encode_mesh
 from ..decoder import open as open_video
 from ..derived import Backwards
-from ..metrics.report import ComparisonOptions, compare_sequences
+from ..metrics.report import ComparisonOptions
 from ..types import Frames, MeshSequence
 from .bench import Bench
 from .bridges import count_bridges, count_degenerate
-from .checked import check_told, decoded_by, decoder_of
+from .checked import check_told, compared, decoded_by, decoder_of
 from .codec import Codec, coded_row
 from .codecs import make_codec
 from .codecs.draco import lattice_step
@@ -62,7 +62,7 @@ def _measured_codec(name: str, sequence: MeshSequence, codec: Codec, options: Co
         "peer": peer,
         "decode_over_peer": decode["frame_ms"] / peer["frame_ms"] if peer else None,
     }
-    row |= compare_sequences(sequence, video, options).to_row() | {"groups": group_records(data)}
+    row |= compared(sequence, video, options) | {"groups": group_records(data)}
     row |= {"bridges": [count_bridges(a, b) for a, b in zip(sequence, video, strict=True)]}
     return row | {"degenerate_faces": [count_degenerate(mesh) for mesh in video]}, data
 
@@ -75,7 +75,7 @@ def run_curve_point(name: str, sequence: MeshSequence, codec: Codec, options: Co
     check_told(codec, data)
     row = _rate(name, sequence, codec, data) | {"encode_s": encode_s}
     video = confirmed(data, decoder, decoded_by(decoder, data, codec.name, sequence))
-    measured = compare_sequences(sequence, video, options).to_row()
+    measured = compared(sequence, video, options)
     frames = [{key: frame[key] for key in CURVE_METRICS if key in frame} for frame in measured["per_frame"]]
     return row | measured | {"per_frame": frames, "groups": group_records(data)}
 

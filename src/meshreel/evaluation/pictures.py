@@ -21,6 +21,7 @@ from ..metrics.sheet import error_at_pixels
 from ..types import Mesh
 from .rows import Row
 
+PICTURES = ".pictures"  # how the name of the folder ends
 VIEW = 900  # pixels, width and height of the view of what no camera has seen
 SMALLEST = 900  # pixels across: pictures of small cameras are enlarged by a whole factor
 LIMIT_PERCENT = 0.5  # of the diagonal, where the heat map's colors end
@@ -62,4 +63,4 @@ def _enlarged(camera: PinholeCamera) -> PinholeCamera:
 
 def _write(path: Path, picture: Float32[np.ndarray, "H W 3"]) -> None:
     with replacing(path) as file:
-        Image.fromarray(np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)).save(file, "PNG", optimize=True)
+        Image.fromarray(np.rint(255 * np.clip(picture, 0, 1)).astype(np.uint8)).save(file, "PNG")

@@ -18,11 +18,10 @@ from ..derived import Chosen
 from ..errors import InputError
 from ..io.sequence import SequenceOptions
 from ..metrics.render import Visible
-from ..metrics.report import compare_sequences
 from ..metrics.truth import Scene, scene_means, scene_row
 from ..types import Frames, MeshSequence, evenly
 from .bench import Bench
-from .checked import check_told, decoded_by, decoder_of
+from .checked import check_told, compared, decoded_by, decoder_of
 from .codec import Codec, TwoStepCodec, coded_row
 from .codecs import make_codec
 from .datasets import Dataset, open_known
@@ -32,8 +31,10 @@ from .groups import group_records
 from .identity import identity
 from .originals import KEPT_PICTURES, KeptPictures
 from .peers import measure_fresh_decode
-from .pictures import draw_decoded, draw_original
+from .pictures import PICTURES, draw_decoded, draw_original
+from .row_form import UNPICTURED
 from .rows import Point, Row
+from .said import one_line
 from .timer import StageTimer
 from .truth import finite, true_scene
 
@@ -122,7 +123,7 @@ def _floor(known: Dataset, numbers: Sequence[int], bench: Bench) -> Row:
 def _to_input(known: Dataset, numbers: Sequence[int], shown: Frames, bench: Bench) -> Row:
     options = replace(bench.comparison, cameras=known.cameras or bench.comparison.cameras)
     seen = Visible if bench.cache is None else KeptPictures(bench.cache / KEPT_PICTURES)
-    row = compare_sequences(Chosen(known.sequence, numbers), shown, options, seen).to_row()
+    row = compared(Chosen(known.sequence, numbers), shown, options, seen)
     row["per_frame"] = [{key: frame[key] for key in KEPT if key in frame} for frame in row["per_frame"]]
     row.pop("cameras")
     return row
@@ -139,14 +140,18 @@ def _pictures(point: Point, known: Dataset, numbers: Sequence[int], shown: tuple
     meshes, bench = shown
     if bench.cache is None:
         return {}
-    folder = bench.cache.with_suffix(".pictures")
+    folder = bench.cache.with_suffix(PICTURES)
     index = len(numbers) // 2
     original = known.sequence[numbers[index]]
     file = f"{file_name(point.sequence)}-{numbers[index]}-{len(known.sequence)}-original.png"
-    camera = draw_original(folder / file, original, known.cameras)
+    decoded = meshes[index]
     name = hashlib.sha256(point.key.encode()).hexdigest()[:16]
     found: Row = {"frame": numbers[index], "original": file}
-    return {"pictures": found | draw_decoded(folder, name, (original, meshes[index]), camera)}
+    try:
+        camera = draw_original(folder / file, original, known.cameras)
+        return {"pictures": found | draw_decoded(folder, name, (original, decoded), camera)}
+    except InputError as error:  # the disk is full: what was measured for minutes is a row all the same
+        return {UNPICTURED: one_line(str(error))}
 
 
 @lru_cache(maxsize=1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
@@ -12,16 +11,10 @@ from typing import Any
 
 from ..errors import InputError
 from .locked import locked
+from .row_form import CURVE_KINDS, FAILED, problem_of
 
 Row = dict[str, Any]
 FIRST = "targets"  # the experiment of rows that do not name theirs
-FAILED = "failed"  # of a row: why nothing was measured
-CURVE_KINDS = ("quality", "curve", "floor", "scene", "rated", "sampled")  # rows that have a rate and metrics
-
-REQUIRED = ("point", "kind", "sequence", "codec", "options")  # of every row, whether it failed or not
-_TEXTS = ("point", "kind", "sequence", "codec", "experiment", FAILED)
-_OBJECTS = ("options", "decode", "encode_stages_s", "made_by")
-_LISTS = ("groups", "per_frame")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,19 +46,21 @@ def read_rows(path: Path) -> list[Row]:
         raise InputError(f"{path}: is no file; give one that `meshreel bench run` made")
     try:
         data = path.read_bytes()
-        lines = data[: _whole(data)].decode().splitlines()
+        lines = data[: _whole(data)].decode("utf-8-sig").split("\n")  # texts may have other ends of lines
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}; make it with `meshreel bench run`") from error
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 ({error.reason}); make it with `meshreel bench run`") from error
     rows = []
     for number, line in enumerate(lines, 1):
+        if not line.strip():
+            continue
         try:
             row = json.loads(line, parse_constant=_not_json)
         except (ValueError, RecursionError) as error:
             told = error.msg if isinstance(error, json.JSONDecodeError) else error
             raise InputError(f"{path}, line {number}: not JSON: {told}; delete that line") from error
-        if problem := _problem(row):
+        if problem := problem_of(row):
             raise InputError(f"{path}, line {number}: not a row: {problem}; delete that line")
         rows.append(_printable(row) if "\\ud" in line else row)
     return rows
@@ -78,26 +73,6 @@ def _printable(row: Row) -> Row:
 
 def _not_json(found: str) -> float:
     raise ValueError(f"{found} is no number")
-
-
-def _problem(row: object) -> str | None:
-    """Why something is no row; None where it is one."""
-    if not isinstance(row, dict):
-        return "no JSON object"
-    for keys, kind, told in ((_TEXTS, str, "text"), (_OBJECTS, dict, "JSON object"), (_LISTS, list, "list")):
-        for key in keys:
-            if (key in row or key in REQUIRED) and not isinstance(row.get(key), kind):
-                return f"{key!r} is {_told(row, key)}, and not a {told}"
-    if row["kind"] in CURVE_KINDS and FAILED not in row:
-        for key in ("mbps", "frames"):
-            number = row.get(key)
-            if not (isinstance(number, (int, float)) and 0 < number < math.inf):
-                return f"{key!r} is {_told(row, key)}, and not a number above 0"
-    return None
-
-
-def _told(row: Row, key: str) -> str:
-    return repr(row[key])[:60] if key in row else "missing"
 
 
 def experiment_of(row: Row) -> str:
@@ -143,7 +118,19 @@ def check_appendable(path: Path) -> None:
         raise _not_written(path, error) from None
 
 
+def check_folder(path: Path) -> None:
+    """Raises InputError where nothing could be kept in a folder, which is made if needed."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path) as file:
+            file.write(b"0")
+    except OSError as error:
+        raise _not_written(path, error) from None
+
+
 def _not_written(path: Path, error: OSError) -> InputError:
+    if isinstance(error, (FileExistsError, NotADirectoryError)):
+        return InputError(f"{path}: cannot be written (a part of that path is a file); choose another")
     return InputError(f"{path}: cannot be written ({error.strerror or error}); free space, or choose another file")
 
 

@@ -11,15 +11,17 @@ from concurrent.futures import Executor, Future
 from pathlib import Path
 from queue import PriorityQueue, SimpleQueue
 
-from .apart import make_apart, measure_apart
+from .apart import failed_row, make_apart, measure_apart
 from .bench import Bench
 from .codec import TwoStepCodec
 from .codecs import make_codec
-from .datasets import MADE, open_dataset
-from .identity import check_same
+from .datasets import MADE, open_dataset, own_digest
+from .identity import changed, check_same
 from .measure import measure_point
+from .pictures import PICTURES
 from .rd_rows import KINDS as RATED_KINDS
-from .rows import FAILED, Point, Row, append_row, check_appendable, experiment_of, measured_rows, read_rows
+from .row_form import FAILED
+from .rows import Point, Row, append_row, check_appendable, check_folder, experiment_of, measured_rows, read_rows
 from .scene_rows import KINDS as SCENE_KINDS
 
 AFTER = ("decode",)  # kinds of points that compare with rows measured before
@@ -54,8 +56,14 @@ def run_points(
         if point.key in known:
             tell(known[point.key], False)
     missing = [point for point in points if point.key not in known]
+    for folder in (bench.cache, bench.cache.with_suffix(PICTURES)) if bench.cache and missing else ():
+        check_folder(folder)
     _check_sequences(missing, bench, executor is not None)
-    for row in _measured(missing, list(known.values()), bench, executor):
+    began = {point.sequence: own_digest(point.sequence, bench.data, bench.own) for point in missing}
+    asked = {point.key: point for point in missing}
+    for found in _measured(missing, list(known.values()), bench, executor):
+        why = changed(found, began, bench)
+        row = found if why is None else failed_row(asked[found["point"]], bench, why)
         append_row(file, row)
         known[row["point"]] = row
         tell(row, True)

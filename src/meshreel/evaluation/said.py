@@ -1,4 +1,5 @@
-"""Why a process has ended, in a line. In -> out: its exit code, and the file that it said things to -> words."""
+"""What others say, in a line. In -> out: a text, or the exit code of a process and the file that it said things to ->
+words fit for a terminal."""
 
 from __future__ import annotations
 
@@ -7,6 +8,11 @@ from typing import IO
 
 LONGEST = 300  # characters of what a process said last
 _TAIL = 1 << 16  # bytes of it that are read: it may have said gigabytes
+
+
+def one_line(text: str) -> str:
+    """A text without ends of lines, and with ? for what else moves a terminal's cursor or colours it."""
+    return "".join(sign if sign.isprintable() else "?" for sign in " ".join(text.split()))
 
 
 def last_words(code: int, said: IO[bytes]) -> str:

@@ -28,7 +28,7 @@ _PARSERS: dict[str, Callable[[bytes], Polygons]] = {
     ".off": parse_off,
 }
 EXTENSIONS = tuple(_PARSERS)
-_FARTHEST = 1e12  # beyond it float64 has no tenth of a millimetre, and squares of squares overflow
+FARTHEST = 1e12  # of a coordinate: beyond it float64 has no tenth of a millimetre, and squares of squares overflow
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def read_mesh(path: Path, where: str | None = None) -> Loaded:
 def checked(polygons: Polygons) -> Loaded:
     """The mesh of polygons whose every number is legal; raises Unreadable for the first that is not."""
     vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
-    bad = np.flatnonzero(~(np.abs(vertices) <= _FARTHEST).all(axis=1))  # NaN is not <= anything
+    bad = np.flatnonzero(~(np.abs(vertices) <= FARTHEST).all(axis=1))  # NaN is not <= anything
     if len(bad):
         x, y, z = vertices[bad[0]]
         raise Unreadable(f"vertex {bad[0]} is at ({x:g}, {y:g}, {z:g}), and {len(bad)} in all are not within 1e12")

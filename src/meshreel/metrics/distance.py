@@ -17,6 +17,7 @@ from ..types import Mesh
 from .normals import WORST_ANGLE, angles
 from .samples import RESOLUTION, Matches, Samples, match, sample_pair, used_surface
 
+_LEAST, _MOST = 1e-3, 1e6  # m, from the middle of two meshes: distances are asked for in m
 PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; a mean over frames counts an infinite PSNR as this
 
 
@@ -31,6 +32,12 @@ class OneWayErrors:
     maximum: float  # m, over all samples
     angle: float  # degrees, mean over the area, between interpolated vertex normals
     vertex_angle: float  # degrees, the same at the vertices only, where quantisation turns normals most
+
+    def times(self, unit: float) -> OneWayErrors:
+        """The same of meshes that are so many times larger."""
+        point_mse, plane_mse, rms = self.point_mse * unit**2, self.plane_mse * unit**2, self.rms * unit
+        hausdorff95, maximum = self.hausdorff95 * unit, self.maximum * unit
+        return OneWayErrors(point_mse, plane_mse, rms, hausdorff95, maximum, self.angle, self.vertex_angle)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +110,23 @@ def surface_errors(original: Mesh, decoded: Mesh) -> SurfaceErrors:
     if original.is_empty or decoded.is_empty:
         both = _PERFECT if original.is_empty and decoded.is_empty else _WORST
         return SurfaceErrors(original.diagonal, both, both)
-    diagonal = original.diagonal
     a, b = sample_pair(original, decoded)
+    if (unit := _unit(a.mesh, b.mesh)) != 1:  # in another one, squares of the queries' float32 would be inf or 0
+        smaller = surface_errors(_scaled(original, 1 / unit), _scaled(decoded, 1 / unit))
+        return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))
+    diagonal = original.diagonal
     resolution = RESOLUTION * diagonal
     return SurfaceErrors(diagonal, _one_way(a, match(a, b, resolution)), _one_way(b, match(b, a, resolution)))
+
+
+def _unit(a: Mesh, b: Mesh) -> float:
+    """A power of two near the size of both centered meshes; 1 where that is a size of things that are scanned."""
+    extent = max(float(np.abs(mesh.vertices).max()) for mesh in (a, b))
+    return 1.0 if _LEAST <= extent <= _MOST else 2.0 ** math.floor(math.log2(extent))
+
+
+def _scaled(mesh: Mesh, factor: float) -> Mesh:
+    return Mesh.of(mesh.vertices * factor, mesh.faces)
 
 
 _PERFECT = OneWayErrors(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

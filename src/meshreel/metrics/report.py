@@ -4,7 +4,7 @@ Two iterables of meshes -> Comparison. Frames are read once and one at a time (o
 where the cameras are not given). Rate and times are not here: only who has the bytes and the clock knows them.
 
 How frames are put together: the mean of the frames' values (PSNR: mean of dB, an infinite one counted as
-`PSNR_CEILING`) and the worst frame. Frames that are empty on both sides say nothing and are left out of means.
+`PSNR_CEILING`) and the worst frame. Frames without surface on both sides say nothing and are left out of means.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Comparison:
     """The metrics of a sequence; values in m, % of the diagonal, dB and degrees, as their names say."""
 
     frames: tuple[Row, ...]  # metrics of each frame; inf and nan are kept here
-    empty: tuple[bool, ...]  # frames that are empty on both sides
+    empty: tuple[bool, ...]  # frames without surface on both sides
     cameras: tuple[PinholeCamera | OrthographicCamera, ...]
     keys: tuple[int, ...]
 
@@ -104,7 +104,7 @@ def compare_sequences(
         if other is None:
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
         rows.append(frame_row(mesh, other, cameras, seen))
-        empty.append(mesh.is_empty and other.is_empty)
+        empty.append(_is_nothing(rows[-1]))
     if next(others, None) is not None:
         raise InputError(f"the original sequence ends after {len(rows)} frames and the decoded one does not")
     if any(key >= len(rows) for key in options.keys):
@@ -119,6 +119,11 @@ def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras, seen: Callable[[M
         ssim = ssim_normals(original, decoded, cameras, seen)
         row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}
     return row
+
+
+def _is_nothing(row: Row) -> bool:
+    """Whether both meshes of a frame are without surface: vertices alone, or faces without area, are none."""
+    return bool(row["diagonal_m"] == row["rms_forward_m"] == 0)
 
 
 def aggregate(frames: Sequence[Row]) -> Row:

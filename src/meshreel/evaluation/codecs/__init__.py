@@ -41,10 +41,17 @@ def make_codec(kind: str, options: dict[str, Any]) -> Codec:
     make = CODECS.get(kind) or _of_another_package(kind)
     try:
         made = make(**options)
-    except TypeError as error:
-        raise InputError(f"codec {kind!r} does not take {options}: {error}") from error
-    if kind not in CODECS and str(made.name).split()[:1] in [[ours] for ours in CODECS]:
-        raise InputError(f"codec {kind!r} calls itself {made.name!r}, as one of meshreel's own; give it another name")
+        name, is_codec = getattr(made, "name", None), isinstance(made, Codec)  # either may run what others wrote
+    except InputError:
+        raise  # which says what it does not take
+    except (Exception, SystemExit) as error:
+        told = error if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
+        raise InputError(f"codec {kind!r} does not take {options}: {told}") from error
+    if not is_codec:
+        lacking = [part for part in ("name", "options", "encode", "decode") if not hasattr(made, part)]
+        raise InputError(f"codec {kind!r} is a {type(made).__name__} without {', '.join(lacking)}; see docs/codecs.md")
+    if kind not in CODECS and str(name).split()[:1] in [[ours] for ours in CODECS]:
+        raise InputError(f"codec {kind!r} calls itself {name!r}, as one of meshreel's own; give it another name")
     return made
 
 
@@ -74,7 +81,9 @@ def _of_another_package(kind: str) -> Callable[..., Codec]:
         raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted({*CODECS, *others}))}")
     try:
         make: Callable[..., Codec] = others[kind].load()
-    except Exception as error:  # what runs when a package is imported may raise anything
+    except (Exception, SystemExit) as error:  # what runs when a package is imported may raise anything
         told = error if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
         raise InputError(f"codec {kind!r} cannot be loaded ({told}); install what its package needs") from error
+    if not callable(make):
+        raise InputError(f"codec {kind!r} is a {type(make).__name__}; its entry point must name a class or a function")
     return make

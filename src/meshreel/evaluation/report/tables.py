@@ -16,7 +16,8 @@ from typing import Any
 from ..curves import Measure, against, curve, curve_of, value
 from ..promises import Promise
 from ..provenance import MADE_BY
-from ..rows import CURVE_KINDS, FAILED, Row, curve_rows, experiment_of
+from ..row_form import CURVE_KINDS, FAILED
+from ..rows import Row, curve_rows, experiment_of
 from .looks import arrow, in_order
 from .plots import METRICS
 
