@@ -116,16 +116,13 @@ def test_a_sequence_without_surface_fails_and_others_go_on(run, study):
         assert said.code == 0 and said.row["failed"] == 1 and "no frame has a face with an area" in said.err
 
 
-def test_rows_of_two_sequences_by_one_name_make_no_report(run, study):
-    for part in ("a", "b"):
-        said = run(
-            "bench", "run", "figure6", "-o", study / f"{part}.jsonl", "--data", study, "--no-ssim", "--on", "ball"
-        )
-        assert said.code == 0
-        np.savez(study / "ball.npz", vertices=[BALL.vertices, BALL.vertices], faces=BALL.faces)
-    said = run("bench", "report", study / "a.jsonl", study / "b.jsonl", "-o", study / "out")
+def test_rows_of_two_sequences_by_one_name_make_no_report(run, tmp_path):
+    for name, source in (("a", "1f"), ("b", "2e")):
+        made = row("ball", "draco", 1.0, 60.0, experiment="figure6", source=source)
+        (tmp_path / f"{name}.jsonl").write_text(json.dumps(made) + "\n")
+    said = run("bench", "report", tmp_path / "a.jsonl", tmp_path / "b.jsonl", "-o", tmp_path / "out")
     assert failed(said, "rows of ball are of sequences of different content", "make a report of each")
-    assert not (study / "out").exists()
+    assert not (tmp_path / "out").exists()
 
 
 def test_how_files_are_read_is_about_own_sequences(run, study, monkeypatch):
