@@ -15,13 +15,12 @@ from rich.table import Table
 
 from ..errors import InputError
 from ..evaluation.apart import begin, end_all
-from ..evaluation.bench import Bench
+from ..evaluation.bench import PICTURES, Bench
 from ..evaluation.datasets import own_digest
 from ..evaluation.experiment import Experiment
 from ..evaluation.experiments import EXPERIMENTS
 from ..evaluation.experiments import experiment as find_experiment
 from ..evaluation.identity import check_one_source
-from ..evaluation.pictures import PICTURES
 from ..evaluation.promises import Promise
 from ..evaluation.rd_rows import FLOOR as RATED_FLOOR
 from ..evaluation.report import write_report

@@ -132,9 +132,9 @@ def _read(line: bytes) -> Row:
 
 def _problem(row: Row, point: Point) -> str | None:
     """Why an answer is none of the point that was asked for: codecs may write anywhere. None where it is one."""
-    if FAILED in row:
-        return None if isinstance(row[FAILED], str) else "wrote among the answers of its process"
-    if row.get("point") != point.key:
+    if isinstance(row.get(FAILED), str):
+        return None
+    if FAILED in row or row.get("point") != point.key:
         return "wrote among the answers of its process"
     wrong = problem_of(row)
     return wrong and f"has no row that can be kept: {wrong}"

@@ -9,6 +9,8 @@ from ..io.sequence import SequenceOptions
 from ..metrics.report import ComparisonOptions
 from .rows import FIRST
 
+PICTURES = ".pictures"  # how the folder's name ends, beside the rows
+
 
 @dataclass(frozen=True, slots=True)
 class Bench:
@@ -22,6 +24,11 @@ class Bench:
     retry: bool = False  # points that failed before are measured again
     alike: tuple[str, ...] = ()  # experiments that measure in the same way: their rows count, too
     own: SequenceOptions = field(default_factory=SequenceOptions)  # how files become a sequence that is no benchmark's
+
+    @property
+    def pictures(self) -> Path | None:
+        """The folder of the pictures of what is decoded; none where nothing is kept."""
+        return self.cache and self.cache.with_suffix(PICTURES)
 
     def absolute(self) -> Bench:
         """The same wherever a process goes."""

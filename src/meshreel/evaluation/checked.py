@@ -1,4 +1,4 @@
-"""What a codec gives, looked at before it is measured: streams, meshes, and the same meshes of another process.
+"""What a codec gives, looked at before and as it is measured: streams, meshes, and the same meshes of another process.
 
 In -> out: what `encode` or `decode` of anybody returned -> the same, or InputError that says what it is.
 """

@@ -21,7 +21,6 @@ from ..metrics.sheet import error_at_pixels
 from ..types import Mesh
 from .rows import Row
 
-PICTURES = ".pictures"  # how the name of the folder ends
 VIEW = 900  # pixels, width and height of the view of what no camera has seen
 SMALLEST = 900  # pixels across: pictures of small cameras are enlarged by a whole factor
 LIMIT_PERCENT = 0.5  # of the diagonal, where the heat map's colors end

@@ -31,7 +31,7 @@ from .groups import group_records
 from .identity import identity
 from .originals import KEPT_PICTURES, KeptPictures
 from .peers import measure_fresh_decode
-from .pictures import PICTURES, draw_decoded, draw_original
+from .pictures import draw_decoded, draw_original
 from .row_form import UNPICTURED
 from .rows import Point, Row
 from .said import one_line
@@ -138,9 +138,9 @@ def _to_truth(known: Dataset, numbers: Sequence[int], shown: Frames) -> Row:
 def _pictures(point: Point, known: Dataset, numbers: Sequence[int], shown: tuple[Frames, Bench]) -> Row:
     """Where the pictures of the frame in the middle are; no pictures where there is no folder for them."""
     meshes, bench = shown
-    if bench.cache is None:
+    folder = bench.pictures
+    if folder is None:
         return {}
-    folder = bench.cache.with_suffix(PICTURES)
     index = len(numbers) // 2
     original = known.sequence[numbers[index]]
     file = f"{file_name(point.sequence)}-{numbers[index]}-{len(known.sequence)}-original.png"

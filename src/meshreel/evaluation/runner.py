@@ -18,7 +18,6 @@ from .codecs import make_codec
 from .datasets import MADE, open_dataset, own_digest
 from .identity import changed, check_same
 from .measure import measure_point
-from .pictures import PICTURES
 from .rd_rows import KINDS as RATED_KINDS
 from .row_form import FAILED
 from .rows import Point, Row, append_row, check_appendable, check_folder, experiment_of, measured_rows, read_rows
@@ -56,8 +55,9 @@ def run_points(
         if point.key in known:
             tell(known[point.key], False)
     missing = [point for point in points if point.key not in known]
-    for folder in (bench.cache, bench.cache.with_suffix(PICTURES)) if bench.cache and missing else ():
-        check_folder(folder)
+    for folder in (bench.cache, bench.pictures) if missing else ():
+        if folder is not None:
+            check_folder(folder)
     _check_sequences(missing, bench, executor is not None)
     began = {point.sequence: own_digest(point.sequence, bench.data, bench.own) for point in missing}
     asked = {point.key: point for point in missing}

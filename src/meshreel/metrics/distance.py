@@ -8,7 +8,7 @@ PSNR inf, angle 0); one empty mesh is the worst case (distances inf, PSNR 0 dB, 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
@@ -35,9 +35,9 @@ class OneWayErrors:
 
     def times(self, unit: float) -> OneWayErrors:
         """The same of meshes that are so many times larger."""
-        point_mse, plane_mse, rms = self.point_mse * unit**2, self.plane_mse * unit**2, self.rms * unit
-        hausdorff95, maximum = self.hausdorff95 * unit, self.maximum * unit
-        return OneWayErrors(point_mse, plane_mse, rms, hausdorff95, maximum, self.angle, self.vertex_angle)
+        squares = {"point_mse": self.point_mse * unit**2, "plane_mse": self.plane_mse * unit**2}
+        lengths = {"rms": self.rms * unit, "hausdorff95": self.hausdorff95 * unit, "maximum": self.maximum * unit}
+        return replace(self, **squares, **lengths)
 
 
 @dataclass(frozen=True, slots=True)

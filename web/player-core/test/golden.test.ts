@@ -57,12 +57,13 @@ async function shownAt(frame: number, timeline: Head): Promise<Shown> {
   return player.update(performance.now())!;
 }
 
-describe.each(NAMES)("%s", { retry: 2 }, (name) => { // in real time: a machine that halts for a moment stalls once
+describe.each(NAMES)("%s", (name) => {
   const file = new Uint8Array(readFileSync(`${FOLDER}/${name}.reel`));
   const golden = JSON.parse(readFileSync(`${FOLDER}/${name}.json`, "utf8")) as Golden;
   const head = Head.parse(file);
 
-  test("plays to its end from a web server, every frame with the faces that Python gives", async () => {
+  // In real time: a machine that halts for a moment stalls once.
+  test("plays to its end from a web server, every frame with the faces that Python gives", { retry: 2 }, async () => {
     server = await FileServer.of(file);
     open(file, new HttpSource(server.url));
     const seen = new Map<number, number>();

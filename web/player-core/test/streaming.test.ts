@@ -13,7 +13,7 @@ import { Viewer } from "./viewer.ts";
 const FULL = [20_000, 40_000, 80_000, 160_000]; // bytes a second of each layer
 const RATE = 300_000; // of all
 const SECONDS = 6;
-const AGAIN = { retry: 2 }; // in real time: a machine that halts for a moment stalls once, a fault of the player every time
+const AGAIN = { retry: 2 }; // what must not stall in real time: a machine that halts for a moment stalls once, a fault of the player every time
 const FILE = stream(SECONDS, FULL, 5);
 
 let server: FileServer;
@@ -58,8 +58,8 @@ function everyFrame(): void {
   expect(viewer.frames.length).toBeGreaterThan(0.7 * 25 * SECONDS);
 }
 
-describe("throttled", AGAIN, () => {
-  test("to twice the rate, it plays at best, without a stall", async () => {
+describe("throttled", () => {
+  test("to twice the rate, it plays at best, without a stall", AGAIN, async () => {
     throttle(2 * RATE);
     await ended();
     expect(new Set(viewer.qualities)).toEqual(new Set([3]));
@@ -69,7 +69,7 @@ describe("throttled", AGAIN, () => {
     expect(player.stats.bandwidthMbps).toBeLessThan((3 * RATE * 8) / 1e6);
   });
 
-  test("to half the rate, it drops layers and no frames, without a stall", async () => {
+  test("to half the rate, it drops layers and no frames, without a stall", AGAIN, async () => {
     throttle(RATE / 2);
     await ended();
     everyFrame();
@@ -101,8 +101,8 @@ describe("throttled", AGAIN, () => {
   });
 });
 
-describe("a server", AGAIN, () => {
-  test("that ignores ranges is played from one stream, as it arrives", async () => {
+describe("a server", () => {
+  test("that ignores ranges is played from one stream, as it arrives", AGAIN, async () => {
     const limit = new Throttle(2 * RATE);
     server.respond = async (response) => {
       response.writeHead(200, { "Content-Length": FILE.length });
@@ -118,7 +118,7 @@ describe("a server", AGAIN, () => {
     expect(player.stats.fetchedBytes).toBe(FILE.length);
   });
 
-  test("that cuts connections in mid-stream is asked again: warnings, and every frame", async () => {
+  test("that cuts connections in mid-stream is asked again: warnings, and every frame", AGAIN, async () => {
     server.respond = (response, asked, count) => {
       const body = server.begin(response, asked);
       if (count % 2 === 1) response.write(body.subarray(0, body.length / 3), () => response.destroy());
