@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 from captured import Row, keep
+from meshreel_bench.scenes import FOUND, SceneData, open_scene
 
 from meshreel.analysis.background import BackgroundOptions, fuse_background
 from meshreel.analysis.background_depth import fuse_still_depth
-from meshreel.evaluation.scenes import FOUND, SceneData, open_scene
-from meshreel.evaluation.truth import true_scene
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.metrics.truth import Scene, scene_row
+from meshreel.metrics.truth_comparison import true_scene
 from meshreel.types import Mesh, evenly
 
 DECISION, VOXEL, FRAME = "backgrounds", 0.02, 30

@@ -6,9 +6,9 @@ import json
 import sys
 from pathlib import Path
 
-from meshreel.evaluation import checksums
-from meshreel.evaluation.datasets import BODIES, PERFORMERS, RECORDED, RECORDINGS
-from meshreel.evaluation.rooms import PEOPLE, ROOM
+from meshreel_bench import checksums
+from meshreel_bench.datasets import BODIES, PERFORMERS, RECORDED, RECORDINGS
+from meshreel_bench.rooms import PEOPLE, ROOM
 
 BODIES_ALONE = ("collision",)
 

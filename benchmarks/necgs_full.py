@@ -15,10 +15,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from meshreel.evaluation.codec import coded_row
-from meshreel.evaluation.codecs.necgs import FULL, QUICK, SMALL, NecgsCodec
-from meshreel.evaluation.datasets import open_dataset
-from meshreel.evaluation.rows import Point, append_row, read_rows
+from meshreel_bench.codec import coded_row
+from meshreel_bench.codecs.necgs import FULL, QUICK, SMALL, NecgsCodec
+from meshreel_bench.datasets import open_dataset
+from meshreel_bench.rows import Point, append_row, read_rows
+
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
 from meshreel.types import MeshSequence
 

@@ -17,13 +17,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from meshreel_bench.codecs import make_codec
+from meshreel_bench.curves import ANCHOR
+from meshreel_bench.datasets import open_dataset
+from meshreel_bench.experiments import layers
+from meshreel_bench.rows import Row, curve_rows, read_rows
 
 from meshreel.errors import InputError
-from meshreel.evaluation.codecs import make_codec
-from meshreel.evaluation.curves import ANCHOR
-from meshreel.evaluation.datasets import open_dataset
-from meshreel.evaluation.experiments import layers
-from meshreel.evaluation.rows import Row, curve_rows, read_rows
 from meshreel.metrics.distance import SurfaceErrors, surface_errors
 from meshreel.types import Mesh, MeshList, MeshSequence
 

@@ -22,7 +22,7 @@ HEAVY = (
 )
 ENCODER_SIDE = (
     *("analysis", "capture", "metrics", "encoder", "layered", "windows", "choice", "presets", "rate_control"),
-    *("evaluation", "cli", "io"),
+    *("cli", "io"),
 )
 
 LOOK = f"""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
 from meshreel import encoder as encoding
 from meshreel import windows, work
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.choice import Quality
 from meshreel.encoder import Encoder, encode
-from meshreel.evaluation.codecs.tvmc.tracking import track_sequence
 from meshreel.format.layout import Form
 from meshreel.types import Mesh, MeshList
 from meshreel.work import SpanStore, shared_options

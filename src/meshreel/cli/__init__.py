@@ -11,9 +11,10 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from importlib.metadata import entry_points
 from types import FrameType
 from typing import NoReturn
 
@@ -37,9 +38,9 @@ COMMANDS = {
     "compare": "Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.",
     "play": "Play a .reel file in a browser, or in a headset's.",
     "serve": "Serve a folder of .reel files: a gallery, and a page to play each.",
-    "bench": "Measure codecs against each other, and make tables and plots of the rows.",
     "demo": "Make a short capture of moving people, encode it, and measure what comes back.",
 }
+BENCH = "Measure codecs against each other (a distribution of its own: pip install meshreel-bench)."
 
 
 PLAY_NEEDS = ("starlette", "uvicorn", "trustme")  # of the extra `play`; what else may be missing is of `encode`
@@ -49,17 +50,30 @@ class Terminated(BaseException):
     """SIGTERM arrived; an exception, so that temporary files are removed on the way out."""
 
 
+PLUGINS = "meshreel.commands"  # entry points by which other distributions add commands: meshreel-bench adds `bench`
+
+
 def make_app() -> App:
-    """The command line's parser."""
+    """The command line's parser, with the commands that other distributions add."""
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
     for name, text in COMMANDS.items():
         app.command(f"meshreel.cli.{name}:command", name=name, help=text)
+    added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
+    for name, where in added.items():
+        app.command(where, name=name)
+    if "bench" not in added:
+        app.command("meshreel.cli.no_bench:command", name="bench", help=BENCH)
     return app
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command; 0, or 2 after an error, 130 after an interrupt, 143 after SIGTERM, 141 where nobody reads.
+    """The program `meshreel`; what it returns is said of `run_app`."""
+    return run_app(make_app, arguments)
+
+
+def run_app(make: Callable[[], App], arguments: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit code: 0, 2 after an error, or 128 and a signal's number.
 
     Exits where called bare.
     """
@@ -69,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # a file name that the terminal cannot show is no failure
     try:
         with _signals_raise(stopped):
-            make_app()(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+            make()(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         code = 0
     except KeyboardInterrupt:
         code = _tell("interrupted", INTERRUPTED)

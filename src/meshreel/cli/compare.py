@@ -19,7 +19,6 @@ from ..container.sources import FileSource
 from ..decoder import Video
 from ..decoder import open as open_video
 from ..errors import FormatError, InputError
-from ..evaluation.truth import compare_with_truth
 from ..format.layout import MAGIC
 from ..geometry.cameras import PinholeCamera
 from ..geometry.topology import weld
@@ -27,6 +26,7 @@ from ..io.sequence import FileSequence, SequenceOptions, open_sequence
 from ..metrics.cameras import read_cameras
 from ..metrics.report import compare_sequences
 from ..metrics.sheet import SheetOptions, write_sheet
+from ..metrics.truth_comparison import compare_with_truth
 from ..types import Frames, Mesh, MeshSequence
 from .console import Common, StageBars
 from .info import describe_file

@@ -20,8 +20,8 @@ from ..decoder import Video
 from ..decoder import open as open_video
 from ..encoder import encode
 from ..errors import InputError
-from ..evaluation.truth import compare_with_truth
 from ..metrics.sheet import SheetOptions, write_sheet
+from ..metrics.truth_comparison import compare_with_truth
 from ..presets import preset_options
 from ..types import MeshSequence
 from .compare import truth_table

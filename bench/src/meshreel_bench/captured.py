@@ -1,0 +1,45 @@
+"""A rig's recording as a benchmark has it: each frame fused once and kept as a file.
+
+In: a recording, a folder. Out: its meshes, with what the cameras measured of them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from meshreel.capture.record import Recording
+from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.depth import DepthPicture
+from meshreel.io.sequence import open_sequence
+from meshreel.io.write import frame_names, make_folder, write_mesh
+from meshreel.types import Frames, Mesh
+
+
+class Captured(Frames):
+    """The frames of a recording, made as `meshreel capture` makes them where the folder lacks them.
+
+    What the cameras measured comes from the rig itself.
+    """
+
+    def __init__(self, recording: Recording, folder: Path) -> None:
+        make_folder(folder)
+        for number, name in enumerate(frame_names(len(recording), "ply")):
+            if not (folder / name).exists():
+                write_mesh(recording[number], folder / name)
+        self._recording, self._meshes = recording, open_sequence(folder)
+        self.frame_rate = recording.frame_rate
+
+    def __len__(self) -> int:
+        return len(self._recording)
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self._meshes[range(len(self))[index]]
+
+    @property
+    def cameras(self) -> tuple[PinholeCamera, ...]:
+        """Where it was seen from."""
+        return tuple(camera.view for camera in self._recording.rig.cameras)
+
+    def pictures(self, index: int) -> list[DepthPicture | None]:
+        """What each camera measured in a frame."""
+        return self._recording.pictures(index)

@@ -1,0 +1,65 @@
+"""What the benchmark data were when numbers of them were first told: SHA-256 of files, and of folders file by file.
+
+In: a path. Out: nothing, or InputError. Who has other data by the same name is told before anything is measured.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from meshreel.errors import InputError
+
+TABLE = "checksums.json"  # package data: by path below the benchmark data
+
+
+def check_source(path: Path, known_as: Path) -> None:
+    """Raises InputError where `path` is not what is known by the name `known_as`.
+
+    What has no checksum is not looked at, and a path that is missing is left to whoever opens it.
+    """
+    expected = known_checksums().get(known_as.as_posix())
+    if expected is None or not path.exists():
+        return
+    found = checksum(path)
+    if found != expected:
+        text = f"{path}: SHA-256 {found[:12]}, and {expected[:12]} is that of the benchmark's {known_as.as_posix()}"
+        raise InputError(f"{text}; copy it again, or give your own data another name")
+
+
+@cache
+def known_checksums() -> dict[str, str]:
+    """By path below the benchmark data."""
+    table: dict[str, str] = json.loads((files(__package__) / TABLE).read_text(encoding="utf-8"))
+    return table
+
+
+def checksum(path: Path) -> str:
+    """SHA-256 of a file, or of the names and contents of all files below a folder, in the order of their names.
+
+    Files are read again where their sizes or times have changed. Raises InputError where one cannot be read.
+    """
+    try:
+        files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+        stamps = [(file, file.stat()) for file in files]
+        return _checksum(path, tuple((file, stat.st_size, stat.st_mtime_ns) for file, stat in stamps))
+    except OSError as error:
+        raise InputError(
+            f"{error.filename}: cannot be read ({error.strerror}); check the path and its rights"
+        ) from None
+
+
+@cache
+def _checksum(path: Path, stamps: tuple[tuple[Path, int, int], ...]) -> str:
+    digest = hashlib.sha256()
+    if path.is_file():
+        digest.update(path.read_bytes())
+        return digest.hexdigest()
+    for file, _, _ in stamps:
+        data = file.read_bytes()
+        digest.update(f"{file.relative_to(path).as_posix()} {len(data)}\n".encode())
+        digest.update(data)
+    return digest.hexdigest()

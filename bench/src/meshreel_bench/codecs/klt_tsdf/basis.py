@@ -1,0 +1,117 @@
+"""The KLT of a block's distances, in integers: a mean and principal components, learned offline (`train`).
+
+A vector is a sum of products of discrete Legendre (Gram) polynomials of total degree 8 at most. Blocks were learned
+under all 48 symmetries of the cube, so each vector is even or odd along each axis and takes about twenty small
+integers: the whole basis costs a kilobyte, and every platform decodes the same values from it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+from jaxtyping import Float64, Int32, Int64
+
+from meshreel.coding.entropy import decode_integers, encode_integers
+from meshreel.errors import FormatError
+
+from .grid import OFFSETS, POINTS
+from .wire import Reader, Writer
+
+DEGREE = 8  # of the polynomials, in all three axes together
+ONE = 1 << 12  # what a value of 1 is in a basis; a vector's root mean square is 1
+COEFFICIENT = 1 << 9  # what a coefficient of 1 is
+MOST = 64  # components that were learned
+ENERGY = 1 << 20  # what a mean square of 1 is in the package data
+FILE = "basis.bin"  # package data: energies, mean and components, as `pack` writes them
+_LARGEST = 1 << 20  # of a coefficient: integers below 2^53 all along
+
+
+@dataclass(frozen=True, slots=True)
+class BasisSymbols:
+    """A basis as it travels."""
+
+    classes: Int32[np.ndarray, " M"]  # parities of each vector: 4 x odd along x, 2 x along y, 1 x along z
+    coefficients: tuple[Int32[np.ndarray, " _"], ...]  # of the mean, which is even, in voxels; then of each vector
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """A basis at a block's voxels: integers in units of 1 / ONE, float64 so that products of them are exact."""
+
+    mean: Float64[np.ndarray, " N"]  # voxels
+    vectors: Float64[np.ndarray, "N M"]  # root mean square 1, strongest first
+
+
+@cache
+def degrees() -> Int64[np.ndarray, "K 3"]:
+    """The polynomials' degrees along the axes, low totals first."""
+    every = [d for d in itertools.product(range(POINTS), repeat=3) if sum(d) <= DEGREE]
+    return np.array(sorted(every, key=lambda d: (sum(d), d)))
+
+
+@cache
+def polynomials() -> Float64[np.ndarray, "N K"]:
+    """Each polynomial at a block's voxels, root mean square 1, in whole multiples of 1 / ONE; times ONE."""
+    x = np.arange(POINTS) - POINTS // 2.0
+    rows = [np.ones(POINTS), x]
+    for n in range(1, POINTS - 1):  # the recurrence of Gram's polynomials
+        rows.append(((2 * n + 1) * x * rows[n] - n * (POINTS**2 - n**2) / 4 * rows[n - 1]) / (n + 1))
+    scaled = np.stack([row / np.sqrt(sum(v * v for v in row.tolist()) / POINTS) for row in rows])
+    a, b, c = (scaled[degrees()[:, axis]][:, OFFSETS[:, axis]].T for axis in range(3))
+    return np.rint(a * b * c * ONE)
+
+
+@cache
+def members(kind: int) -> Int64[np.ndarray, " K"]:
+    """The polynomials of one parity class."""
+    return np.flatnonzero(degrees() % 2 @ [4, 2, 1] == kind)
+
+
+def basis_of(symbols: BasisSymbols) -> Basis:
+    """The basis at the voxels; exact: all numbers are integers below 2^53."""
+    kinds = [0, *symbols.classes.tolist()]
+    columns = [polynomials()[:, members(k)] @ c for k, c in zip(kinds, symbols.coefficients, strict=True)]
+    values = np.stack([np.floor(column / COEFFICIENT + 0.5) for column in columns], axis=1)
+    return Basis(values[:, 0].copy(), np.ascontiguousarray(values[:, 1:]))
+
+
+def encode_basis(symbols: BasisSymbols) -> bytes:
+    """The classes, then the coefficients."""
+    out = Writer()
+    out.blob(encode_integers(symbols.classes))
+    out.blob(encode_integers(np.concatenate(symbols.coefficients).astype(np.int32)))
+    return bytes(out.data)
+
+
+def decode_basis(data: bytes, count: int) -> BasisSymbols:
+    """The basis of `count` vectors. Raises FormatError where the bytes are not one."""
+    read = Reader(data)
+    classes = decode_integers(read.blob(), count)
+    if (classes < 0).any() or (classes > 7).any():
+        raise FormatError(f"basis: a parity class of {classes.max()} or {classes.min()} is outside of 0 to 7")
+    lengths = np.cumsum([len(members(kind)) for kind in [0, *classes.tolist()]])
+    coefficients = decode_integers(read.blob(), int(lengths[-1]))
+    read.end()
+    if (np.abs(coefficients.astype(np.int64)) > _LARGEST).any():
+        raise FormatError("basis: a coefficient is beyond 2^20; the stream is damaged")
+    return BasisSymbols(classes, tuple(np.split(coefficients, lengths[:-1])))
+
+
+def learned(count: int) -> tuple[BasisSymbols, Float64[np.ndarray, " M"]]:
+    """The first `count` vectors that were learned, and each weight's mean square, voxels squared."""
+    read = Reader((files(__package__) / FILE).read_bytes())
+    energies = decode_integers(read.blob(), MOST) / ENERGY
+    symbols = decode_basis(read.blob(), MOST)
+    return BasisSymbols(symbols.classes[:count], symbols.coefficients[: count + 1]), energies[:count]
+
+
+def pack(symbols: BasisSymbols, energies: Float64[np.ndarray, " M"]) -> bytes:
+    """The package data that `learned` reads."""
+    out = Writer()
+    out.blob(encode_integers(np.maximum(np.rint(energies * ENERGY), 1).astype(np.int32)))
+    out.blob(encode_basis(symbols))
+    return bytes(out.data)

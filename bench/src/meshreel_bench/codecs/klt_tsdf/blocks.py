@@ -1,0 +1,137 @@
+"""Entropy coding of what a group of frames says: which blocks hold surface, their symbols, and what is left out.
+
+All by the product's adaptive range coder with contexts from neighbours that are decoded already: beside, below, behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Int32, Int64
+
+from meshreel.coding.entropy import Neighbours, check_plausible, decode_weights, encode_weights
+from meshreel.errors import FormatError, InputError
+
+from .grid import block_keys
+from .wire import Reader, Writer
+
+MOST_BLOCKS = 1 << 15  # of a frame
+MOST_PLACES = 1 << 19  # of a group's box: 1024 cells along its diagonal need no more
+MOST_SYMBOLS = 1 << 26  # of a group
+FARTHEST = 1 << 15  # blocks from the origin
+_AROUND = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) < (0, 0, 0)])
+
+
+def neighbours(frames: Sequence[Int64[np.ndarray, "_ 3"]], reach: int = 3) -> Neighbours:
+    """For the places of all frames, one after the other, those before them in their frame that touch them.
+
+    A frame's places are sorted. `reach` 1: by a face; 2: by an edge, too; 3: by a corner, too.
+    """
+    offsets = _AROUND[np.abs(_AROUND).sum(axis=1) <= reach]
+    later, earlier, start = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], 0
+    for places in frames:
+        keys = block_keys(places)
+        for offset in offsets if len(keys) else ():
+            asked = block_keys(places + offset)
+            at = np.minimum(np.searchsorted(keys, asked), len(keys) - 1)
+            hit = np.flatnonzero(keys[at] == asked)
+            later.append(hit + start)
+            earlier.append(at[hit] + start)
+        start += len(places)
+    v, u = np.concatenate(later), np.concatenate(earlier)
+    order = np.lexsort((u, v))
+    indptr = np.concatenate([[0], np.cumsum(np.bincount(v, minlength=start))]).astype(np.int64)
+    return Neighbours(indptr, u[order].astype(np.int32))
+
+
+def encode_places(frames: Sequence[Int64[np.ndarray, "_ 3"]]) -> bytes:
+    """A bit for every place of the group's box and frame; a frame's bits are a column, seen by those of the next.
+
+    Raises InputError where there are more blocks, or places, than a decoder takes.
+    """
+    out, every = Writer(), np.concatenate(frames)
+    fullest = max(len(places) for places in frames)
+    out.number(len(every))
+    if len(every) == 0:
+        return bytes(out.data)
+    low, shape = every.min(axis=0), np.ptp(every, axis=0) + 1
+    if fullest > MOST_BLOCKS or shape.prod() > MOST_PLACES or np.abs(every).max() >= FARTHEST:
+        raise InputError(
+            f"{fullest} blocks in a box of {shape.prod()}: over {MOST_BLOCKS} or too far; give fewer cells"
+        )
+    for axis in range(3):
+        out.integer(int(low[axis]))
+        out.number(int(shape[axis]))
+    bits = np.zeros((int(shape.prod()), len(frames)), np.int32)
+    for column, places in enumerate(frames):
+        bits[np.ravel_multi_index(tuple((places - low).T), tuple(shape)), column] = 1
+    for stream in encode_weights(bits, neighbours([_box(shape)])):
+        out.blob(stream)
+    return bytes(out.data)
+
+
+def decode_places(data: bytes, count: int) -> list[Int64[np.ndarray, "_ 3"]]:
+    """The blocks of `count` frames. Raises FormatError where the bytes are damaged."""
+    read = Reader(data)
+    total = read.number(MOST_BLOCKS * count)
+    if total == 0:
+        read.end()
+        return [np.zeros((0, 3), np.int64)] * count
+    pairs = [(read.integer(FARTHEST), read.number(2 * FARTHEST)) for _ in range(3)]
+    low, shape = np.array([a for a, _ in pairs]), np.array([b for _, b in pairs])
+    if not 0 < shape.prod() <= MOST_PLACES:
+        raise FormatError(f"a box of {shape.tolist()} blocks; the stream is damaged")
+    streams = [read.blob() for _ in range(count)]
+    read.end()
+    for stream in streams:
+        check_plausible(int(shape.prod()), len(stream), "places")
+    box = _box(shape)
+    bits = decode_weights(streams, len(box), neighbours([box])) == 1
+    frames = [box[bits[:, column]] + low for column in range(count)]
+    if sum(map(len, frames)) != total or max(map(len, frames)) > MOST_BLOCKS:
+        raise FormatError(f"{sum(map(len, frames))} blocks, not {total}; the stream is damaged")
+    return frames
+
+
+def encode_symbols(symbols: Int32[np.ndarray, "B M"], frames: Sequence[Int64[np.ndarray, "_ 3"]]) -> bytes:
+    """The symbols of all blocks of a group, a stream for each component."""
+    out = Writer()
+    if len(symbols):
+        for stream in encode_weights(symbols, neighbours(frames, 1)):
+            out.blob(stream)
+    return bytes(out.data)
+
+
+def decode_symbols(data: bytes, frames: Sequence[Int64[np.ndarray, "_ 3"]], width: int) -> Int32[np.ndarray, "B M"]:
+    """The symbols of `width` components. Raises FormatError where the bytes are damaged."""
+    read, count = Reader(data), sum(map(len, frames))
+    if count * width > MOST_SYMBOLS:
+        raise FormatError(f"{count} blocks of {width} components: over {MOST_SYMBOLS} symbols; the stream is damaged")
+    streams = [read.blob() for _ in range(width)] if count else []
+    read.end()
+    if not count:
+        return np.zeros((0, width), np.int32)
+    return decode_weights(streams, count, neighbours(frames, 1))
+
+
+def encode_bits(bits: Bool[np.ndarray, " C"], places: Int64[np.ndarray, "C 3"]) -> bytes:
+    """A bit for each of some sorted places; nothing where none is set."""
+    if not bits.any():
+        return b""
+    return encode_weights(bits.astype(np.int32)[:, None], neighbours([places]))[0]
+
+
+def decode_bits(data: bytes, places: Int64[np.ndarray, "C 3"]) -> Bool[np.ndarray, " C"]:
+    """The inverse of `encode_bits`. Raises FormatError where the bytes are damaged."""
+    if not data:
+        return np.zeros(len(places), bool)
+    bits = decode_weights([data], len(places), neighbours([places]))[:, 0]
+    if ((bits != 0) & (bits != 1)).any() or not bits.any():
+        raise FormatError(f"bits of {len(places)} places: other values, or none set; the stream is damaged")
+    return bits == 1
+
+
+def _box(shape: Int64[np.ndarray, " 3"]) -> Int64[np.ndarray, "P 3"]:
+    """All places of a box, sorted."""
+    return np.indices(tuple(shape.tolist())).reshape(3, -1).T.astype(np.int64)

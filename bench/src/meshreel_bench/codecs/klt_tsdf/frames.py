@@ -1,0 +1,129 @@
+"""A group of frames <-> bytes: each frame for itself, the entropy coder's models together.
+
+What decoded surface is not there in the original (past the border of an open surface, where signs contradict each
+other, or where few components ripple) is left out cell by cell: a bit for each block, and one for each cell that the
+decoded zero level passes in the blocks that have such.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64
+
+from meshreel.errors import FormatError, InputError
+from meshreel.geometry.nearest import Surface
+from meshreel.types import Mesh
+
+from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols
+from .grid import SIDE, block_keys, prepared, sample
+from .surface import Field, cells_of, count_crossed, crossed, field_of, polygonize, without
+from .weights import Model, forward
+from .wire import Reader, Writer
+
+_FAR = 1.5  # voxels from the surface beyond which decoded surface is left out
+_PAST = 0.5  # voxels past a border
+MOST_CROSSED = 1 << 22  # cells of a frame with surface: as many blocks as there may be, of noise, would have 16 million
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """The frames of a group as they travel."""
+
+    places: list[Int64[np.ndarray, "_ 3"]]  # of each frame
+    symbols: list[Int32[np.ndarray, "_ _"]]
+    omitted: list[bytes]
+
+
+def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndarray, " M"]) -> bytes:
+    """The bytes of some frames in voxel units, and of what mean square weights are expected.
+
+    Raises InputError where a frame has more blocks, or more surface, than a decoder takes.
+    """
+    group = Group([], [], [])
+    for mesh in meshes:
+        mesh = prepared(mesh)
+        blocks = sample(mesh)
+        symbols = forward(blocks, model, energies)
+        group.places.append(blocks.places)
+        group.symbols.append(symbols)
+        field = field_of(blocks.places, symbols, model)
+        if (count := count_crossed(field)) > MOST_CROSSED:
+            raise InputError(f"surface in {count} cells of a frame, over {MOST_CROSSED}; give fewer cells")
+        group.omitted.append(_encode_omitted(mesh, field))
+    out = Writer()
+    out.blob(encode_places(group.places))
+    out.blob(encode_symbols(np.concatenate(group.symbols), group.places))
+    for data in group.omitted:
+        out.blob(data)
+    return bytes(out.data)
+
+
+def decode_group(data: bytes, count: int, width: int) -> Group:
+    """The group of `count` frames. Raises FormatError where the bytes are damaged."""
+    read = Reader(data)
+    places = decode_places(read.blob(), count)
+    symbols = decode_symbols(read.blob(), places, width)
+    omitted = [read.blob() for _ in range(count)]
+    read.end()
+    return Group(places, np.split(symbols, np.cumsum([len(p) for p in places])[:-1]), omitted)
+
+
+def decode_frame(group: Group, number: int, model: Model) -> Mesh:
+    """A frame of a group, in voxel units. Raises FormatError where its bytes are damaged."""
+    field = field_of(group.places[number], group.symbols[number], model)
+    if (count := count_crossed(field)) > MOST_CROSSED:
+        raise FormatError(f"surface in {count} cells of a frame, over {MOST_CROSSED}; the stream is damaged")
+    return without(polygonize(field), _decode_omitted(group.omitted[number], field))
+
+
+def _encode_omitted(mesh: Mesh, field: Field) -> bytes:
+    """Which blocks leave surface out, and which of their cells; nothing where none does."""
+    cells = _wrong(mesh, polygonize(field))
+    if len(cells) == 0:
+        return b""
+    chosen = np.zeros(len(field.places), bool)
+    every = crossed(field, ~chosen)
+    cells = cells[np.isin(cells, block_keys(every))]
+    owners = _owners(every, field)
+    chosen[owners[np.isin(block_keys(every), cells)]] = True
+    if not chosen.any():
+        return b""
+    out, seen = Writer(), every[chosen[owners]]
+    out.blob(encode_bits(chosen, field.places))
+    out.blob(encode_bits(np.isin(block_keys(seen), cells), seen))
+    return bytes(out.data)
+
+
+def _decode_omitted(data: bytes, field: Field) -> Int64[np.ndarray, "C 3"]:
+    """The cells that are left out."""
+    if not data:
+        return np.zeros((0, 3), np.int64)
+    read = Reader(data)
+    cells = crossed(field, decode_bits(read.blob(), field.places))
+    bits: Bool[np.ndarray, " C"] = decode_bits(read.blob(), cells)
+    read.end()
+    return cells[bits]
+
+
+def _wrong(mesh: Mesh, decoded: Mesh) -> Int64[np.ndarray, " C"]:
+    """The keys of the cells most of whose decoded faces are where the mesh is not."""
+    if decoded.is_empty or mesh.is_empty:
+        return np.zeros(0, np.int64)
+    middles = decoded.vertices[decoded.faces].mean(axis=1)
+    surface = Surface(mesh)
+    hits = surface.closest(middles)
+    away = middles - hits.points
+    squared = np.einsum("nd,nd->n", away, away)
+    along = np.einsum("nd,nd->n", away, surface.normals[hits.faces])
+    past = surface.past_border(hits) & (squared - along**2 > _PAST**2)
+    keys, index = np.unique(cells_of(decoded), return_inverse=True)
+    share = np.bincount(index, past | (squared > _FAR**2)) / np.bincount(index)
+    return keys[share > 0.5]
+
+
+def _owners(cells: Int64[np.ndarray, "C 3"], field: Field) -> Int64[np.ndarray, " C"]:
+    """The number of the block that each cell is in."""
+    return np.searchsorted(block_keys(field.places), block_keys(cells // SIDE))

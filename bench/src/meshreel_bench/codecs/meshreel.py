@@ -1,0 +1,91 @@
+"""meshreel itself, through the same door as its users."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from meshreel.decoder import open as open_video
+from meshreel.encoder import Encoder
+from meshreel.presets import preset_options
+from meshreel.types import Mesh, MeshSequence
+from meshreel.windows import EncoderOptions
+from meshreel.work import shared_options
+
+from ..codec import Progress
+from ..variants import find_variant
+
+
+@dataclass(frozen=True, slots=True)
+class MeshreelCodec:
+    """A preset at a quality; what is None is the preset's own.
+
+    `basis_size` fixes the number of components m; a `variant` (`..variants`) changes one thing of the preset.
+    """
+
+    preset: str = "paper"
+    quality: float = 50.0  # 0 to 100
+    basis_size: int | None = None
+    group_size: int | None = None
+    centers: int | None = None
+    variant: str | None = None
+
+    def __post_init__(self) -> None:
+        find_variant(self.variant)
+
+    @property
+    def name(self) -> str:
+        """What rows and plots call it; points with a fixed m or a variant are a curve of their own."""
+        changed = "" if self.variant is None else f", {self.variant}"
+        return f"meshreel {self.preset}{changed}" + ("" if self.basis_size is None else " m")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The operating point, ready for JSON."""
+        return asdict(self)
+
+    @property
+    def encoder_options(self) -> EncoderOptions:
+        """What the encoder is given."""
+        chosen = {name: value for name, value in asdict(self).items() if value is not None and name != "variant"}
+        return find_variant(self.variant)(preset_options(**chosen))
+
+    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+        """The .reel file."""
+        return self.code(self.analyse(sequence, progress), progress)
+
+    @property
+    def analysis_key(self) -> str:
+        """Of all options that decide what `Encoder.prepare` finds."""
+        return analysis_key(self.encoder_options)
+
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
+        """An encoder that has found what does not depend on the rate."""
+        return prepared(sequence, self.encoder_options, progress)
+
+    def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
+        """The .reel file."""
+        analysis.progress = progress
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "video.reel"
+            analysis.encode(path, self.encoder_options)
+            return path.read_bytes()
+
+    def decode(self, data: bytes) -> Sequence[Mesh]:
+        """The frames, from the bytes alone."""
+        return open_video(data)
+
+
+def prepared(sequence: MeshSequence, options: EncoderOptions, progress: Progress | None = None) -> Encoder:
+    """An encoder that has found what operating points share."""
+    encoder = Encoder(sequence, progress=progress)
+    encoder.prepare(options)
+    return encoder
+
+
+def analysis_key(options: EncoderOptions) -> str:
+    """Equal for options with which `Encoder.prepare` finds the same."""
+    return repr(shared_options(options))

@@ -1,0 +1,123 @@
+"""Deformable marching cubes (NeCGS, section 3.1): the surface of a TSDF-Def volume.
+
+In -> out: signed distances and deformations at the points of a grid -> a mesh in cells. A vertex lies where the
+distance is zero on an edge of the grid between two points that the deformation has moved.
+
+The 256 cases are derived, not stored. On a face of a cube with four crossings each inside corner is cut off by itself,
+which both cubes of the face say alike: the surface has no holes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int32, Int64
+
+from meshreel.geometry.topology import drop_unreferenced
+from meshreel.types import Mesh
+
+REACH = 0.5  # cells that a deformation of 1 moves a point, so that cells do not fold over
+STEEP = 0.8  # a change along an edge, where a surface has half: no surface but a flip of sign far from any
+
+
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Where the surface of a grid of K x K x K points runs; V vertices on edges of the grid."""
+
+    low: Int64[np.ndarray, " V"]  # flat number of the edge's first point
+    high: Int64[np.ndarray, " V"]  # and of its second, one further along one axis
+    faces: Int32[np.ndarray, "F 3"]  # counter-clockwise from outside
+
+
+def extract(volume: Float32[np.ndarray, "K K K 4"], trimmed: bool) -> Mesh:
+    """The mesh of a TSDF-Def volume, in cells; `trimmed` leaves out what is too steep to be a surface."""
+    resolution, flat = len(volume), volume.reshape(-1, 4).astype(np.float64)
+    found = cut(volume[..., 0])
+    vertices = place(flat[found.low], flat[found.high], *(grid_points(n, resolution) for n in (found.low, found.high)))
+    faces = found.faces
+    if trimmed:
+        steep = np.abs(flat[found.low, 0] - flat[found.high, 0]) > STEEP
+        faces = faces[~steep[faces].any(axis=1)]
+    return drop_unreferenced(Mesh.of(vertices, faces))
+
+
+def place(low: Any, high: Any, first: Any, second: Any) -> Any:
+    """Vertices on edges, cells: V x 4 values and V x 3 places of both ends; arrays of NumPy or of torch."""
+    share = (low[:, 0] / (low[:, 0] - high[:, 0]))[:, None]
+    return (1 - share) * (first + REACH * low[:, 1:]) + share * (second + REACH * high[:, 1:])
+
+
+def grid_points(numbers: Int64[np.ndarray, " N"], resolution: int) -> Float64[np.ndarray, "N 3"]:
+    """The places of grid points by their flat numbers, cells."""
+    return np.stack(np.unravel_index(numbers, (resolution,) * 3), axis=1).astype(np.float64)
+
+
+def cut(distances: Float32[np.ndarray, "K K K"]) -> Cut:
+    """The edges between a negative value and one that is not, and the faces between these."""
+    resolution = len(distances)
+    inside = (distances < 0).astype(np.uint8)
+    ends = (slice(None, -1), slice(1, None))
+    cases = np.zeros((resolution - 1,) * 3, np.uint8)
+    for corner, (i, j, k) in enumerate(_CORNERS):
+        cases |= inside[ends[i], ends[j], ends[k]] << np.uint8(corner)
+    cells = np.flatnonzero((cases > 0) & (cases < 255))
+    strides = np.array([resolution**2, resolution, 1])
+    origins = np.stack(np.unravel_index(cells, cases.shape), axis=1) @ strides
+    local = _table()[cases.reshape(-1)[cells]]
+    used = local[..., 0] >= 0
+    starts, axes = (np.array(_EDGES) @ [1, 0])[local], (np.array(_EDGES) @ [0, 1])[local]
+    first = origins[:, None, None] + (np.array(_CORNERS) @ strides)[starts]
+    keys, faces = np.unique((first * 3 + axes)[used], return_inverse=True)
+    low = keys // 3
+    return Cut(low, low + strides[keys % 3], faces.reshape(-1, 3).astype(np.int32))
+
+
+_CORNERS = [(n & 1, n >> 1 & 1, n >> 2) for n in range(8)]
+_EDGES = [(n, axis) for axis in range(3) for n in range(8) if not n >> axis & 1]  # first corner, axis
+
+
+@cache
+def _table() -> Int64[np.ndarray, "N T 3"]:
+    """The triangles of each case, as numbers of `_EDGES`; -1 where there are no more."""
+    cases = [_triangles(case) for case in range(256)]
+    table = np.full((256, max(map(len, cases)), 3), -1)
+    for case, triangles in enumerate(cases):
+        table[case, : len(triangles)] = np.reshape(triangles, (-1, 3))
+    return table
+
+
+def _triangles(case: int) -> list[tuple[int, int, int]]:
+    """The loops in which the surface meets the cube's faces, each as a fan; bit n of `case`: corner n is inside."""
+    following = dict(step for side in _sides() for step in _steps(side, case))
+    triangles = []
+    while following:
+        loop = [min(following)]
+        while (edge := following.pop(loop[-1])) != loop[0]:
+            loop.append(edge)
+        triangles += [(loop[0], a, b) for a, b in pairwise(loop[1:])]
+    return triangles
+
+
+def _sides() -> list[list[int]]:
+    """The corners of each of the six faces, counter-clockwise from outside."""
+    sides = []
+    for axis in range(3):
+        b, c = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
+        ring = [0, b, b | c, c]
+        sides += [ring[::-1], [corner | 1 << axis for corner in ring]]
+    return sides
+
+
+def _steps(side: list[int], case: int) -> list[tuple[int, int]]:
+    """For each run of inside corners around a face, the edge where it begins and the edge where it ends."""
+    crossed = []
+    for a, b in zip(side, side[1:] + side[:1], strict=True):
+        if (case >> a ^ case >> b) & 1:
+            crossed.append((_EDGES.index((min(a, b), (a ^ b).bit_length() - 1)), bool(case >> b & 1)))
+    if crossed and not crossed[0][1]:
+        crossed = crossed[1:] + crossed[:1]
+    return [(crossed[n][0], crossed[n + 1][0]) for n in range(0, len(crossed), 2)]

@@ -1,0 +1,134 @@
+"""Where the frames' grids lie, and the truncated signed distances of a mesh at their points.
+
+In -> out: meshes, m -> a placement of one grid a frame; a mesh in cells -> K x K x K values, negative inside. Distances
+are those to the closest point (`geometry.nearest`). Inside is where the winding number is above 1/2
+(`geometry.inside`), but for points whose closest face has no inside on either side, a sheet's: behind it is inside
+there, as of the walls of a room that was seen from within, whose number is below -1/2. What flips its sign far from any
+surface, past a sheet's border, is trimmed by the decoder.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
+
+from meshreel.errors import InputError
+from meshreel.geometry.inside import winding_numbers
+from meshreel.geometry.nearest import Hits, Surface
+from meshreel.geometry.topology import border_edges, face_normals, weld
+from meshreel.types import Mesh
+
+TRUNCATION = 2.0  # cells at which a distance becomes 1, as in the authors' code
+MARGIN = 2  # cells between the largest frame and its grid's sides
+FARTHEST = 1 << 30  # cells that a frame may be away
+SHEETS = 0.05  # share of a mesh's area from which sheets are kept and trimmed; less of them is left out
+_BLOCK = 4  # points a side of a block that is decided at once where no surface is near
+_PROBE = 0.02  # cells before and behind a face
+_ASKED = 20_000  # faces, at least where there are as many, that tell whether there are sheets
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """One grid a frame, of cells of one size; frames move by whole cells, so that what stands still stays the same."""
+
+    cell: float  # m
+    anchor: tuple[float, float, float]  # m, middle of the grid of a frame without a shift
+    shifts: Int32[np.ndarray, "T 3"]  # cells
+
+    def inverse(self, mesh: Mesh, frame: int, resolution: int) -> Mesh:
+        """A frame in metres in the cells of its grid."""
+        return Mesh((mesh.vertices - self._origin(frame, resolution)) / self.cell, mesh.faces)
+
+    def forward(self, mesh: Mesh, frame: int, resolution: int) -> Mesh:
+        """A frame in cells in metres."""
+        return Mesh(mesh.vertices * self.cell + self._origin(frame, resolution), mesh.faces)
+
+    def _origin(self, frame: int, resolution: int) -> Float64[np.ndarray, " 3"]:
+        return np.array(self.anchor) + self.cell * (self.shifts[frame] - (resolution - 1) / 2)
+
+
+Box = tuple[Float64[np.ndarray, " 3"], Float64[np.ndarray, " 3"]]  # lowest and highest corner
+
+
+def box_of(mesh: Mesh) -> Box | None:
+    """The box of a mesh's faces; None where it has none."""
+    if mesh.is_empty:
+        return None
+    used = mesh.vertices[np.unique(mesh.faces)]
+    return used.min(axis=0), used.max(axis=0)
+
+
+def place_grids(boxes: Sequence[Box | None], resolution: int) -> Placement:
+    """Grids into which every frame's box fits; that of an empty frame is where the anchor is."""
+    full = [box for box in boxes if box is not None]
+    if not full:
+        return Placement(1.0, (0.0, 0.0, 0.0), np.zeros((len(boxes), 3), np.int32))
+    side = max(float((high - low).max()) for low, high in full)
+    cell = max(side, 1e-9) / (resolution - 1 - 2 * MARGIN)
+    anchor = (full[0][0] + full[0][1]) / 2
+    middles = np.array([anchor if box is None else (box[0] + box[1]) / 2 for box in boxes])
+    shifts = np.rint((middles - anchor) / cell)
+    if np.abs(shifts).max() > FARTHEST:
+        raise InputError(f"frames {np.abs(shifts).max() * cell:g} m apart in cells of {cell:g} m; code them by parts")
+    return Placement(cell, (float(anchor[0]), float(anchor[1]), float(anchor[2])), shifts.astype(np.int32))
+
+
+def truncated_distances(mesh: Mesh, resolution: int) -> tuple[Float32[np.ndarray, "K K K"], bool]:
+    """Distances of a mesh in cells, -1 to 1 for `TRUNCATION` cells, and whether it has sheets to trim."""
+    solid = Mesh(mesh.vertices, mesh.faces[face_normals(mesh)[1] > 0])  # zero areas break the winding number's tree
+    if solid.is_empty:
+        return np.ones((resolution,) * 3, np.float32), False
+    signs = _Signs(solid)
+    blocks = np.indices((resolution // _BLOCK,) * 3).reshape(3, -1).T * _BLOCK
+    offsets = np.indices((_BLOCK,) * 3).reshape(3, -1).T
+    middles = blocks + (_BLOCK - 1) / 2
+    hits = signs.surface.closest(middles)
+    away = np.linalg.norm(hits.points - middles, axis=1)
+    near = away <= TRUNCATION + np.sqrt(3) * (_BLOCK - 1) / 2
+    values = np.repeat(np.where(signs.inside(middles, hits), -1.0, 1.0)[:, None], _BLOCK**3, axis=1)
+    points = (blocks[near, None] + offsets).reshape(-1, 3).astype(np.float64)
+    hits = signs.surface.closest(points)
+    distances = np.linalg.norm(hits.points - points, axis=1) * np.where(signs.inside(points, hits), -1.0, 1.0)
+    values[near] = np.clip(distances / TRUNCATION, -1, 1).reshape(-1, _BLOCK**3)
+    count = resolution // _BLOCK
+    grid = values.reshape((count,) * 3 + (_BLOCK,) * 3).transpose(0, 3, 1, 4, 2, 5)
+    return grid.reshape((resolution,) * 3).astype(np.float32), signs.has_sheets
+
+
+class _Signs:
+    """Which side of a mesh points are on; its faces have areas."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.surface = Surface(mesh)
+        self._closed = not len(border_edges(weld(mesh)))
+        self.has_sheets = not self._closed and self._many_are_sheets()
+
+    def inside(self, points: Float64[np.ndarray, "N 3"], hits: Hits) -> Bool[np.ndarray, " N"]:
+        """Whether points are inside a body, or behind the sheet that is closest to them."""
+        sheet = np.zeros(len(points), bool)  # untrimmed, one loose face would have all that is behind it inside
+        if self.has_sheets:
+            asked, which = np.unique(hits.faces, return_inverse=True)
+            sheet = self._sheets(asked)[which]
+        behind = np.einsum("nd,nd->n", points - hits.points, self.surface.normals[hits.faces]) < 0
+        behind[~sheet] = self._enclosed(points[~sheet])
+        return behind
+
+    def _enclosed(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Whether points are in a body; all faces of a closed mesh may look inwards."""
+        numbers = winding_numbers(self.surface.mesh, points)
+        return (np.abs(numbers) if self._closed else numbers) > 0.5
+
+    def _many_are_sheets(self) -> bool:
+        """Whether they are more than `SHEETS` of the area, by some of the faces."""
+        some = np.arange(0, len(self.surface.mesh.faces), max(1, len(self.surface.mesh.faces) // _ASKED))
+        areas = self.surface.areas[some]
+        return bool(areas[self._sheets(some)].sum() > SHEETS * areas.sum())
+
+    def _sheets(self, faces: Int64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+        """Which of some faces have no inside on either side."""
+        mesh = self.surface.mesh
+        middles, offsets = mesh.vertices[mesh.faces[faces]].mean(axis=1), _PROBE * self.surface.normals[faces]
+        return ~(self._enclosed(middles - offsets) | self._enclosed(middles + offsets))

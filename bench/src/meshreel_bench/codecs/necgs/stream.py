@@ -1,0 +1,140 @@
+"""The bytes of a coded set: a head, and streams of integers (`coding.entropy`). In -> out: a record <-> bytes.
+
+A checksum refuses what was damaged by chance; what claims more numbers than its bytes can say is refused before memory
+is taken for them, and the largest network that the head can name takes about a GB to run.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from jaxtyping import Bool, Int32
+
+from meshreel.coding.entropy import check_plausible, decode_integers, encode_integers
+from meshreel.errors import FormatError
+from meshreel.format.kinds import F64, U8, U16, U32, Array, Blob, Bytes, List, Rest
+from meshreel.format.records import pack, unpack_all
+
+from .grid import FARTHEST, Placement
+from .shape import BITS, MOST_CHANNELS, MOST_FEATURES, RESOLUTIONS, Shape
+
+MAGIC = b"NeCGS\r\n\x1a"
+VERSION = 1
+_LARGEST = 1e12  # m
+
+
+@dataclass(frozen=True, slots=True)
+class Coded:
+    """All that a decoder needs; there are symbols of the N frames that are not empty."""
+
+    shape: Shape
+    trimmed: bool  # surface that is too steep is left out
+    full: Bool[np.ndarray, " T"]  # frames that are not empty
+    placement: Placement  # of all frames
+    features: Int32[np.ndarray, "N E"]
+    parameters: list[np.ndarray]  # of every tensor of the network, flat; none where all frames are empty
+
+
+@dataclass(frozen=True, slots=True)
+class _Outer:
+    magic: Annotated[bytes, Bytes(8), "what it is"]
+    version: Annotated[int, U8, "a reader refuses any other than 1"]
+    checksum: Annotated[int, U32, "CRC-32 of all that follows"]
+    inner: Annotated[bytes, Rest(), "an _Inner"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Inner:
+    resolution: Annotated[int, U8, "K"]
+    features: Annotated[int, U8, "C"]
+    channels: Annotated[int, U8, "of the first module"]
+    bits: Annotated[int, U8, "N"]
+    trimmed: Annotated[int, U8, "1: surface that is too steep is left out"]
+    frames: Annotated[int, U32, "T"]
+    cell: Annotated[float, F64, "m"]
+    anchor: Annotated[tuple[float, ...], Array(3, F64), "m"]
+    full: Annotated[bytes, Blob(U32), "a bit a frame: not empty"]
+    shifts: Annotated[bytes, Blob(U32), "integers: cells, of the frames that are not empty, less those before"]
+    symbols: Annotated[bytes, Blob(U32), "integers: of the features, frame by frame"]
+    parameters: Annotated[tuple[bytes, ...], List(U16, Blob(U32)), "integers: of every tensor"]
+
+
+def encode_stream(coded: Coded) -> bytes:
+    """The bytes of a coded set."""
+    shape, placement = coded.shape, coded.placement
+    shifts = np.diff(placement.shifts[coded.full], axis=0, prepend=np.zeros((1, 3), np.int32))
+    inner = _Inner(
+        resolution=shape.resolution,
+        features=shape.features,
+        channels=shape.channels,
+        bits=shape.bits,
+        trimmed=int(coded.trimmed),
+        frames=len(coded.full),
+        cell=placement.cell,
+        anchor=placement.anchor,
+        full=np.packbits(coded.full).tobytes(),
+        shifts=encode_integers(shifts.astype(np.int32).reshape(-1)),
+        symbols=encode_integers(coded.features.reshape(-1)),
+        parameters=tuple(encode_integers(flat) for flat in coded.parameters),
+    )
+    data = pack(inner)
+    return pack(_Outer(MAGIC, VERSION, zlib.crc32(data), data))
+
+
+def decode_stream(data: bytes) -> Coded:
+    """The coded set of bytes. FormatError where they are none."""
+    outer = unpack_all(_Outer, data)
+    if outer.magic != MAGIC or outer.version != VERSION:
+        raise FormatError(f"not a NeCGS stream of version {VERSION}: begins with {data[:9]!r}")
+    if zlib.crc32(outer.inner) != outer.checksum:
+        raise FormatError("a NeCGS stream with a wrong checksum; it is damaged")
+    inner = unpack_all(_Inner, outer.inner)
+    shape = _shape(inner)
+    full = _full(inner)
+    count = int(full.sum())
+    shifts = np.zeros((len(full), 3), np.int32)
+    shifts[full] = _shifts(decode_integers(inner.shifts, 3 * count).reshape(-1, 3))
+    check_plausible(count * shape.feature_size, len(inner.symbols), "features")
+    features = _bounded(decode_integers(inner.symbols, count * shape.feature_size), shape)
+    sizes = [int(np.prod(size)) for size in shape.tensors] if count else []
+    if len(inner.parameters) != len(sizes):
+        raise FormatError(f"{len(inner.parameters)} tensors, {len(sizes)} wanted")
+    tensors = zip(inner.parameters, sizes, strict=True)
+    parameters = [_bounded(decode_integers(stream, size), shape) for stream, size in tensors]
+    placement = Placement(inner.cell, (inner.anchor[0], inner.anchor[1], inner.anchor[2]), shifts)
+    return Coded(shape, bool(inner.trimmed), full, placement, features.reshape(count, shape.feature_size), parameters)
+
+
+def _shape(inner: _Inner) -> Shape:
+    if inner.resolution not in RESOLUTIONS or inner.bits not in BITS or inner.trimmed > 1:
+        raise FormatError(f"resolution {inner.resolution}, {inner.bits} bits, trimmed {inner.trimmed}: unknown")
+    if not 1 <= inner.features <= MOST_FEATURES or not 1 <= inner.channels <= MOST_CHANNELS:
+        raise FormatError(f"{inner.features} features, {inner.channels} channels: too many, or none")
+    if not 0 < inner.cell <= _LARGEST or any(abs(x) > _LARGEST for x in inner.anchor):
+        raise FormatError(f"cells of {inner.cell} m around {inner.anchor}")
+    return Shape(inner.resolution, inner.features, inner.channels, inner.bits)
+
+
+def _full(inner: _Inner) -> Bool[np.ndarray, " T"]:
+    if len(inner.full) != -(-inner.frames // 8):
+        raise FormatError(f"{len(inner.full)} bytes say which of {inner.frames} frames are empty")
+    bits = np.unpackbits(np.frombuffer(inner.full, np.uint8))
+    if bits[inner.frames :].any():
+        raise FormatError("a frame beyond the last")
+    return bits[: inner.frames].astype(bool)
+
+
+def _shifts(steps: Int32[np.ndarray, "N 3"]) -> Int32[np.ndarray, "N 3"]:
+    shifts = np.cumsum(steps.astype(np.int64), axis=0)
+    if len(shifts) and np.abs(shifts).max() > FARTHEST:
+        raise FormatError(f"a grid {int(np.abs(shifts).max())} cells away")
+    return shifts.astype(np.int32)
+
+
+def _bounded(symbols: Int32[np.ndarray, " S"], shape: Shape) -> Int32[np.ndarray, " S"]:
+    if len(symbols) and np.abs(symbols.astype(np.int64)).max() > shape.most:
+        raise FormatError(f"a symbol beyond {shape.most}")
+    return symbols

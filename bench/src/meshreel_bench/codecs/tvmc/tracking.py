@@ -1,0 +1,81 @@
+"""What a TVMC* stream is made of, before a step is chosen: references, displacements, the background.
+
+In: an encoder that found the spans, the options of preset `paper`. Out: Tracking; it does not depend on the rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from meshreel.analysis.survey import Survey, survey
+from meshreel.coding.reference import CodedReference
+from meshreel.encoder import Encoder
+from meshreel.scene import BodyRun, Static, all_windows, encode_static, options_of
+from meshreel.windows import EncoderOptions, Span, displacement_field, intra_only
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """Frames that one reference follows."""
+
+    first_frame: int
+    reference: CodedReference
+    field: Float64[np.ndarray, "V T 3"]  # displacements of its base, normalised
+
+    @property
+    def width(self) -> float:
+        """The longest side of the box of a frame's displacements, the widest frame's."""
+        return float(np.ptp(self.field, axis=0).max())
+
+    @property
+    def largest(self) -> float:
+        """The largest magnitude of a displacement's coordinate."""
+        return float(np.abs(self.field).max())
+
+
+@dataclass(frozen=True, slots=True)
+class Untracked:
+    """Frames that none follows, as Draco meshes."""
+
+    first_frame: int
+    frame_count: int
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Tracking:
+    """What is known of a sequence; groups are in the order of their first frames."""
+
+    seen: Survey
+    states: list[Static]  # of the background; none: everything may move
+    groups: list[Tracked | Untracked]  # of frames with surface
+
+
+def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
+    """The groups of a sequence, of each body of a scene. Raises InputError for frames that cannot be used.
+
+    Spans that the encoder prepared are not looked for again.
+    """
+    sequence, parts, groups = encoder.sequence, encoder.parts(options), list[Tracked | Untracked]()
+    seen, options = survey(sequence) if parts is None else parts.seen, options_of(parts, options)
+    for run in all_windows(sequence, seen, parts, options):
+        if not run.frames[0].is_empty:
+            groups += _groups(run, encoder.spans.find(run.frames, options), options)
+    states = [] if parts is None else encode_static(parts, len(sequence), sequence.frame_rate, options.background)
+    return Tracking(seen, states, sorted(groups, key=lambda group: group.first_frame))
+
+
+def _groups(run: BodyRun, spans: Sequence[Span], options: EncoderOptions) -> Iterator[Tracked | Untracked]:
+    """The groups of a window."""
+    first = run.first_frame
+    for span in spans:
+        if span.fitted is None:
+            yield Untracked(first, len(span.frames), intra_only(span.frames, options).payload)
+        else:
+            reference = span.fitted.reference
+            yield Tracked(first, reference, displacement_field(reference, span.fitted.positions))
+        first += len(span.frames)

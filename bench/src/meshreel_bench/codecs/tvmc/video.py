@@ -1,0 +1,94 @@
+"""The decoder: frames of a TVMC* stream by number, from nothing but the bytes."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+from typing import overload
+
+from meshreel.coding.background import decode_background, decode_change
+from meshreel.coding.intra import decode_intra
+from meshreel.errors import FormatError
+from meshreel.geometry.topology import concatenate
+from meshreel.tracks import MOST_TOGETHER
+from meshreel.types import Mesh, Placement
+from meshreel.windows import MOST_FRAMES
+
+from .layout import Group, Kind, is_bare, is_patch, unpack_stream
+from .tracked import decode_tracked
+
+
+class TvmcVideo(Sequence[Mesh]):
+    """The frames; the groups of the last one and its background are kept."""
+
+    def __init__(self, data: bytes) -> None:
+        """Raises FormatError where the stream is damaged; a group's payload is looked at when it is asked for."""
+        self.stream = unpack_stream(data)
+        self._place = Placement(self.stream.scale, self.stream.origin)
+        self._firsts = [group.first_frame for group in self.stream.groups]
+        self._decoded: dict[int, list[Mesh]] = {}  # of the groups of the last frame, by number
+        self._background: tuple[int, Mesh] = (-1, Mesh.empty())  # the last state, and its number
+
+    def __len__(self) -> int:
+        return self.stream.frame_count
+
+    @overload
+    def __getitem__(self, index: int) -> Mesh: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Mesh]: ...
+    def __getitem__(self, index: int | slice) -> Mesh | list[Mesh]:
+        """A frame in metres: the background, then the bodies. Raises FormatError where its bytes are damaged."""
+        if isinstance(index, slice):
+            return [self[number] for number in range(*index.indices(len(self)))]
+        frame = range(len(self))[index]
+        return self._place.of(concatenate([*self._still(frame), *self._moving(frame)]))
+
+    def __iter__(self) -> Iterator[Mesh]:
+        return (self[number] for number in range(len(self)))
+
+    def _moving(self, frame: int) -> Iterator[Mesh]:
+        """The bodies of a frame, normalised."""
+        near = range(bisect_left(self._firsts, frame - MOST_FRAMES + 1), bisect_right(self._firsts, frame))
+        groups = [number for number in near if frame < self._end(number)]
+        before, self._decoded, size = self._decoded, {}, 0
+        for number in groups:
+            self._decoded[number] = meshes = before.get(number) or self._decode(number)
+            size += sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in meshes)
+            if size > MOST_TOGETHER:
+                raise FormatError(f"the groups of frame {frame} take over {MOST_TOGETHER} bytes")
+        return (meshes[frame - self._firsts[number]] for number, meshes in self._decoded.items())
+
+    def _end(self, number: int) -> int:
+        return self._firsts[number] + self.stream.groups[number].frame_count
+
+    def _decode(self, number: int) -> list[Mesh]:
+        group = self.stream.groups[number]
+        try:
+            return _frames(group, self.stream.step)
+        except FormatError as error:
+            raise FormatError(f"group {number}, from frame {group.first_frame} on: {error}") from error
+
+    def _still(self, frame: int) -> Iterator[Mesh]:
+        """The background of a frame, normalised, where it has one."""
+        states = self.stream.states
+        number = bisect_right([state.first_frame for state in states], frame) - 1
+        if number < 0 or is_bare(self.stream, frame):
+            return
+        if number != self._background[0]:
+            first = number
+            while is_patch(states[first]):
+                first -= 1
+            mesh = decode_background(states[first].payload)
+            for state in states[first + 1 : number + 1]:
+                mesh = decode_change(state.payload, mesh)
+            self._background = (number, mesh)
+        yield self._background[1]
+
+
+def _frames(group: Group, step: float) -> list[Mesh]:
+    if group.kind == Kind.TRACKED:
+        return decode_tracked(group.payload, group.frame_count, step)
+    meshes = decode_intra(group.payload)
+    if len(meshes) != group.frame_count:
+        raise FormatError(f"{len(meshes)} meshes, {group.frame_count} frames")
+    return meshes

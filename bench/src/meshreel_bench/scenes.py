@@ -1,0 +1,159 @@
+"""The benchmark scenes, captured: noisy fused meshes, the truth, and labels of the faces that move.
+
+In: a scene's name, the benchmark data, a folder to keep things in. Out: a SceneData. What is made is kept: the rig
+(minutes), the fused meshes (a frame a second or two), the labels and the background that an anchor is given; labels
+that the encoder finds for as long as its code is the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool
+
+from meshreel import geometry
+from meshreel.analysis import segment as segmenter
+from meshreel.analysis.background import BackgroundOptions
+from meshreel.analysis.background_depth import fuse_still_depth
+from meshreel.analysis.segment.scene import SegmentOptions, segment
+from meshreel.capture import room as procedural
+from meshreel.capture.fusion import FusionOptions
+from meshreel.capture.record import open_recording
+from meshreel.capture.rig import RIG
+from meshreel.capture.simulate import TRUTH
+from meshreel.capture.truth import Truth, read_truth
+from meshreel.derived import Chosen
+from meshreel.errors import InputError
+from meshreel.geometry.decimate import decimate_faces
+from meshreel.io.meshes import read_mesh
+from meshreel.io.write import make_folder, replacing, write_mesh
+from meshreel.types import Mesh, MeshSequence, evenly
+
+from .captured import Captured
+from .provenance import sources
+from .rooms import SPEEDS, RoomOptions, simulate_room
+
+SCENES = tuple(SPEEDS)
+TRUE = "truth"  # labels: those of the nearest clean faces
+FOUND = "found"  # labels: those that the encoder finds
+PROCEDURAL = "procedural_room"  # the room of `meshreel demo`: needs no benchmark data
+PROCEDURAL_FRAMES = 60
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SceneData:
+    """A captured scene with its truth."""
+
+    name: str
+    folder: Path  # where everything about it is kept
+    meshes: Captured
+    truth: Truth
+
+    def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
+        """Which faces of a frame move: `truth`, `found`, or what `labels/SOURCE.npz` says (a bit a face, by frame).
+
+        Raises InputError where that file is missing or does not fit.
+        """
+        if source == TRUE:
+            path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
+            return _kept_array(path, lambda: self.truth[number].labels_for(self.meshes[number]))
+        path, frame = self.folder / "labels" / f"{_kept_as(source)}.npz", f"frame_{number:05}"
+        if source == FOUND and not path.exists():
+            _find_labels(self.meshes, path)
+        faces = len(self.meshes[number].faces)
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                bits = archive[frame]
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{path}: no labels of {frame} ({error}); write packed labels of every frame") from None
+        if bits.dtype != np.uint8 or bits.shape != ((faces + 7) // 8,):
+            raise InputError(f"{path}: {bits.dtype} {bits.shape} in {frame} for {faces} faces; give a bit a face")
+        return np.unpackbits(bits, count=faces).astype(bool)
+
+    def background(self, source: str = TRUE) -> Mesh:
+        """What stands, fused over time from what the rig's cameras measured of it, as the encoder does."""
+        path = self.folder / "background" / f"depth-{_kept_as(source)}.ply"
+        return _kept_mesh(path, lambda: self._fused(source))
+
+    def decimated(self, number: int, share: float) -> Mesh:
+        """A whole frame with this share of its faces."""
+        path = self.folder / "decimated" / f"{share:g}-{number:05}.ply"
+        mesh = self.meshes[number]
+        return _kept_mesh(path, lambda: decimate_faces(mesh, round(share * len(mesh.faces))))
+
+    def _fused(self, source: str) -> Mesh:
+        options = BackgroundOptions()
+        meshes = ((number, self.meshes[number]) for number in evenly(len(self.meshes), options.frames))
+        moments = ((self.meshes.pictures(k), mesh, ~self.labels(k, source)) for k, mesh in meshes)
+        return fuse_still_depth(moments, FusionOptions().voxel, options)
+
+
+class SceneFrames(Chosen):
+    """Some frames of a captured scene, which anchors may ask for its labels."""
+
+    def __init__(self, scene: SceneData, numbers: Sequence[int]) -> None:
+        super().__init__(scene.meshes, numbers)
+        self.scene, self.numbers = scene, tuple(numbers)
+
+
+def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) -> SceneData:
+    """The scene called `name`, made below `cache` where it is not there yet; its first frames, where that is asked for.
+
+    Raises InputError for an unknown name and where the benchmark data are missing.
+    """
+    folder = cache / (name if frames is None else f"{name}-{frames}")
+    rig, meshes = folder / "rig", folder / "meshes"
+    if not (rig / RIG).exists():
+        _simulate(name, rig, data, frames)
+    fusion = FusionOptions(procedural.VOXEL) if name == PROCEDURAL else FusionOptions()
+    recording, _ = open_recording(rig, fusion, keep=False)
+    return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH))
+
+
+def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
+    """Writes the rig and the truth of a scene."""
+    if name == PROCEDURAL:
+        room = procedural.RoomOptions(PROCEDURAL_FRAMES if frames is None else frames)
+        procedural.record_room(rig, room)
+    else:
+        simulate_room(rig, data, RoomOptions(name) if frames is None else RoomOptions(name, frames))
+
+
+@cache
+def _kept_as(source: str) -> str:
+    """The name that labels are kept under: what the encoder finds, by the code that found it."""
+    if source != FOUND:
+        return source
+    digest = hashlib.sha256(repr(SegmentOptions()).encode())
+    for path in (*sources(segmenter), *sources(geometry)):
+        digest.update(path.read_bytes())
+    return f"{FOUND}-{digest.hexdigest()[:12]}"
+
+
+def _find_labels(meshes: MeshSequence, path: Path) -> None:
+    """Writes what the encoder finds to move, a bit a face, by frame."""
+    found = segment(meshes)
+    labels = {f"frame_{k:05}": np.packbits(found.moving(k, meshes[k])) for k in range(len(meshes))}
+    make_folder(path.parent)
+    with replacing(path) as file:
+        np.savez_compressed(file, allow_pickle=False, **labels)
+
+
+def _kept_mesh(path: Path, make: Callable[[], Mesh]) -> Mesh:
+    if not path.exists():
+        make_folder(path.parent)
+        write_mesh(make(), path)
+    return read_mesh(path).mesh
+
+
+def _kept_array(path: Path, make: Callable[[], np.ndarray]) -> np.ndarray:
+    if not path.exists():
+        make_folder(path.parent)
+        with replacing(path) as file:
+            np.save(file, make())
+    return np.load(path)

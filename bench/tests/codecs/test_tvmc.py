@@ -1,0 +1,310 @@
+"""TVMC*: displacements come back in order, frames from the bytes alone, and damaged bytes are told."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from meshreel_bench.codecs import make_codec
+from meshreel_bench.codecs.tvmc import TvmcCodec
+from meshreel_bench.codecs.tvmc.layout import LONGEST, Group, Kind, State, Stream, pack_stream, unpack_stream
+from meshreel_bench.codecs.tvmc.tracked import decode_tracked, encode_tracked
+from meshreel_bench.codecs.tvmc.tracking import Tracked, track_sequence
+from meshreel_bench.codecs.tvmc.video import TvmcVideo
+from meshreel_bench.groups import without_keys
+from meshreel_bench.measure import run_curve_point
+
+from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
+from meshreel.coding.intra import encode_intra
+from meshreel.encoder import Encoder
+from meshreel.errors import FormatError, InputError, NoReferenceError
+from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
+from meshreel.geometry.nearest import distances
+from meshreel.geometry.topology import concatenate
+from meshreel.metrics.distance import surface_errors
+from meshreel.metrics.report import ComparisonOptions
+from meshreel.presets import quality_of_vertices, reference_vertices
+from meshreel.types import Mesh, MeshList
+from tests.scenes import CELL, NOISE, ball, of_body, quick_scene, room, with_room
+from tests.small_options import quick
+
+CODEC = "meshreel_bench.codecs.tvmc.codec"
+SMALL = TvmcCodec(qp=8, vertices=150, group_size=3, centers=150)
+BALL = sliding_sphere(1, levels=2)[0]
+BODY = MeshList(tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.04))))
+
+
+@pytest.fixture(autouse=True)
+def quick_analysis(monkeypatch):
+    monkeypatch.setattr(f"{CODEC}.preset_options", quick)
+
+
+@pytest.fixture(scope="module")
+def tracking():
+    """What a walking body is made of, in two groups."""
+    return tracked(BODY, replace(SMALL, group_size=2))
+
+
+@pytest.fixture(scope="module")
+def stream(tracking):
+    return SMALL.pack(tracking)
+
+
+def tracked(sequence, codec=SMALL, make=quick):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(f"{CODEC}.preset_options", make)
+        return track_sequence(Encoder(sequence), codec.encoder_options)
+
+
+def percent(original, found):
+    """Symmetric RMS distance, % of the original's diagonal."""
+    return 100 * surface_errors(original, found).symmetric_rms / original.diagonal
+
+
+def kinds(data):
+    return [(group.first_frame, group.frame_count, group.kind) for group in unpack_stream(data).groups]
+
+
+def with_checksum(data):
+    """The bytes with the checksum that fits them, so that what is behind it is tried."""
+    return data[:-4] + zlib.crc32(data[:-4]).to_bytes(4, "little")
+
+
+# ---- sequences
+
+
+@pytest.mark.parametrize("step", [1e-2, 1e-4])
+def test_a_group_decodes_to_the_fitted_vertices_within_half_a_step(tracking, step):
+    group = tracking.groups[0]
+    frames = decode_tracked(encode_tracked(group.reference, group.field, step), group.field.shape[1], step)
+    for number, frame in enumerate(frames):
+        wanted = group.reference.base.vertices + group.field[:, number]
+        assert np.abs(frame.vertices - wanted).max() <= step / 2 * (1 + 1e-9)
+        assert np.array_equal(frame.faces, group.reference.base.faces)
+
+
+def test_a_moving_body_comes_back(stream):
+    assert kinds(stream) == [(0, 2, Kind.TRACKED), (2, 2, Kind.TRACKED)]
+    video = SMALL.decode(stream)
+    assert len(video) == 4
+    assert max(percent(a, b) for a, b in zip(BODY, video, strict=True)) < 0.6
+    assert np.array_equal(video[0].faces, video[1].faces)  # one connectivity a group, whatever the input's
+    assert np.array_equal(video[-1].vertices, list(video)[3].vertices) and len(video[1:3]) == 2
+
+
+def test_quality_rises_with_the_rate(tracking):
+    found = []
+    for qp in (3, 5, 7, 9):
+        data = replace(SMALL, qp=qp).pack(tracking)
+        errors = [percent(a, b) for a, b in zip(BODY, SMALL.decode(data), strict=True)]
+        found.append((len(data), float(np.mean(errors))))
+    sizes, errors = zip(*found, strict=True)
+    assert list(sizes) == sorted(sizes) and list(errors) == sorted(errors, reverse=True)
+    assert sizes[-1] > 2 * sizes[0] and errors[0] > 2 * errors[-1]
+
+
+def test_no_frame_takes_more_than_its_bits_and_all_have_one_step(tracking):
+    groups = [group for group in tracking.groups if isinstance(group, Tracked)]
+    step = SMALL.step(tracking)
+    widths = [np.ptp(np.rint(group.field / step), axis=0).max() for group in groups]
+    assert 2**7 < max(widths) <= 2**8 and unpack_stream(SMALL.pack(tracking)).step == step
+
+
+def test_the_same_input_gives_the_same_bytes_and_tells_its_stages():
+    last: dict[str, int] = {}
+    sequence = deforming_sphere(3, levels=2)
+    data = SMALL.encode(sequence, lambda stage, done, _: last.update({stage: done}))
+    assert SMALL.encode(sequence) == data
+    assert last == dict.fromkeys(("survey", "track", "reference", "fit", "code"), 3)
+    assert max(percent(a, b) for a, b in zip(sequence, SMALL.decode(data), strict=True)) < 1
+
+
+def test_empty_frames_are_legal_and_stay_in_their_places():
+    frames = (Mesh.empty(), BALL, Mesh.empty(), Mesh.of(np.zeros((3, 3)), []))
+    data = SMALL.encode(MeshList(frames))
+    assert kinds(data) == [(1, 1, Kind.DRACO)]
+    assert [mesh.is_empty for mesh in SMALL.decode(data)] == [True, False, True, True]
+    nothing = SMALL.decode(SMALL.encode(MeshList((Mesh.empty(),) * 3)))
+    assert [len(mesh.vertices) for mesh in nothing] == [0, 0, 0]
+
+
+def test_a_row_tells_the_rate_and_the_metrics_of_a_stream():
+    row = run_curve_point("ball", MeshList((BALL, Mesh.empty())), SMALL, ComparisonOptions(ssim=False))
+    assert row["codec"] == "tvmc" and row["options"]["qp"] == 8 and row["groups"] == []
+    assert row["bytes"] == len(SMALL.encode(MeshList((BALL, Mesh.empty())))) and row["d2_psnr_paper"] > 50
+    assert without_keys(row, "d2_psnr_paper") is None
+
+
+def test_no_frames_are_refused():
+    with pytest.raises(InputError, match="no frames"):
+        SMALL.encode(MeshList(()))
+
+
+def test_what_no_reference_follows_is_cut_or_coded_frame_by_frame(monkeypatch):
+    other = Mesh.of(BALL.vertices * [1, 0.2, 3] + [0, 4, 0], BALL.faces)
+    frames = MeshList((BALL, BALL, other))
+    cut = SMALL.encode(frames)
+    assert kinds(cut) == [(0, 2, Kind.TRACKED), (2, 1, Kind.DRACO)]
+
+    def none(*_):
+        raise NoReferenceError("none")
+
+    monkeypatch.setattr("meshreel.windows.analyze", none)
+    plain = SMALL.encode(frames)
+    assert kinds(plain) == [(0, 3, Kind.DRACO)]
+    for data in (cut, plain):
+        assert max(percent(a, b) for a, b in zip(frames, SMALL.decode(data), strict=True)) < 1
+
+
+def test_coordinates_around_a_million_keep_their_millimetres():
+    far, balls = np.array([4.5e6, 1.2e2, 5.1e6]), sliding_sphere(2, levels=2)
+    video = SMALL.decode(SMALL.encode(MeshList(tuple(Mesh.of(b.vertices + far, b.faces) for b in balls))))
+    for mesh, found in zip(balls, video, strict=True):
+        assert percent(mesh, Mesh.of(found.vertices - far, found.faces)) < 1
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"qp": 1}, "qp 1"),
+        ({"qp": 17}, "qp 17"),
+        ({"vertices": 3}, "vertices 3"),
+        ({"group_size": 0}, "group size"),
+        ({"centers": 0}, "centers"),
+        ({"bits": 8}, "bits"),
+    ],
+)
+def test_options_out_of_range_are_refused(options, words, monkeypatch):
+    from meshreel.presets import preset_options
+
+    monkeypatch.setattr(f"{CODEC}.preset_options", preset_options)
+    with pytest.raises(InputError, match=words):
+        make_codec("tvmc", options)
+
+
+def test_a_reference_has_the_quality_of_its_vertices():
+    assert [reference_vertices(quality_of_vertices(count)) for count in (800, 1300, 2000, 5000)] == [
+        800,
+        1300,
+        2000,
+        5000,
+    ]
+    assert (quality_of_vertices(4), quality_of_vertices(10**6)) == (0, 100)
+
+
+# ---- scenes
+
+ROLLING = with_room([ball(0.5 + 0.35 * t) for t in range(4)])
+
+
+@pytest.fixture(scope="module")
+def rolling():
+    return tracked(MeshList((Mesh.empty(), *ROLLING)), replace(SMALL, group_size=4), quick_scene)
+
+
+def test_a_scene_has_its_background_once_and_its_body_tracked(rolling):
+    data = SMALL.pack(rolling)
+    stream = unpack_stream(data)
+    assert len(stream.states) == 1 and kinds(data) == [(1, 4, Kind.TRACKED)]
+    assert stream.scale == pytest.approx(2 * np.sqrt(3) * 0.3, rel=0.1)  # m, the ball's diagonal
+    frames = list(SMALL.decode(data))
+    assert frames[0].is_empty  # bare: without the room, too
+    still = len(SMALL.decode(data)[1].faces) - len(rolling.groups[0].reference.base.faces)
+    for number, (found, frame) in enumerate(zip(frames[1:], ROLLING, strict=True)):
+        assert np.array_equal(found.vertices[found.faces[:still]], frames[1].vertices[frames[1].faces[:still]])
+        clean = concatenate([room(), ball(0.5 + 0.35 * number)])
+        assert np.sqrt((distances(clean.vertices, found) ** 2).mean()) < 2.5 * NOISE
+        assert of_body(frame).sum() > 0 and found.diagonal == pytest.approx(clean.diagonal, abs=CELL)
+
+
+# ---- hostile bytes
+
+
+def test_every_truncation_and_every_flipped_byte_is_told(stream):
+    places = np.unique(np.linspace(0, len(stream) - 1, 400).astype(int))
+    for place in places:
+        with pytest.raises(FormatError):
+            TvmcVideo(stream[:place])
+        damaged = bytearray(stream)
+        damaged[place] ^= 0x41
+        with pytest.raises(FormatError):
+            TvmcVideo(bytes(damaged))
+    with pytest.raises(FormatError):
+        TvmcVideo(stream + b"\0")
+
+
+def test_bytes_that_are_changed_with_their_checksum_give_frames_or_an_error(stream):
+    random, errors = np.random.default_rng(2), 0
+    for place in [*range(60), *random.integers(0, len(stream) - 4, 140).tolist()]:
+        damaged = bytearray(stream)
+        damaged[place] ^= 1 << random.integers(0, 8)
+        try:
+            video = TvmcVideo(with_checksum(bytes(damaged)))
+            frames = [video[number] for number in range(min(len(video), 4))]
+        except FormatError:
+            errors += 1
+            continue
+        assert all(np.isfinite(mesh.vertices).all() for mesh in frames)
+        assert all(mesh.faces.max(initial=-1) < len(mesh.vertices) for mesh in frames)
+    assert errors > 20
+
+
+def test_another_version_is_told_as_one(stream):
+    with pytest.raises(FormatError, match="version"):
+        TvmcVideo(with_checksum(stream[:4] + bytes([9]) + stream[5:]))
+
+
+GROUP = Group(0, 2, Kind.DRACO, encode_intra([BALL, BALL], 1e-2, 0))
+WHOLE, PATCH = State(0, encode_intra([BALL], 1e-2, 0)), State(1, b"\x05")
+PLAIN = Stream(b"TVMC", 1, 2, (0.0, 0.0, 0.0), 1.0, 1e-3, (), (), (GROUP,))
+
+
+def test_a_stream_that_keeps_the_laws_is_read():
+    assert unpack_stream(pack_stream(PLAIN)) == PLAIN
+    assert len(TvmcVideo(pack_stream(PLAIN))[1].faces) == len(BALL.faces)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"frame_count": 0, "groups": ()}, "0 frames"),
+        ({"frame_count": LONGEST + 1}, "frames"),
+        ({"scale": 0.0}, "scale 0"),
+        ({"scale": 1e16}, "scale 1e"),
+        ({"step": 0.0}, "step 0"),
+        ({"step": -1.0}, "step -1"),
+        ({"origin": (0.0, -1e16, 0.0)}, "origin"),
+        ({"bare": (1, 2)}, "3 frames"),
+        ({"states": (PATCH,)}, "patch of none"),
+        ({"states": (WHOLE, WHOLE)}, "states"),
+        ({"states": (replace(WHOLE, first_frame=2),)}, "states"),
+        ({"groups": (replace(GROUP, first_frame=1),)}, "beyond the end"),
+        ({"groups": (replace(GROUP, frame_count=0),)}, "0 frames"),
+        ({"groups": (replace(GROUP, first_frame=1, frame_count=1), GROUP)}, "out of order"),
+        ({"groups": (GROUP,) * (MOST_TRACKS + 1)}, "257 groups"),
+        (
+            {"frame_count": 1000, "states": (WHOLE, *(replace(PATCH, first_frame=k) for k in range(1, 300)))},
+            f"frame {MOST_CHANGES + 1}",
+        ),
+        ({"frame_count": 100, "groups": (replace(GROUP, frame_count=100),)}, "100 frames"),
+    ],
+)
+def test_streams_that_break_a_law_are_told(change, words):
+    with pytest.raises(FormatError, match=words):
+        unpack_stream(pack_stream(replace(PLAIN, **change)))
+
+
+def test_groups_of_other_frames_than_they_claim_are_told(tracking):
+    group = tracking.groups[0]
+    payload = encode_tracked(group.reference, group.field, 1e-3)
+    for wrong in (Group(0, 1, Kind.TRACKED, payload), replace(GROUP, frame_count=1), Group(0, 1, Kind.TRACKED, b"")):
+        video = TvmcVideo(pack_stream(replace(PLAIN, groups=(wrong,))))
+        with pytest.raises(FormatError, match="group 0"):
+            video[0]
+
+
+def test_frames_beyond_the_end_are_no_frames(stream):
+    with pytest.raises(IndexError):
+        TvmcVideo(stream)[4]

@@ -1,0 +1,10 @@
+"""`meshreel bench` where the distribution meshreel-bench is not installed."""
+
+from __future__ import annotations
+
+from ..errors import MeshreelError
+
+
+def command(*_arguments: str) -> None:
+    """Raise MeshreelError with the line that installs the bench."""
+    raise MeshreelError("the bench is a distribution of its own; install it with: pip install meshreel-bench")
