@@ -23,10 +23,10 @@ from meshreel.analysis.fuse import Group
 from meshreel.analysis.reference import MDS
 from meshreel.analysis.reference_centers import affinity, largest_distances
 from meshreel.choice import cheapest_intra, measure
-from meshreel.coding import quantize
-from meshreel.coding.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.group import decode_group, encode_group
-from meshreel.coding.laplacian import System, anchors
+from meshreel.coding.paper import quantize
+from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
+from meshreel.coding.paper.laplacian import System, anchors
 from meshreel.coding.reference import code_reference
 from meshreel.format.layout import AnchorRule
 from meshreel.presets import displacement_step, preset_options

@@ -14,14 +14,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+from meshreel.coding.layers.layers.layers import LayersOptions, LayersState, encode_layers
+from meshreel.coding.layers.layers.patches import encode_patches
 
 from meshreel.capture.procedural import deforming_sphere
 from meshreel.coding.background import decode_background, encode_background, encode_change
-from meshreel.coding.displacements import DisplacementOptions
 from meshreel.coding.group import encode_group
 from meshreel.coding.intra import encode_empty, encode_intra
-from meshreel.coding.layers import LayersOptions, LayersState, encode_layers
-from meshreel.coding.patches import encode_patches
+from meshreel.coding.paper.displacements import DisplacementOptions
 from meshreel.coding.reference import CodedReference, code_reference
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import Video

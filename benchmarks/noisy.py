@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 from captured import Row, keep
+from meshreel.coding.layers.layers.layers import LayersState, place_layers, read_layers
+from meshreel.coding.layers.layers.patches import decode_patches
 from meshreel_bench.rooms import PEOPLE
 
 from meshreel.coding.intra import decode_intra, encode_intra
-from meshreel.coding.layers import LayersState, place_layers, read_layers
-from meshreel.coding.patches import decode_patches
 from meshreel.format.layout import Form, LayersPatches
 from meshreel.format.records import unpack_all
 from meshreel.geometry.decimate import decimate

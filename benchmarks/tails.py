@@ -16,8 +16,8 @@ from itertools import chain
 import numpy as np
 from captured import Case, Row, asked_cases, keep
 from jaxtyping import Bool
+from meshreel.coding.layers.layers.layers import LayersState, decode_layers
 
-from meshreel.coding.layers import LayersState, decode_layers
 from meshreel.format.layout import Form
 from meshreel.format.records import pack
 from meshreel.geometry.nearest import Surface

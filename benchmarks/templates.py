@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 from captured import Case, Row, asked_cases, keep
+from meshreel.coding.layers.layers.layers import LayersOptions, encode_layers
 
 from meshreel.analysis.correspond import choose_key
 from meshreel.analysis.fit import Guides, fit_targets
 from meshreel.analysis.fit_match import Target
 from meshreel.analysis.template import shared_detail
 from meshreel.choice import measure
-from meshreel.coding.layers import LayersOptions, encode_layers
 from meshreel.coding.reference import CodedReference, code_on_lattice
 from meshreel.geometry.decimate import decimate
 from meshreel.presets import preset_options

@@ -8,11 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from meshreel.coding.layers.layers.layers import encode_layers
 
 import meshreel
 from meshreel import tracks
 from meshreel.coding.intra import encode_empty
-from meshreel.coding.layers import encode_layers
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter

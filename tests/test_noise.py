@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from meshreel.coding.layers.layers.layers import decode_layers
 
-from meshreel.coding.layers import decode_layers
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.layered import encode_segment

@@ -6,9 +6,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
+from meshreel.coding.layers.layers.layers import LayersOptions
 
 from meshreel.analysis.template import TemplateOptions
-from meshreel.coding.layers import LayersOptions
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.presets import PRESETS, displacement_step, preset_options, reference_vertices

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from meshreel.coding.layers.layers.patches import decode_patches
 
 import meshreel
 from meshreel import tails
 from meshreel.choice import Quality, measure
 from meshreel.coding.group import payload_parts
-from meshreel.coding.patches import decode_patches
 from meshreel.encoder import encode
 from meshreel.errors import InputError
 from meshreel.format.records import pack
@@ -19,7 +19,7 @@ from meshreel.presets import preset_options
 from meshreel.tails import TailOptions, find_tails
 from meshreel.types import Mesh, MeshList
 from meshreel.windows import EncoderOptions
-from tests.coding.test_laplacian import icosahedron
+from tests.coding.paper.test_laplacian import icosahedron
 
 BALL = Mesh.of(0.3 * icosahedron(3).vertices, icosahedron(3).faces)
 NOISE = 1e-4 * np.random.default_rng(0).normal(size=(6, *BALL.vertices.shape))

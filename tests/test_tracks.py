@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from meshreel.coding.layers.layers.layers import encode_layers
 
 import meshreel
 from meshreel import tracks
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
-from meshreel.coding.layers import encode_layers
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter, pack_head
 from meshreel.errors import FormatError
@@ -25,7 +25,7 @@ from meshreel.format.layout import ChunkKind, Form, Index, IndexEntry, Layer
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement
 from tests.coding.bodies import ball, moving
-from tests.coding.test_laplacian import icosahedron
+from tests.coding.paper.test_laplacian import icosahedron
 from tests.container.files import HEADER
 from tests.golden import GOLDEN, frame_record
 

@@ -21,7 +21,7 @@ from .analysis.groups import cut_at, leading
 from .analysis.template import base_mesh, shared_detail
 from .choice import NO_ERROR, measure
 from .coding.intra import encode_empty
-from .coding.layers import EncodedLayers, LayersState, encode_layers
+from .coding.layers.layers import EncodedLayers, LayersState, encode_layers
 from .coding.reference import CodedReference, code_on_lattice
 from .format.layout import Form
 from .format.records import pack

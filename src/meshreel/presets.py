@@ -15,8 +15,8 @@ from .analysis.reference import ReferenceOptions
 from .analysis.template import TemplateOptions
 from .analysis.track import TrackOptions
 from .choice import Quality
-from .coding.displacements import DisplacementOptions
-from .coding.layers import LayersOptions
+from .coding.layers.layers import LayersOptions
+from .coding.paper.displacements import DisplacementOptions
 from .errors import InputError
 from .format.layout import Form
 from .windows import EncoderOptions

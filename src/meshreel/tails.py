@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from .coding import entropy
+from .coding.layers.patches import Patches, encode_patches, encode_runs, reach
 from .coding.mesh import encode_mesh
-from .coding.patches import Patches, encode_patches, encode_runs, reach
 from .coding.steps import level_of, step_of
 from .errors import InputError
 from .format.layout import LayersPatches

@@ -27,10 +27,10 @@ from .analysis.segment.scene import SegmentOptions
 from .analysis.template import TemplateOptions
 from .analysis.track import TrackOptions, track_centers
 from .choice import NO_ERROR, IntraOptions, Quality, cheapest_intra, finest_intra, measure
-from .coding.displacements import DisplacementOptions
 from .coding.group import decode_group, encode_group
 from .coding.intra import encode_empty
-from .coding.layers import LayersOptions
+from .coding.layers.layers import LayersOptions
+from .coding.paper.displacements import DisplacementOptions
 from .coding.reference import CodedReference, code_reference
 from .errors import InputError, NoReferenceError
 from .format.layout import Form

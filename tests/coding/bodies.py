@@ -7,7 +7,7 @@ import numpy as np
 from meshreel.coding.reference import CodedReference, code_reference
 from meshreel.types import Mesh
 
-from .test_laplacian import icosahedron
+from .paper.test_laplacian import icosahedron
 
 
 def ball(levels: int = 2, bits: int = 10) -> CodedReference:

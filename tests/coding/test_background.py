@@ -19,7 +19,7 @@ from meshreel.format.layout import Form, StaticPatch
 from meshreel.format.records import pack, unpack_all
 from meshreel.types import Mesh, Placement
 
-from .test_laplacian import icosahedron
+from .paper.test_laplacian import icosahedron
 
 STEP = 1e-3
 BALL = icosahedron(2)

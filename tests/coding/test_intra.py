@@ -15,7 +15,7 @@ from meshreel.format.layout import DracoGroup, Form
 from meshreel.format.records import pack
 from meshreel.types import Mesh
 
-from .test_laplacian import icosahedron
+from .paper.test_laplacian import icosahedron
 
 BALL = icosahedron(2)
 

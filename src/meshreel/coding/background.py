@@ -16,8 +16,8 @@ from ..geometry.topology import concatenate, part_of
 from ..types import Mesh, Placement
 from . import entropy
 from .intra import decode_intra, encode_intra
+from .layers.patches import fill_runs, run_lengths
 from .mesh import check_growth, check_step, decode_mesh, encode_mesh
-from .patches import fill_runs, run_lengths
 
 
 def encode_background(mesh: Mesh, step: float) -> bytes:

@@ -16,11 +16,11 @@ from ..format.layout import DracoGroup, Form, LaplacianGroup, LayersPatches
 from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh, Placement
-from .displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
 from .intra import decode_empty, decode_intra
-from .layers import LayersState, layers_parts, place_layers, read_layers
+from .layers.layers import LayersState, layers_parts, place_layers, read_layers
+from .layers.patches import decode_patches
 from .mesh import check_growth, check_step, decode_mesh
-from .patches import decode_patches
+from .paper.displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
 from .reference import CodedReference
 
 

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+from meshreel.coding.layers.layers.patches import run_lengths
 
-from meshreel.coding.patches import run_lengths
 from meshreel.encoder import Encoder
 from meshreel.errors import InputError
 from meshreel.presets import preset_options, quality_of_vertices

@@ -8,19 +8,26 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from meshreel.coding.layers.layers.layers import encode_layers
+from meshreel.coding.layers.layers.patches import (
+    Patches,
+    _parted,
+    decode_patches,
+    decode_runs,
+    encode_patches,
+    encode_runs,
+)
 
 from meshreel import _core
 from meshreel.coding.group import continue_group, decode_group, payload_parts
-from meshreel.coding.layers import encode_layers
-from meshreel.coding.patches import Patches, _parted, decode_patches, decode_runs, encode_patches, encode_runs
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersPatches
 from meshreel.format.records import pack
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh, Placement
 
-from .bodies import ball, moving
-from .test_laplacian import icosahedron
+from ..bodies import ball, moving
+from ..paper.test_laplacian import icosahedron
 
 FRAMES, STEP_LEVEL = 4, 72
 BALL = ball()

@@ -12,17 +12,17 @@ from itertools import accumulate
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from ..errors import FormatError, InputError
-from ..format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
-from ..format.records import pack, unpack, unpack_all
-from ..geometry.levels import frames_of, heights, refine, subdivide
-from ..types import Mesh, Placement
+from ...errors import FormatError, InputError
+from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
+from ...format.records import pack, unpack, unpack_all
+from ...geometry.levels import frames_of, heights, refine, subdivide
+from ...types import Mesh, Placement
+from ..mesh import check_growth, check_step, decode_mesh
+from ..reference import CodedReference
+from ..steps import LEVELS, level_of, step_of
 from .details import Shown, decode_last, decode_level, encode_level
 from .fields import Rate
 from .graph import Connectivity, connectivity
-from .mesh import check_growth, check_step, decode_mesh
-from .reference import CodedReference
-from .steps import LEVELS, level_of, step_of
 from .trajectories import decode_trajectories, encode_trajectories
 
 MOST_FRAMES = 255

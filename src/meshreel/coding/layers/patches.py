@@ -13,13 +13,13 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
-from .. import _core
-from ..errors import FormatError, InputError
-from ..format.layout import LayersPatches
-from ..types import Mesh, Placement
-from . import entropy
-from .mesh import check_growth, decode_mesh, encode_mesh
-from .steps import LEVELS, step_of
+from ... import _core
+from ...errors import FormatError, InputError
+from ...format.layout import LayersPatches
+from ...types import Mesh, Placement
+from .. import entropy
+from ..mesh import check_growth, decode_mesh, encode_mesh
+from ..steps import LEVELS, step_of
 
 MOST_CELLS = 1 << 20  # of the lattice, over all frames: what Draco's float32 positions tell apart
 

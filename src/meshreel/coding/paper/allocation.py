@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
-from ..errors import InputError
-from ..format.layout import AnchorRule
-from ..geometry.topology import components
-from . import entropy, klt, quantize
+from ...errors import InputError
+from ...format.layout import AnchorRule
+from ...geometry.topology import components
+from .. import entropy, klt
+from ..steps import LEVELS, level_of, step_of
+from . import quantize
 from .laplacian import System
-from .steps import LEVELS, level_of, step_of
 
 WORTH = 1.8  # squared steps that a bit saves along the curve of distortion over rate (measured)
 LADDER = (0, -4, -2, 2, 4)  # steps that a component may have, eighths of an octave from the base step; more is finer

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64
 
-from .. import _core
-from ..errors import FormatError
-from ..format.layout import CodedField
-from ..geometry.levels import frames_of
-from ..geometry.topology import vertex_normals
-from ..types import Mesh
+from ... import _core
+from ...errors import FormatError
+from ...format.layout import CodedField
+from ...geometry.levels import frames_of
+from ...geometry.topology import vertex_normals
+from ...types import Mesh
 from .fields import EncodedField, Rate, SurfaceWeight, decode_field, encode_field
 from .graph import Hierarchy, hierarchy
 

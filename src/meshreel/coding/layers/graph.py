@@ -12,10 +12,10 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
-from .. import _core
-from ..errors import FormatError
-from ..geometry.levels import Level, subdivide
-from ..types import Mesh
+from ... import _core
+from ...errors import FormatError
+from ...geometry.levels import Level, subdivide
+from ...types import Mesh
 
 GraphArrays: TypeAlias = tuple[Int64[np.ndarray, " S"], Int32[np.ndarray, " E"], Float64[np.ndarray, " E"]]
 

@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from .. import _core
-from ..format.layout import AnchorRule
-from ..geometry.topology import components
-from ..types import Mesh
+from ... import _core
+from ...format.layout import AnchorRule
+from ...geometry.topology import components
+from ...types import Mesh
 
 
 def anchors(rule: AnchorRule, count: int, faces: Int32[np.ndarray, "F 3"], vertices: int) -> Int32[np.ndarray, " l"]:

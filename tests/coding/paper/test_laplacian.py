@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from meshreel import _core
-from meshreel.coding import laplacian
+from meshreel.coding.paper import laplacian
 from meshreel.format.layout import AnchorRule
 from meshreel.geometry.topology import components, subdivide_midpoint
 from meshreel.types import Mesh

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from ..errors import InputError
+from ...errors import InputError
 
 LARGEST = 2**31 - 1
 

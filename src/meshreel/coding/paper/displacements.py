@@ -10,13 +10,14 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64
 
-from ..errors import FormatError, InputError
-from ..format import records
-from ..format.layout import Component, DisplacementHead
-from ..types import Mesh
-from . import entropy, klt, laplacian, quantize
+from ...errors import FormatError, InputError
+from ...format import records
+from ...format.layout import Component, DisplacementHead
+from ...types import Mesh
+from .. import entropy, klt
+from ..steps import LEVELS, step_of
+from . import laplacian, quantize
 from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost
-from .steps import LEVELS, step_of
 
 MOST_FRAMES = 65_535
 MOST_BITS = 30

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from .. import _core
-from ..errors import FormatError
+from ... import _core
+from ...errors import FormatError
 
 
 def forward(vectors: Float64[np.ndarray, "M C"], scales: Float64[np.ndarray, " M"]) -> Int32[np.ndarray, " N"]:

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64
 
-from .. import _core
-from ..errors import FormatError
-from ..format.layout import LayersLevel, Origin
-from ..geometry.levels import Level, checked
-from ..types import Placement
+from ... import _core
+from ...errors import FormatError
+from ...format.layout import LayersLevel, Origin
+from ...geometry.levels import Level, checked
+from ...types import Placement
 from .fields import EncodedField, FieldValues, Rate, encode_field, read_field
 from .graph import Connectivity, Siblings, siblings
 

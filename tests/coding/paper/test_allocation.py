@@ -3,9 +3,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.coding import entropy, klt, laplacian
-from meshreel.coding.allocation import WORTH, DisplacementOptions, allocate, alternatives
-from meshreel.coding.displacements import decode_displacements, encode_displacements
+from meshreel.coding import entropy, klt
+from meshreel.coding.paper import laplacian
+from meshreel.coding.paper.allocation import WORTH, DisplacementOptions, allocate, alternatives
+from meshreel.coding.paper.displacements import decode_displacements, encode_displacements
 from meshreel.coding.steps import step_of
 from meshreel.errors import InputError
 

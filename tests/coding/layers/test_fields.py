@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from meshreel.coding.layers.layers.fields import Rate, SurfaceWeight, decode_field, encode_field
+from meshreel.coding.layers.layers.graph import hierarchy, siblings
 
 from meshreel import _core
-from meshreel.coding import fields, orthonormal
-from meshreel.coding.fields import Rate, SurfaceWeight, decode_field, encode_field
-from meshreel.coding.graph import hierarchy, siblings
+from meshreel.coding.layers.layers import fields, orthonormal
 from meshreel.coding.steps import LEVELS
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.levels import subdivide
 from meshreel.geometry.topology import vertex_normals
 
-from .bodies import ball, moving
+from ..bodies import ball, moving
 
 REFERENCE = ball(1)
 MESH = REFERENCE.mesh

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from meshreel.coding import quantize
+from meshreel.coding.paper import quantize
 from meshreel.errors import InputError
 
 

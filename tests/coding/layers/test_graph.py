@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from meshreel.coding.layers.layers.graph import Graph, hierarchy, siblings
 
-from meshreel.coding.graph import Graph, hierarchy, siblings
 from meshreel.errors import FormatError
 from meshreel.geometry.levels import subdivide
 from meshreel.geometry.topology import subdivide_midpoint, unique_edges
 from meshreel.types import Mesh
 
-from .bodies import ball, sheet
+from ..bodies import ball, sheet
 
 
 def row(graph: Graph, place: int) -> tuple[np.ndarray, np.ndarray]:

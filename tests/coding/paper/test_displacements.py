@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.coding import displacements, entropy
-from meshreel.coding.allocation import DisplacementOptions
-from meshreel.coding.displacements import decode_displacements, encode_displacements, layer_sizes
+from meshreel.coding import entropy
+from meshreel.coding.paper import displacements
+from meshreel.coding.paper.allocation import DisplacementOptions
+from meshreel.coding.paper.displacements import decode_displacements, encode_displacements, layer_sizes
 from meshreel.coding.steps import LEVELS, level_of, step_of
 from meshreel.errors import FormatError, InputError
 from meshreel.format import records

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from meshreel.coding.layers.layers.layers import EncodedLayers, LayersOptions, decode_layers, encode_layers
 
-from meshreel.coding import layers
 from meshreel.coding.group import continue_group, decode_group, payload_parts
-from meshreel.coding.layers import EncodedLayers, LayersOptions, decode_layers, encode_layers
+from meshreel.coding.layers.layers import layers
 from meshreel.coding.reference import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin
@@ -19,7 +19,7 @@ from meshreel.geometry.levels import heights, refine, subdivide
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
-from .bodies import ball, moving, sheet
+from ..bodies import ball, moving, sheet
 
 BALL = ball()
 WANTED = moving(BALL, 4)

@@ -12,12 +12,13 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
-from .. import _core
-from ..errors import FormatError, InputError
-from ..format.layout import CodedField
-from . import entropy, klt, orthonormal
+from ... import _core
+from ...errors import FormatError, InputError
+from ...format.layout import CodedField
+from .. import entropy, klt
+from ..steps import LEVELS, step_of
+from . import orthonormal
 from .graph import Graph, GraphArrays
-from .steps import LEVELS, step_of
 
 MOST_BITS = 30  # of a mean's fraction: one that is a diagonal long still fits 32 bits
 FINENESS = 20.0  # a basis vector's rounding turns its column's typical weight away by about 1 / FINENESS of a step
