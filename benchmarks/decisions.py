@@ -16,12 +16,12 @@ from typing import Any
 
 import DracoPy
 import numpy as np
+from meshreel.analysis.fit.fit.fit import fit_frames
+from meshreel.analysis.reference.reference.centers import affinity, largest_distances
+from meshreel.analysis.reference.reference.deform import neighbours
+from meshreel.analysis.reference.reference.fuse import Group
+from meshreel.analysis.reference.reference.reference import MDS
 
-from meshreel.analysis.deform import neighbours
-from meshreel.analysis.fit import fit_frames
-from meshreel.analysis.fuse import Group
-from meshreel.analysis.reference import MDS
-from meshreel.analysis.reference_centers import affinity, largest_distances
 from meshreel.choice import cheapest_intra, measure
 from meshreel.coding.group import decode_group, encode_group
 from meshreel.coding.paper import quantize

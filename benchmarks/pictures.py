@@ -16,9 +16,9 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from meshreel.analysis.reference.reference.reference import MDS
 from PIL import Image
 
-from meshreel.analysis.reference import MDS
 from meshreel.geometry.topology import components as connected
 from meshreel.metrics.cameras import Box
 from meshreel.metrics.sheet import SheetOptions, write_sheet

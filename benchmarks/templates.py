@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 from captured import Case, Row, asked_cases, keep
+from meshreel.analysis.fit.fit.fit import Guides, fit_targets
+from meshreel.analysis.fit.fit.match import Target
 from meshreel.coding.layers.layers.layers import LayersOptions, encode_layers
 
-from meshreel.analysis.correspond import choose_key
-from meshreel.analysis.fit import Guides, fit_targets
-from meshreel.analysis.fit_match import Target
-from meshreel.analysis.template import shared_detail
+from meshreel.analysis.follow.correspond import choose_key
+from meshreel.analysis.follow.template import shared_detail
 from meshreel.choice import measure
 from meshreel.coding.reference import CodedReference, code_on_lattice
 from meshreel.geometry.decimate import decimate

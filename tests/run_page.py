@@ -39,8 +39,9 @@ def give() -> None:
 
 def small(preset_options: Any) -> Any:
     """A preset's options with little of everything, so that a page runs in seconds."""
-    from meshreel.analysis.reference import ReferenceOptions
-    from meshreel.analysis.track import TrackOptions
+    from meshreel.analysis.reference.reference.reference import ReferenceOptions
+    from meshreel.analysis.reference.reference.track import TrackOptions
+
     from meshreel.choice import IntraOptions
 
     def options(*arguments: Any, **named: Any) -> Any:

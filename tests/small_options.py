@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from meshreel.analysis.embedded import EmbeddedOptions, Stage
+from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
 from meshreel.analysis.segment.views import ViewsOptions
 from meshreel.choice import IntraOptions, Quality
 from meshreel.presets import preset_options

@@ -8,9 +8,9 @@ from typing import overload
 
 import numpy as np
 import pytest
+from meshreel.analysis.fit.fit.match import Target
 
 from meshreel import layered
-from meshreel.analysis.fit_match import Target
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.choice import measure
 from meshreel.coding.group import continue_group

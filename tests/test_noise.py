@@ -17,7 +17,7 @@ from meshreel.tails import TailOptions
 from meshreel.types import Mesh
 from meshreel.windows import target_of
 
-from .analysis.test_fused import SIDE, gaps, noisy, sheet, with_hole
+from .analysis.follow.test_fused import SIDE, gaps, noisy, sheet, with_hole
 
 NOISE = 0.003
 BEST = preset_options("best")

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from meshreel.coding.layers.layers.layers import LayersOptions
 
-from meshreel.analysis.template import TemplateOptions
+from meshreel.analysis.follow.template import TemplateOptions
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.presets import PRESETS, displacement_step, preset_options, reference_vertices

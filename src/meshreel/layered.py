@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from .analysis.correspond import Course, choose_key, from_last
-from .analysis.fit import Fit, Guides, fit_targets
-from .analysis.fit_match import Target
-from .analysis.fused import fused_mesh
+from .analysis.fit.fit import Fit, Guides, fit_targets
+from .analysis.fit.match import Target
+from .analysis.follow.correspond import Course, choose_key, from_last
+from .analysis.follow.fused import fused_mesh
+from .analysis.follow.template import base_mesh, shared_detail
 from .analysis.groups import cut_at, leading
-from .analysis.template import base_mesh, shared_detail
 from .choice import NO_ERROR, measure
 from .coding.intra import encode_empty
 from .coding.layers.layers import EncodedLayers, LayersState, encode_layers

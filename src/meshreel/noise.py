@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from .analysis.embedded import EmbeddedOptions
-from .analysis.fit import FitOptions
+from .analysis.fit.fit import FitOptions
+from .analysis.follow.embedded import EmbeddedOptions
 from .windows import EncoderOptions
 
 LOST = 3.0  # RMS distances of the noise that a residual may have besides: legs come and go in noisy frames

@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from .analysis.fit import FitOptions
+from .analysis.fit.fit import FitOptions
+from .analysis.follow.template import TemplateOptions
 from .analysis.groups import GroupOptions
-from .analysis.reference import ReferenceOptions
-from .analysis.template import TemplateOptions
-from .analysis.track import TrackOptions
+from .analysis.reference.reference import ReferenceOptions
+from .analysis.reference.track import TrackOptions
 from .choice import Quality
 from .coding.layers.layers import LayersOptions
 from .coding.paper.displacements import DisplacementOptions

@@ -17,15 +17,15 @@ from jaxtyping import Float64
 
 from .analysis.background import BackgroundOptions
 from .analysis.bodies import BodyOptions
-from .analysis.correspond import PLACES
-from .analysis.embedded import EmbeddedOptions
-from .analysis.fit import Fit, FitOptions, fit_frames
-from .analysis.fused import FusedOptions
+from .analysis.fit.fit import Fit, FitOptions, fit_frames
+from .analysis.follow.correspond import PLACES
+from .analysis.follow.embedded import EmbeddedOptions
+from .analysis.follow.fused import FusedOptions
+from .analysis.follow.template import TemplateOptions
 from .analysis.groups import GroupOptions, cut_at
-from .analysis.reference import ReferenceOptions, extract_reference, predict
+from .analysis.reference.reference import ReferenceOptions, extract_reference, predict
+from .analysis.reference.track import TrackOptions, track_centers
 from .analysis.segment.scene import SegmentOptions
-from .analysis.template import TemplateOptions
-from .analysis.track import TrackOptions, track_centers
 from .choice import NO_ERROR, IntraOptions, Quality, cheapest_intra, finest_intra, measure
 from .coding.group import decode_group, encode_group
 from .coding.intra import encode_empty

@@ -1,0 +1,77 @@
+"""How well a fitted template lies on a frame: symmetric distance, its 95 % quantile, normal error (docs: metrics).
+
+The encoder's own measure (it decides keys and cuts); both directions, since one way does not see left-over surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ...geometry.nearest import Surface
+from ...geometry.topology import vertex_areas, vertex_normals
+from ...types import Mesh
+from .match import ON_BORDER, Target, interpolated, interpolated_scalar
+
+BITS = 0.01  # of a noisy frame's area, that may have flown
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """Distances in units of the sequence's diagonal; infinite where there is nothing to compare."""
+
+    to_fit: float  # RMS over the frame's vertices to the fitted surface
+    to_frame: float  # RMS over the template's vertices to the frame's surface
+    quantile: float  # 95 % of all these distances are less; the worse direction
+    normals: float  # degrees, mean angle to the normal at the closest point; mean of both directions
+    by_area: float  # RMS over the area, the worse direction: few vertices may span much of a surface that is left over
+    common: float  # the same, where both have surface: without holes of the frame, and the farthest of it (`BITS`)
+
+    @property
+    def rms(self) -> float:
+        """Symmetric RMS distance: the worse of the two directions."""
+        return max(self.to_fit, self.to_frame)
+
+
+NOTHING = Residual(np.inf, np.inf, np.inf, np.inf, np.inf, np.inf)
+
+
+def residual_of(fitted: Mesh, target: Target) -> Residual:
+    """The residual of one fitted frame."""
+    surface, normals = Surface(fitted), vertex_normals(fitted)
+    ahead, back = surface.closest(target.mesh.vertices), target.surface.closest(fitted.vertices)
+    to_fit = np.linalg.norm(ahead.points - target.mesh.vertices, axis=1)
+    to_frame = np.linalg.norm(back.points - fitted.vertices, axis=1)
+    angles = (
+        _mean_angle(target.normals, interpolated(normals, fitted.faces, ahead))
+        + _mean_angle(normals, target.normals_at(back))
+    ) / 2
+    quantile = max(float(np.quantile(to_fit, 0.95)), float(np.quantile(to_frame, 0.95)))
+    own, areas = vertex_areas(target.mesh), vertex_areas(fitted)
+    beside = interpolated_scalar(target.inside, target.mesh.faces, back) > ON_BORDER
+    by_area = max(_rms(to_fit, own), _rms(to_frame, areas))
+    common = max(_rms(to_fit, _without_farthest(to_fit, own)), _rms(to_frame * beside, areas))
+    return Residual(_rms(to_fit), _rms(to_frame), quantile, angles, by_area, common)
+
+
+def _without_farthest(
+    distances: Float64[np.ndarray, " N"], areas: Float64[np.ndarray, " N"]
+) -> Float64[np.ndarray, " N"]:
+    """The areas, zero for the farthest `BITS` of them."""
+    order = np.argsort(-distances, kind="stable")
+    kept = areas.copy()
+    kept[order[np.cumsum(areas[order]) <= BITS * areas.sum()]] = 0
+    return kept
+
+
+def _rms(distances: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"] | None = None) -> float:
+    if weights is None or not weights.any():
+        return float(np.sqrt(np.mean(distances**2)))
+    return float(np.sqrt(np.average(distances**2, weights=weights)))
+
+
+def _mean_angle(one: Float64[np.ndarray, "N 3"], other: Float64[np.ndarray, "N 3"]) -> float:
+    cosine = np.clip(np.einsum("nd,nd->n", one, other), -1.0, 1.0)
+    return float(np.degrees(np.mean(np.arccos(cosine))))

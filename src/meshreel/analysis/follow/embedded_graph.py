@@ -1,0 +1,123 @@
+"""A graph of nodes on a mesh, and which of them move a point: nearest along the surface, not through space.
+
+In: the key frame's mesh. Out: nodes (farthest-point samples), the edges between cells that touch, bindings of points.
+A hand near a hip shares no node with it: candidates are the nodes within two steps of the point's own cell.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial import cKDTree
+
+from ...geometry.topology import components, face_normals, unique_edges, vertex_normals
+from ...types import Mesh
+
+TURN = 0.01  # distance that a difference of 1 between unit normals counts as: both sides of a thin part get nodes
+SEEDED = 0.25  # share of the nodes that may go to the components' first ones
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """The nodes that move each point, and their shares."""
+
+    indices: Int64[np.ndarray, "P k"]
+    weights: Float64[np.ndarray, "P k"]  # rows sum to 1
+
+
+@dataclass(frozen=True, slots=True)
+class DeformationGraph:
+    """Nodes on a mesh; every vertex of it belongs to the cell of the node that is nearest along the surface."""
+
+    nodes: Float64[np.ndarray, "N 3"]
+    edges: Int64[np.ndarray, "E 2"]  # both directions of each pair of touching cells
+    cells: Int64[np.ndarray, " V"]
+    hood: Int64[np.ndarray, "N h"]  # itself and the nodes at most two edges away, then -1
+
+    def bind(self, points: Float64[np.ndarray, "P 3"], cells: Int64[np.ndarray, " P"], count: int) -> Binding:
+        """Each point's `count` nearest nodes of its cell's hood, with shares that fall to 0 at the one after them."""
+        hood = self.hood[cells]
+        away = np.linalg.norm(self.nodes[hood] - points[:, None], axis=2)
+        away[hood < 0] = np.inf
+        count = min(count, hood.shape[1])
+        some = np.argsort(away, axis=1, kind="stable")[:, : count + 1]
+        away, indices = np.take_along_axis(away, some, axis=1), np.take_along_axis(hood, some, axis=1)
+        finite = np.where(np.isfinite(away), away, 0.0)
+        reach = np.where(np.isfinite(away[:, -1]), away[:, -1], 1.5 * finite.max(axis=1))
+        reach = np.maximum(reach, np.finfo(float).tiny)
+        weights = np.square(np.maximum(1 - away[:, :count] / reach[:, None], 0))
+        weights[:, 0] = np.maximum(weights[:, 0], 1e-12)
+        return Binding(np.maximum(indices[:, :count], 0), weights / weights.sum(axis=1, keepdims=True))
+
+
+def area_samples(mesh: Mesh, count: int) -> Int64[np.ndarray, " S"]:
+    """About `count` vertices, evenly over the area, in order: the same for the same mesh."""
+    if len(mesh.vertices) <= count:
+        return np.arange(len(mesh.vertices))
+    _, areas = face_normals(mesh)
+    share = np.bincount(mesh.faces.reshape(-1), np.repeat(areas, 3), len(mesh.vertices))
+    reached = np.cumsum(share)
+    at = (np.arange(count) + 0.5) * (reached[-1] / count)
+    return np.unique(np.minimum(np.searchsorted(reached, at), len(share) - 1))
+
+
+def farthest_first(mesh: Mesh, candidates: Int64[np.ndarray, " S"], count: int) -> Int64[np.ndarray, " N"]:
+    """`count` of the candidate vertices, each the farthest from those before: any beginning of it is spread evenly.
+
+    The distance is of position and normal; every component (the largest, if there are many) gets its first one early.
+    """
+    labels = components(mesh.faces, len(mesh.vertices))[candidates]
+    _, first, sizes = np.unique(labels, return_index=True, return_counts=True)
+    seeds = first[np.argsort(-sizes, kind="stable")][: max(1, int(SEEDED * count))]
+    normals = vertex_normals(mesh)[candidates]
+    places = np.concatenate([mesh.vertices[candidates], TURN * normals], axis=1)
+    nearest = np.full(len(candidates), np.inf)
+    chosen = np.empty(min(count, len(candidates)), np.int64)
+    for n in range(len(chosen)):
+        chosen[n] = seeds[n] if n < len(seeds) else int(np.argmax(nearest))
+        offset = places - places[chosen[n]]
+        nearest = np.minimum(nearest, np.einsum("ij,ij->i", offset, offset))
+    return candidates[chosen]
+
+
+def build_graph(mesh: Mesh, nodes: Int64[np.ndarray, " N"]) -> DeformationGraph:
+    """The graph whose nodes are these vertices of the mesh."""
+    edges, _ = unique_edges(mesh.faces)
+    cells = _cells(mesh, edges, nodes)
+    i, j = cells[edges].T
+    count = len(nodes)
+    touching = np.unique((np.concatenate([i, j]) * count + np.concatenate([j, i]))[np.concatenate([i != j, i != j])])
+    pairs = np.stack([touching // count, touching % count], axis=1)
+    return DeformationGraph(mesh.vertices[nodes], pairs, cells, _hoods(pairs, count))
+
+
+def _cells(mesh: Mesh, edges: Int64[np.ndarray, "E 2"], nodes: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " V"]:
+    """The node nearest along the edges to each vertex; by air where no path leads to any."""
+    size = len(mesh.vertices)
+    lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
+    roads = sparse.csr_array((np.maximum(lengths, 1e-12), (edges[:, 0], edges[:, 1])), shape=(size, size))
+    away, _, source = csgraph.dijkstra(roads, directed=False, indices=nodes, min_only=True, return_predecessors=True)
+    rank = np.full(size, -1)
+    rank[nodes] = np.arange(len(nodes))
+    cells = rank[np.maximum(source, 0)]
+    lost = ~np.isfinite(away)
+    if lost.any():
+        cells[lost] = cKDTree(mesh.vertices[nodes]).query(mesh.vertices[lost])[1]
+    return cells
+
+
+def _hoods(pairs: Int64[np.ndarray, "E 2"], count: int) -> Int64[np.ndarray, "N h"]:
+    one = sparse.csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    one = sparse.csr_array(one + sparse.eye_array(count))
+    two = sparse.csr_array(one @ one)
+    two.sort_indices()
+    sizes = np.diff(two.indptr)
+    hood = np.full((count, int(sizes.max())), -1, np.int64)
+    hood[np.repeat(np.arange(count), sizes), np.arange(len(two.indices)) - np.repeat(two.indptr[:-1], sizes)] = (
+        two.indices
+    )
+    return hood

@@ -1,0 +1,78 @@
+"""The template of a group of layers: a coarse base mesh of its key frame, and detail that all frames share.
+
+In: a key frame; fitted positions of the subdivided base. Out: the base; positions whose detail does not change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from ...errors import InputError
+from ...geometry.decimate import BOUNDARY_WEIGHT, decimate
+from ...geometry.levels import heights, levels_of, refine
+from ...geometry.nearest import Surface
+from ...types import Mesh
+
+FEWEST = 40  # vertices of a base mesh: below, a body has no limbs
+DECAY = 1.2  # the error of quadric decimation falls with this power of the number of vertices (measured on bodies)
+CURVATURE = 52  # of midpoints, 64ths: about what the coder has; what is left of the bend is detail
+ROUNDS = 2  # of the search for the number of vertices
+
+
+@dataclass(frozen=True, slots=True)
+class TemplateOptions:
+    """How fine the template of a group is."""
+
+    error: float = 1.1e-3  # RMS distance of the key frame's vertices to the base mesh to aim at, of the diagonal
+    levels: int = 2  # midpoint subdivisions of the base
+    border: float = BOUNDARY_WEIGHT  # weight of open borders in the decimation
+
+    def __post_init__(self) -> None:
+        if self.error <= 0 or not 0 <= self.levels <= 4 or not 0 < self.border < np.inf:
+            raise InputError(
+                f"template error {self.error:g}, {self.levels} levels, border {self.border:g}: "
+                "give > 0, 0 to 4, and > 0"
+            )
+
+
+def base_mesh(key: Mesh, options: TemplateOptions) -> Mesh:
+    """The key frame decimated until its error is about what the options ask for."""
+    most = len(key.vertices)
+    count = min(max(most // 20, FEWEST), most)
+    for left in reversed(range(ROUNDS + 1)):
+        base = decimate(key, max(count, 4), options.border)
+        error = _rms(key, base)
+        if left == 0 or error == 0.0 or abs(np.log(error / options.error)) < 0.05:
+            break
+        wanted = round(len(base.vertices) * (error / options.error) ** (1 / DECAY))
+        if (count := min(max(wanted, FEWEST), most)) == len(base.vertices):
+            break
+    return base
+
+
+def shared_detail(
+    faces: Int32[np.ndarray, "F 3"], count: int, levels: int
+) -> Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]:
+    """What makes fitted positions coherent: `count` base vertices stay, the detail becomes its median over time.
+
+    Detail is what the coder sees: scalars along the normals of the coarser level.
+    """
+    hierarchy = levels_of(faces, count, levels)
+
+    def coherent(positions: Float64[np.ndarray, "T V 3"]) -> Float64[np.ndarray, "T V 3"]:
+        known = np.ascontiguousarray(positions[:, :count])
+        for level in hierarchy:
+            scalars = heights(positions[:, : level.count], positions[:, : level.vertices], level, CURVATURE)
+            known = refine(known, level, np.tile(np.median(scalars, axis=0), (len(known), 1)), CURVATURE)
+        return known
+
+    return coherent
+
+
+def _rms(mesh: Mesh, base: Mesh) -> float:
+    gaps = Surface(base).closest(mesh.vertices).points - mesh.vertices
+    return float(np.sqrt((gaps**2).sum(axis=1).mean()))

@@ -1,0 +1,178 @@
+"""Reference centers: one pose for all frames of a group, in which nothing touches (paper, section 3.3.1, eqs. 5-6).
+
+In: tracked centers. Out: their largest distances, the pose that keeps those distances best (SMACOF from a
+classical start), and the affinity of each pair.
+
+Differs from the paper: distances do not tell left from right, so a real frame's pose settles the reflection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32, Float64
+
+from ...errors import InputError
+from ...geometry.rigid import fit_rigid
+from ...types import Centers
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceCenterOptions:
+    """How eqs. 5 and 6 are solved."""
+
+    max_rounds: int = 80  # SMACOF rounds at most
+    tolerance: float = 2e-4  # stop where a round lowers the stress by less than this share
+    reach: float = 2.0  # affinity is 1/2 at this many typical distances between nearest centers (eq. 6's sigma)
+    seed: int = 0  # of the eigenvector iteration's start
+
+    def __post_init__(self) -> None:
+        if self.max_rounds < 0:
+            raise InputError(f"max_rounds is {self.max_rounds}: give 0 or more rounds")
+        if not 0 <= self.tolerance < 1:
+            raise InputError(f"tolerance is {self.tolerance}: give a share of the stress from 0 to below 1")
+        if not self.reach > 0:
+            raise InputError(f"reach is {self.reach}: give a positive multiple of the center spacing")
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceCenters:
+    """The pose found and how well it keeps the distances."""
+
+    positions: Float64[np.ndarray, "K 3"]  # in the frame of the pose it was aligned to
+    stress: float  # eq. 5; 0 is perfect
+    rounds: int  # SMACOF rounds done
+
+
+def largest_distances(centers: Centers) -> Float32[np.ndarray, "K K"]:
+    """The largest distance of each pair of centers over all frames (eq. 5's d), in units of the centers.
+
+    Two K x K arrays in float32 at a time, whatever the number of frames.
+    """
+    largest = np.zeros((centers.positions.shape[1],) * 2, np.float32)
+    for pose in centers.positions:
+        np.maximum(largest, _squared_distances(pose), out=largest)
+    np.sqrt(largest, out=largest)
+    np.fill_diagonal(largest, 0)
+    return largest
+
+
+def reference_centers(
+    distances: Float32[np.ndarray, "K K"], pose: Float64[np.ndarray, "K 3"], options: ReferenceCenterOptions
+) -> ReferenceCenters:
+    """The pose of least stress (eq. 5), turned, shifted and, where needed, mirrored to agree with a frame's `pose`."""
+    if len(distances) < 4 or not distances.any():  # three points or fewer, or all at one place: no shape is open
+        return ReferenceCenters(pose.copy(), _stress(distances, pose), 0)
+    positions, rounds = _smacof(distances, _classical(distances, options), options)
+    positions = _orient(positions, pose, distances)
+    return ReferenceCenters(positions, _stress(distances, positions), rounds)
+
+
+def affinity(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOptions) -> Float32[np.ndarray, "K K"]:
+    """How strongly each pair of centers is connected, 1 for a center and itself (eq. 6).
+
+    Sigma follows from the spacing of the centers, so that it needs no unit and no number of bodies.
+    """
+    sigma = np.sqrt(np.log(2)) / max(options.reach * center_spacing(distances), np.finfo(np.float32).tiny)
+    return np.exp(-np.square(np.float32(sigma) * distances))  # eq. 6
+
+
+def center_spacing(distances: Float32[np.ndarray, "K K"]) -> float:
+    """The typical (median) distance from a center to its nearest other one."""
+    if len(distances) < 2:
+        return 0.0
+    return float(np.median(np.partition(distances, 1, axis=1)[:, 1]))
+
+
+def _classical(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOptions) -> Float64[np.ndarray, "K 3"]:
+    """Torgerson's classical scaling: the three strongest axes of the doubly centered squared distances."""
+    from scipy.sparse.linalg import eigsh
+
+    gram = -0.5 * np.square(distances)
+    gram -= gram.mean(axis=0, keepdims=True)
+    gram -= gram.mean(axis=1, keepdims=True)
+    if len(gram) <= 8:  # the iteration wants more than a handful of rows
+        values, vectors = np.linalg.eigh(gram.astype(np.float64))
+        values, vectors = values[-3:], vectors[:, -3:]
+    else:
+        start = np.random.default_rng(options.seed).standard_normal(len(gram)).astype(np.float32)
+        values, vectors = eigsh(gram, k=3, which="LA", v0=start, tol=1e-4)
+    return (vectors * np.sqrt(np.maximum(values, 0))).astype(np.float64)
+
+
+def _smacof(
+    distances: Float32[np.ndarray, "K K"], start: Float64[np.ndarray, "K 3"], options: ReferenceCenterOptions
+) -> tuple[Float64[np.ndarray, "K 3"], int]:
+    """Majorisation with doubled steps: a step that does not lower the stress is taken back to the safe half.
+
+    One round costs one distance matrix. All in float32: positions are near the origin.
+    """
+    x = (start - start.mean(axis=0)).astype(np.float32)
+    guttman, stress = _guttman(distances, x)
+    rounds = 0
+    while rounds < options.max_rounds:
+        rounds += 1
+        bold = 2 * guttman - x
+        bold_guttman, bold_stress = _guttman(distances, bold)
+        if bold_stress > stress:  # the plain step never raises the stress
+            bold = guttman
+            bold_guttman, bold_stress = _guttman(distances, bold)
+        done = bold_stress > stress * (1 - options.tolerance)
+        x, guttman, stress = bold, bold_guttman, bold_stress
+        if done:
+            break
+    return guttman.astype(np.float64), rounds
+
+
+def _guttman(
+    distances: Float32[np.ndarray, "K K"], x: Float32[np.ndarray, "K 3"]
+) -> tuple[Float32[np.ndarray, "K 3"], float]:
+    """The Guttman transform of x and the raw stress of x."""
+    current = np.sqrt(_squared_distances(x))
+    np.maximum(current, np.float32(1e-12), out=current)
+    ratio = distances / current
+    current -= distances
+    flat = current.ravel()
+    stress = float(flat @ flat)
+    moved = (ratio.sum(axis=1)[:, None] * x - ratio @ x) / np.float32(len(x))
+    return moved, stress
+
+
+def _orient(
+    positions: Float64[np.ndarray, "K 3"], pose: Float64[np.ndarray, "K 3"], distances: Float32[np.ndarray, "K K"]
+) -> Float64[np.ndarray, "K 3"]:
+    """Positions aligned to a real pose, mirrored where most small neighbourhoods are inside out.
+
+    A limb may lie elsewhere than in the frame, so the global fit may prefer the mirror image; neighbourhoods do not.
+    """
+    count = min(12, len(pose))
+    near = np.argpartition(distances, count - 1, axis=1)[:, :count]
+    a, b = (
+        positions[near] - positions[near].mean(axis=1, keepdims=True),
+        pose[near] - pose[near].mean(axis=1, keepdims=True),
+    )
+    votes = np.sign(np.linalg.det(np.swapaxes(b, 1, 2) @ a))
+    if votes.sum() < 0:
+        positions = positions * np.array([1.0, 1.0, -1.0])
+    rotation, translation = fit_rigid(positions[None], pose[None], np.ones((1, len(pose))))
+    return positions @ rotation[0].T + translation[0]
+
+
+def _stress(distances: Float32[np.ndarray, "K K"], positions: Float64[np.ndarray, "K 3"]) -> float:
+    """Kruskal's stress (eq. 5); both sums run over each pair twice, which cancels."""
+    current = np.sqrt(_squared_distances(positions))
+    np.fill_diagonal(current, 0)
+    norm = float(np.linalg.norm(distances))
+    return float(np.linalg.norm(distances - current)) / norm if norm > 0 else 0.0
+
+
+def _squared_distances(
+    pose: Float64[np.ndarray, "K 3"] | Float32[np.ndarray, "K 3"],
+) -> Float32[np.ndarray, "K K"]:
+    p = (pose - pose.mean(axis=0)).astype(np.float32)
+    square = np.einsum("kd,kd->k", p, p)
+    result = p @ (-2 * p.T)
+    result += square
+    result += square[:, None]
+    return np.maximum(result, 0, out=result)

@@ -1,0 +1,187 @@
+"""Center-affinity deformation: points follow the centers that belong to them (paper, section 3.3.2, eq. 7).
+
+In: points in one pose of the centers. Out: the same points in another pose; the way back swaps the poses.
+
+Differs from the paper: where bodies touch, a vertex's nearest center (eq. 7) may be the other body's. So centers in
+front of the surface count as farther, and a vertex whose center is a stranger to its mesh neighbours' centers takes
+another of its few nearest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int64
+
+from ...errors import InputError
+from ...geometry.rigid import apply, blend, fit_rigid, from_rigid, rotate
+from ...geometry.topology import unique_edges, vertex_normals
+from ...types import Mesh
+
+FRONT = 4.0  # a center in front of the surface counts as this many times as far
+
+
+@dataclass(frozen=True, slots=True)
+class DeformOptions:
+    """Which centers move a point, and how their say falls off."""
+
+    neighbours: int = 8  # centers per neighbourhood (the paper's K_nbr), itself included
+    falloff: float = 1.0  # a center's say falls to 1/e at this many center spacings beyond the point's nearest one
+    guard_choices: int = 6  # nearest centers a vertex may take instead of a stranger; 1 is the paper's rule alone
+    guard_rounds: int = 2  # passes of that guard over the mesh
+
+    def __post_init__(self) -> None:
+        if self.neighbours < 1:
+            raise InputError(f"neighbours is {self.neighbours}: give at least 1 center (8 is usual)")
+        if not self.falloff > 0:
+            raise InputError(f"falloff is {self.falloff}: give a positive multiple of the center spacing")
+        if self.guard_choices < 1 or self.guard_rounds < 0:
+            raise InputError(f"guard_choices {self.guard_choices}, guard_rounds {self.guard_rounds}: give >= 1, >= 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbours:
+    """The neighbourhood of each center, by affinity, itself first."""
+
+    indices: Int64[np.ndarray, "K n"]
+    affinities: Float64[np.ndarray, "K n"]  # eq. 6
+    affinity: Float32[np.ndarray, "K K"]  # eq. 6, of all pairs
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """Which centers move each point, and with what share: it holds for any target pose."""
+
+    nearest: Int64[np.ndarray, " V"]  # k1, eq. 7
+    weights: Float64[np.ndarray, "V n"]  # of the neighbours of k1; rows sum to 1
+
+
+def deform(
+    mesh: Mesh,
+    source: Float64[np.ndarray, "K 3"],
+    target: Float64[np.ndarray, "K 3"],
+    neighbours: Neighbours,
+    options: DeformOptions,
+) -> Float64[np.ndarray, "V 3"]:
+    """The mesh's vertices, which lie in the source pose, moved to the target pose (eq. 7)."""
+    binding = bind(mesh, source, neighbours, options)
+    return move(mesh.vertices, binding, center_motions(source, target, neighbours), neighbours)
+
+
+def neighbours(affinity: Float32[np.ndarray, "K K"], options: DeformOptions) -> Neighbours:
+    """The top K_nbr centers by affinity to each center, itself first, then falling."""
+    count = min(options.neighbours, len(affinity))
+    distance = 1 - affinity
+    np.fill_diagonal(distance, -1)  # a twin at the same place may not push a center out of its own neighbourhood
+    some = np.argpartition(distance, count - 1, axis=1)[:, :count]
+    order = np.argsort(np.take_along_axis(distance, some, axis=1), axis=1, kind="stable")
+    indices = np.take_along_axis(some, order, axis=1).astype(np.int64)
+    return Neighbours(indices, np.take_along_axis(affinity, indices, axis=1).astype(np.float64), affinity)
+
+
+def center_motions(
+    source: Float64[np.ndarray, "K 3"], target: Float64[np.ndarray, "K 3"], neighbours: Neighbours
+) -> Float64[np.ndarray, "K 8"]:
+    """Each center's motion between two poses, fitted to its neighbourhood by affinity (weighted Kabsch)."""
+    rotations, translations = fit_rigid(source[neighbours.indices], target[neighbours.indices], neighbours.affinities)
+    return from_rigid(rotations, translations)
+
+
+def bind(mesh: Mesh, source: Float64[np.ndarray, "K 3"], neighbours: Neighbours, options: DeformOptions) -> Binding:
+    """The centers that move each vertex of a mesh that lies in the source pose, and their shares."""
+    from scipy.spatial import cKDTree
+
+    choices = min(options.guard_choices, len(source))
+    reach, near = cKDTree(source).query(mesh.vertices, k=choices)
+    reach, near = reach.reshape(-1, choices), near.reshape(-1, choices).astype(np.int64)
+    if choices > 1 and not mesh.is_empty:
+        near = _behind_first(mesh, near, reach, source)
+    nearest = near[:, 0]  # eq. 7
+    if choices > 1 and not mesh.is_empty:
+        for _ in range(options.guard_rounds):
+            nearest = _guard(mesh, near, nearest, neighbours)
+    return Binding(nearest, _weights(mesh.vertices, nearest, source, neighbours, options))
+
+
+def move(
+    points: Float64[np.ndarray, "V 3"],
+    binding: Binding,
+    motions: Float64[np.ndarray, "K 8"],
+    neighbours: Neighbours,
+) -> Float64[np.ndarray, "V 3"]:
+    """Bound points moved by the blend of their centers' motions."""
+    return apply(blended(binding, motions, neighbours), points)
+
+
+def move_normals(
+    normals: Float64[np.ndarray, "V 3"],
+    binding: Binding,
+    motions: Float64[np.ndarray, "K 8"],
+    neighbours: Neighbours,
+) -> Float64[np.ndarray, "V 3"]:
+    """Normals of bound points, turned as their points are."""
+    return rotate(blended(binding, motions, neighbours), normals)
+
+
+def blended(
+    binding: Binding, motions: Float64[np.ndarray, "K 8"], neighbours: Neighbours
+) -> Float64[np.ndarray, "V 8"]:
+    """One unit dual quaternion for each bound point."""
+    rows = neighbours.indices[binding.nearest]
+    return blend(motions[rows], binding.weights)
+
+
+def _behind_first(
+    mesh: Mesh,
+    near: Int64[np.ndarray, "V n"],
+    reach: Float64[np.ndarray, "V n"],
+    source: Float64[np.ndarray, "K 3"],
+) -> Int64[np.ndarray, "V n"]:
+    """Each vertex's nearest centers, sorted anew by distance plus what they stand in front of the surface.
+
+    A body's own centers are inside it, so behind its surface.
+    """
+    offset = source[near] - mesh.vertices[:, None]
+    front = np.maximum(np.einsum("vnd,vd->vn", offset, vertex_normals(mesh)), 0)
+    order = np.argsort(np.square(reach) + np.square(FRONT * front), axis=1, kind="stable")
+    return np.take_along_axis(near, order, axis=1)
+
+
+def _guard(
+    mesh: Mesh, near: Int64[np.ndarray, "V n"], nearest: Int64[np.ndarray, " V"], neighbours: Neighbours
+) -> Int64[np.ndarray, " V"]:
+    """k1 of each vertex, replaced where its affinity to the mesh neighbours' k1 is under half of what it could be."""
+    edges, _ = unique_edges(mesh.faces)
+    to, other = np.concatenate([edges, edges[:, ::-1]]).T
+    kin = np.zeros(near.shape)
+    for choice in range(near.shape[1]):
+        values = neighbours.affinity[near[to, choice], nearest[other]].astype(np.float64)
+        kin[:, choice] = np.bincount(to, values, len(near))
+    own = np.bincount(to, neighbours.affinity[nearest[to], nearest[other]].astype(np.float64), len(near))
+    best = np.argmax(kin >= 0.8 * kin.max(axis=1, keepdims=True), axis=1)  # the nearest of the good ones
+    stranger = own < 0.5 * kin.max(axis=1)
+    return np.where(stranger, near[np.arange(len(near)), best], nearest)
+
+
+def _weights(
+    points: Float64[np.ndarray, "V 3"],
+    nearest: Int64[np.ndarray, " V"],
+    source: Float64[np.ndarray, "K 3"],
+    neighbours: Neighbours,
+    options: DeformOptions,
+) -> Float64[np.ndarray, "V n"]:
+    """Shares that fall off with the distance to the point (in this pose) and with the affinity to k1."""
+    rows = neighbours.indices[nearest]
+    square = np.sum(np.square(points[:, None] - source[rows]), axis=2)
+    square -= square.min(axis=1, keepdims=True)  # far from all centers the nearest ones still decide
+    width = options.falloff * _spacing(source, neighbours)
+    weights = neighbours.affinities[nearest] * np.exp(-square / max(width**2, np.finfo(float).tiny))
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+def _spacing(source: Float64[np.ndarray, "K 3"], neighbours: Neighbours) -> float:
+    if neighbours.indices.shape[1] < 2:
+        return 1.0
+    away = np.linalg.norm(source[neighbours.indices[:, 1:]] - source[:, None], axis=2)
+    return float(np.median(away.min(axis=1)))

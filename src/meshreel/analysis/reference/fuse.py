@@ -1,0 +1,203 @@
+"""All frames of a group as one surface in one pose of the centers (paper, section 3.3.2).
+
+In: frames, centers, a pose, a key frame. Out: the dense points of the frames deformed to the pose, and their mesh.
+
+Differs from the paper: the key frame's points come first, and other frames add what it lacks; faces that tear on the
+way, or join parts that are apart in some frame, are cut; surface far from all points is not invented.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
+
+from ...errors import InputError
+from ...geometry.decimate import decimate
+from ...geometry.holes import close_holes
+from ...geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
+from ...geometry.topology import clean, components, face_normals, subdivide_midpoint, unique_edges, vertex_normals
+from ...types import Mesh
+from .centers import center_spacing
+from .deform import Binding, DeformOptions, Neighbours, bind, center_motions, move, move_normals
+
+Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # of geometry.topology.unique_edges
+
+SPARSE_ROUNDS = 4  # midpoint rounds at most for large faces
+
+
+@dataclass(frozen=True, slots=True)
+class FuseOptions:
+    """How the frames' points become one surface; lengths in mean edges of the frames' meshes."""
+
+    subdivisions: int = 1  # midpoint rounds that make each frame's points dense
+    cover: float = 0.3  # a frame adds points where those before it have less than this share of its surface
+    cell: float = 0.75  # points are averaged in cells of this size
+    reach: float = 1.5  # no surface farther than this from every point
+    torn: float = 3.0  # a length that grows beyond this factor, plus half a center spacing, tears
+    smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
+    hole: float = 0.08  # holes with a shorter perimeter are closed, as share of the mesh's diagonal: cuts leave them
+    poisson: PoissonOptions = field(default_factory=PoissonOptions)
+
+    def __post_init__(self) -> None:
+        if self.subdivisions < 0 or self.cover < 0 or not 0 <= self.smallest < 1:
+            raise InputError(
+                f"subdivisions {self.subdivisions}, cover {self.cover}, smallest {self.smallest}: "
+                "give >= 0, >= 0 and 0 to below 1"
+            )
+        if not (self.cell > 0 and self.reach > 0 and self.torn > 1):
+            raise InputError(f"cell {self.cell}, reach {self.reach}, torn {self.torn}: give > 0, > 0 and > 1")
+
+
+class Group:
+    """Frames with what holds in every pose: their centers' neighbourhoods, bindings, and the faces that part."""
+
+    def __init__(
+        self,
+        frames: Sequence[Mesh],
+        positions: Float64[np.ndarray, "T K 3"],
+        distances: Float32[np.ndarray, "K K"],
+        kin: Neighbours,
+        options: tuple[DeformOptions, FuseOptions],
+    ) -> None:
+        """Non-empty frames, their centers, and of all frames of the group the largest distances and neighbours."""
+        self.frames, self.positions, self.kin = frames, positions, kin
+        self.deform, self.fuse = options
+        self.distances, self.spacing = distances, center_spacing(distances)
+        self.edges = [unique_edges(frame.faces) for frame in frames]
+        self.edge = float(
+            np.mean([_lengths(f.vertices, e).mean() for f, (e, _) in zip(frames, self.edges, strict=True)])
+        )
+        self.bindings = [bind(frame, pose, kin, self.deform) for frame, pose in zip(frames, positions, strict=True)]
+        self.normals = [vertex_normals(frame) for frame in frames]
+        self.parting = [self._parting(*each) for each in zip(self.edges, self.bindings, positions, strict=True)]
+
+    def sent(self, mesh: Mesh, pose: Float64[np.ndarray, "K 3"]) -> Float64[np.ndarray, "T V 3"]:
+        """The vertices of a mesh in this pose, deformed to each frame."""
+        binding = bind(mesh, pose, self.kin, self.deform)
+        motions = (center_motions(pose, target, self.kin) for target in self.positions)
+        return np.stack([move(mesh.vertices, binding, each, self.kin) for each in motions])
+
+    def cloud(
+        self, pose: Float64[np.ndarray, "K 3"], key: int, subdivisions: int
+    ) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
+        """Points and outward normals of the surface in a pose: the key frame's, and what only others have.
+
+        Where tracking drifts, frames disagree by more than their detail: all points at once would be many layers.
+        """
+        covered = np.zeros(len(pose))
+        points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
+        for t in sorted(range(len(self.frames)), key=lambda t: (abs(t - key), t)):
+            moved, turned, faces = self._moved(t, pose)
+            nearest = self.bindings[t].nearest
+            area = np.bincount(nearest, _vertex_areas(self.frames[t], faces), len(pose))
+            wanted = self._around(covered) < self.fuse.cover * self._around(area)
+            covered += np.where(wanted, area, 0)
+            faces = faces[wanted[nearest][faces].any(axis=1)]
+            more, turned = _dense(moved, turned, faces, subdivisions, self.edge)
+            points.append(more)
+            normals.append(turned)
+        return thin_out(np.concatenate(points), np.concatenate(normals), self.fuse.cell * self.edge)
+
+    def fused(self, pose: Float64[np.ndarray, "K 3"], key: int, depth: int, vertices: int) -> Mesh:
+        """One mesh in a pose with about this many vertices, nothing far from data, no face that tears in a frame."""
+        poisson, final = self.fuse.poisson, depth >= self.fuse.poisson.depth
+        options = replace(
+            poisson,
+            depth=depth,
+            reach=self.fuse.reach * self.edge,
+            smallest=self.fuse.smallest,
+            vertices=max(poisson.vertices, 4 * vertices) if final else vertices,
+        )
+        subdivisions = self.fuse.subdivisions if final else 0
+        mesh = decimate(reconstruct(*self.cloud(pose, key, subdivisions), options), vertices)
+        if mesh.is_empty:
+            return mesh
+        edges = unique_edges(mesh.faces)
+        bad = self._parting(edges, bind(mesh, pose, self.kin, self.deform), pose)
+        for moved in self.sent(mesh, pose):
+            bad |= self._torn(mesh.vertices, moved, edges)
+        whole = drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[~bad])), self.fuse.smallest)
+        return close_holes(whole, self.fuse.hole * mesh.diagonal)
+
+    def _moved(
+        self, t: int, pose: Float64[np.ndarray, "K 3"]
+    ) -> tuple[Float64[np.ndarray, "V 3"], Float64[np.ndarray, "V 3"], Int32[np.ndarray, "F 3"]]:
+        """A frame's vertices and normals in a pose, and those of its faces that came there whole."""
+        frame, binding = self.frames[t], self.bindings[t]
+        motions = center_motions(self.positions[t], pose, self.kin)
+        points = move(frame.vertices, binding, motions, self.kin)
+        spoiled = np.zeros(len(points), bool)
+        spoiled[frame.faces[self.parting[t] | self._torn(frame.vertices, points, self.edges[t])]] = True
+        faces = frame.faces[~spoiled[frame.faces].any(axis=1)]
+        faces = faces[_large(faces, len(points), self.fuse.smallest)]
+        return points, move_normals(self.normals[t], binding, motions, self.kin), faces
+
+    def _parting(self, edges: Edges, binding: Binding, pose: Float64[np.ndarray, "K 3"]) -> Bool[np.ndarray, " F"]:
+        """Faces that join centers which are far more apart in some frame than in this pose."""
+        i, j = binding.nearest[edges[0]].T
+        now = np.linalg.norm(pose[i] - pose[j], axis=1)
+        return (self.distances[i, j] > self.fuse.torn * now + self.spacing / 2)[edges[1]].any(axis=1)
+
+    def _torn(
+        self, here: Float64[np.ndarray, "V 3"], there: Float64[np.ndarray, "V 3"], edges: Edges
+    ) -> Bool[np.ndarray, " F"]:
+        """Faces with an edge that is far longer in one pose than in the other."""
+        one, two = _lengths(here, edges[0]), _lengths(there, edges[0])
+        far = np.maximum(one, two) > self.fuse.torn * np.minimum(one, two) + self.spacing / 2
+        return far[edges[1]].any(axis=1)
+
+    def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:
+        """What the neighbourhood of each center has: from frame to frame surface changes hands between neighbours."""
+        return np.sum(amounts[self.kin.indices] * self.kin.affinities, axis=1)
+
+
+def _large(faces: Int32[np.ndarray, "F 3"], count: int, share: float) -> Bool[np.ndarray, " F"]:
+    """Faces of connected bits that are not tiny: a patch on the wrong body's centers is torn all round."""
+    if len(faces) == 0:
+        return np.zeros(0, bool)
+    label = components(faces, count)[faces[:, 0]]
+    size = np.bincount(label)
+    return size[label] >= share * size.max()
+
+
+def _dense(
+    points: Float64[np.ndarray, "V 3"],
+    normals: Float64[np.ndarray, "V 3"],
+    faces: Int32[np.ndarray, "F 3"],
+    subdivisions: int,
+    longest: float,
+) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
+    """The points of these faces with their normals, and of midpoint rounds: the first for all, then where too sparse.
+
+    A flat sole may have few, large triangles: without points inside them it would pass for far from data.
+    """
+    found, turned = [], []
+    for round_ in range(max(subdivisions, SPARSE_ROUNDS) + 1):
+        used = np.zeros(len(points), bool)
+        used[faces] = True
+        faces = (np.cumsum(used) - 1)[faces].astype(np.int32)
+        points, normals = points[used], normals[used]
+        found.append(points)
+        turned.append(normals)
+        finer, finer_normals = (subdivide_midpoint(Mesh(a, faces)) for a in (points, normals))
+        points, normals, faces = finer.vertices, finer_normals.vertices, finer.faces
+        if round_ >= subdivisions:
+            faces = faces[_longest_edges(points, faces) > longest]
+    return np.concatenate(found), np.concatenate(turned)
+
+
+def _longest_edges(points: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
+    corners = points[faces]
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+
+
+def _vertex_areas(mesh: Mesh, faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " V"]:
+    areas = face_normals(Mesh.of(mesh.vertices, faces))[1] / 3
+    return np.bincount(faces.reshape(-1), np.repeat(areas, 3), len(mesh.vertices)).astype(np.float64)  # int if empty
+
+
+def _lengths(vertices: Float64[np.ndarray, "V 3"], edges: np.ndarray) -> Float64[np.ndarray, " E"]:
+    return np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)

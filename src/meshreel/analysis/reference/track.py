@@ -1,0 +1,202 @@
+"""Volume tracking: centers that follow the volume through frames of any connectivity (paper, section 3.1).
+
+Frames in, center trajectories out. Frame 0: Lloyd's relaxation. Later frames: extrapolation, then descent on even
+spread + rigidity towards the frame before. Neighbours are those that were never far and never moved differently.
+Differs from its sources: one energy for both wishes, so that convergence is seen and steps are accelerated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int32, Int64
+
+from ... import _core
+from ...errors import InputError
+from ...geometry.inside import Samples, interior_samples
+from ...types import Centers, Mesh
+
+LEAST_AFFINITY = 1e-3
+FEWEST_NEIGHBOURS = 4  # always kept: fewer do not fix a rotation
+FEWEST_CENTERS = 4  # of a body
+
+
+@dataclass(frozen=True, slots=True)
+class TrackOptions:
+    """How centers are spread and followed; lengths in units of the sequence's bounding-box diagonal."""
+
+    centers: int = 2000  # K, of all bodies together
+    samples: int = 45_000  # points that stand for the volume of a frame
+    reach: float = 0.058  # distance that halves an affinity
+    agreement: float = 0.003  # difference of motion (RMS, a frame) that halves an affinity
+    neighbours: int = 16  # at most, of a center
+    spread: float = 1.0  # weight of the even spread (Lloyd)
+    rigidity: float = 3.0  # weight of the rigid term
+    tolerance: float = 1e-5  # a frame is done when a round can lower the energy by no more than this share
+    rounds: int = 300  # at most, a frame
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.centers < 1:
+            raise InputError(f"centers is {self.centers}; give at least 1")
+        if self.samples < 4 * self.centers:
+            raise InputError(f"samples is {self.samples}; give at least 4 a center, {4 * self.centers}")
+        if self.neighbours < FEWEST_NEIGHBOURS:
+            raise InputError(f"neighbours is {self.neighbours}; give at least {FEWEST_NEIGHBOURS}")
+        for name in ("reach", "agreement", "spread", "rigidity", "tolerance"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0):
+                raise InputError(f"{name} is {value}; give a positive number")
+        if self.rounds < 1:
+            raise InputError(f"rounds is {self.rounds}; give at least 1")
+        if self.seed < 0:
+            raise InputError(f"seed is {self.seed}; give 0 or more")
+
+
+def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:
+    """Trajectories of about `options.centers` volume centers through normalised frames, each with faces.
+
+    Fewer where there are fewer samples, more where there are so many bodies that each gets its least.
+
+    Bodies are the connected components of the first frame, without specks; each gets centers by its volume.
+    """
+    if len(frames) == 0:
+        raise InputError("no frames to track; give at least one")
+    samples = _samples(frames, 0, options)
+    first, bodies, owners = _spread_over_bodies(samples, options)
+    graph = _Affinities(first, bodies, options)
+    track = [first]
+    for t in range(1, len(frames)):
+        following = _samples(frames, t, options)
+        now, rotations, next_owners = _follow(track, following, graph, options)
+        graph.learn(track[-1], now, rotations, samples.points, owners)
+        track.append(now)
+        samples, owners = following, next_owners
+    return Centers(np.stack(track), bodies)
+
+
+def _samples(frames: Sequence[Mesh], t: int, options: TrackOptions) -> Samples:
+    frame = frames[t]
+    if frame.is_empty:
+        raise InputError(f"frame {t} is empty; code it on its own and track the frames around it")
+    if not np.isfinite(frame.vertices).all():
+        raise InputError(f"frame {t} has coordinates that are not finite; repair it first")
+    return interior_samples(frame, options.samples, np.random.default_rng((options.seed, t)))
+
+
+def _spread_over_bodies(
+    samples: Samples, options: TrackOptions
+) -> tuple[Float64[np.ndarray, "K 3"], Int32[np.ndarray, " K"], Int32[np.ndarray, " N"]]:
+    """Centers of the first frame, the body of each, and the center that owns each sample."""
+    generator = np.random.default_rng((options.seed, 0, 1))
+    owners = np.zeros(len(samples.points), np.int32)
+    places: list[Float64[np.ndarray, "K 3"]] = []
+    counts = _shares(np.bincount(samples.bodies), options.centers)
+    for body, count in enumerate(counts):
+        mine = np.flatnonzero(samples.bodies == body)
+        points = np.ascontiguousarray(samples.points[mine])
+        centers = points[np.sort(generator.choice(len(points), count, replace=False))]
+        owned = np.zeros(len(points), np.int32)
+        _core.spread_centers(points, centers, owned, options.tolerance, options.rounds)
+        owners[mine] = owned + sum(len(c) for c in places)
+        places.append(centers)
+    return np.concatenate(places), np.repeat(np.arange(len(counts)), counts).astype(np.int32), owners
+
+
+def _shares(sizes: Int64[np.ndarray, " B"], centers: int) -> Int64[np.ndarray, " B"]:
+    """Centers of each body: by volume, a few at least, never more than it has samples."""
+    counts = np.maximum(np.floor(centers * sizes / sizes.sum()).astype(np.int64), FEWEST_CENTERS)
+    counts[0] = max(counts[0] + centers - counts.sum(), FEWEST_CENTERS)  # the largest body takes what rounding left
+    return np.minimum(counts, sizes)
+
+
+def _follow(
+    track: list[Float64[np.ndarray, "K 3"]], samples: Samples, graph: _Affinities, options: TrackOptions
+) -> tuple[Float64[np.ndarray, "K 3"], Float64[np.ndarray, "K 3 3"], Int32[np.ndarray, " N"]]:
+    """Centers in the next frame, the rotation of each on the way there, and the owner of each sample."""
+    centers = 2 * track[-1] - track[-2] if len(track) > 1 else track[-1].copy()
+    rotations = np.zeros((len(centers), 9))
+    owners = np.zeros(len(samples.points), np.int32)
+    offsets, indices, weights = graph.lists()
+    _core.follow_centers(
+        samples.points, track[-1], offsets, indices, weights, centers, rotations, owners,
+        options.spread, options.rigidity, options.tolerance, options.rounds,
+    )  # fmt: skip
+    return centers, rotations.reshape(-1, 3, 3), owners
+
+
+class _Affinities:
+    """Which centers hold each other: pairs near in the first frame, weakened by all that came after."""
+
+    def __init__(
+        self, centers: Float64[np.ndarray, "K 3"], bodies: Int32[np.ndarray, " K"], options: TrackOptions
+    ) -> None:
+        from scipy.spatial import cKDTree
+
+        self._options = options
+        rows, columns = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+        for body in range(int(bodies.max()) + 1):
+            mine = np.flatnonzero(bodies == body)
+            nearest = min(2 * options.neighbours + 1, len(mine))
+            _, found = cKDTree(centers[mine]).query(centers[mine], k=np.arange(1, nearest + 1))
+            rows.append(np.repeat(mine, nearest))
+            columns.append(mine[found].reshape(-1))
+        i, j = np.concatenate(rows), np.concatenate(columns)
+        self._i, self._j = i[i != j], j[i != j].astype(np.int32)
+        self._offsets = _offsets(self._i, len(centers))
+        self._distance = _squared(centers[self._i] - centers[self._j])  # largest so far, squared
+        self._difference = np.zeros(len(self._i))  # of motion, largest so far, squared
+
+    def learn(
+        self,
+        before: Float64[np.ndarray, "K 3"],
+        now: Float64[np.ndarray, "K 3"],
+        rotations: Float64[np.ndarray, "K 3 3"],
+        points: Float64[np.ndarray, "N 3"],
+        owners: Int32[np.ndarray, " N"],
+    ) -> None:
+        """Takes in one step: distances now, and how differently the motions send what a center owned before."""
+        means, covariances = _moments(points, owners, before)
+        shifts = now - np.einsum("kij,kj->ki", rotations, before)
+        difference = np.empty(len(self._i))
+        _core.motion_differences(
+            self._offsets, self._j, rotations.reshape(-1, 9), shifts, means, covariances.reshape(-1, 9), difference
+        )
+        self._difference = np.maximum(self._difference, difference)
+        self._distance = np.maximum(self._distance, _squared(now[self._i] - now[self._j]))
+
+    def lists(self) -> tuple[Int32[np.ndarray, " K1"], Int32[np.ndarray, " P"], Float64[np.ndarray, " P"]]:
+        """Neighbour lists (offsets, indices, affinities): the strongest of each center."""
+        o = self._options
+        halvings = self._distance / o.reach**2 + self._difference / o.agreement**2
+        affinity = np.maximum(np.exp2(-halvings), 1e-6)
+        order = np.lexsort((halvings, self._i))
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.arange(len(order)) - self._offsets[self._i[order]]
+        kept = (rank < FEWEST_NEIGHBOURS) | ((rank < o.neighbours) & (affinity >= LEAST_AFFINITY))
+        return _offsets(self._i[kept], len(self._offsets) - 1), self._j[kept], affinity[kept]
+
+
+def _offsets(rows: Int64[np.ndarray, " P"], count: int) -> Int32[np.ndarray, " K1"]:
+    return np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=count))]).astype(np.int32)
+
+
+def _squared(differences: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
+    return np.einsum("ij,ij->i", differences, differences)
+
+
+def _moments(
+    points: Float64[np.ndarray, "N 3"], owners: Int32[np.ndarray, " N"], centers: Float64[np.ndarray, "K 3"]
+) -> tuple[Float64[np.ndarray, "K 3"], Float64[np.ndarray, "K 3 3"]]:
+    """Mean and covariance of the samples that each center owns; a center that owns none stands for itself."""
+    count = len(centers)
+    size = np.maximum(np.bincount(owners, minlength=count), 1)
+    local = points - centers[owners]
+    mean = np.stack([np.bincount(owners, local[:, a], count) for a in range(3)], axis=1) / size[:, None]
+    second = np.empty((count, 3, 3))
+    for a in range(3):
+        for b in range(a, 3):
+            second[:, a, b] = second[:, b, a] = np.bincount(owners, local[:, a] * local[:, b], count) / size
+    return centers + mean, second - mean[:, :, None] * mean[:, None, :]

@@ -1,0 +1,174 @@
+"""The fit against surfaces with known answers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from meshreel.analysis.fit.fit.border import border_sides
+from meshreel.analysis.fit.fit.fit import FitOptions, fit_frames
+from meshreel.analysis.fit.fit.shape import strongest_components
+
+from meshreel.errors import InputError
+from meshreel.geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint
+from meshreel.types import Mesh
+
+AXES = np.array([0.24, 0.2, 0.22])
+QUICK = FitOptions(components=0)
+
+
+def ball(levels: int, radius: float = 0.22) -> Mesh:
+    corners = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
+    faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+    mesh = subdivide_midpoint(Mesh.of(corners, faces), levels)
+    return Mesh(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1)[:, None] * radius, mesh.faces)
+
+
+def stretched(mesh: Mesh) -> Mesh:
+    return Mesh(mesh.vertices / 0.22 * AXES, mesh.faces)
+
+
+def sheet(n: int, height: float = 0.0, up: bool = True) -> Mesh:
+    x, y = np.meshgrid(np.linspace(-0.3, 0.3, n), np.linspace(-0.3, 0.3, n), indexing="ij")
+    i = np.arange(n * n).reshape(n, n)
+    a, b, c, d = (k.reshape(-1) for k in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    vertices = np.stack([x, y, np.full_like(x, height)], axis=-1).reshape(-1, 3)
+    return Mesh.of(vertices, faces if up else faces[:, ::-1])
+
+
+def flipped(mesh: Mesh, positions: np.ndarray) -> int:
+    before, area = face_normals(mesh)
+    after, left = face_normals(Mesh(positions, mesh.faces))
+    return int(((before * after).sum(axis=1) <= 0).sum() + (left < 0.05 * area).sum())
+
+
+def test_a_sphere_becomes_the_ellipsoid() -> None:
+    template, frame = ball(4), stretched(ball(5))
+    fit = fit_frames(template.faces, template.vertices[None], [frame], QUICK)
+    off = np.abs(np.linalg.norm(fit.positions[0] / AXES, axis=1) - 1) * AXES.min()
+    assert np.sqrt(np.mean(off**2)) < 0.0006  # the template's own chords are that far from a sphere
+    assert fit.residuals[0].rms < 0.0006
+    assert fit.residuals[0].normals < 1.5
+    assert flipped(template, fit.positions[0]) == 0
+
+
+def test_a_prediction_on_its_target_stays() -> None:
+    template = stretched(ball(4))
+    fit = fit_frames(template.faces, template.vertices[None], [template], QUICK)
+    assert np.abs(fit.positions[0] - template.vertices).max() < 1e-6
+    assert fit.residuals[0].quantile < 1e-6
+
+
+def test_over_a_hole_the_template_follows_its_prediction() -> None:
+    template, frame = ball(4), ball(5)
+    hole = frame.vertices[frame.faces].mean(axis=1)[:, 2] > 0.2
+    open_frame = drop_unreferenced(Mesh(frame.vertices, frame.faces[~hole]))
+    prediction = template.vertices + np.array([0.0, 0.0, 0.004])
+    fit = fit_frames(template.faces, prediction[None], [open_frame], QUICK)
+    above = template.vertices[:, 2] > 0.212
+    assert above.sum() > 10
+    step = fit.positions[0][above] - prediction[above]
+    assert np.abs(step).max() < 0.008
+    assert np.ptp(step[:, 2]) < 0.002  # smoothly
+    assert flipped(template, fit.positions[0]) == 0
+
+
+def test_noise_does_not_fold_the_template() -> None:
+    template, frame = ball(4), ball(5)
+    noise = np.random.default_rng(3).normal(0, 0.002, frame.vertices.shape)
+    fit = fit_frames(template.faces, template.vertices[None], [Mesh(frame.vertices + noise, frame.faces)], QUICK)
+    assert flipped(template, fit.positions[0]) == 0
+
+
+def test_a_near_sheet_that_faces_away_does_not_attract() -> None:
+    template = sheet(20)
+    fit = fit_frames(template.faces, template.vertices[None], [sheet(40, 0.01, up=False)], QUICK)
+    assert np.allclose(fit.positions[0], template.vertices, atol=1e-9)
+
+
+def test_a_far_sheet_does_not_attract() -> None:
+    template = sheet(20)
+    fit = fit_frames(template.faces, template.vertices[None], [sheet(40, 0.1)], QUICK)
+    assert np.allclose(fit.positions[0], template.vertices, atol=1e-9)
+
+
+def test_an_open_border_is_laid_on_the_frame_s_border() -> None:
+    template, frame = sheet(20), sheet(40)
+    small = template.vertices * 0.98  # 0.006 short on each side: point-to-plane rows do not see it
+    fit = fit_frames(template.faces, small[None], [frame], QUICK)
+    rim = np.abs(template.vertices[:, :2]).max(axis=1) > 0.299
+    assert np.abs(np.abs(fit.positions[0][rim, :2]).max(axis=1) - 0.3).max() < 0.001
+    assert len(border_sides(template.faces).faces) == 4 * 19
+
+
+def test_the_second_fit_is_nearer_to_few_components() -> None:
+    template, rng = ball(3), np.random.default_rng(0)
+    frames = [stretched(ball(4)) for _ in range(4)]
+    predictions = template.vertices + np.repeat(rng.normal(0, 0.002, (4, 1, 3)), len(template.vertices), axis=1)
+    predictions = predictions + rng.normal(0, 0.0005, predictions.shape)
+
+    def tail(components: int) -> float:
+        options = FitOptions(components=components, pull=0.3, key=0)
+        positions = fit_frames(template.faces, predictions, frames, options).positions
+        return float(np.linalg.norm(positions - strongest_components(positions, 0, 2)))
+
+    assert tail(2) < 0.7 * tail(0)
+
+
+def test_the_same_input_gives_the_same_bits() -> None:
+    template, frames = ball(3), [ball(4), stretched(ball(4))]
+    predictions = np.stack([template.vertices] * 2)
+    one, two = (fit_frames(template.faces, predictions, frames, FitOptions()) for _ in range(2))
+    assert np.array_equal(one.positions, two.positions)
+    assert one.residuals == two.residuals
+
+
+def test_an_empty_frame_keeps_its_prediction() -> None:
+    template = ball(3)
+    predictions = np.stack([template.vertices] * 3)
+    fit = fit_frames(template.faces, predictions, [ball(4), Mesh.empty(), ball(4)], FitOptions())
+    assert np.isinf(fit.residuals[1].rms)
+    assert np.isfinite(fit.positions).all()
+    assert fit.residuals[0].rms < 0.002 and fit.residuals[2].rms < 0.002
+
+
+def test_no_frames_and_no_faces_are_legal() -> None:
+    template = ball(1)
+    assert fit_frames(template.faces, np.zeros((0, 18, 3)), [], FitOptions()).positions.shape == (0, 18, 3)
+    bare = fit_frames(np.zeros((0, 3), np.int32), template.vertices[None], [ball(2)], FitOptions())
+    assert np.array_equal(bare.positions[0], template.vertices)
+
+
+def test_vertices_that_no_face_uses_keep_their_prediction() -> None:
+    template = ball(2)
+    loose = np.concatenate([template.vertices, [[0.4, 0.4, 0.4]]])
+    fit = fit_frames(template.faces, loose[None], [ball(3)], QUICK)
+    assert np.allclose(fit.positions[0][-1], 0.4)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"gates": (0.01,)},
+        {"smoothing": (1.0, 1.0, 1.0, 0.0)},
+        {"agreement": 1.0},
+        {"anchor": 0.0},
+        {"guard": 0.5},
+        {"second_smoothing": -1.0},
+        {"second_smoothing": 0.0},
+        {"components": -1},
+        {"iterations": 0},
+        {"tolerance": 1.0},
+    ],
+)
+def test_options_that_make_no_sense_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="give"):
+        FitOptions(**wrong)  # type: ignore[arg-type]
+
+
+def test_a_key_outside_the_frames_and_missing_predictions_are_refused() -> None:
+    template = ball(1)
+    with pytest.raises(InputError, match="key 3"):
+        fit_frames(template.faces, template.vertices[None], [ball(1)], FitOptions(key=3))
+    with pytest.raises(InputError, match="1 predictions for 2 frames"):
+        fit_frames(template.faces, template.vertices[None], [ball(1)] * 2, FitOptions())

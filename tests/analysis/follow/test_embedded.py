@@ -1,0 +1,256 @@
+"""Embedded deformation against motions with known answers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from meshreel.analysis.fit.fit.match import Target
+
+from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage, Tracker, register
+from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.errors import InputError
+from meshreel.geometry.topology import clean, drop_unreferenced, subdivide_midpoint, vertex_normals
+from meshreel.types import Mesh
+
+SMALL = EmbeddedOptions(
+    coarse=Stage(40, (0.1, 0.08, 0.06, 0.045, 0.03), (10.0, 3.0, 1.0, 0.5, 0.2)),
+    fine=Stage(150, (0.024, 0.018, 0.012, 0.012), (0.3, 0.1, 0.1, 0.05)),
+    samples=1500,
+)
+AXES = np.array([0.3, 0.12, 0.18])
+RADIUS, LENGTH, SIDES = 0.03, 0.4, 24
+
+
+def ball(levels: int) -> Mesh:
+    corners = np.concatenate([np.eye(3), -np.eye(3)])[[0, 3, 1, 4, 2, 5]]
+    faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+    mesh = subdivide_midpoint(Mesh.of(corners, faces), levels)
+    return Mesh(mesh.vertices / np.linalg.norm(mesh.vertices, axis=1)[:, None], mesh.faces)
+
+
+def ellipsoid(levels: int = 4) -> Mesh:
+    mesh = ball(levels)
+    return Mesh(mesh.vertices * AXES, mesh.faces)
+
+
+def shuffled(mesh: Mesh, seed: int) -> Mesh:
+    order = np.random.default_rng(seed).permutation(len(mesh.vertices))
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return Mesh.of(mesh.vertices[order], rank[mesh.faces])
+
+
+def turn(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def tube(path: np.ndarray) -> Mesh:
+    """A closed tube around a path in the plane z = 0, with a tip at each end."""
+    along = np.gradient(path, axis=0)
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    side = along @ turn(np.pi / 2).T
+    angles = np.linspace(0, 2 * np.pi, SIDES, endpoint=False)
+    around = np.cos(angles)[None, :, None] * side[:, None] + np.sin(angles)[None, :, None] * np.array([0, 0, 1.0])
+    rings = len(path)
+    tips = [path[0] - RADIUS * along[0], path[-1] + RADIUS * along[-1]]
+    vertices = np.concatenate([(path[:, None] + RADIUS * around).reshape(-1, 3), tips])
+    i = np.arange(SIDES)
+    j = (i + 1) % SIDES
+    faces = [np.stack([s + i, s + SIDES + i, s + j], axis=1) for s in SIDES * np.arange(rings - 1)]
+    faces += [np.stack([s + j, s + SIDES + i, s + SIDES + j], axis=1) for s in SIDES * np.arange(rings - 1)]
+    first, last = SIDES * rings, SIDES * (rings - 1)
+    faces += [np.stack([i, j, np.full(SIDES, first)], axis=1)]
+    faces += [np.stack([last + j, last + i, np.full(SIDES, first + 1)], axis=1)]
+    return Mesh.of(vertices, np.concatenate(faces)[:, ::-1])
+
+
+def arm(angle: float, rings: int) -> Mesh:
+    """A straight tube whose second half turns by `angle`, bent over a fifth of its length."""
+    s = np.linspace(-LENGTH / 2, LENGTH / 2, rings)
+    heading = angle * np.clip(s / (0.2 * LENGTH) + 0.5, 0, 1)
+    step = np.stack([np.cos(heading), np.sin(heading), np.zeros(rings)], axis=1) * (s[1] - s[0])
+    path = np.concatenate([np.zeros((1, 3)), np.cumsum((step[1:] + step[:-1]) / 2, axis=0)])
+    return tube(path - [LENGTH / 2, 0, 0])
+
+
+def legs(angle: float, rings: int) -> Mesh:
+    """A tube bent to a U, whose legs stand 0.02 apart and open by `angle` each."""
+    bend, leg = 0.04, 0.3
+    total = 2 * leg + np.pi * bend
+    s = np.linspace(-total / 2, total / 2, rings)
+    heading = np.clip(s / (np.pi * bend / 2), -1, 1) * (np.pi / 2 - angle)
+    step = np.stack([np.cos(heading), -np.sin(heading), np.zeros(rings)], axis=1) * (s[1] - s[0])
+    path = np.concatenate([np.zeros((1, 3)), np.cumsum((step[1:] + step[:-1]) / 2, axis=0)])
+    return tube(path - path[rings // 2])
+
+
+def test_a_rigid_motion_is_found_exactly() -> None:
+    mesh = ellipsoid()
+    shift = np.array([0.02, -0.01, 0.015])
+    frames = [shuffled(Mesh(mesh.vertices @ turn(0.12 * k).T + k * shift, mesh.faces), k) for k in range(4)]
+    motion = register(mesh, frames, 0, SMALL)
+    for k, moved in enumerate(motion.move(mesh.vertices)):
+        assert np.abs(moved - (mesh.vertices @ turn(0.12 * k).T + k * shift)).max() < 1e-4
+    assert motion.residuals[0] == 0 and motion.residuals.max() < 1e-4
+
+
+def test_a_bending_arm_is_followed() -> None:
+    angles, rings = (0.0, 0.25, 0.5, 0.75), (121, 101, 111, 131)
+    frames = [arm(angle, count) for angle, count in zip(angles, rings, strict=True)]
+    motion = register(frames[0], frames, 0, SMALL)
+    truth = arm(angles[-1], rings[0]).vertices
+    assert motion.residuals.max() < 0.001
+    assert np.sqrt(np.mean(np.sum((motion.move(frames[0].vertices)[-1] - truth) ** 2, axis=1))) < 0.003
+
+
+def test_near_legs_share_no_node_and_part_without_sticking() -> None:
+    angles, rings = (0.0, 0.1, 0.2, 0.3), (161, 151, 171, 141)
+    frames = [legs(angle, count) for angle, count in zip(angles, rings, strict=True)]
+    motion = register(frames[0], frames, 0, SMALL)
+    graph = motion.graph
+    low = graph.nodes[:, 1] < -0.12
+    left, right = low & (graph.nodes[:, 0] < 0), low & (graph.nodes[:, 0] > 0)
+    assert left.sum() > 10 and right.sum() > 10
+    assert not right[graph.hood[left][graph.hood[left] >= 0]].any()
+    assert motion.residuals.max() < 0.001
+    off = motion.move(frames[0].vertices)[-1] - legs(angles[-1], rings[0]).vertices
+    assert np.linalg.norm(off, axis=1).max() < 0.02
+
+
+def test_fast_steps_are_followed_from_the_speed_of_the_ones_before() -> None:
+    mesh = ellipsoid()
+    places = (0.0, 0.06, 0.13, 0.21, 0.3)
+    frames = [shuffled(Mesh(mesh.vertices * [0.4, 1, 0.4] + [0, x, 0], mesh.faces), k) for k, x in enumerate(places)]
+    motion = register(frames[0], frames, 0, SMALL)
+    assert motion.residuals.max() < 0.001
+
+
+def test_several_bodies_go_their_own_ways() -> None:
+    one = ball(3)
+    faces = np.concatenate([one.faces, one.faces + len(one.vertices)])
+
+    def both(t: int) -> Mesh:
+        shapes = [one.vertices * [0.1, 0.06, 0.08] + [0.13 + 0.02 * t, 0, 0]]
+        shapes += [one.vertices * [0.06, 0.09, 0.1] - [0.08, 0.02 * t, 0]]
+        return Mesh.of(np.concatenate(shapes), faces)
+
+    frames = [shuffled(both(t), t) if t else both(t) for t in range(4)]
+    moved = register(frames[0], frames, 0, SMALL).move(frames[0].vertices)
+    assert np.abs(moved[3] - both(3).vertices).max() < 0.003
+
+
+def test_an_open_mesh_is_followed_and_its_border_does_not_pull() -> None:
+    whole = ellipsoid()
+    kept = whole.vertices[whole.faces].mean(axis=1)[:, 0] < 0.2
+    mesh = drop_unreferenced(Mesh(whole.vertices, whole.faces[kept]))
+    frames = [mesh, Mesh(mesh.vertices @ turn(0.1).T, mesh.faces)]
+    moved = register(mesh, frames, 0, SMALL).move(mesh.vertices)
+    assert np.abs(moved[1] - frames[1].vertices).max() < 0.002
+
+
+def test_an_empty_frame_takes_its_neighbour_s_place_and_the_next_goes_on() -> None:
+    mesh = ellipsoid()
+    frames = [Mesh(mesh.vertices + [0.01 * k, 0, 0], mesh.faces) for k in range(4)]
+    frames[2] = Mesh.empty()
+    motion = register(mesh, frames, 0, SMALL)
+    assert np.isinf(motion.residuals[2]) and np.array_equal(motion.positions[1], motion.positions[2])
+    assert motion.residuals[3] < 1e-4
+
+
+def test_steps_in_both_directions_are_the_same_as_all_at_once() -> None:
+    mesh = ellipsoid(3)
+    frames = [Mesh(mesh.vertices @ turn(0.05 * k).T, mesh.faces) for k in range(5)]
+    tracker = Tracker(frames[2], 2, SMALL)
+    residuals = [tracker.step(frame, Target(frames[frame])) for frame in (3, 4, 1, 0)]
+    one, all_at_once = tracker.motion(range(5)), register(frames[2], frames, 2, SMALL)
+    assert np.array_equal(one.positions, all_at_once.positions)
+    assert np.array_equal(one.rotations, all_at_once.rotations)
+    assert residuals == [tracker.residual(frame) for frame in (3, 4, 1, 0)]
+
+
+def test_a_frame_that_is_something_else_has_a_large_residual_and_stays_finite() -> None:
+    tracker = Tracker(ellipsoid(3), 0, SMALL)
+    assert tracker.step(1, Mesh(ball(3).vertices * 0.02 + 0.4, ball(3).faces)) > 0.1
+    spike = Mesh.of(np.random.default_rng(0).normal(0, 0.2, (300, 3)), np.arange(300).reshape(-1, 3))
+    tracker.step(2, spike)
+    assert np.isfinite(tracker.motion([1, 2]).move(np.zeros((1, 3)))).all()
+
+
+def test_the_smallest_meshes_are_legal() -> None:
+    corner = Mesh.of(0.1 * np.concatenate([np.zeros((1, 3)), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    frames = [corner, Mesh(corner.vertices + 0.01, corner.faces), Mesh.of(np.eye(3), [[0, 1, 2]])]
+    motion = register(corner, frames, 0, SMALL)
+    assert np.abs(motion.move(corner.vertices)[1] - frames[1].vertices).max() < 0.003
+    assert motion.move(np.zeros((0, 3))).shape == (3, 0, 3)
+
+
+def test_normals_keep_a_point_off_a_near_sheet_that_faces_away() -> None:
+    x, y = np.meshgrid(np.linspace(-0.3, 0.3, 25), np.linspace(-0.3, 0.3, 25), indexing="ij")
+    i = np.arange(625).reshape(25, 25)
+    a, b, c, d = (k.reshape(-1) for k in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+
+    def sheets(gap: float) -> Mesh:
+        return Mesh.of(
+            np.concatenate([flat + [0, 0, gap], flat]),
+            np.concatenate([faces[:, ::-1], faces[:, ::-1] + 625][:1] + [faces + 625]),
+        )
+
+    frames = [sheets(0.01), sheets(0.02)]
+    asked = np.array([[0.1, 0.1, 0.006]])
+    up = np.array([[0.0, 0.0, 1.0]])
+    motion = register(frames[0], frames, 0, SMALL)
+    assert abs(motion.move(asked, -up)[1, 0, 2] - motion.move(asked, up)[1, 0, 2] - 0.01) < 0.002
+
+
+def test_the_same_input_gives_the_same_bits() -> None:
+    people = soft_bodies(SoftBodiesOptions(frames=2, spacing=0.05, people=1))
+    frames = [clean(Mesh(mesh.vertices / 2, mesh.faces)) for mesh in people]
+    points, normals = frames[0].vertices, vertex_normals(frames[0])
+    one, two = (register(frames[0], frames, 0, SMALL) for _ in range(2))
+    assert np.array_equal(one.move(points, normals), two.move(points, normals))
+    assert one.residuals[1] < 0.004
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"coarse": Stage(20, (0.1,), (1.0,)), "fine": Stage(10, (0.1,), (1.0,))},
+        {"samples": 2},
+        {"neighbours": 0},
+        {"iterations": 0},
+        {"agreement": 1.0},
+        {"damping": 0.0},
+        {"tolerance": 1.0},
+        {"torn": (0.5, 0.0)},
+        {"doubt": -1.0},
+        {"rekeyed": -1.0},
+        {"lost": -1.0},
+        {"settled": -1.0},
+        {"uneven": -1.0},
+    ],
+)
+def test_options_that_make_no_sense_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(InputError, match="give"):
+        EmbeddedOptions(**wrong)  # type: ignore[arg-type]
+
+
+def test_stages_that_make_no_sense_are_refused() -> None:
+    for wrong in ((0, (0.1,), (1.0,)), (10, (), ()), (10, (0.1, 0.2), (1.0,)), (10, (-0.1,), (1.0,))):
+        with pytest.raises(InputError, match="give"):
+            Stage(*wrong)
+
+
+def test_keys_and_frames_that_cannot_be_are_refused() -> None:
+    mesh = ellipsoid(2)
+    with pytest.raises(InputError, match="key 3"):
+        register(mesh, [mesh], 3, SMALL)
+    with pytest.raises(InputError, match="is empty"):
+        Tracker(Mesh.empty(), 0, SMALL)
+    tracker = Tracker(mesh, 0, SMALL)
+    with pytest.raises(InputError, match="is the key"):
+        tracker.step(0, mesh)
+    with pytest.raises(InputError, match="not finite"):
+        tracker.step(1, Mesh(mesh.vertices * np.nan, mesh.faces))

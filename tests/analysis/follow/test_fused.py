@@ -1,0 +1,153 @@
+"""Frames fused into one surface: sheets with holes, borders and noise whose truth is known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from meshreel.analysis.fit.fit.match import Target
+from meshreel.analysis.fit.fit.residual import residual_of
+
+from meshreel.analysis.follow.embedded import Motion
+from meshreel.analysis.follow.embedded_graph import area_samples, build_graph, farthest_first
+from meshreel.analysis.follow.fused import FusedOptions, fused_mesh
+from meshreel.errors import InputError
+from meshreel.geometry.nearest import Surface
+from meshreel.geometry.topology import clean, concatenate
+from meshreel.types import Mesh
+
+SIDE, CELLS = 0.5, 40  # of the sheet
+HOLE = 0.06  # half a hole's side
+
+
+def sheet(height: float = 0.0) -> Mesh:
+    """A gently curved square, open all round."""
+    x, y = np.meshgrid(*[np.linspace(-SIDE / 2, SIDE / 2, CELLS + 1)] * 2, indexing="ij")
+    at = np.arange((CELLS + 1) ** 2).reshape(CELLS + 1, CELLS + 1)
+    a, b, c, d = at[:-1, :-1].ravel(), at[1:, :-1].ravel(), at[1:, 1:].ravel(), at[:-1, 1:].ravel()
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return Mesh.of(np.stack([x, y, height + 0.5 * x**2], axis=-1).reshape(-1, 3), faces)
+
+
+def with_hole(mesh: Mesh, x: float, y: float, half: float = HOLE) -> Mesh:
+    middles = mesh.vertices[mesh.faces].mean(axis=1)[:, :2]
+    return clean(Mesh(mesh.vertices, mesh.faces[(np.abs(middles - (x, y)) > half).any(axis=1)]))
+
+
+def noisy(mesh: Mesh, deviation: float, seed: int) -> Mesh:
+    away = np.random.default_rng(seed).normal(0, deviation, len(mesh.vertices))
+    return Mesh(mesh.vertices + away[:, None] * (0, 0, 1.0), mesh.faces)
+
+
+def moving(key: Mesh, count: int, turn: float = 0.1) -> Motion:
+    """The key goes up by .05 a frame and turns about the axis z: rotations and places of its nodes."""
+    graph = build_graph(key, farthest_first(key, area_samples(key, 500), 60))
+    angles = turn * np.arange(count)
+    zero, one = np.zeros(count), np.ones(count)
+    c, s = np.cos(angles), np.sin(angles)
+    turns = np.stack([c, -s, zero, s, c, zero, zero, zero, one], axis=1).reshape(count, 3, 3)
+    rotations = np.repeat(turns[:, None], len(graph.nodes), axis=1)
+    places = np.einsum("tij,nj->tni", turns, graph.nodes) + 0.05 * np.arange(count)[:, None, None] * (0, 0, 1.0)
+    return Motion(key, graph, rotations, places, zero)
+
+
+def carried(frames: list[Mesh], motion: Motion) -> list[Target]:
+    """Frames given in the key's pose, moved as the motion says."""
+    turns, lifts = motion.rotations[:, 0], 0.05 * np.arange(len(frames))
+    meshes = (
+        Mesh(f.vertices @ turn.T + (0, 0, lift), f.faces) for f, turn, lift in zip(frames, turns, lifts, strict=True)
+    )
+    return [Target(mesh) for mesh in meshes]
+
+
+def holey(count: int) -> list[Mesh]:
+    return [with_hole(sheet(), x, 0.05) for x in np.linspace(-0.15, 0.15, count)]
+
+
+def gaps(mesh: Mesh, points: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.norm(Surface(mesh).closest(points).points - points, axis=1))
+
+
+def test_a_mesh_that_was_moved_goes_back_exactly() -> None:
+    key = sheet()
+    motion = moving(key, 3)
+    frame = carried([key] * 3, motion)[2].mesh
+    np.testing.assert_allclose(motion.back(2, frame).vertices, key.vertices, atol=1e-9)
+
+
+def test_a_hole_that_moves_over_time_is_closed() -> None:
+    frames = holey(6)
+    motion = moving(frames[0], 6)
+    fused = fused_mesh(motion, carried(frames, motion), 0.001)
+    assert gaps(frames[0], sheet().vertices).max() > 0.8 * HOLE
+    inner = sheet().vertices[np.abs(sheet().vertices[:, :2]).max(axis=1) < 0.45 * SIDE]
+    assert gaps(fused, inner).max() < 0.003
+
+
+def test_a_border_that_is_always_open_stays_where_it_is() -> None:
+    frames = [sheet()] * 5
+    motion = moving(frames[0], 5)
+    fused = fused_mesh(motion, carried(frames, motion), 0.001)
+    spacing = SIDE / CELLS
+    assert np.abs(fused.vertices[:, :2]).max() < SIDE / 2 + spacing
+    assert gaps(fused, sheet().vertices).max() < spacing
+
+
+def test_a_hole_that_is_always_there_stays_open() -> None:
+    frames = [with_hole(sheet(), 0.0, 0.0)] * 5
+    motion = moving(frames[0], 5)
+    fused = fused_mesh(motion, carried(frames, motion), 0.001)
+    assert gaps(fused, np.array([[0.0, 0.0, 0.0]]))[0] > 0.5 * HOLE
+
+
+def test_what_one_frame_alone_has_is_not_believed() -> None:
+    frames = [with_hole(sheet(), 0.0, 0.0), *[with_hole(sheet(), 0.0, 0.0)] * 6, sheet()]
+    motion = moving(frames[0], 8)
+    fused = fused_mesh(motion, carried(frames, motion), 0.001)
+    assert gaps(fused, np.array([[0.0, 0.0, 0.0]]))[0] > 0.5 * HOLE
+
+
+def test_noise_averages_out_by_the_root_of_the_number_of_frames() -> None:
+    deviation, left = 0.004, {}
+    for count in (4, 16, 64):
+        frames = [noisy(sheet(), deviation, seed) for seed in range(count)]
+        motion = moving(frames[0], count, 0.0)
+        fused = fused_mesh(motion, carried(frames, motion), deviation)
+        inner = np.abs(fused.vertices[:, :2]).max(axis=1) < 0.4 * SIDE
+        left[count] = float(np.sqrt(np.mean(gaps(sheet(), fused.vertices[inner]) ** 2)))
+    assert left[4] < deviation / 1.6
+    assert 1.5 < left[4] / left[16] < 2.6
+    assert 1.4 < left[16] / left[64] < 2.6
+
+
+def test_frames_without_surface_in_common_give_the_empty_mesh() -> None:
+    frames = [Mesh(sheet().vertices + (3.0 * n, 0, 0), sheet().faces) for n in range(3)]
+    motion = moving(sheet(), 3, 0.0)
+    assert fused_mesh(motion, carried(frames, motion), 0.001).is_empty
+
+
+def test_a_hole_in_a_frame_is_no_residual_in_common_but_what_the_template_lacks_is() -> None:
+    whole, holed = sheet(), with_hole(sheet(), 0.0, 0.0)
+    over = residual_of(whole, Target(holed))
+    assert over.by_area > 0.001
+    assert over.common < 1e-6
+    lacking = residual_of(holed, Target(whole))
+    assert 0.001 < lacking.common <= lacking.by_area
+
+
+def test_what_has_flown_is_no_residual_in_common() -> None:
+    whole = sheet()
+    flown = Mesh(whole.vertices[whole.faces[0]] + (0, 0, 0.3), np.array([[0, 1, 2]], np.int32))
+    residual = residual_of(whole, Target(concatenate([whole, flown])))
+    assert residual.by_area > 0.003
+    assert residual.common < 1e-6
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"noise": -1.0}, {"noise": 0.0, "spacing": 0.0}, {"reach": 0.0}, {"agree": 0.0}, {"agree": 1.1}, {"smallest": 1}],
+)
+def test_options_out_of_range_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="give"):
+        FusedOptions(**wrong)
