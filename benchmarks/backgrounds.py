@@ -17,8 +17,8 @@ import numpy as np
 from captured import Row, keep
 from meshreel_bench.scenes import FOUND, SceneData, open_scene
 
-from meshreel.analysis.background import BackgroundOptions, fuse_background
-from meshreel.analysis.background_depth import fuse_still_depth
+from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
+from meshreel.analysis.scene.background_depth import fuse_still_depth
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.metrics.truth import Scene, scene_row
 from meshreel.metrics.truth_comparison import true_scene

@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from meshreel.analysis.segment.views import ViewsOptions, place_views
-from meshreel.analysis.segment.votes import primitive_ids
+from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.votes import primitive_ids
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.topology import face_normals

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from skimage.measure import marching_cubes
 
-from meshreel.analysis.background import BackgroundOptions
-from meshreel.analysis.segment.places import PlacesOptions
-from meshreel.analysis.segment.scene import SegmentOptions
-from meshreel.analysis.segment.views import ViewsOptions
+from meshreel.analysis.scene.background import BackgroundOptions
+from meshreel.analysis.scene.places import PlacesOptions
+from meshreel.analysis.scene.segment import SegmentOptions
+from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.geometry.topology import concatenate, weld
 from meshreel.types import Mesh
 from meshreel.windows import EncoderOptions

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
-from meshreel.analysis.segment.views import ViewsOptions
+from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.choice import IntraOptions, Quality
 from meshreel.presets import preset_options
 from meshreel.windows import EncoderOptions

@@ -10,10 +10,10 @@ import pytest
 
 import meshreel
 import meshreel.scene as scene
-from meshreel.analysis.background import BackgroundOptions
-from meshreel.analysis.segment.labelling import ByPlace
-from meshreel.analysis.segment.scene import scene_views
-from meshreel.analysis.segment.settle import Rest
+from meshreel.analysis.scene.background import BackgroundOptions
+from meshreel.analysis.scene.labelling import ByPlace
+from meshreel.analysis.scene.segment import scene_views
+from meshreel.analysis.scene.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.choice import NO_ERROR
 from meshreel.coding.background import decode_background

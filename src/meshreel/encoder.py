@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from .analysis.background import BackgroundOptions
-from .analysis.segment.masks import Masker
-from .analysis.segment.probe import is_scene
-from .analysis.segment.scene import SegmentOptions
+from .analysis.scene.background import BackgroundOptions
+from .analysis.scene.masks import Masker
+from .analysis.scene.probe import is_scene
+from .analysis.scene.segment import SegmentOptions
 from .analysis.survey import Survey, survey
 from .coding.background import decode_background
 from .container.writer import ReelWriter, check_target

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, UInt16
 
-from .analysis.bodies import with_ring
-from .analysis.segment.labelling import Segmentation
+from .analysis.scene.bodies import with_ring
+from .analysis.scene.labelling import Segmentation
 from .geometry.topology import part_of
 from .scene import Tracks, segments
 from .types import Mesh, MeshSequence

@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool
 
-from .analysis.background import BackgroundOptions, fuse_background
-from .analysis.background_depth import fuse_still_depth
-from .analysis.bodies import ring
-from .analysis.segment.labelling import Segmentation
-from .analysis.segment.masks import Masker
-from .analysis.segment.scene import segment, segment_by
+from .analysis.scene.background import BackgroundOptions, fuse_background
+from .analysis.scene.background_depth import fuse_still_depth
+from .analysis.scene.bodies import ring
+from .analysis.scene.labelling import Segmentation
+from .analysis.scene.masks import Masker
+from .analysis.scene.segment import segment, segment_by
 from .analysis.survey import Survey, check_one_unit
 from .derived import ChosenParts
 from .errors import InputError

@@ -16,9 +16,9 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool
 
-from .analysis.background import BackgroundOptions
-from .analysis.bodies import at_most, find_bodies, same_bodies, with_ring
-from .analysis.segment.labelling import Segmentation
+from .analysis.scene.background import BackgroundOptions
+from .analysis.scene.bodies import at_most, find_bodies, same_bodies, with_ring
+from .analysis.scene.labelling import Segmentation
 from .analysis.survey import Survey
 from .choice import NO_ERROR
 from .coding.background import decode_background, decode_change, encode_background, encode_change

@@ -15,8 +15,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float64
 
-from .analysis.background import BackgroundOptions
-from .analysis.bodies import BodyOptions
 from .analysis.fit.fit import Fit, FitOptions, fit_frames
 from .analysis.follow.correspond import PLACES
 from .analysis.follow.embedded import EmbeddedOptions
@@ -25,7 +23,9 @@ from .analysis.follow.template import TemplateOptions
 from .analysis.groups import GroupOptions, cut_at
 from .analysis.reference.reference import ReferenceOptions, extract_reference, predict
 from .analysis.reference.track import TrackOptions, track_centers
-from .analysis.segment.scene import SegmentOptions
+from .analysis.scene.background import BackgroundOptions
+from .analysis.scene.bodies import BodyOptions
+from .analysis.scene.segment import SegmentOptions
 from .choice import NO_ERROR, IntraOptions, Quality, cheapest_intra, finest_intra, measure
 from .coding.group import decode_group, encode_group
 from .coding.intra import encode_empty

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from meshreel.analysis.segment.pictures import write_views
-from meshreel.analysis.segment.views import place_views
+from meshreel.analysis.scene.pictures import write_views
+from meshreel.analysis.scene.views import place_views
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.cli import main
 from meshreel.geometry.raycast import Rays

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..analysis.segment.scene import SegmentOptions
+from ..analysis.scene.segment import SegmentOptions
 from ..encoder import Encoder
 from ..errors import InputError
 from ..presets import preset_options

@@ -10,9 +10,9 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from ..analysis.segment.masks import ImageMasks, Masker, one_size
-from ..analysis.segment.sam3 import Sam3Masks, Sam3Options
-from ..analysis.segment.scene import SegmentOptions
+from ..analysis.scene.masks import ImageMasks, Masker, one_size
+from ..analysis.scene.sam3 import Sam3Masks, Sam3Options
+from ..analysis.scene.segment import SegmentOptions
 from ..axes import Up, known_up
 from ..capture.record import open_recording
 from ..capture.rig import RIG, SINGLE

@@ -10,11 +10,11 @@ import numpy as np
 from cyclopts import Parameter
 from jaxtyping import UInt8
 
-from ..analysis.segment.labelling import Segmentation
-from ..analysis.segment.masks import CAMERAS, Masker
-from ..analysis.segment.pictures import write_views
-from ..analysis.segment.preview import FrameViews, label_colors, look_at_labels, sheet
-from ..analysis.segment.scene import scene_views, segment, segment_by
+from ..analysis.scene.labelling import Segmentation
+from ..analysis.scene.masks import CAMERAS, Masker
+from ..analysis.scene.pictures import write_views
+from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
+from ..analysis.scene.segment import scene_views, segment, segment_by
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..io.masks import is_mask, write_picture

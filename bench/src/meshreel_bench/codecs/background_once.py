@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from meshreel.analysis.segment.probe import is_scene
+from meshreel.analysis.scene.probe import is_scene
 from meshreel.analysis.survey import Survey, survey
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import open as open_video

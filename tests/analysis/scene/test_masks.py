@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from meshreel.analysis.segment.masks import CAMERAS, ImageMasks, Masker, one_size, read_views
-from meshreel.analysis.segment.pictures import write_views
-from meshreel.analysis.segment.scene import SegmentOptions, scene_views, segment_by
-from meshreel.analysis.segment.views import ViewsOptions, place_views
-from meshreel.analysis.segment.votes import Votes
+from meshreel.analysis.scene.masks import CAMERAS, ImageMasks, Masker, one_size, read_views
+from meshreel.analysis.scene.pictures import write_views
+from meshreel.analysis.scene.segment import SegmentOptions, scene_views, segment_by
+from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import pack_cameras
 from meshreel.geometry.raycast import Rays
 from meshreel.io.masks import write_picture
 from meshreel.types import Mesh, MeshList
-from tests.analysis.segment.test_views import ROOM
+from tests.analysis.scene.test_views import ROOM
 from tests.metrics.shapes import sphere
 
 BALL = len(sphere().faces)  # the last faces of the room are the ball's

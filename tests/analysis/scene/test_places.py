@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from meshreel.analysis.segment import places as module
-from meshreel.analysis.segment.cut import moving_places
-from meshreel.analysis.segment.places import Places, PlacesOptions, Watched, find_places, look
-from meshreel.analysis.segment.views import place_views
+from meshreel.analysis.scene import places as module
+from meshreel.analysis.scene.cut import moving_places
+from meshreel.analysis.scene.places import Places, PlacesOptions, Watched, find_places, look
+from meshreel.analysis.scene.views import place_views
 from meshreel.errors import InputError
 from meshreel.geometry.depth import DepthPicture
 from meshreel.geometry.raycast import Rays

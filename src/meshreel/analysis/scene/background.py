@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
-from ..errors import InputError
-from ..geometry.connected import without_fragments
-from ..geometry.nearest import Surface
-from ..geometry.tsdf import SIDE, extract, fill_grid
-from ..geometry.voxels import Lattice, around, distinct, spread
-from ..types import Mesh
+from ...errors import InputError
+from ...geometry.connected import without_fragments
+from ...geometry.nearest import Surface
+from ...geometry.tsdf import SIDE, extract, fill_grid
+from ...geometry.voxels import Lattice, around, distinct, spread
+from ...types import Mesh
 
 _REACH = 1.5  # voxels on both sides of a surface that know their distance to it: cubes that it goes through, and noise
 

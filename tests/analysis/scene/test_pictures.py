@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from meshreel.analysis.segment.masks import CAMERAS, read_views
-from meshreel.analysis.segment.pictures import normal_picture, write_views
+from meshreel.analysis.scene.masks import CAMERAS, read_views
+from meshreel.analysis.scene.pictures import normal_picture, write_views
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
 from meshreel.metrics.cameras import Box, ViewOptions, views_around

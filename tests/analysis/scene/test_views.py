@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.segment.views import ViewsOptions, place_views
-from meshreel.analysis.segment.votes import primitive_ids
+from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.votes import primitive_ids
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.topology import face_normals, subdivide_midpoint

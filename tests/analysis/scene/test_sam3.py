@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from meshreel.analysis.segment import sam3
-from meshreel.analysis.segment.hypotheses import HypothesisOptions, Tracked, reference_view
-from meshreel.analysis.segment.masks import Masker
-from meshreel.analysis.segment.pictures import normal_picture
-from meshreel.analysis.segment.scene import SegmentOptions, segment_by
-from meshreel.analysis.segment.views import ViewsOptions, place_views
-from meshreel.analysis.segment.votes import Votes
+from meshreel.analysis.scene import sam3
+from meshreel.analysis.scene.hypotheses import HypothesisOptions, Tracked, reference_view
+from meshreel.analysis.scene.masks import Masker
+from meshreel.analysis.scene.pictures import normal_picture
+from meshreel.analysis.scene.segment import SegmentOptions, segment_by
+from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
 from meshreel.types import MeshList
-from tests.analysis.segment.test_views import box, together
+from tests.analysis.scene.test_views import box, together
 from tests.metrics.shapes import moved, sphere
 
 WALLS = box((0, 0, 0), (5, 2.5, 4), inwards=True)
@@ -33,7 +33,7 @@ EASILY = sam3.Sam3Options(reference=1, hypotheses=HypothesisOptions(variation=0.
 def weights(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for library in ("torch", "transformers"):
         pytest.importorskip(library, reason="the extra sam3 is not installed: MESHREEL_SAM3=1 ./scripts/setup")
-    from tests.analysis.segment.tiny_sam3 import write_tiny_sam3
+    from tests.analysis.scene.tiny_sam3 import write_tiny_sam3
 
     folder = tmp_path_factory.mktemp("weights")
     write_tiny_sam3(folder)

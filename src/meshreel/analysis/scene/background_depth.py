@@ -12,12 +12,12 @@ from collections.abc import Iterable
 import numpy as np
 from jaxtyping import Bool, Float32
 
-from ..geometry.connected import without_fragments
-from ..geometry.depth import DepthPicture
-from ..geometry.raycast import Rays
-from ..geometry.topology import face_normals, part_of
-from ..geometry.tsdf import SEEN, TRUNCATION, extract, integrate
-from ..types import Mesh
+from ...geometry.connected import without_fragments
+from ...geometry.depth import DepthPicture
+from ...geometry.raycast import Rays
+from ...geometry.topology import face_normals, part_of
+from ...geometry.tsdf import SEEN, TRUNCATION, extract, integrate
+from ...types import Mesh
 from .background import BackgroundOptions
 
 BESIDE = 3  # pixels around what moves that are not believed

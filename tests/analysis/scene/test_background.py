@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from meshreel.analysis.background import BackgroundOptions, fuse_background
+from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
 from meshreel.errors import InputError
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate, face_normals

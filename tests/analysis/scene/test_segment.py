@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.segment import labelling
-from meshreel.analysis.segment.labelling import ByPlace, without_islands
-from meshreel.analysis.segment.places import PlacesOptions
-from meshreel.analysis.segment.scene import SegmentOptions, segment, segment_by
-from meshreel.analysis.segment.settle import Rest
+from meshreel.analysis.scene import labelling
+from meshreel.analysis.scene.labelling import ByPlace, without_islands
+from meshreel.analysis.scene.places import PlacesOptions
+from meshreel.analysis.scene.segment import SegmentOptions, segment, segment_by
+from meshreel.analysis.scene.settle import Rest
 from meshreel.errors import InputError
 from meshreel.geometry.topology import components, concatenate, face_normals
 from meshreel.geometry.voxels import Lattice

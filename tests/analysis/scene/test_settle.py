@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.analysis.segment.cut import CutOptions
-from meshreel.analysis.segment.labelling import ByPlace
-from meshreel.analysis.segment.places import PlacesOptions
-from meshreel.analysis.segment.scene import SegmentOptions, segment
-from meshreel.analysis.segment.settle import NEVER, SettleOptions
-from meshreel.analysis.segment.views import ViewsOptions
+from meshreel.analysis.scene.cut import CutOptions
+from meshreel.analysis.scene.labelling import ByPlace
+from meshreel.analysis.scene.places import PlacesOptions
+from meshreel.analysis.scene.segment import SegmentOptions, segment
+from meshreel.analysis.scene.settle import NEVER, SettleOptions
+from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.errors import InputError

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from meshreel.analysis.segment.views import ViewsOptions, place_views
-from meshreel.analysis.segment.votes import Votes, primitive_ids
+from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.votes import Votes, primitive_ids
 from meshreel.geometry.raycast import Rays
 from tests.metrics.shapes import sphere
 

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
-from ..errors import InputError
-from ..geometry.connected import connected_faces
-from ..geometry.nearest import Outline
-from ..geometry.topology import concatenate, face_normals, part_of, with_neighbours
-from ..geometry.voxels import Lattice, around, distinct, spread
-from ..types import Mesh
+from ...errors import InputError
+from ...geometry.connected import connected_faces
+from ...geometry.nearest import Outline
+from ...geometry.topology import concatenate, face_normals, part_of, with_neighbours
+from ...geometry.voxels import Lattice, around, distinct, spread
+from ...types import Mesh
 
 MOST_RINGS = 4  # around what moves, where the background ends short of it
 RING = 2.0  # cells: the longest edges of a body's ring; a wall of a few faces is no part of it

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from meshreel.analysis.segment.hypotheses import (
+from meshreel.analysis.scene.hypotheses import (
     HypothesisOptions,
     Tracked,
     hypotheses,
@@ -17,10 +17,10 @@ from meshreel.analysis.segment.hypotheses import (
     tour,
     variation,
 )
-from meshreel.analysis.segment.views import ViewsOptions, place_views
+from meshreel.analysis.scene.views import ViewsOptions, place_views
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
-from tests.analysis.segment.test_views import ROOM, box, together
+from tests.analysis.scene.test_views import ROOM, box, together
 from tests.metrics.shapes import moved, sphere
 
 WALKER, CHAIR, LAMP = 1, 2, 3

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.segment.cut import _UNIT, CutOptions, _cut, _hollow, moving_places
-from meshreel.analysis.segment.places import Places, Tally
+from meshreel.analysis.scene.cut import _UNIT, CutOptions, _cut, _hollow, moving_places
+from meshreel.analysis.scene.places import Places, Tally
 from meshreel.errors import InputError
 from meshreel.geometry.voxels import Lattice, neighbours
 

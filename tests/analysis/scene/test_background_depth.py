@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.background import BackgroundOptions
-from meshreel.analysis.background_depth import fuse_still_depth, usual_pictures
+from meshreel.analysis.scene.background import BackgroundOptions
+from meshreel.analysis.scene.background_depth import fuse_still_depth, usual_pictures
 from meshreel.capture.fusion import FusionOptions, fuse_depths
 from meshreel.geometry.depth import SeesDepth
 from meshreel.geometry.nearest import distances

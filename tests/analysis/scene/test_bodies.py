@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.analysis.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies, with_ring
+from meshreel.analysis.scene.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies, with_ring
 from meshreel.errors import InputError
 from meshreel.geometry.nearest import Outline
 from meshreel.geometry.topology import concatenate, part_of
