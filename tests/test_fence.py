@@ -27,9 +27,9 @@ ENCODER_SIDE = (
 
 LOOK = f"""
 import sys
-import meshreel.decoder
+import meshreel.decoder.video
 for path in sys.argv[1:]:
-    for frame in meshreel.decoder.open(path):
+    for frame in meshreel.decoder.video.open(path):
         pass
 loaded = set(sys.modules)
 print([name for name in {HEAVY!r} if name in loaded])

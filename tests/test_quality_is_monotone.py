@@ -6,10 +6,10 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
+from meshreel.decoder.video.video import open as open_video
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.choice import IntraOptions
-from meshreel.decoder import open as open_video
 from meshreel.encoder import encode
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import weld

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .decoder import Video, open
+from .decoder.video import Video, open
 from .errors import FormatError, InputError, MeshreelError
 from .types import Mesh, MeshList, MeshSequence
 

@@ -23,7 +23,7 @@ from .analysis.scene.segment import SegmentOptions
 from .analysis.survey import Survey, survey
 from .coding.background import decode_background
 from .container.writer import ReelWriter, check_target
-from .decoder import open as open_video
+from .decoder.video import open as open_video
 from .errors import InputError
 from .format.layout import Form, Header
 from .geometry.nearest import distances

@@ -17,13 +17,13 @@ import numpy as np
 
 from .axes import Up
 from .container.reader import Chunk, ReelReader
+from .decoder.tracks import Background, Track
 from .errors import InputError
 from .format.layout import Form
 from .geometry.topology import vertex_normals
 from .io.animated_glb import animated_glb
 from .io.animated_usd import EXTENSIONS, animated_usd
 from .io.animation import Animation, AnimationWriter, Points, Shape, check_target
-from .tracks import Background, Track
 from .types import Mesh
 
 MOST_TOGETHER = 64  # frames of a shape: what viewers take as morph targets of one mesh, and what is in memory

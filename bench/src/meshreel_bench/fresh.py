@@ -20,8 +20,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from meshreel.decoder import Video
-from meshreel.decoder import open as open_video
+from meshreel.decoder.video.video import Video
+from meshreel.decoder.video.video import open as open_video
+
 from meshreel.types import Mesh
 
 FRAMES = "frames_sha256"  # of a row: the digest of each mesh that is decoded

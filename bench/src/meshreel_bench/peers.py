@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from meshreel.decoder.video.video import Video
 
 from meshreel.analysis.survey import Survey, survey
 from meshreel.choice import IntraOptions, cheapest_intra, measure
-from meshreel.decoder import Video
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 

@@ -16,8 +16,8 @@ from ..capture.rig import DepthCamera
 from ..capture.simulate import SceneFrame
 from ..capture.truth import Truth, read_truth
 from ..container.sources import FileSource
-from ..decoder import Video
-from ..decoder import open as open_video
+from ..decoder.video import Video
+from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..format.layout import MAGIC
 from ..geometry.cameras import PinholeCamera

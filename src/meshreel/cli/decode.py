@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from ..container.reader import ReelReader
-from ..decoder import open as open_video
+from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..io.write import frame_names, left_over, make_folder, write_mesh
 from ..types import Mesh

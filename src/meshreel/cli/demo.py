@@ -16,8 +16,8 @@ from ..capture.rig import RIG, read_cameras
 from ..capture.room import VOXEL, WIDTH, RoomOptions, record_room, room_cameras
 from ..capture.simulate import TRUTH
 from ..capture.truth import read_truth
-from ..decoder import Video
-from ..decoder import open as open_video
+from ..decoder.video import Video
+from ..decoder.video import open as open_video
 from ..encoder import encode
 from ..errors import InputError
 from ..metrics.sheet import SheetOptions, write_sheet

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..axes import Up
-from ..decoder import open as open_video
+from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..export import ExportOptions, export
 from ..io.animated_usd import EXTENSIONS

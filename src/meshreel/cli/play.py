@@ -10,7 +10,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..decoder import open as open_video
+from ..decoder.video import open as open_video
 from ..server.app import make_app
 from ..server.library import Library
 from ..server.run import ServerOptions, run

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..decoder import Video
-from ..decoder import open as open_video
+from ..decoder.video import Video
+from ..decoder.video import open as open_video
 from ..errors import MeshreelError
 from ..types import Mesh
 

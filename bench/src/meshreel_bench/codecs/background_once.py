@@ -12,10 +12,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from meshreel.decoder.video.video import open as open_video
+
 from meshreel.analysis.scene.probe import is_scene
 from meshreel.analysis.survey import Survey, survey
 from meshreel.container.writer import ReelWriter
-from meshreel.decoder import open as open_video
 from meshreel.encoder import make_header
 from meshreel.geometry.topology import part_of
 from meshreel.parts import take_apart

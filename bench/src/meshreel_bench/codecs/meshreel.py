@@ -8,7 +8,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from meshreel.decoder import open as open_video
+from meshreel.decoder.video.video import open as open_video
+
 from meshreel.encoder import Encoder
 from meshreel.presets import preset_options
 from meshreel.types import Mesh, MeshSequence

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from meshreel.decoder.video.video import open as open_video
 
 from meshreel.analysis.survey import Survey
 from meshreel.container.writer import ReelWriter
-from meshreel.decoder import open as open_video
 from meshreel.encoder import make_header
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate_faces

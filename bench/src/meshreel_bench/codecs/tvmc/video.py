@@ -6,11 +6,12 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from typing import overload
 
+from meshreel.decoder.video.tracks import MOST_TOGETHER
+
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.intra import decode_intra
 from meshreel.errors import FormatError
 from meshreel.geometry.topology import concatenate
-from meshreel.tracks import MOST_TOGETHER
 from meshreel.types import Mesh, Placement
 from meshreel.windows import MOST_FRAMES
 

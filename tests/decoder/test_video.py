@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from meshreel.decoder.video.tracks import Track, _Decoded
 
 import meshreel
 from meshreel.coding.entropy import encode_integers
@@ -16,7 +17,6 @@ from meshreel.container.sources import BytesSource
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import AnchorRule, DisplacementHead, Form, LaplacianGroup
 from meshreel.format.records import pack
-from meshreel.tracks import Track, _Decoded
 from tests.golden import GOLDEN, frame_record
 
 MIXED = (GOLDEN / "mixed.reel").read_bytes()  # empty 0-1, laplacian 2-5, draco 6-8, empty 9

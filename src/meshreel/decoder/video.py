@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import overload
 
-from .container.reader import ReelReader
-from .container.sources import BytesSource, FileSource, Source
-from .errors import FormatError, InputError
-from .geometry.topology import concatenate
+from ..container.reader import ReelReader
+from ..container.sources import BytesSource, FileSource, Source
+from ..errors import FormatError, InputError
+from ..geometry.topology import concatenate
+from ..types import Mesh
 from .tracks import Background, Track, moving_of_frame
-from .types import Mesh
 
 BACKGROUND = "background"  # its name among the parts of a frame
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .coding.background import decode_background, decode_change
-from .coding.group import continue_group
-from .coding.layers.layers import MOST_NUMBERS, LayersState
-from .container.reader import Chunk, ReelReader
-from .errors import FormatError
-from .format.layout import Form
-from .types import Frames, Mesh, Placement
+from ..coding.background import decode_background, decode_change
+from ..coding.group import continue_group
+from ..coding.layers.layers import MOST_NUMBERS, LayersState
+from ..container.reader import Chunk, ReelReader
+from ..errors import FormatError
+from ..format.layout import Form
+from ..types import Frames, Mesh, Placement
 
 MOST_KEPT = 1 << 29  # bytes of states: a few bytes may say groups that take as much as a file may claim, each
 MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes of the groups of a frame, where it has several: as much as one may have

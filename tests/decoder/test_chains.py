@@ -9,16 +9,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from meshreel.coding.layers.layers.layers import encode_layers
+from meshreel.decoder.video.tracks import Track, _Decoded
 
 import meshreel
-from meshreel import tracks
 from meshreel.coding.intra import encode_empty
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
+from meshreel.decoder.video import tracks
 from meshreel.errors import FormatError
 from meshreel.format.layout import Header
-from meshreel.tracks import Track, _Decoded
 from tests.coding.bodies import ball, moving
 from tests.golden import frame_record
 
