@@ -10,8 +10,8 @@ from cyclopts import Parameter
 from ..axes import Up
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
-from ..export import ExportOptions, export
-from ..io.animated_usd import EXTENSIONS
+from ..export.animated_usd import EXTENSIONS
+from ..export.video import ExportOptions, export
 from ..io.sequence import SequenceOptions
 from .console import Common
 from .decode import Part, check_part

@@ -15,16 +15,16 @@ from typing import Literal
 
 import numpy as np
 
-from .axes import Up
-from .container.reader import Chunk, ReelReader
-from .decoder.tracks import Background, Track
-from .errors import InputError
-from .format.layout import Form
-from .geometry.topology import vertex_normals
-from .io.animated_glb import animated_glb
-from .io.animated_usd import EXTENSIONS, animated_usd
-from .io.animation import Animation, AnimationWriter, Points, Shape, check_target
-from .types import Mesh
+from ..axes import Up
+from ..container.reader import Chunk, ReelReader
+from ..decoder.tracks import Background, Track
+from ..errors import InputError
+from ..format.layout import Form
+from ..geometry.topology import vertex_normals
+from ..types import Mesh
+from .animated_glb import animated_glb
+from .animated_usd import EXTENSIONS, animated_usd
+from .animation import Animation, AnimationWriter, Points, Shape, check_target
 
 MOST_TOGETHER = 64  # frames of a shape: what viewers take as morph targets of one mesh, and what is in memory
 _FAR = 8.0  # diagonals from the origin from which float32 coordinates count from elsewhere

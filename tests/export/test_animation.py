@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from meshreel.export.video.animated_glb import animated_glb
+from meshreel.export.video.animated_usd import animated_usd
+from meshreel.export.video.animation import Animation, AnimationWriter, Points, Shape, changes
 
 from meshreel.errors import InputError
-from meshreel.io.animated_glb import animated_glb
-from meshreel.io.animated_usd import animated_usd
-from meshreel.io.animation import Animation, AnimationWriter, Points, Shape, changes
 from tests.play_glb import PlayedGlb
 
 WRITERS = {"glb": animated_glb, "usdc": animated_usd, "usda": animated_usd, "usdz": animated_usd}
@@ -89,11 +89,11 @@ def test_a_glb_that_would_be_too_long_is_told_before_it_is(tmp_path, monkeypatch
     with animated_glb(tmp_path / "a.glb", animation()) as writer:
         writer.add(shape())
     size = (tmp_path / "a.glb").stat().st_size
-    monkeypatch.setattr("meshreel.io.animated_glb.MOST_BYTES", size)
+    monkeypatch.setattr("meshreel.export.animated_glb.MOST_BYTES", size)
     with animated_glb(tmp_path / "a.glb", animation()) as writer:
         writer.add(shape())
     for most, what in ((size - 1, "description"), (100, "part, name")):
-        monkeypatch.setattr("meshreel.io.animated_glb.MOST_BYTES", most)
+        monkeypatch.setattr("meshreel.export.animated_glb.MOST_BYTES", most)
         told = pytest.raises(InputError, match=f"{what}.*{most} bytes.*fewer frames")
         with told, animated_glb(tmp_path / "b.glb", animation()) as writer:
             writer.add(shape())
@@ -102,7 +102,7 @@ def test_a_glb_that_would_be_too_long_is_told_before_it_is(tmp_path, monkeypatch
 
 def test_a_usdz_that_would_be_too_long_is_told(tmp_path, monkeypatch):
     pytest.importorskip("pxr")
-    monkeypatch.setattr("meshreel.io.animated_usd._MOST_PACKED", 100)
+    monkeypatch.setattr("meshreel.export.animated_usd._MOST_PACKED", 100)
     told = pytest.raises(InputError, match=r"a.usdz: more than the 100 bytes")
     with told, animated_usd(tmp_path / "a.usdz", animation()) as writer:
         writer.add(shape())
@@ -130,7 +130,7 @@ def test_usd_counts_in_frames_but_keeps_times_apart(tmp_path):
 
 def test_usd_is_saved_piece_by_piece_and_whole_all_the_same(tmp_path, monkeypatch):
     Usd = pytest.importorskip("pxr.Usd")
-    monkeypatch.setattr("meshreel.io.animated_usd._MOST_UNSAVED", 100)
+    monkeypatch.setattr("meshreel.export.animated_usd._MOST_UNSAVED", 100)
     with animated_usd(tmp_path / "a.usdc", animation()) as writer:
         sizes = []
         for number in range(3):

@@ -19,8 +19,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..io.names import is_text
 from .animation import Animation, Shape, changes, unit_normals
-from .names import is_text
 
 EXTENSIONS = (".usdc", ".usda", ".usdz", ".usd")
 _GREY = (0.8, 0.8, 0.8)
