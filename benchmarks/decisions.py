@@ -21,15 +21,15 @@ from meshreel.analysis.reference.reference.centers import affinity, largest_dist
 from meshreel.analysis.reference.reference.deform import neighbours
 from meshreel.analysis.reference.reference.fuse import Group
 from meshreel.analysis.reference.reference.reference import MDS
+from meshreel.encoder.sequence.draco import cheapest_intra, measure
+from meshreel.encoder.sequence.presets import displacement_step, preset_options
 
-from meshreel.choice import cheapest_intra, measure
 from meshreel.coding.group import decode_group, encode_group
 from meshreel.coding.paper import quantize
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.paper.laplacian import System, anchors
 from meshreel.coding.reference import code_reference
 from meshreel.format.layout import AnchorRule
-from meshreel.presets import displacement_step, preset_options
 from meshreel.types import Mesh
 
 sys.path.insert(0, str(Path(__file__).parent))

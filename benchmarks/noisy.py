@@ -19,6 +19,9 @@ import numpy as np
 from captured import Row, keep
 from meshreel.coding.layers.layers.layers import LayersState, place_layers, read_layers
 from meshreel.coding.layers.layers.patches import decode_patches
+from meshreel.encoder.sequence.layers import encode_segment
+from meshreel.encoder.sequence.paper import EncodedGroup
+from meshreel.encoder.sequence.presets import preset_options
 from meshreel_bench.rooms import PEOPLE
 
 from meshreel.coding.intra import decode_intra, encode_intra
@@ -28,14 +31,11 @@ from meshreel.geometry.decimate import decimate
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import face_normals, part_of
 from meshreel.io.meshes import read_mesh
-from meshreel.layered import encode_segment
 from meshreel.metrics.bd_rate import Curve, bd_rate
 from meshreel.metrics.cameras import Box, parallel_views_around
 from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.ssim import ssim_normals
-from meshreel.presets import preset_options
 from meshreel.types import Mesh
-from meshreel.windows import EncodedGroup
 
 DECISION, FRAME_RATE, EVERY, VIEW = "fused", 30.0, 4, 512
 QUALITIES, FACTORS, FRACTIONS, QP = (15, 50, 85), (0.5, 2.0), (0.03, 0.05, 0.1, 0.25), 10

@@ -14,6 +14,7 @@ from meshreel.analysis.reference.reference.centers import largest_distances, ref
 from meshreel.analysis.reference.reference.deform import bind, center_motions, move
 from meshreel.analysis.reference.reference.reference import Reference, extract_reference, predict
 from meshreel.analysis.reference.reference.track import track_centers
+from meshreel.encoder.sequence.paper import EncoderOptions
 
 from meshreel.analysis.survey import survey
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
@@ -22,7 +23,6 @@ from meshreel.coding.group import decode_group, encode_group, payload_parts
 from meshreel.coding.reference import CodedReference, code_reference
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
-from meshreel.windows import EncoderOptions
 
 FIRST, COUNT = 27, 10  # of the story's 90 frames: the hands meet on the way
 CONTACT = 5  # of these: the two surfaces are melted into one

@@ -17,19 +17,19 @@ import numpy as np
 from captured import Case, Row, asked_cases, keep
 from jaxtyping import Bool
 from meshreel.coding.layers.layers.layers import LayersState, decode_layers
+from meshreel.encoder.sequence.layers import encode_segment
+from meshreel.encoder.sequence.paper import EncodedGroup
+from meshreel.encoder.sequence.presets import preset_options
+from meshreel.encoder.sequence.tails import TailOptions, find_tails
 
 from meshreel.format.layout import Form
 from meshreel.format.records import pack
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import drop_unreferenced
-from meshreel.layered import encode_segment
 from meshreel.metrics.cameras import Box, parallel_views_around
 from meshreel.metrics.distance import SurfaceErrors, surface_errors
 from meshreel.metrics.ssim import ssim_normals
-from meshreel.presets import preset_options
-from meshreel.tails import TailOptions, find_tails
 from meshreel.types import Mesh
-from meshreel.windows import EncodedGroup
 
 DECISION, FRAME_RATE, VIEW = "tails", 30.0, 512
 QUALITIES = (25, 50, 85)

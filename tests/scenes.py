@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from meshreel.encoder.sequence.paper import EncoderOptions
 from skimage.measure import marching_cubes
 
 from meshreel.analysis.scene.background import BackgroundOptions
@@ -14,7 +15,6 @@ from meshreel.analysis.scene.segment import SegmentOptions
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.geometry.topology import concatenate, weld
 from meshreel.types import Mesh
-from meshreel.windows import EncoderOptions
 
 from .metrics.shapes import moved, noisy, plane, sphere
 from .small_options import quick

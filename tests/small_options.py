@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from meshreel.encoder.sequence.draco import IntraOptions, Quality
+from meshreel.encoder.sequence.paper import EncoderOptions
+from meshreel.encoder.sequence.presets import preset_options
+
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
 from meshreel.analysis.scene.views import ViewsOptions
-from meshreel.choice import IntraOptions, Quality
-from meshreel.presets import preset_options
-from meshreel.windows import EncoderOptions
 
 VIEWS = ViewsOptions(count=6, width=120, height=90, places=4, samples=500)
 TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,))

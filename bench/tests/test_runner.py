@@ -23,9 +23,9 @@ from meshreel_bench.rows import Point, append_row, read_rows
 from meshreel_bench.runner import run_points
 
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.derived import Backwards
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
+from meshreel.geometry.sequences import Backwards
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Mesh, MeshList
 from tests.golden import GOLDEN

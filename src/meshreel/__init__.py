@@ -14,10 +14,10 @@ from .errors import FormatError, InputError, MeshreelError
 from .types import Mesh, MeshList, MeshSequence
 
 if TYPE_CHECKING:
-    from .encoder import encode
+    from .encoder.paper import EncoderOptions
+    from .encoder.presets import preset_options
+    from .encoder.sequence import encode
     from .io.sequence import open_sequence
-    from .presets import preset_options
-    from .windows import EncoderOptions
 
 __version__ = "0.1.0"
 

@@ -7,6 +7,7 @@ import shutil
 
 import numpy as np
 import pytest
+from meshreel.encoder.sequence.paper import encode_window
 from PIL import Image
 
 import meshreel
@@ -14,7 +15,6 @@ from meshreel.capture.record import open_recording
 from meshreel.cli.encode import describe
 from meshreel.io.depth import write_depth
 from meshreel.io.write import write_mesh
-from meshreel.windows import encode_window
 from tests.capture.depth_scenes import camera, measured, record
 from tests.cli.conftest import failed
 from tests.small_scene import scene
@@ -31,7 +31,7 @@ def quick_bodies(monkeypatch):
         windows = [frames] if frames[0].is_empty else [[frame] for frame in frames]
         return [group for window in windows for group in encode_window(window, options, stages)]
 
-    monkeypatch.setattr("meshreel.scene.encode_segment", frame_by_frame)
+    monkeypatch.setattr("meshreel.encoder.scene.encode_segment", frame_by_frame)
 
 
 def test_a_scene_is_told_by_its_parts_and_info_agrees(run, scan, tmp_path):

@@ -140,7 +140,7 @@ def test_a_glb_needs_nothing_but_the_light_install(tmp_path):
     script = (
         "import sys; from meshreel.cli import main\n"
         "code = main(['export', sys.argv[1], '-o', sys.argv[2], '--quiet'])\n"
-        "heavy = ('open3d', 'scipy', 'skimage', 'igl', 'matplotlib', 'trimesh', 'pxr', 'meshreel.encoder')\n"
+        "heavy = ('open3d', 'scipy', 'skimage', 'igl', 'matplotlib', 'trimesh', 'pxr', 'meshreel.encoder.sequence')\n"
         "print(code, [name for name in heavy if name in sys.modules])"
     )
     command = [sys.executable, "-c", script, str(FILE), str(tmp_path / "a.glb")]

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from meshreel.derived import DerivedSequence
 from meshreel.errors import InputError
+from meshreel.geometry.sequences import DerivedSequence
 from meshreel.io.meshes import FARTHEST
 from meshreel.metrics.render import Looked, Visible
 from meshreel.metrics.report import ComparisonOptions, compare_sequences

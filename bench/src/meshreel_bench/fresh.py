@@ -115,7 +115,7 @@ def measure_pair(path: str, anchor: str) -> dict[str, Any]:
 
 def measure_encode(name: str, data: str, frames: str, options: str) -> dict[str, Any]:
     """Bytes and CPU s a frame of encoding so many frames of a sequence; the memory is what it is run for."""
-    from meshreel.encoder import encode
+    from meshreel.encoder.sequence.sequence import encode
 
     from .codecs.meshreel import MeshreelCodec
     from .datasets import open_dataset
@@ -130,9 +130,10 @@ def measure_encode(name: str, data: str, frames: str, options: str) -> dict[str,
 
 def measure_scene_encode(name: str, data: str, cache: str, frames: str, quality: str) -> dict[str, Any]:
     """The same of a captured scene and the preset `best`; longer than it is, it is played forth and back."""
-    from meshreel.derived import forth_and_back
-    from meshreel.encoder import encode
-    from meshreel.presets import preset_options
+    from meshreel.encoder.sequence.presets import preset_options
+    from meshreel.encoder.sequence.sequence import encode
+
+    from meshreel.geometry.sequences import forth_and_back
 
     from .scenes import open_scene
 

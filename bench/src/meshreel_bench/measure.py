@@ -16,7 +16,7 @@ import numpy as np
 from meshreel.decoder.video.video import open as open_video
 
 from meshreel.coding.mesh import encode_mesh
-from meshreel.derived import Backwards
+from meshreel.geometry.sequences import Backwards
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Frames, MeshSequence
 

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 from meshreel.decoder.video.video import Video
+from meshreel.encoder.sequence.draco import IntraOptions, cheapest_intra, measure
 
 from meshreel.analysis.survey import Survey, survey
-from meshreel.choice import IntraOptions, cheapest_intra, measure
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 

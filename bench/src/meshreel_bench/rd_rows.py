@@ -14,8 +14,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from meshreel.derived import Chosen
 from meshreel.errors import InputError
+from meshreel.geometry.sequences import Chosen
 from meshreel.io.sequence import SequenceOptions
 from meshreel.metrics.render import Visible
 from meshreel.metrics.truth import Scene, scene_means, scene_row

@@ -27,9 +27,9 @@ from meshreel.capture.record import open_recording
 from meshreel.capture.rig import RIG
 from meshreel.capture.simulate import TRUTH
 from meshreel.capture.truth import Truth, read_truth
-from meshreel.derived import Chosen
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate_faces
+from meshreel.geometry.sequences import Chosen
 from meshreel.io.meshes import read_mesh
 from meshreel.io.write import make_folder, replacing, write_mesh
 from meshreel.types import Mesh, MeshSequence, evenly

@@ -9,8 +9,9 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from meshreel.encoder.sequence.paper import EncoderOptions
+
 from meshreel.errors import InputError
-from meshreel.windows import EncoderOptions
 
 Change = Callable[[EncoderOptions], EncoderOptions]
 

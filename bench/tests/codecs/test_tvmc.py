@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from meshreel.encoder.sequence.presets import quality_of_vertices, reference_vertices
+from meshreel.encoder.sequence.sequence import Encoder
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.tvmc import TvmcCodec
 from meshreel_bench.codecs.tvmc.layout import LONGEST, Group, Kind, State, Stream, pack_stream, unpack_stream
@@ -18,14 +20,12 @@ from meshreel_bench.measure import run_curve_point
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.intra import encode_intra
-from meshreel.encoder import Encoder
 from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate
 from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.report import ComparisonOptions
-from meshreel.presets import quality_of_vertices, reference_vertices
 from meshreel.types import Mesh, MeshList
 from tests.scenes import CELL, NOISE, ball, of_body, quick_scene, room, with_room
 from tests.small_options import quick
@@ -151,7 +151,7 @@ def test_what_no_reference_follows_is_cut_or_coded_frame_by_frame(monkeypatch):
     def none(*_):
         raise NoReferenceError("none")
 
-    monkeypatch.setattr("meshreel.windows.analyze", none)
+    monkeypatch.setattr("meshreel.encoder.paper.analyze", none)
     plain = SMALL.encode(frames)
     assert kinds(plain) == [(0, 3, Kind.DRACO)]
     for data in (cut, plain):
@@ -177,7 +177,7 @@ def test_coordinates_around_a_million_keep_their_millimetres():
     ],
 )
 def test_options_out_of_range_are_refused(options, words, monkeypatch):
-    from meshreel.presets import preset_options
+    from meshreel.encoder.sequence.presets import preset_options
 
     monkeypatch.setattr(f"{CODEC}.preset_options", preset_options)
     with pytest.raises(InputError, match=words):

@@ -18,11 +18,11 @@ from ..capture.simulate import TRUTH
 from ..capture.truth import read_truth
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
-from ..encoder import encode
+from ..encoder.presets import preset_options
+from ..encoder.sequence import encode
 from ..errors import InputError
 from ..metrics.sheet import SheetOptions, write_sheet
 from ..metrics.truth_comparison import compare_with_truth
-from ..presets import preset_options
 from ..types import MeshSequence
 from .compare import truth_table
 from .console import Common, StageBars, called_as

@@ -15,12 +15,12 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..analysis.scene.segment import SegmentOptions
-from ..encoder import Encoder
+from ..encoder.paper import EncoderOptions
+from ..encoder.presets import preset_options
+from ..encoder.quality import Goal, encode_to
+from ..encoder.sequence import Encoder
+from ..encoder.summary import SceneSummary, Summary
 from ..errors import InputError
-from ..presets import preset_options
-from ..rate_control import Goal, encode_to
-from ..summary import SceneSummary, Summary
-from ..windows import EncoderOptions
 from .console import Common
 from .reading import Reading
 from .scenes import Masking, open_source

@@ -15,14 +15,14 @@ from ..analysis.scene.masks import CAMERAS, Masker
 from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
 from ..analysis.scene.segment import scene_views, segment, segment_by
+from ..encoder.labels import FrameLabels, label_frames
+from ..encoder.paper import EncoderOptions
+from ..encoder.presets import preset_options
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..io.masks import is_mask, write_picture
 from ..io.write import frame_names, left_over, make_folder, replacing, write_colored
-from ..labels import FrameLabels, label_frames
-from ..presets import preset_options
 from ..types import evenly
-from ..windows import EncoderOptions
 from .console import Common
 from .reading import Reading
 from .scenes import Masking, Source, open_source

@@ -4,6 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from meshreel.encoder.sequence.paper import Stages
+from meshreel.encoder.sequence.parts import take_apart
+from meshreel.encoder.sequence.presets import preset_options
+from meshreel.encoder.sequence.scene import encode_static
 
 from meshreel.analysis.scene.cut import CutOptions
 from meshreel.analysis.scene.labelling import ByPlace
@@ -16,11 +20,7 @@ from meshreel.coding.background import decode_background, decode_change
 from meshreel.errors import InputError
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld
-from meshreel.parts import take_apart
-from meshreel.presets import preset_options
-from meshreel.scene import encode_static
 from meshreel.types import Mesh, MeshList, Placement
-from meshreel.windows import Stages
 
 FRAMES, LIFTED, PUT = 28, 9, 18  # at 4 frames a second
 OPTIONS = SegmentOptions(

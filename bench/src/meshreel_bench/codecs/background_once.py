@@ -13,17 +13,17 @@ from pathlib import Path
 from typing import Any
 
 from meshreel.decoder.video.video import open as open_video
+from meshreel.encoder.sequence.paper import Stages
+from meshreel.encoder.sequence.parts import take_apart
+from meshreel.encoder.sequence.presets import preset_options
+from meshreel.encoder.sequence.scene import Static, encode_static
+from meshreel.encoder.sequence.sequence import make_header
 
 from meshreel.analysis.scene.probe import is_scene
 from meshreel.analysis.survey import Survey, survey
 from meshreel.container.writer import ReelWriter
-from meshreel.encoder import make_header
 from meshreel.geometry.topology import part_of
-from meshreel.parts import take_apart
-from meshreel.presets import preset_options
-from meshreel.scene import Static, encode_static
 from meshreel.types import Mesh, MeshSequence
-from meshreel.windows import Stages
 
 from ..codec import Progress
 from .draco import check_point, decimated, encode_frame

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from meshreel.decoder.video.video import open as open_video
+from meshreel.encoder.sequence.job import shared_options
+from meshreel.encoder.sequence.paper import EncoderOptions
+from meshreel.encoder.sequence.presets import preset_options
+from meshreel.encoder.sequence.sequence import Encoder
 
-from meshreel.encoder import Encoder
-from meshreel.presets import preset_options
 from meshreel.types import Mesh, MeshSequence
-from meshreel.windows import EncoderOptions
-from meshreel.work import shared_options
 
 from ..codec import Progress
 from ..variants import find_variant

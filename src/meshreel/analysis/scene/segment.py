@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...derived import Chosen, TurnedOver
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.depth import DepthPicture, SeesDepth
 from ...geometry.nearest import distances
+from ...geometry.sequences import Chosen, TurnedOver
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly

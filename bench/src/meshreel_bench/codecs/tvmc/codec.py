@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 from meshreel.coding.layers.layers.patches import run_lengths
+from meshreel.encoder.sequence.paper import EncoderOptions, Stages
+from meshreel.encoder.sequence.presets import preset_options, quality_of_vertices
+from meshreel.encoder.sequence.sequence import Encoder
 
-from meshreel.encoder import Encoder
 from meshreel.errors import InputError
-from meshreel.presets import preset_options, quality_of_vertices
 from meshreel.types import Mesh, MeshSequence
-from meshreel.windows import EncoderOptions, Stages
 
 from ...codec import Progress
 from ..meshreel import analysis_key, prepared

@@ -9,13 +9,13 @@ from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
+from meshreel.encoder.sequence.paper import MOST_FRAMES
 
 from meshreel.errors import FormatError
 from meshreel.format.checks import LARGEST, MOST_CHANGES, MOST_TRACKS, SMALLEST
 from meshreel.format.kinds import F64, U8, U32, Array, Blob, Bytes, Choice, List, Varint
 from meshreel.format.layout import Checksum, Form
 from meshreel.format.records import Nested, least_size, pack, unpack_all
-from meshreel.windows import MOST_FRAMES
 
 MAGIC = b"TVMC"
 VERSION = 1

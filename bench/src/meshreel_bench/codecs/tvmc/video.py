@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 from typing import overload
 
 from meshreel.decoder.video.tracks import MOST_TOGETHER
+from meshreel.encoder.sequence.paper import MOST_FRAMES
 
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.intra import decode_intra
 from meshreel.errors import FormatError
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement
-from meshreel.windows import MOST_FRAMES
 
 from .layout import Group, Kind, is_bare, is_patch, unpack_stream
 from .tracked import decode_tracked

@@ -7,12 +7,12 @@ from itertools import pairwise
 
 import pytest
 from meshreel.coding.layers.layers.layers import LayersOptions
+from meshreel.encoder.sequence.paper import EncoderOptions
+from meshreel.encoder.sequence.presets import PRESETS, displacement_step, preset_options, reference_vertices
 
 from meshreel.analysis.follow.template import TemplateOptions
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
-from meshreel.presets import PRESETS, displacement_step, preset_options, reference_vertices
-from meshreel.windows import EncoderOptions
 
 
 def test_the_default_preset_is_best_and_bare_options_are_those_of_paper():

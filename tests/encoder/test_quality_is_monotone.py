@@ -7,18 +7,18 @@ from itertools import pairwise
 
 import pytest
 from meshreel.decoder.video.video import open as open_video
+from meshreel.encoder.sequence.draco import IntraOptions
+from meshreel.encoder.sequence.paper import EncoderOptions
+from meshreel.encoder.sequence.presets import preset_options
+from meshreel.encoder.sequence.sequence import encode
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.choice import IntraOptions
-from meshreel.encoder import encode
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import weld
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.metrics.cameras import ParallelViewOptions
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
-from meshreel.presets import preset_options
 from meshreel.types import MeshList
-from meshreel.windows import EncoderOptions
 from tests.shared_data import performer
 
 QUALITIES = (0, 50, 100)  # few: every encode is one from the start

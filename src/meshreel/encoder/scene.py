@@ -16,22 +16,22 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool
 
-from .analysis.scene.background import BackgroundOptions
-from .analysis.scene.bodies import at_most, find_bodies, same_bodies, with_ring
-from .analysis.scene.labelling import Segmentation
-from .analysis.survey import Survey
-from .choice import NO_ERROR
-from .coding.background import decode_background, decode_change, encode_background, encode_change
-from .coding.intra import encode_empty
-from .format.checks import MOST_TRACKS
-from .format.layout import Form
-from .geometry.decimate import decimate, decimate_faces
-from .geometry.nearest import distances
-from .layered import MOST_EMPTY, encode_segment
+from ..analysis.scene.background import BackgroundOptions
+from ..analysis.scene.bodies import at_most, find_bodies, same_bodies, with_ring
+from ..analysis.scene.labelling import Segmentation
+from ..analysis.survey import Survey
+from ..coding.background import decode_background, decode_change, encode_background, encode_change
+from ..coding.intra import encode_empty
+from ..format.checks import MOST_TRACKS
+from ..format.layout import Form
+from ..geometry.decimate import decimate, decimate_faces
+from ..geometry.nearest import distances
+from ..types import Frames, Mesh, MeshSequence, Placement
+from .draco import NO_ERROR
+from .job import Work
+from .layers import MOST_EMPTY, encode_segment
+from .paper import MOST_NOISE, EncodedGroup, EncoderOptions, FindSpans, Stages, encode_window
 from .parts import Change, Parts
-from .types import Frames, Mesh, MeshSequence, Placement
-from .windows import MOST_NOISE, EncodedGroup, EncoderOptions, FindSpans, Stages, encode_window
-from .work import Work
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 HALFWAY = 0.3  # of the vertices: what has fewer than half as many is decimated from there, a third of the time

@@ -8,11 +8,11 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
+from meshreel.encoder.sequence.sequence import encode
 
 import meshreel
-from meshreel import layered
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.encoder import encode
+from meshreel.encoder.sequence import layers as layered
 from meshreel.format.layout import Form
 from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
@@ -97,7 +97,7 @@ def test_what_the_summary_says_is_what_is_measured_on_the_file(written):
 
 
 def test_without_options_preset_best_is_taken(tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.encoder.preset_options", quick)
+    monkeypatch.setattr("meshreel.encoder.sequence.preset_options", quick)
     encode(MeshList((BALLS[0],)), tmp_path / "a.reel")
     with meshreel.open(tmp_path / "a.reel") as video:
         assert (video.reader.metadata["preset"], video.reader.metadata["quality"]) == ("best", 50)

@@ -13,21 +13,21 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool
 
-from .analysis.scene.background import BackgroundOptions, fuse_background
-from .analysis.scene.background_depth import fuse_still_depth
-from .analysis.scene.bodies import ring
-from .analysis.scene.labelling import Segmentation
-from .analysis.scene.masks import Masker
-from .analysis.scene.segment import segment, segment_by
-from .analysis.survey import Survey, check_one_unit
-from .derived import ChosenParts
-from .errors import InputError
-from .geometry.connected import connected
-from .geometry.depth import SeesDepth
-from .geometry.nearest import Outline, distances
-from .geometry.topology import concatenate, face_normals, part_of
-from .types import Mesh, MeshSequence, evenly
-from .windows import EncoderOptions, Stages
+from ..analysis.scene.background import BackgroundOptions, fuse_background
+from ..analysis.scene.background_depth import fuse_still_depth
+from ..analysis.scene.bodies import ring
+from ..analysis.scene.labelling import Segmentation
+from ..analysis.scene.masks import Masker
+from ..analysis.scene.segment import segment, segment_by
+from ..analysis.survey import Survey, check_one_unit
+from ..errors import InputError
+from ..geometry.connected import connected
+from ..geometry.depth import SeesDepth
+from ..geometry.nearest import Outline, distances
+from ..geometry.sequences import ChosenParts
+from ..geometry.topology import concatenate, face_normals, part_of
+from ..types import Mesh, MeshSequence, evenly
+from .paper import EncoderOptions, Stages
 
 PROBES = 8  # frames, at most, that what moves is measured in
 LOST = 0.5  # of a frame's faces: as many stand still only where there is a background

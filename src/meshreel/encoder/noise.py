@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from .analysis.fit.fit import FitOptions
-from .analysis.follow.embedded import EmbeddedOptions
-from .windows import EncoderOptions
+from ..analysis.fit.fit import FitOptions
+from ..analysis.follow.embedded import EmbeddedOptions
+from .paper import EncoderOptions
 
 LOST = 3.0  # RMS distances of the noise that a residual may have besides: legs come and go in noisy frames
 KEYS = 2  # tried at most: what one of them lacks, the fused template has from the other frames

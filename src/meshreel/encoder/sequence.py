@@ -16,19 +16,22 @@ from typing import Any
 
 import numpy as np
 
-from .analysis.scene.background import BackgroundOptions
-from .analysis.scene.masks import Masker
-from .analysis.scene.probe import is_scene
-from .analysis.scene.segment import SegmentOptions
-from .analysis.survey import Survey, survey
-from .coding.background import decode_background
-from .container.writer import ReelWriter, check_target
-from .decoder.video import open as open_video
-from .errors import InputError
-from .format.layout import Form, Header
-from .geometry.nearest import distances
-from .geometry.topology import drop_unreferenced
-from .metrics.distance import PSNR_CEILING, psnr
+from ..analysis.scene.background import BackgroundOptions
+from ..analysis.scene.masks import Masker
+from ..analysis.scene.probe import is_scene
+from ..analysis.scene.segment import SegmentOptions
+from ..analysis.survey import Survey, survey
+from ..coding.background import decode_background
+from ..container.writer import ReelWriter, check_target
+from ..decoder.video import open as open_video
+from ..errors import InputError
+from ..format.layout import Form, Header
+from ..geometry.nearest import distances
+from ..geometry.topology import drop_unreferenced
+from ..metrics.distance import PSNR_CEILING, psnr
+from ..types import Frames, Mesh, MeshSequence, evenly
+from .job import SpanStore, Work
+from .paper import EncodedGroup, EncoderOptions, Progress, Stages
 from .parts import Parts, take_apart
 from .presets import preset_options
 from .scene import (
@@ -42,9 +45,6 @@ from .scene import (
     options_of,
 )
 from .summary import GroupSummary, SceneSummary, Summary
-from .types import Frames, Mesh, MeshSequence, evenly
-from .windows import EncodedGroup, EncoderOptions, Progress, Stages
-from .work import SpanStore, Work
 
 MEASURED = 4  # frames of a scene that are compared with what is decoded
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less

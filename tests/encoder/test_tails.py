@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from meshreel.coding.layers.layers.patches import decode_patches
+from meshreel.encoder.sequence.draco import Quality, measure
+from meshreel.encoder.sequence.paper import EncoderOptions
+from meshreel.encoder.sequence.presets import preset_options
+from meshreel.encoder.sequence.sequence import encode
+from meshreel.encoder.sequence.tails import TailOptions, find_tails
 
 import meshreel
-from meshreel import tails
-from meshreel.choice import Quality, measure
 from meshreel.coding.group import payload_parts
-from meshreel.encoder import encode
+from meshreel.encoder.sequence import tails
 from meshreel.errors import InputError
 from meshreel.format.records import pack
-from meshreel.presets import preset_options
-from meshreel.tails import TailOptions, find_tails
 from meshreel.types import Mesh, MeshList
-from meshreel.windows import EncoderOptions
 from tests.coding.paper.test_laplacian import icosahedron
 
 BALL = Mesh.of(0.3 * icosahedron(3).vertices, icosahedron(3).faces)

@@ -7,29 +7,29 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from meshreel.encoder.sequence.draco import NO_ERROR
+from meshreel.encoder.sequence.job import Work
+from meshreel.encoder.sequence.paper import EncodedGroup, Stages, target_of
+from meshreel.encoder.sequence.parts import Parts, take_apart
+from meshreel.encoder.sequence.scene import TrackGroup, encode_bodies, encode_static
+from meshreel.encoder.sequence.sequence import Encoder, encode
 
 import meshreel
-import meshreel.scene as scene
+import meshreel.encoder.scene as scene
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.segment import scene_views
 from meshreel.analysis.scene.settle import Rest
 from meshreel.analysis.survey import survey
-from meshreel.choice import NO_ERROR
 from meshreel.coding.background import decode_background
 from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
-from meshreel.encoder import Encoder, encode
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
-from meshreel.parts import Parts, take_apart
-from meshreel.scene import TrackGroup, encode_bodies, encode_static
 from meshreel.types import Mesh, MeshList, Placement
-from meshreel.windows import EncodedGroup, Stages, target_of
-from meshreel.work import Work
 from tests import small_scene
 from tests.metrics.shapes import moved, plane, sphere
 from tests.scenes import CELL, NOISE, RADIUS, SIDE, ball, of_body, quick_scene, room, with_room
@@ -80,7 +80,7 @@ def plainly(monkeypatch):
         assert not any(mesh.is_empty for mesh in frames)
         return [EncodedGroup(Form.DRACO, len(frames), encode_intra(list(frames), 1e-3, 0), (), NO_ERROR)]
 
-    monkeypatch.setattr("meshreel.scene.encode_segment", coded)
+    monkeypatch.setattr("meshreel.encoder.scene.encode_segment", coded)
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,7 @@ def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
 @pytest.mark.usefixtures("plainly")
 def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch):
     count = []
-    monkeypatch.setattr("meshreel.encoder.take_apart", lambda *args: count.append(1) or take_apart(*args))
+    monkeypatch.setattr("meshreel.encoder.sequence.take_apart", lambda *args: count.append(1) or take_apart(*args))
     encoder = Encoder(MeshList(tuple(ROLLING), 4.0))
     for quality in (30, 60):
         encoder.encode(tmp_path / f"{quality}.reel", quick_scene(quality=quality))
@@ -167,7 +167,7 @@ def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, mon
 
 
 def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.encoder.is_scene", None)
+    monkeypatch.setattr("meshreel.encoder.sequence.is_scene", None)
     small = [Mesh.of(plane(1.0, 6).vertices, plane(1.0, 6).faces)] * 2
     options = replace(quick_scene("paper", group_size=1), dynamic_only=True)
     video, summary = encoded(small, tmp_path / "a.reel", options)

@@ -9,16 +9,16 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from meshreel.encoder.sequence.draco import Quality
+from meshreel.encoder.sequence.quality import TRIALS, Goal, Search, encode_to
+from meshreel.encoder.sequence.sequence import Encoder
+from meshreel.encoder.sequence.summary import GroupSummary, SceneSummary, Summary
 
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
-from meshreel.choice import Quality
-from meshreel.encoder import Encoder
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions, compare_sequences
-from meshreel.rate_control import TRIALS, Goal, Search, encode_to
-from meshreel.summary import GroupSummary, SceneSummary, Summary
 from meshreel.types import MeshList
 from tests.small_options import quick
 
@@ -129,7 +129,7 @@ def test_a_target_out_of_reach_is_told_and_leaves_nothing(goal: Goal, tmp_path) 
 
 
 def test_a_place_that_cannot_be_written_is_told_before_anything_is_coded(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("meshreel.rate_control.Encoder.encode", lambda *_: pytest.fail("coded"))
+    monkeypatch.setattr("meshreel.encoder.quality.Encoder.encode", lambda *_: pytest.fail("coded"))
     for path in (tmp_path, tmp_path / "none" / "a.reel"):
         with pytest.raises(InputError, match=f"{path}: "):
             encode_to(Encoder(BODY), path, Goal(psnr=58.5), options_at)

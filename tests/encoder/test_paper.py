@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from meshreel.encoder.sequence.draco import IntraOptions, Quality, cheapest_intra
+from meshreel.encoder.sequence.paper import EncodedGroup, cheaper
 
-from meshreel import windows
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.choice import IntraOptions, Quality, cheapest_intra
+from meshreel.encoder.sequence import paper as windows
 from meshreel.format.layout import Form
-from meshreel.windows import EncodedGroup, cheaper
 from tests.small_options import quick
 
 BALLS = list(sliding_sphere(2, levels=1))

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .coding.intra import decode_intra, encode_intra
-from .coding.mesh import MAX_BITS
-from .geometry.decimate import decimate
-from .metrics.distance import PSNR_CEILING, surface_errors
-from .types import Mesh
+from ..coding.intra import decode_intra, encode_intra
+from ..coding.mesh import MAX_BITS
+from ..geometry.decimate import decimate
+from ..metrics.distance import PSNR_CEILING, surface_errors
+from ..types import Mesh
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from meshreel.encoder.sequence.labels import label_frames
 
 from meshreel.geometry.topology import concatenate
-from meshreel.labels import label_frames
 from meshreel.types import Mesh, MeshList
+from tests.encoder.test_scene import ALL, NONE, SMALL, at
 from tests.metrics.shapes import moved, sphere
 from tests.scenes import quick_scene
-from tests.test_scene import ALL, NONE, SMALL, at
 
 OPTIONS = quick_scene(key_interval=2.0)
 COUNT = len(SMALL.faces)

@@ -9,15 +9,15 @@ from typing import overload
 import numpy as np
 import pytest
 from meshreel.analysis.fit.fit.match import Target
+from meshreel.encoder.sequence.draco import measure
+from meshreel.encoder.sequence.layers import encode_segment
+from meshreel.encoder.sequence.paper import EncodedGroup
 
-from meshreel import layered
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
-from meshreel.choice import measure
 from meshreel.coding.group import continue_group
+from meshreel.encoder.sequence import layers as layered
 from meshreel.format.layout import Form
-from meshreel.layered import encode_segment
 from meshreel.types import Mesh
-from meshreel.windows import EncodedGroup
 from tests.small_options import quick
 
 OPTIONS = quick(group_size=4)

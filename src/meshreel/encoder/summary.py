@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .choice import Quality
-from .format.layout import Form
+from ..format.layout import Form
+from .draco import Quality
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, UInt16
 
-from .analysis.scene.bodies import with_ring
-from .analysis.scene.labelling import Segmentation
-from .geometry.topology import part_of
+from ..analysis.scene.bodies import with_ring
+from ..analysis.scene.labelling import Segmentation
+from ..geometry.topology import part_of
+from ..types import Mesh, MeshSequence
+from .paper import EncoderOptions
 from .scene import Tracks, segments
-from .types import Mesh, MeshSequence
-from .windows import EncoderOptions
 
 
 @dataclass(frozen=True, slots=True)

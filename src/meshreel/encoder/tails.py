@@ -13,17 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
-from .coding import entropy
-from .coding.layers.patches import Patches, encode_patches, encode_runs, reach
-from .coding.mesh import encode_mesh
-from .coding.steps import level_of, step_of
-from .errors import InputError
-from .format.layout import LayersPatches
-from .format.records import pack
-from .geometry.decimate import decimate
-from .geometry.nearest import Surface
-from .geometry.topology import clean, components, concatenate, drop_unreferenced, face_normals
-from .types import Mesh
+from ..coding import entropy
+from ..coding.layers.patches import Patches, encode_patches, encode_runs, reach
+from ..coding.mesh import encode_mesh
+from ..coding.steps import level_of, step_of
+from ..errors import InputError
+from ..format.layout import LayersPatches
+from ..format.records import pack
+from ..geometry.decimate import decimate
+from ..geometry.nearest import Surface
+from ..geometry.topology import clean, components, concatenate, drop_unreferenced, face_normals
+from ..types import Mesh
 
 BODY = 0.98  # of the surface; the rest are the tails
 LEAST_BYTES = 4  # that a region or a patch takes at least

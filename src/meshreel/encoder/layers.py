@@ -13,22 +13,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from .analysis.fit.fit import Fit, Guides, fit_targets
-from .analysis.fit.match import Target
-from .analysis.follow.correspond import Course, choose_key, from_last
-from .analysis.follow.fused import fused_mesh
-from .analysis.follow.template import base_mesh, shared_detail
-from .analysis.groups import cut_at, leading
-from .choice import NO_ERROR, measure
-from .coding.intra import encode_empty
-from .coding.layers.layers import EncodedLayers, LayersState, encode_layers
-from .coding.reference import CodedReference, code_on_lattice
-from .format.layout import Form
-from .format.records import pack
+from ..analysis.fit.fit import Fit, Guides, fit_targets
+from ..analysis.fit.match import Target
+from ..analysis.follow.correspond import Course, choose_key, from_last
+from ..analysis.follow.fused import fused_mesh
+from ..analysis.follow.template import base_mesh, shared_detail
+from ..analysis.groups import cut_at, leading
+from ..coding.intra import encode_empty
+from ..coding.layers.layers import EncodedLayers, LayersState, encode_layers
+from ..coding.reference import CodedReference, code_on_lattice
+from ..format.layout import Form
+from ..format.records import pack
+from ..types import Frames, Mesh
+from .draco import NO_ERROR, measure
 from .noise import above_noise
+from .paper import EncodedGroup, EncoderOptions, Stages, cheaper, intra_only, laplacian, target_of
 from .tails import find_tails
-from .types import Frames, Mesh
-from .windows import EncodedGroup, EncoderOptions, Stages, cheaper, intra_only, laplacian, target_of
 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: what it rounds away is coded again with the motion
 LATTICE_ALONE = 0.8  # the same for one frame, whose base need not move

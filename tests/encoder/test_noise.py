@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from meshreel.coding.layers.layers.layers import decode_layers
+from meshreel.encoder.sequence.layers import encode_segment
+from meshreel.encoder.sequence.noise import above_noise
+from meshreel.encoder.sequence.paper import target_of
+from meshreel.encoder.sequence.presets import preset_options
+from meshreel.encoder.sequence.tails import TailOptions
 
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
-from meshreel.layered import encode_segment
-from meshreel.noise import above_noise
-from meshreel.presets import preset_options
-from meshreel.tails import TailOptions
 from meshreel.types import Mesh
-from meshreel.windows import target_of
 
-from .analysis.follow.test_fused import SIDE, gaps, noisy, sheet, with_hole
+from ..analysis.follow.test_fused import SIDE, gaps, noisy, sheet, with_hole
 
 NOISE = 0.003
 BEST = preset_options("best")

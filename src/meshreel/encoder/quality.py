@@ -12,10 +12,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from .encoder import Encoder
-from .errors import InputError
+from ..errors import InputError
+from .paper import EncoderOptions
+from .sequence import Encoder
 from .summary import Summary
-from .windows import EncoderOptions
 
 TRIALS = 8  # whole encodes, at most
 FIRST_QUALITY = 50.0

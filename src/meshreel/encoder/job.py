@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from .format.layout import Form
-from .types import Mesh, MeshSequence
-from .windows import EncoderOptions, Fitted, Span, Stages, find_spans
+from ..format.layout import Form
+from ..types import Mesh, MeshSequence
+from .paper import EncoderOptions, Fitted, Span, Stages, find_spans
 
 Found = tuple[tuple[int, Fitted | None], ...]  # of each span its number of frames, and what follows them
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from meshreel.encoder.sequence.draco import Quality
+from meshreel.encoder.sequence.job import SpanStore, shared_options
+from meshreel.encoder.sequence.sequence import Encoder, encode
 from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
-from meshreel import encoder as encoding
-from meshreel import windows, work
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
-from meshreel.choice import Quality
-from meshreel.encoder import Encoder, encode
+from meshreel.encoder.sequence import job as work
+from meshreel.encoder.sequence import paper as windows
+from meshreel.encoder.sequence import sequence as encoding
 from meshreel.format.layout import Form
 from meshreel.types import Mesh, MeshList
-from meshreel.work import SpanStore, shared_options
 from tests.scenes import ball, quick_scene, with_room
 from tests.small_options import quick
 

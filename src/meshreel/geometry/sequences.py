@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Bool
 
-from .geometry.topology import part_of
-from .types import Mesh, MeshSequence
+from ..types import Mesh, MeshSequence
+from .topology import part_of
 
 
 class DerivedSequence(MeshSequence):
