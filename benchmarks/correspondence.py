@@ -14,14 +14,14 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from captured import Case, Row, asked_cases, keep
 from jaxtyping import Float64
-from meshreel.analysis.fit.fit.fit import FitOptions, fit_frames
-from meshreel.analysis.fit.fit.match import Target
-from meshreel.analysis.fit.fit.residual import Residual, residual_of
-from meshreel.analysis.reference.reference.centers import ReferenceCenterOptions, affinity, largest_distances
-from meshreel.analysis.reference.reference.deform import DeformOptions, bind, center_motions, move, neighbours
-from meshreel.analysis.reference.reference.track import TrackOptions, track_centers
 
+from meshreel.analysis.fit.fit import FitOptions, fit_frames
+from meshreel.analysis.fit.match import Target
+from meshreel.analysis.fit.residual import Residual, residual_of
 from meshreel.analysis.follow.embedded import register
+from meshreel.analysis.reference.centers import ReferenceCenterOptions, affinity, largest_distances
+from meshreel.analysis.reference.deform import DeformOptions, bind, center_motions, move, neighbours
+from meshreel.analysis.reference.track import TrackOptions, track_centers
 from meshreel.coding import klt
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import subdivide_midpoint, unique_edges, vertex_normals

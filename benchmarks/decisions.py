@@ -16,19 +16,19 @@ from typing import Any
 
 import DracoPy
 import numpy as np
-from meshreel.analysis.fit.fit.fit import fit_frames
-from meshreel.analysis.reference.reference.centers import affinity, largest_distances
-from meshreel.analysis.reference.reference.deform import neighbours
-from meshreel.analysis.reference.reference.fuse import Group
-from meshreel.analysis.reference.reference.reference import MDS
-from meshreel.encoder.sequence.draco import cheapest_intra, measure
-from meshreel.encoder.sequence.presets import displacement_step, preset_options
 
+from meshreel.analysis.fit.fit import fit_frames
+from meshreel.analysis.reference.centers import affinity, largest_distances
+from meshreel.analysis.reference.deform import neighbours
+from meshreel.analysis.reference.fuse import Group
+from meshreel.analysis.reference.reference import MDS
 from meshreel.coding.group import decode_group, encode_group
 from meshreel.coding.paper import quantize
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.paper.laplacian import System, anchors
 from meshreel.coding.reference import code_reference
+from meshreel.encoder.draco import cheapest_intra, measure
+from meshreel.encoder.presets import displacement_step, preset_options
 from meshreel.format.layout import AnchorRule
 from meshreel.types import Mesh
 

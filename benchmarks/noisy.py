@@ -17,14 +17,14 @@ from pathlib import Path
 
 import numpy as np
 from captured import Row, keep
-from meshreel.coding.layers.layers.layers import LayersState, place_layers, read_layers
-from meshreel.coding.layers.layers.patches import decode_patches
-from meshreel.encoder.sequence.layers import encode_segment
-from meshreel.encoder.sequence.paper import EncodedGroup
-from meshreel.encoder.sequence.presets import preset_options
 from meshreel_bench.rooms import PEOPLE
 
 from meshreel.coding.intra import decode_intra, encode_intra
+from meshreel.coding.layers.layers import LayersState, place_layers, read_layers
+from meshreel.coding.layers.patches import decode_patches
+from meshreel.encoder.layers import encode_segment
+from meshreel.encoder.paper import EncodedGroup
+from meshreel.encoder.presets import preset_options
 from meshreel.format.layout import Form, LayersPatches
 from meshreel.format.records import unpack_all
 from meshreel.geometry.decimate import decimate

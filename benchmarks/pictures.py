@@ -16,10 +16,10 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from meshreel.analysis.reference.reference.reference import MDS
-from meshreel.encoder.sequence.presets import preset_options
 from PIL import Image
 
+from meshreel.analysis.reference.reference import MDS
+from meshreel.encoder.presets import preset_options
 from meshreel.geometry.topology import components as connected
 from meshreel.metrics.cameras import Box
 from meshreel.metrics.sheet import SheetOptions, write_sheet

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 from drawing import Sheet, shaded
 from jaxtyping import Float64
-from meshreel.decoder.video.video import open as open_video
-from meshreel.encoder.sequence.presets import preset_options
-from meshreel.encoder.sequence.sequence import encode
 
 from meshreel.analysis.scene.segment import segment
 from meshreel.capture.fusion import FusionOptions
 from meshreel.capture.record import Recording, open_recording
 from meshreel.capture.room import RoomOptions, furnished_room, room_cameras
 from meshreel.capture.simulate import SensorOptions, simulate_rig
+from meshreel.decoder.video import open as open_video
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.sequence import encode
 from meshreel.geometry.topology import components, concatenate, part_of
 from meshreel.metrics.cameras import Box, OrthographicCamera
 from meshreel.types import Mesh

@@ -14,12 +14,11 @@ from collections.abc import Callable
 from itertools import accumulate
 from pathlib import Path
 
-from meshreel.decoder.video.video import open as open_video
-
 from meshreel.coding.background import encode_background
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
+from meshreel.decoder.video import open as open_video
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import concatenate, weld
 from meshreel.io.meshes import read_mesh

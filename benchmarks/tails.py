@@ -16,12 +16,12 @@ from itertools import chain
 import numpy as np
 from captured import Case, Row, asked_cases, keep
 from jaxtyping import Bool
-from meshreel.coding.layers.layers.layers import LayersState, decode_layers
-from meshreel.encoder.sequence.layers import encode_segment
-from meshreel.encoder.sequence.paper import EncodedGroup
-from meshreel.encoder.sequence.presets import preset_options
-from meshreel.encoder.sequence.tails import TailOptions, find_tails
 
+from meshreel.coding.layers.layers import LayersState, decode_layers
+from meshreel.encoder.layers import encode_segment
+from meshreel.encoder.paper import EncodedGroup
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.tails import TailOptions, find_tails
 from meshreel.format.layout import Form
 from meshreel.format.records import pack
 from meshreel.geometry.nearest import Surface

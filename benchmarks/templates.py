@@ -14,15 +14,15 @@ from typing import Any
 
 import numpy as np
 from captured import Case, Row, asked_cases, keep
-from meshreel.analysis.fit.fit.fit import Guides, fit_targets
-from meshreel.analysis.fit.fit.match import Target
-from meshreel.coding.layers.layers.layers import LayersOptions, encode_layers
-from meshreel.encoder.sequence.draco import measure
-from meshreel.encoder.sequence.presets import preset_options
 
+from meshreel.analysis.fit.fit import Guides, fit_targets
+from meshreel.analysis.fit.match import Target
 from meshreel.analysis.follow.correspond import choose_key
 from meshreel.analysis.follow.template import shared_detail
+from meshreel.coding.layers.layers import LayersOptions, encode_layers
 from meshreel.coding.reference import CodedReference, code_on_lattice
+from meshreel.encoder.draco import measure
+from meshreel.encoder.presets import preset_options
 from meshreel.geometry.decimate import decimate
 from meshreel.types import Mesh
 

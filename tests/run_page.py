@@ -39,9 +39,9 @@ def give() -> None:
 
 def small(preset_options: Any) -> Any:
     """A preset's options with little of everything, so that a page runs in seconds."""
-    from meshreel.analysis.reference.reference.reference import ReferenceOptions
-    from meshreel.analysis.reference.reference.track import TrackOptions
-    from meshreel.encoder.sequence.draco import IntraOptions
+    from meshreel.analysis.reference.reference import ReferenceOptions
+    from meshreel.analysis.reference.track import TrackOptions
+    from meshreel.encoder.draco import IntraOptions
 
     def options(*arguments: Any, **named: Any) -> Any:
         reference = ReferenceOptions(vertices=300, keys=1, trial_vertices=300)

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from meshreel.encoder.sequence.paper import EncoderOptions
 from skimage.measure import marching_cubes
 
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.places import PlacesOptions
 from meshreel.analysis.scene.segment import SegmentOptions
 from meshreel.analysis.scene.views import ViewsOptions
+from meshreel.encoder.paper import EncoderOptions
 from meshreel.geometry.topology import concatenate, weld
 from meshreel.types import Mesh
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from meshreel.encoder.sequence.draco import IntraOptions, Quality
-from meshreel.encoder.sequence.paper import EncoderOptions
-from meshreel.encoder.sequence.presets import preset_options
-
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
 from meshreel.analysis.scene.views import ViewsOptions
+from meshreel.encoder.draco import IntraOptions, Quality
+from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.presets import preset_options
 
 VIEWS = ViewsOptions(count=6, width=120, height=90, places=4, samples=500)
 TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,))

@@ -6,7 +6,6 @@ import json
 from dataclasses import asdict
 
 import pytest
-from meshreel.encoder.sequence.presets import PRESETS, preset_options
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.experiments import EXPERIMENTS, ablation_stages, layers
 from meshreel_bench.rd_rows import FLOOR as RATED_FLOOR
@@ -16,6 +15,7 @@ from meshreel_bench.rows import Point, join_rows
 from meshreel_bench.scene_rows import FLOOR, SEGMENTATION
 from meshreel_bench.variants import VARIANTS
 
+from meshreel.encoder.presets import PRESETS, preset_options
 from meshreel.errors import InputError
 
 BEST, A2S = f"meshreel {layers.PRESET}", "decimated_draco_subdivided"

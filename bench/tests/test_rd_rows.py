@@ -8,7 +8,6 @@ from threading import Event
 
 import numpy as np
 import pytest
-from meshreel.encoder.sequence.sequence import encode
 from meshreel_bench import fresh, peers, rd_rows, runner
 from meshreel_bench.apart import make_apart
 from meshreel_bench.bench import Bench
@@ -24,6 +23,7 @@ from meshreel_bench.runner import run_points, runs_of
 from PIL import Image
 
 from meshreel.capture.procedural import sliding_sphere
+from meshreel.encoder.sequence import encode
 from meshreel.errors import InputError
 from meshreel.geometry.sequences import Chosen
 from meshreel.metrics.cameras import ViewOptions

@@ -38,10 +38,10 @@ __all__ = [
 
 # Found on first use, so that a player never imports the encoder.
 _LATER = {
-    "EncoderOptions": ".windows",
-    "encode": ".encoder",
+    "EncoderOptions": ".encoder.paper",
+    "encode": ".encoder.sequence",
     "open_sequence": ".io.sequence",
-    "preset_options": ".presets",
+    "preset_options": ".encoder.presets",
 }
 
 

@@ -7,10 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64, Int32
+
+from .errors import InputError
+
+Up = Literal["y", "z", "-y", "-z"]  # the axis of a recording that points up
+UPS: tuple[Up, ...] = get_args(Up)
+UP_AXES = {
+    "y": (0.0, 1.0, 0.0),
+    "z": (0.0, 0.0, 1.0),
+    "-y": (0.0, -1.0, 0.0),
+    "-z": (0.0, 0.0, -1.0),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,3 +129,14 @@ class Centers:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+
+def check_up(axis: str) -> None:
+    """Raise InputError where `axis` is not one of the axes that can point up."""
+    if axis not in UP_AXES:
+        raise InputError(f"up axis {axis!r}: give {', '.join(UP_AXES)}")
+
+
+def known_up(axis: object) -> Up:
+    """The up axis that a file names, or y where it names none that is known."""
+    return next((known for known in UPS if known == axis), "y")

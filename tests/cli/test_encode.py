@@ -7,10 +7,10 @@ import shutil
 from dataclasses import asdict, replace
 
 import pytest
-from meshreel.encoder.sequence.presets import preset_options
 
 import meshreel
 from meshreel.cli.encode import command
+from meshreel.encoder.presets import preset_options
 from meshreel.io.sequence import SequenceOptions
 from tests.cli.conftest import failed
 

@@ -7,12 +7,12 @@ import shutil
 
 import numpy as np
 import pytest
-from meshreel.encoder.sequence.paper import encode_window
 from PIL import Image
 
 import meshreel
 from meshreel.capture.record import open_recording
 from meshreel.cli.encode import describe
+from meshreel.encoder.paper import encode_window
 from meshreel.io.depth import write_depth
 from meshreel.io.write import write_mesh
 from tests.capture.depth_scenes import camera, measured, record

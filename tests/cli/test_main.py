@@ -79,7 +79,7 @@ def test_decode_and_info_need_nothing_of_the_encoder(tmp_path):
         "import sys; from meshreel.cli import main\n"
         "commands = [['decode', sys.argv[1], '-o', sys.argv[2], '--quiet'], ['info', sys.argv[1], '--quiet']]\n"
         "codes = [main(command) for command in commands]\n"
-        "heavy = ('open3d', 'scipy', 'skimage', 'igl', 'fast_simplification', 'matplotlib', 'meshreel.encoder.sequence')\n"
+        "heavy = ('open3d', 'scipy', 'skimage', 'igl', 'fast_simplification', 'matplotlib', 'meshreel.encoder')\n"
         "print(codes, [name for name in heavy if name in sys.modules])"
     )
     command = [sys.executable, "-c", script, str(FILE), str(tmp_path)]

@@ -8,15 +8,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from meshreel.coding.layers.layers.layers import encode_layers
-from meshreel.decoder.video.tracks import Track, _Decoded
 
 import meshreel
 from meshreel.coding.intra import encode_empty
+from meshreel.coding.layers.layers import encode_layers
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
-from meshreel.decoder.video import tracks
+from meshreel.decoder import tracks
+from meshreel.decoder.tracks import Track, _Decoded
 from meshreel.errors import FormatError
 from meshreel.format.layout import Header
 from tests.coding.bodies import ball, moving

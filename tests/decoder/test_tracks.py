@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshreel.coding.layers.layers.layers import encode_layers
 
 import meshreel
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
+from meshreel.coding.layers.layers import encode_layers
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter, pack_head
-from meshreel.decoder.video import tracks
+from meshreel.decoder import tracks
 from meshreel.errors import FormatError
 from meshreel.format.layout import ChunkKind, Form, Index, IndexEntry, Layer
 from meshreel.geometry.topology import concatenate

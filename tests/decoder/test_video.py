@@ -6,7 +6,6 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
-from meshreel.decoder.video.tracks import Track, _Decoded
 
 import meshreel
 from meshreel.coding.entropy import encode_integers
@@ -14,6 +13,7 @@ from meshreel.coding.group import decode_group
 from meshreel.coding.mesh import encode_mesh
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
+from meshreel.decoder.tracks import Track, _Decoded
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import AnchorRule, DisplacementHead, Form, LaplacianGroup
 from meshreel.format.records import pack

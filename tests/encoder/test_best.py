@@ -8,11 +8,11 @@ from multiprocessing import get_context
 
 import numpy as np
 import pytest
-from meshreel.encoder.sequence.sequence import encode
 
 import meshreel
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.encoder.sequence import layers as layered
+from meshreel.encoder import layers as layered
+from meshreel.encoder.sequence import encode
 from meshreel.format.layout import Form
 from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.report import ComparisonOptions, compare_sequences

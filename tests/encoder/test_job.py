@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from meshreel.encoder.sequence.draco import Quality
-from meshreel.encoder.sequence.job import SpanStore, shared_options
-from meshreel.encoder.sequence.sequence import Encoder, encode
 from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
-from meshreel.encoder.sequence import job as work
-from meshreel.encoder.sequence import paper as windows
-from meshreel.encoder.sequence import sequence as encoding
+from meshreel.encoder import job as work
+from meshreel.encoder import paper as windows
+from meshreel.encoder import sequence as encoding
+from meshreel.encoder.draco import Quality
+from meshreel.encoder.job import SpanStore, shared_options
+from meshreel.encoder.sequence import Encoder, encode
 from meshreel.format.layout import Form
 from meshreel.types import Mesh, MeshList
 from tests.scenes import ball, quick_scene, with_room

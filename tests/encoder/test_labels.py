@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from meshreel.encoder.sequence.labels import label_frames
 
+from meshreel.encoder.labels import label_frames
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, MeshList
 from tests.encoder.test_scene import ALL, NONE, SMALL, at

@@ -8,14 +8,14 @@ from typing import overload
 
 import numpy as np
 import pytest
-from meshreel.analysis.fit.fit.match import Target
-from meshreel.encoder.sequence.draco import measure
-from meshreel.encoder.sequence.layers import encode_segment
-from meshreel.encoder.sequence.paper import EncodedGroup
 
+from meshreel.analysis.fit.match import Target
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.group import continue_group
-from meshreel.encoder.sequence import layers as layered
+from meshreel.encoder import layers as layered
+from meshreel.encoder.draco import measure
+from meshreel.encoder.layers import encode_segment
+from meshreel.encoder.paper import EncodedGroup
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
 from tests.small_options import quick

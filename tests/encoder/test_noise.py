@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from meshreel.coding.layers.layers.layers import decode_layers
-from meshreel.encoder.sequence.layers import encode_segment
-from meshreel.encoder.sequence.noise import above_noise
-from meshreel.encoder.sequence.paper import target_of
-from meshreel.encoder.sequence.presets import preset_options
-from meshreel.encoder.sequence.tails import TailOptions
 
+from meshreel.coding.layers.layers import decode_layers
+from meshreel.encoder.layers import encode_segment
+from meshreel.encoder.noise import above_noise
+from meshreel.encoder.paper import target_of
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.tails import TailOptions
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.types import Mesh

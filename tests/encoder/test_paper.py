@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from meshreel.encoder.sequence.draco import IntraOptions, Quality, cheapest_intra
-from meshreel.encoder.sequence.paper import EncodedGroup, cheaper
 
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.encoder.sequence import paper as windows
+from meshreel.encoder import paper as windows
+from meshreel.encoder.draco import IntraOptions, Quality, cheapest_intra
+from meshreel.encoder.paper import EncodedGroup, cheaper
 from meshreel.format.layout import Form
 from tests.small_options import quick
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from meshreel.coding.layers.layers.layers import LayersOptions
-from meshreel.encoder.sequence.paper import EncoderOptions
-from meshreel.encoder.sequence.presets import PRESETS, displacement_step, preset_options, reference_vertices
 
 from meshreel.analysis.follow.template import TemplateOptions
+from meshreel.coding.layers.layers import LayersOptions
+from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.presets import PRESETS, displacement_step, preset_options, reference_vertices
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 

@@ -9,13 +9,13 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from meshreel.encoder.sequence.draco import Quality
-from meshreel.encoder.sequence.quality import TRIALS, Goal, Search, encode_to
-from meshreel.encoder.sequence.sequence import Encoder
-from meshreel.encoder.sequence.summary import GroupSummary, SceneSummary, Summary
 
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
+from meshreel.encoder.draco import Quality
+from meshreel.encoder.quality import TRIALS, Goal, Search, encode_to
+from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.summary import GroupSummary, SceneSummary, Summary
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.metrics.report import ComparisonOptions, compare_sequences

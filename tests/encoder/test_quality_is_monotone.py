@@ -6,13 +6,13 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
-from meshreel.decoder.video.video import open as open_video
-from meshreel.encoder.sequence.draco import IntraOptions
-from meshreel.encoder.sequence.paper import EncoderOptions
-from meshreel.encoder.sequence.presets import preset_options
-from meshreel.encoder.sequence.sequence import encode
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
+from meshreel.decoder.video import open as open_video
+from meshreel.encoder.draco import IntraOptions
+from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.sequence import encode
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import weld
 from meshreel.io.sequence import SequenceOptions, open_sequence

@@ -7,12 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from meshreel.encoder.sequence.draco import NO_ERROR
-from meshreel.encoder.sequence.job import Work
-from meshreel.encoder.sequence.paper import EncodedGroup, Stages, target_of
-from meshreel.encoder.sequence.parts import Parts, take_apart
-from meshreel.encoder.sequence.scene import TrackGroup, encode_bodies, encode_static
-from meshreel.encoder.sequence.sequence import Encoder, encode
 
 import meshreel
 import meshreel.encoder.scene as scene
@@ -23,6 +17,12 @@ from meshreel.analysis.scene.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background
 from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
+from meshreel.encoder.draco import NO_ERROR
+from meshreel.encoder.job import Work
+from meshreel.encoder.paper import EncodedGroup, Stages, target_of
+from meshreel.encoder.parts import Parts, take_apart
+from meshreel.encoder.scene import TrackGroup, encode_bodies, encode_static
+from meshreel.encoder.sequence import Encoder, encode
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form

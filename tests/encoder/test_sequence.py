@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from meshreel.encoder.sequence.draco import IntraOptions
-from meshreel.encoder.sequence.sequence import encode
 
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
+from meshreel.encoder.draco import IntraOptions
+from meshreel.encoder.sequence import encode
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.io.sequence import SequenceOptions, open_sequence

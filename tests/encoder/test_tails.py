@@ -6,16 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from meshreel.coding.layers.layers.patches import decode_patches
-from meshreel.encoder.sequence.draco import Quality, measure
-from meshreel.encoder.sequence.paper import EncoderOptions
-from meshreel.encoder.sequence.presets import preset_options
-from meshreel.encoder.sequence.sequence import encode
-from meshreel.encoder.sequence.tails import TailOptions, find_tails
 
 import meshreel
 from meshreel.coding.group import payload_parts
-from meshreel.encoder.sequence import tails
+from meshreel.coding.layers.patches import decode_patches
+from meshreel.encoder import tails
+from meshreel.encoder.draco import Quality, measure
+from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.sequence import encode
+from meshreel.encoder.tails import TailOptions, find_tails
 from meshreel.errors import InputError
 from meshreel.format.records import pack
 from meshreel.types import Mesh, MeshList

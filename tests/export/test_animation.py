@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from meshreel.export.video.animated_glb import animated_glb
-from meshreel.export.video.animated_usd import animated_usd
-from meshreel.export.video.animation import Animation, AnimationWriter, Points, Shape, changes
 
 from meshreel.errors import InputError
+from meshreel.export.animated_glb import animated_glb
+from meshreel.export.animated_usd import animated_usd
+from meshreel.export.animation import Animation, AnimationWriter, Points, Shape, changes
 from tests.play_glb import PlayedGlb
 
 WRITERS = {"glb": animated_glb, "usdc": animated_usd, "usda": animated_usd, "usdz": animated_usd}

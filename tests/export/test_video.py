@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from meshreel.encoder.sequence.sequence import encode
-from meshreel.export.video.video import ExportOptions
-from meshreel.export.video.video import export as export_file
 
 import meshreel
 from meshreel.coding.intra import encode_intra
 from meshreel.container.writer import ReelWriter
+from meshreel.encoder.sequence import encode
 from meshreel.errors import FormatError, InputError
+from meshreel.export.video import ExportOptions
+from meshreel.export.video import export as export_file
 from meshreel.geometry.topology import vertex_normals
 from meshreel.io.sequence import open_sequence
 from meshreel.types import Mesh, MeshList

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from meshreel.coding.layers.layers.layers import LayersOptions, LayersState, decode_layers, encode_layers
-from meshreel.coding.layers.layers.patches import encode_patches
 
 from meshreel.coding import entropy
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
+from meshreel.coding.layers.layers import LayersOptions, LayersState, decode_layers, encode_layers
+from meshreel.coding.layers.patches import encode_patches
 from meshreel.coding.mesh import decode_mesh
 from meshreel.coding.paper import laplacian
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements

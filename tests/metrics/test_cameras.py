@@ -4,7 +4,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from meshreel.axes import UP_AXES
 from meshreel.errors import InputError
 from meshreel.metrics.cameras import (
     Box,
@@ -14,7 +13,7 @@ from meshreel.metrics.cameras import (
     views_around,
     write_cameras,
 )
-from meshreel.types import Mesh, MeshList
+from meshreel.types import UP_AXES, Mesh, MeshList
 
 from .shapes import moved, sphere
 

@@ -20,9 +20,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from meshreel.decoder.video.video import Video
-from meshreel.decoder.video.video import open as open_video
-
+from meshreel.decoder.video import Video
+from meshreel.decoder.video import open as open_video
 from meshreel.types import Mesh
 
 FRAMES = "frames_sha256"  # of a row: the digest of each mesh that is decoded
@@ -115,7 +114,7 @@ def measure_pair(path: str, anchor: str) -> dict[str, Any]:
 
 def measure_encode(name: str, data: str, frames: str, options: str) -> dict[str, Any]:
     """Bytes and CPU s a frame of encoding so many frames of a sequence; the memory is what it is run for."""
-    from meshreel.encoder.sequence.sequence import encode
+    from meshreel.encoder.sequence import encode
 
     from .codecs.meshreel import MeshreelCodec
     from .datasets import open_dataset
@@ -130,9 +129,8 @@ def measure_encode(name: str, data: str, frames: str, options: str) -> dict[str,
 
 def measure_scene_encode(name: str, data: str, cache: str, frames: str, quality: str) -> dict[str, Any]:
     """The same of a captured scene and the preset `best`; longer than it is, it is played forth and back."""
-    from meshreel.encoder.sequence.presets import preset_options
-    from meshreel.encoder.sequence.sequence import encode
-
+    from meshreel.encoder.presets import preset_options
+    from meshreel.encoder.sequence import encode
     from meshreel.geometry.sequences import forth_and_back
 
     from .scenes import open_scene

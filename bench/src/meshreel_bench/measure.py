@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from meshreel.decoder.video.video import open as open_video
 
 from meshreel.coding.mesh import encode_mesh
+from meshreel.decoder.video import open as open_video
 from meshreel.geometry.sequences import Backwards
 from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Frames, MeshSequence

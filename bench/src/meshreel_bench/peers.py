@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from meshreel.decoder.video.video import Video
-from meshreel.encoder.sequence.draco import IntraOptions, cheapest_intra, measure
 
 from meshreel.analysis.survey import Survey, survey
+from meshreel.decoder.video import Video
+from meshreel.encoder.draco import IntraOptions, cheapest_intra, measure
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 

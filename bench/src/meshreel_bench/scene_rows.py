@@ -13,8 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from meshreel.decoder.video.video import open as open_video
-
+from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import ChunkKind
 from meshreel.metrics.seams import measure_seam, seam_row

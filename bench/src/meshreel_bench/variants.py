@@ -9,8 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from meshreel.encoder.sequence.paper import EncoderOptions
-
+from meshreel.encoder.paper import EncoderOptions
 from meshreel.errors import InputError
 
 Change = Callable[[EncoderOptions], EncoderOptions]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshreel.decoder.video.video import open as open_video
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.background_once import BackgroundOnceDracoCodec
 from meshreel_bench.codecs.draco import DecimatedDracoCodec
 
 from meshreel.capture.procedural import sliding_sphere
+from meshreel.decoder.video import open as open_video
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.nearest import Surface, distances

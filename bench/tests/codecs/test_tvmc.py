@@ -7,8 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from meshreel.encoder.sequence.presets import quality_of_vertices, reference_vertices
-from meshreel.encoder.sequence.sequence import Encoder
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.tvmc import TvmcCodec
 from meshreel_bench.codecs.tvmc.layout import LONGEST, Group, Kind, State, Stream, pack_stream, unpack_stream
@@ -20,6 +18,8 @@ from meshreel_bench.measure import run_curve_point
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.intra import encode_intra
+from meshreel.encoder.presets import quality_of_vertices, reference_vertices
+from meshreel.encoder.sequence import Encoder
 from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
 from meshreel.geometry.nearest import distances
@@ -177,7 +177,7 @@ def test_coordinates_around_a_million_keep_their_millimetres():
     ],
 )
 def test_options_out_of_range_are_refused(options, words, monkeypatch):
-    from meshreel.encoder.sequence.presets import preset_options
+    from meshreel.encoder.presets import preset_options
 
     monkeypatch.setattr(f"{CODEC}.preset_options", preset_options)
     with pytest.raises(InputError, match=words):

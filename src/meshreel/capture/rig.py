@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64, UInt16
 
-from ..axes import UP_AXES, UPS, Up
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import DepthPicture
 from ..io.depth import picture_size, read_depth
 from ..io.names import last_number
 from ..io.write import make_folder, replacing
+from ..types import UP_AXES, UPS, Up
 
 RIG, SINGLE = "rig.json", "camera.json"
 MOST_PIXELS = 16_384  # of a picture's side

@@ -7,12 +7,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..axes import Up
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..export.animated_usd import EXTENSIONS
 from ..export.video import ExportOptions, export
 from ..io.sequence import SequenceOptions
+from ..types import Up
 from .console import Common
 from .decode import Part, check_part
 

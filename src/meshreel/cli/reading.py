@@ -8,12 +8,12 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..axes import Up
 from ..errors import InputError
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions
 from ..metrics.cameras import ViewOptions
 from ..metrics.report import ComparisonOptions
+from ..types import Up
 
 _READ = SequenceOptions()
 _VIEWS = ViewOptions()

@@ -13,13 +13,12 @@ from cyclopts import Parameter
 from ..analysis.scene.masks import ImageMasks, Masker, one_size
 from ..analysis.scene.sam3 import Sam3Masks, Sam3Options
 from ..analysis.scene.segment import SegmentOptions
-from ..axes import Up, known_up
 from ..capture.record import open_recording
 from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
 from ..geometry.cameras import unpack_cameras
 from ..io.sequence import open_sequence
-from ..types import MeshSequence
+from ..types import MeshSequence, Up, known_up
 from .capture import MADE
 from .reading import Reading
 

@@ -10,11 +10,11 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import accumulate
 
-from ..axes import Up, known_up
 from ..errors import FormatError
 from ..format.checks import check_header, check_index, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
+from ..types import Up, known_up
 from .sources import Source
 
 FIRST_REQUEST = 16384  # bytes; the head of some minutes of video

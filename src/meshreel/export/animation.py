@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Float32, Float64, Int32
 
-from ..axes import Up
 from ..errors import InputError
+from ..types import Up
 
 _TURNS: dict[Up, list[list[int]]] = {  # what turns an axis upwards, to +y
     "y": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],

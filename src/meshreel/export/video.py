@@ -15,13 +15,12 @@ from typing import Literal
 
 import numpy as np
 
-from ..axes import Up
 from ..container.reader import Chunk, ReelReader
 from ..decoder.tracks import Background, Track
 from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.topology import vertex_normals
-from ..types import Mesh
+from ..types import Mesh, Up
 from .animated_glb import animated_glb
 from .animated_usd import EXTENSIONS, animated_usd
 from .animation import Animation, AnimationWriter, Points, Shape, check_target

@@ -14,11 +14,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float64
 
-from ..axes import UP_AXES, check_up
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera, pack_cameras, pinhole_record, unpack_cameras
 from ..io.write import replacing
-from ..types import Mesh
+from ..types import UP_AXES, Mesh, check_up
 
 _MARGIN = 1.05  # of the box, so that nothing touches the border
 

@@ -15,12 +15,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float64
 
-from ..axes import UP_AXES, check_up
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..geometry.nearest import Surface
 from ..io.write import replacing
-from ..types import Mesh
+from ..types import UP_AXES, Mesh, check_up
 from .cameras import Box, ViewOptions, views_around
 from .distance import surface_errors
 from .render import View, Window, look

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from meshreel.analysis.fit.fit.conjugate_gradients import Limits, conjugate_gradients
+
+from meshreel.analysis.fit.conjugate_gradients import Limits, conjugate_gradients
 
 ROWS = np.random.default_rng(1).normal(size=(12, 6))
 MATRIX = ROWS.T @ ROWS + 0.1 * np.eye(6)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshreel.analysis.fit.fit.border import border_sides
-from meshreel.analysis.fit.fit.fit import FitOptions, fit_frames
-from meshreel.analysis.fit.fit.shape import strongest_components
 
+from meshreel.analysis.fit.border import border_sides
+from meshreel.analysis.fit.fit import FitOptions, fit_frames
+from meshreel.analysis.fit.shape import strongest_components
 from meshreel.errors import InputError
 from meshreel.geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint
 from meshreel.types import Mesh

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshreel.analysis.fit.fit.match import Target
 
+from meshreel.analysis.fit.match import Target
 from meshreel.analysis.follow import correspond
 from meshreel.analysis.follow.correspond import choose_key, from_last
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage

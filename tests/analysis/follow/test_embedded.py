@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshreel.analysis.fit.fit.match import Target
 
+from meshreel.analysis.fit.match import Target
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage, Tracker, register
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError

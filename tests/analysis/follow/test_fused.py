@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from meshreel.analysis.fit.fit.match import Target
-from meshreel.analysis.fit.fit.residual import residual_of
 
+from meshreel.analysis.fit.match import Target
+from meshreel.analysis.fit.residual import residual_of
 from meshreel.analysis.follow.embedded import Motion
 from meshreel.analysis.follow.embedded_graph import area_samples, build_graph, farthest_first
 from meshreel.analysis.follow.fused import FusedOptions, fused_mesh

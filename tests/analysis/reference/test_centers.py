@@ -6,14 +6,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from meshreel.analysis.reference.reference.centers import (
+
+from meshreel.analysis.reference.centers import (
     ReferenceCenterOptions,
     affinity,
     center_spacing,
     largest_distances,
     reference_centers,
 )
-
 from meshreel.errors import InputError
 from meshreel.types import Centers
 

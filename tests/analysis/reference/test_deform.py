@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from meshreel.analysis.reference.reference.centers import ReferenceCenterOptions, affinity, largest_distances
-from meshreel.analysis.reference.reference.deform import (
+
+from meshreel.analysis.reference.centers import ReferenceCenterOptions, affinity, largest_distances
+from meshreel.analysis.reference.deform import (
     DeformOptions,
     bind,
     center_motions,
@@ -13,7 +14,6 @@ from meshreel.analysis.reference.reference.deform import (
     move_normals,
     neighbours,
 )
-
 from meshreel.errors import InputError
 from meshreel.geometry.topology import subdivide_midpoint, vertex_normals
 from meshreel.types import Centers, Mesh

@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from meshreel.analysis.reference.reference.track import TrackOptions, track_centers
 from scipy.spatial import cKDTree
 
 from meshreel import _core
+from meshreel.analysis.reference.track import TrackOptions, track_centers
 from meshreel.errors import InputError
 from meshreel.geometry.inside import interior_samples
 from meshreel.types import Mesh

@@ -4,10 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from meshreel.encoder.sequence.paper import Stages
-from meshreel.encoder.sequence.parts import take_apart
-from meshreel.encoder.sequence.presets import preset_options
-from meshreel.encoder.sequence.scene import encode_static
 
 from meshreel.analysis.scene.cut import CutOptions
 from meshreel.analysis.scene.labelling import ByPlace
@@ -17,6 +13,10 @@ from meshreel.analysis.scene.settle import NEVER, SettleOptions
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
+from meshreel.encoder.paper import Stages
+from meshreel.encoder.parts import take_apart
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.scene import encode_static
 from meshreel.errors import InputError
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld

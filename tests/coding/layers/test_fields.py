@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshreel.coding.layers.layers.fields import Rate, SurfaceWeight, decode_field, encode_field
-from meshreel.coding.layers.layers.graph import hierarchy, siblings
 
 from meshreel import _core
-from meshreel.coding.layers.layers import fields, orthonormal
+from meshreel.coding.layers import fields, orthonormal
+from meshreel.coding.layers.fields import Rate, SurfaceWeight, decode_field, encode_field
+from meshreel.coding.layers.graph import hierarchy, siblings
 from meshreel.coding.steps import LEVELS
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.levels import subdivide

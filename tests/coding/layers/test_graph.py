@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshreel.coding.layers.layers.graph import Graph, hierarchy, siblings
 
+from meshreel.coding.layers.graph import Graph, hierarchy, siblings
 from meshreel.errors import FormatError
 from meshreel.geometry.levels import subdivide
 from meshreel.geometry.topology import subdivide_midpoint, unique_edges

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from meshreel.coding.layers.layers.layers import EncodedLayers, LayersOptions, decode_layers, encode_layers
 
 from meshreel.coding.group import continue_group, decode_group, payload_parts
-from meshreel.coding.layers.layers import layers
+from meshreel.coding.layers import layers
+from meshreel.coding.layers.layers import EncodedLayers, LayersOptions, decode_layers, encode_layers
 from meshreel.coding.reference import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin

@@ -8,8 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from meshreel.coding.layers.layers.layers import encode_layers
-from meshreel.coding.layers.layers.patches import (
+
+from meshreel import _core
+from meshreel.coding.group import continue_group, decode_group, payload_parts
+from meshreel.coding.layers.layers import encode_layers
+from meshreel.coding.layers.patches import (
     Patches,
     _parted,
     decode_patches,
@@ -17,9 +20,6 @@ from meshreel.coding.layers.layers.patches import (
     encode_patches,
     encode_runs,
 )
-
-from meshreel import _core
-from meshreel.coding.group import continue_group, decode_group, payload_parts
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersPatches
 from meshreel.format.records import pack

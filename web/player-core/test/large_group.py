@@ -9,8 +9,8 @@ import io
 import sys
 
 import numpy as np
-from meshreel.coding.layers.layers.layers import LayersOptions, LayersState, encode_layers
 
+from meshreel.coding.layers.layers import LayersOptions, LayersState, encode_layers
 from meshreel.coding.reference import code_reference
 from meshreel.container.writer import ReelWriter
 from meshreel.format.layout import Header

@@ -12,16 +12,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from meshreel.decoder.video.video import open as open_video
-from meshreel.encoder.sequence.paper import Stages
-from meshreel.encoder.sequence.parts import take_apart
-from meshreel.encoder.sequence.presets import preset_options
-from meshreel.encoder.sequence.scene import Static, encode_static
-from meshreel.encoder.sequence.sequence import make_header
-
 from meshreel.analysis.scene.probe import is_scene
 from meshreel.analysis.survey import Survey, survey
 from meshreel.container.writer import ReelWriter
+from meshreel.decoder.video import open as open_video
+from meshreel.encoder.paper import Stages
+from meshreel.encoder.parts import take_apart
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.scene import Static, encode_static
+from meshreel.encoder.sequence import make_header
 from meshreel.geometry.topology import part_of
 from meshreel.types import Mesh, MeshSequence
 

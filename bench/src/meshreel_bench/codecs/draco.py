@@ -11,12 +11,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from meshreel.decoder.video.video import open as open_video
-from meshreel.encoder.sequence.sequence import make_header
-
 from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.container.writer import ReelWriter
+from meshreel.decoder.video import open as open_video
+from meshreel.encoder.sequence import make_header
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate, decimate_faces
 from meshreel.types import Mesh, MeshSequence

@@ -8,12 +8,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from meshreel.decoder.video.video import open as open_video
-from meshreel.encoder.sequence.job import shared_options
-from meshreel.encoder.sequence.paper import EncoderOptions
-from meshreel.encoder.sequence.presets import preset_options
-from meshreel.encoder.sequence.sequence import Encoder
-
+from meshreel.decoder.video import open as open_video
+from meshreel.encoder.job import shared_options
+from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.presets import preset_options
+from meshreel.encoder.sequence import Encoder
 from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Progress

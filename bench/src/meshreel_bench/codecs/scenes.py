@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from meshreel.decoder.video.video import open as open_video
-from meshreel.encoder.sequence.sequence import make_header
 
 from meshreel.analysis.survey import Survey
 from meshreel.container.writer import ReelWriter
+from meshreel.decoder.video import open as open_video
+from meshreel.encoder.sequence import make_header
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.topology import concatenate, drop_unreferenced

@@ -17,12 +17,11 @@ from functools import cache
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
 
-from ...axes import UP_AXES, check_up
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
-from ...types import Frames, Mesh
+from ...types import UP_AXES, Frames, Mesh, check_up
 
 _TOUCHES = 1e-3  # of a ray's length: what it meets so near its end is the sample itself
 _INSIDE = 0.5  # share of what a place sees from behind from which on it is taken to be inside of something

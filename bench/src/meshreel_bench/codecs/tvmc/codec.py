@@ -7,11 +7,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from meshreel.coding.layers.layers.patches import run_lengths
-from meshreel.encoder.sequence.paper import EncoderOptions, Stages
-from meshreel.encoder.sequence.presets import preset_options, quality_of_vertices
-from meshreel.encoder.sequence.sequence import Encoder
 
+from meshreel.coding.layers.patches import run_lengths
+from meshreel.encoder.paper import EncoderOptions, Stages
+from meshreel.encoder.presets import preset_options, quality_of_vertices
+from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
-from meshreel.encoder.sequence.paper import EncoderOptions, Span, displacement_field, intra_only
-from meshreel.encoder.sequence.scene import BodyRun, Static, all_windows, encode_static, options_of
-from meshreel.encoder.sequence.sequence import Encoder
 
 from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.reference import CodedReference
+from meshreel.encoder.paper import EncoderOptions, Span, displacement_field, intra_only
+from meshreel.encoder.scene import BodyRun, Static, all_windows, encode_static, options_of
+from meshreel.encoder.sequence import Encoder
 
 
 @dataclass(frozen=True, slots=True)

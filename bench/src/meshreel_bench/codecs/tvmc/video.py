@@ -6,11 +6,10 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from typing import overload
 
-from meshreel.decoder.video.tracks import MOST_TOGETHER
-from meshreel.encoder.sequence.paper import MOST_FRAMES
-
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.intra import decode_intra
+from meshreel.decoder.tracks import MOST_TOGETHER
+from meshreel.encoder.paper import MOST_FRAMES
 from meshreel.errors import FormatError
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement
