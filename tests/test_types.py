@@ -1,12 +1,14 @@
-"""Frames by number, and the axis that points up."""
+"""Meshes, sequences of them, and the axis that points up."""
 
 from __future__ import annotations
+
+import sys
 
 import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.types import UP_AXES, check_up, evenly, known_up
+from meshreel.types import UP_AXES, Mesh, MeshList, as_sequence, check_up, evenly, known_up
 
 
 @pytest.mark.parametrize(
@@ -24,11 +26,86 @@ def test_an_axis_that_can_point_up_is_known(axis: str) -> None:
     assert np.linalg.norm(UP_AXES[known_up(axis)]) == 1.0
 
 
-@pytest.mark.parametrize("told", ["x", "", None, 1, ["z"], {"up": "z"}])
-def test_where_a_file_says_nothing_that_is_known_y_points_up(told: object) -> None:
-    assert known_up(told) == "y"
+@pytest.mark.parametrize("axis", ["x", "", None, 1, ["z"], {"up": "z"}])
+def test_an_unknown_axis_in_a_file_means_y(axis: object) -> None:
+    assert known_up(axis) == "y"
 
 
 def test_another_axis_is_refused() -> None:
     with pytest.raises(InputError, match="up axis 'x': give y, z, -y, -z"):
         check_up("x")
+
+
+TRIANGLE = Mesh.of([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+
+
+def test_a_sequence_is_returned_as_it_is():
+    sequence = MeshList((TRIANGLE,), frame_rate=12.0)
+    assert as_sequence(sequence) is sequence
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        TRIANGLE,
+        TRIANGLE.to_trimesh(),
+        (TRIANGLE.vertices, TRIANGLE.faces),
+        [TRIANGLE.vertices.tolist(), TRIANGLE.faces.tolist()],
+        TRIANGLE.to_open3d(),
+    ],
+    ids=["mesh", "trimesh", "pair of arrays", "pair of lists", "open3d"],
+)
+def test_meshes_of_other_libraries_and_pairs_of_arrays_are_frames(item: object):
+    sequence = as_sequence([item, TRIANGLE], frame_rate=25.0)
+    assert (len(sequence), sequence.frame_rate) == (2, 25.0)
+    assert sequence[0].faces.tolist() == [[0, 1, 2]] and sequence[0].faces.dtype == np.int32
+    assert sequence[0].vertices.tolist() == TRIANGLE.vertices.tolist() and sequence[0].vertices.dtype == np.float64
+
+
+def test_an_iterator_of_meshes_and_a_frame_without_faces_are_a_sequence():
+    sequence = as_sequence(pair for pair in [(np.zeros((0, 3)), []), ([[0, 0, 1]], [])])
+    assert [len(mesh.vertices) for mesh in sequence] == [0, 1] and all(mesh.is_empty for mesh in sequence)
+
+
+@pytest.mark.parametrize("value", ["scan", 3, TRIANGLE, None])
+def test_a_value_that_is_no_sequence_of_meshes_is_refused(value: object):
+    with pytest.raises(InputError, match="is no sequence of meshes; give a list of meshes, or"):
+        as_sequence(value)
+
+
+@pytest.mark.parametrize(
+    ("item", "text"),
+    [
+        (7, "frame 1: int '7' is no mesh; give a Mesh"),
+        (TRIANGLE.vertices, "frame 1: ndarray .* is no mesh"),
+        ((TRIANGLE.vertices,), "frame 1: tuple .* is no mesh"),
+        (([[0, 0]], [[0, 0, 0]]), r"frame 1: vertices are int64 of shape \(1, 2\); give N x 3 numbers"),
+        (([["a", "b", "c"]], [[0, 0, 0]]), "frame 1: vertices are <U1"),
+        ((TRIANGLE.vertices, [[0, 1, 2, 0]]), r"frame 1: faces are int64 of shape \(1, 4\)"),
+        ((TRIANGLE.vertices, [[0, 1], [2]]), "frame 1: faces are no array"),
+        ((TRIANGLE.vertices, [[0.0, 1.0, 2.0]]), "frame 1: faces are float64; give integers"),
+        ((TRIANGLE.vertices, [[0, 1, 3]]), r"frame 1: a face refers to vertex 3, but there are 3 \(from 0\)"),
+        ((TRIANGLE.vertices, [[0, -1, 2]]), "frame 1: a face refers to vertex -1"),
+        ((TRIANGLE.vertices, np.array([[0, 1, 1 << 40]])), f"frame 1: a face refers to vertex {1 << 40}"),
+    ],
+)
+def test_a_frame_that_is_no_mesh_is_named(item: object, text: str):
+    with pytest.raises(InputError, match=text):
+        as_sequence([TRIANGLE, item])
+
+
+def test_copies_and_meshes_of_other_libraries_may_be_written_to():
+    vertices = TRIANGLE.vertices.copy()
+    vertices.flags.writeable = False
+    mesh = Mesh(vertices, TRIANGLE.faces)
+    for other in (mesh.copy(), mesh.to_trimesh()):
+        assert np.array_equal(other.vertices, mesh.vertices) and np.array_equal(other.faces, mesh.faces)
+        other.vertices[0] = 5
+    assert mesh.vertices[0].tolist() == [0, 0, 0]
+    assert np.asarray(mesh.to_open3d().triangles).tolist() == [[0, 1, 2]]
+
+
+def test_open3d_missing_names_the_extra(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    with pytest.raises(ImportError, match=r"meshreel\[encode\]"):
+        TRIANGLE.to_open3d()

@@ -1,18 +1,21 @@
-"""The vocabulary: values that every layer passes to the next.
+"""The vocabulary of the package: meshes, sequences of meshes, placements and up axes.
 
 Coordinates are float64 in memory, so that geo-referenced captures (around 1e6) keep their millimetres.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Literal, Protocol, get_args, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64, Int32
 
 from .errors import InputError
+
+if TYPE_CHECKING:
+    import trimesh
 
 Up = Literal["y", "z", "-y", "-z"]  # the axis of a recording that points up
 UPS: tuple[Up, ...] = get_args(Up)
@@ -26,58 +29,80 @@ UP_AXES = {
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A triangle mesh. Legal without faces and without vertices (an empty frame)."""
+    """A triangle mesh, which may have no faces and no vertices (an empty frame).
+
+    The arrays of decoded meshes are read-only; those of `copy()` are not.
+    """
 
     vertices: Float64[np.ndarray, "V 3"]  # m, right-handed
     faces: Int32[np.ndarray, "F 3"]  # counter-clockwise from outside
 
     @staticmethod
     def of(vertices: object, faces: object) -> Mesh:
-        """The mesh of any array-likes, converted to the promised dtypes and made contiguous."""
+        """Return a mesh of any array-likes, converted to contiguous arrays of the annotated dtypes."""
         v = np.ascontiguousarray(np.asarray(vertices, dtype=np.float64).reshape(-1, 3))
         f = np.ascontiguousarray(np.asarray(faces, dtype=np.int32).reshape(-1, 3))
         return Mesh(v, f)
 
     @staticmethod
     def empty() -> Mesh:
-        """A mesh with no vertices and no faces."""
+        """Return a mesh with no vertices and no faces."""
         return Mesh.of(np.zeros((0, 3)), np.zeros((0, 3)))
 
     @property
     def is_empty(self) -> bool:
-        """True where there is no surface."""
+        """True if the mesh has no faces."""
         return len(self.faces) == 0
 
     @property
     def diagonal(self) -> float:
-        """Length of the bounding box's diagonal, m; 0 for an empty mesh."""
+        """Length of the diagonal of the bounding box, m; 0 for a mesh without vertices."""
         if len(self.vertices) == 0:
             return 0.0
         return float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
 
+    def copy(self) -> Mesh:
+        """Return the same mesh in new arrays, which may be written to."""
+        return Mesh(self.vertices.copy(), self.faces.copy())
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """Return a copy as a `trimesh.Trimesh`, with the same vertices in the same order."""
+        import trimesh
+
+        return trimesh.Trimesh(self.vertices.copy(), self.faces.copy(), process=False)
+
+    def to_open3d(self) -> Any:
+        """Return a copy as an `open3d.geometry.TriangleMesh`. Raises ImportError without the extra `encode`."""
+        try:
+            import open3d
+        except ImportError as error:
+            raise ImportError("Mesh.to_open3d needs the extra `encode`: pip install 'meshreel[encode]'") from error
+        mesh, utility = self.copy(), open3d.utility  # it refuses read-only arrays
+        return open3d.geometry.TriangleMesh(utility.Vector3dVector(mesh.vertices), utility.Vector3iVector(mesh.faces))
+
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where normalised coordinates lie in the world: each at origin + scale x coordinate."""
+    """Map from normalised coordinates to metres: origin + scale x coordinate."""
 
     scale: float  # m
     origin: tuple[float, ...]  # m, three
 
     def of(self, mesh: Mesh) -> Mesh:
-        """A mesh of normalised coordinates in metres."""
+        """Return a mesh of normalised coordinates in metres."""
         return Mesh(np.asarray(self.origin) + self.scale * mesh.vertices, mesh.faces)
 
     @property
     def numbers(self) -> tuple[float, tuple[float, ...]]:
-        """Scale and origin, as the core takes them."""
+        """Scale and origin as the pair of arguments that the compiled core takes."""
         return self.scale, self.origin
 
 
 @runtime_checkable
 class Frames(Protocol):
-    """Meshes by number: `len`, `frames[i]` and iteration; a list, or what reads them when they are asked for.
+    """Meshes by frame number: a list, or an object that reads or computes each mesh on access.
 
-    A class that inherits from it need not say how to iterate.
+    Classes that inherit from it get iteration from `len` and `frames[i]`.
     """
 
     def __len__(self) -> int: ...
@@ -89,13 +114,13 @@ class Frames(Protocol):
 
 
 def evenly(count: int, most: int) -> list[int]:
-    """Numbers of some of `count` frames, rising: at most so many, evenly spread from the first to the last."""
+    """Return at most `most` of the frame numbers 0 to `count` - 1, in order, evenly spread from first to last."""
     return sorted({round(k) for k in np.linspace(0, count - 1, min(count, most))})
 
 
 @runtime_checkable
 class MeshSequence(Frames, Protocol):
-    """Frames read one at a time, with a frame rate; never all in memory."""
+    """Frames with a frame rate, accessed one at a time, so that they need not all be in memory."""
 
     @property
     def frame_rate(self) -> float:
@@ -105,7 +130,7 @@ class MeshSequence(Frames, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class MeshList:
-    """Frames that are in memory already, as a MeshSequence."""
+    """A MeshSequence of meshes that are in memory."""
 
     meshes: tuple[Mesh, ...]
     frame_rate: float = 30.0  # 1/s
@@ -120,9 +145,50 @@ class MeshList:
         return iter(self.meshes)
 
 
+def as_sequence(value: object, frame_rate: float = 30.0) -> MeshSequence:
+    """Return `value` if it is a MeshSequence, otherwise a MeshList of its items at `frame_rate` (1/s).
+
+    An item is a Mesh, an object with `vertices` and `faces` (trimesh) or `triangles` (Open3D), or a pair of arrays
+    (vertices, faces). Raises InputError for any other value; the message names the frame.
+    """
+    if isinstance(value, MeshSequence):
+        return value
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        remedy = "give a list of meshes, or meshreel.open_sequence(path)"
+        raise InputError(f"{type(value).__name__} {str(value)[:60]!r} is no sequence of meshes; {remedy}")
+    return MeshList(tuple(_as_mesh(item, f"frame {number}") for number, item in enumerate(value)), frame_rate)
+
+
+def _as_mesh(item: object, where: str) -> Mesh:
+    if isinstance(item, Mesh):
+        return item
+    faces = getattr(item, "faces", getattr(item, "triangles", None))
+    pair = item if isinstance(item, tuple | list) else (getattr(item, "vertices", None), faces)
+    if len(pair) != 2 or pair[0] is None or pair[1] is None:
+        remedy = "give a Mesh, a trimesh or Open3D mesh, or a pair (vertices, faces)"
+        raise InputError(f"{where}: {type(item).__name__} {str(item)[:60]!r} is no mesh; {remedy}")
+    vertices, corners = _rows_of_three(pair[0], f"{where}: vertices"), _rows_of_three(pair[1], f"{where}: faces")
+    if corners.size and corners.dtype.kind not in "iu":
+        raise InputError(f"{where}: faces are {corners.dtype}; give integers, the numbers of vertices")
+    if corners.size and not 0 <= corners.min() <= corners.max() < len(vertices):
+        wrong = corners.min() if corners.min() < 0 else corners.max()
+        raise InputError(f"{where}: a face refers to vertex {wrong}, but there are {len(vertices)} (from 0)")
+    return Mesh.of(vertices, corners)
+
+
+def _rows_of_three(values: object, what: str) -> np.ndarray:
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise InputError(f"{what} are no array ({error}); give one of N x 3 numbers") from None
+    if array.size and (array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "fiu"):
+        raise InputError(f"{what} are {array.dtype} of shape {array.shape}; give N x 3 numbers")
+    return array.reshape(-1, 3)
+
+
 @dataclass(frozen=True, slots=True)
 class Centers:
-    """Tracked volume centers of a run of frames (paper, section 3.1)."""
+    """Tracked volume centers of a group of frames (paper, section 3.1)."""
 
     positions: Float64[np.ndarray, "T K 3"]  # in units of the sequence's bounding-box diagonal
     bodies: Int32[np.ndarray, " K"]  # which connected body of the first frame each center belongs to
@@ -132,11 +198,11 @@ class Centers:
 
 
 def check_up(axis: str) -> None:
-    """Raise InputError where `axis` is not one of the axes that can point up."""
+    """Raise InputError if `axis` is not in UP_AXES."""
     if axis not in UP_AXES:
         raise InputError(f"up axis {axis!r}: give {', '.join(UP_AXES)}")
 
 
 def known_up(axis: object) -> Up:
-    """The up axis that a file names, or y where it names none that is known."""
+    """Return `axis` if it is in UP_AXES, otherwise y, the default of players and of glTF."""
     return next((known for known in UPS if known == axis), "y")

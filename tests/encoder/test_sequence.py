@@ -119,6 +119,12 @@ def test_one_frame_is_legal(tmp_path):
     assert percent(BALL, video[0]) < 0.2
 
 
+def test_a_list_of_foreign_meshes_gives_the_bytes_of_the_same_sequence(tmp_path):
+    encode(MeshList((BALL, BALL)), tmp_path / "a.reel", paper())
+    encode([BALL.to_trimesh(), (BALL.vertices, BALL.faces)], tmp_path / "b.reel", paper())
+    assert (tmp_path / "a.reel").read_bytes() == (tmp_path / "b.reel").read_bytes()
+
+
 def test_no_frames_are_refused(tmp_path):
     with pytest.raises(InputError, match="no frames"):
         encode(MeshList(()), tmp_path / "a.reel", paper())

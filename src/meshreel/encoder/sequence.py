@@ -29,7 +29,7 @@ from ..format.layout import Form, Header
 from ..geometry.nearest import distances
 from ..geometry.topology import drop_unreferenced
 from ..metrics.distance import PSNR_CEILING, psnr
-from ..types import Frames, Mesh, MeshSequence, evenly
+from ..types import Frames, Mesh, MeshSequence, as_sequence, evenly
 from .job import SpanStore, Work
 from .paper import EncodedGroup, EncoderOptions, Progress, Stages
 from .parts import Parts, take_apart
@@ -51,7 +51,7 @@ ASTRAY = 0.005  # of the surface: noise, and what a border of the background lac
 
 
 def encode(
-    sequence: MeshSequence,
+    sequence: MeshSequence | Iterable[object],
     path: str | Path,
     options: EncoderOptions | None = None,
     executor: Executor | None = None,
@@ -65,7 +65,7 @@ def encode(
     as it has workers and one more, each of a key interval (preset `best`) or a group; of a scene, what moves in one
     key interval. Raises InputError for frames that cannot be used, before anything is coded.
     """
-    return Encoder(sequence, executor, progress).encode(path, options or preset_options())
+    return Encoder(as_sequence(sequence), executor, progress).encode(path, options or preset_options())
 
 
 class Encoder:
