@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from captured import Row, keep
-from meshreel_bench.scenes import FOUND, SceneData, open_scene
+from meshreel_bench.datasets.scenes import FOUND, SceneData, open_scene
 
 from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
 from meshreel.analysis.scene.background_depth import fuse_still_depth

@@ -6,9 +6,8 @@ import json
 import sys
 from pathlib import Path
 
-from meshreel_bench import checksums
-from meshreel_bench.datasets import BODIES, PERFORMERS, RECORDED, RECORDINGS
-from meshreel_bench.rooms import PEOPLE, ROOM
+from meshreel_bench.datasets import BODIES, PERFORMERS, RECORDED, RECORDINGS, checksums
+from meshreel_bench.datasets.rooms import PEOPLE, ROOM
 
 BODIES_ALONE = ("collision",)
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from captured import Row, keep
-from meshreel_bench.rooms import PEOPLE
+from meshreel_bench.datasets.rooms import PEOPLE
 
 from meshreel.coding.intra import decode_intra, encode_intra
 from meshreel.coding.layers.layers import LayersState, place_layers, read_layers

@@ -1,4 +1,4 @@
-"""The benchmark scenes `room2` and `room2-standing` (`meshreel_bench.rooms`) as rigs in a folder.
+"""The benchmark scenes `room2` and `room2-standing` (`meshreel_bench.datasets.rooms`) as rigs in a folder.
 
 python benchmarks/rooms.py -o build/room2                            # 60 frames in which they walk; five minutes
 python benchmarks/rooms.py --scene room2-standing -o build/standing   # in which they hardly move
@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from meshreel_bench.rooms import CAMERAS, FRAMES, SPEEDS, RoomOptions, simulate_room
+from meshreel_bench.datasets.rooms import CAMERAS, FRAMES, SPEEDS, RoomOptions, simulate_room
 
 from meshreel.capture.simulate import SensorOptions
 

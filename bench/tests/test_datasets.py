@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from meshreel_bench import checksums
-from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, open_dataset, open_known
-from meshreel_bench.scenes import PROCEDURAL
-from meshreel_bench.side_by_side import SideBySide
+from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, checksums, open_dataset, open_known
+from meshreel_bench.datasets.scenes import PROCEDURAL
+from meshreel_bench.datasets.side_by_side import SideBySide
 
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError

@@ -7,13 +7,13 @@ from dataclasses import asdict
 
 import pytest
 from meshreel_bench.codecs import make_codec
+from meshreel_bench.codecs.variants import VARIANTS
 from meshreel_bench.experiments import EXPERIMENTS, ablation_stages, layers
 from meshreel_bench.rd_rows import FLOOR as RATED_FLOOR
 from meshreel_bench.rd_rows import RATED
 from meshreel_bench.report import write_report
 from meshreel_bench.rows import Point, join_rows
 from meshreel_bench.scene_rows import FLOOR, SEGMENTATION
-from meshreel_bench.variants import VARIANTS
 
 from meshreel.encoder.presets import PRESETS, preset_options
 from meshreel.errors import InputError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from meshreel_bench.datasets import open_dataset
-from meshreel_bench.remesh import RemeshedSequence, RemeshOptions, remesh
+from meshreel_bench.datasets.remesh import RemeshedSequence, RemeshOptions, remesh
 
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
@@ -47,7 +47,7 @@ def test_the_cache_is_a_cache(tmp_path, monkeypatch):
     plain, kept = RemeshedSequence(source, None, SMALL), RemeshedSequence(source, tmp_path / "new", SMALL)
     made = [kept[0], kept[1]]
     assert len(list((tmp_path / "new").iterdir())) == 2
-    monkeypatch.setattr("meshreel_bench.remesh.remesh", lambda *_: pytest.fail("made again"))
+    monkeypatch.setattr("meshreel_bench.datasets.remesh.remesh", lambda *_: pytest.fail("made again"))
     assert all(equal(kept[i], made[i]) for i in range(2))
     monkeypatch.undo()
     assert all(equal(plain[i], made[i]) for i in range(2))

@@ -7,15 +7,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from meshreel_bench import scenes as module
 from meshreel_bench.codecs import make_codec
+from meshreel_bench.datasets import scenes as module
+from meshreel_bench.datasets.rooms import RoomOptions
+from meshreel_bench.datasets.scenes import SceneData, SceneFrames, open_scene
 from meshreel_bench.experiments import scenes
 from meshreel_bench.names import BEST
 from meshreel_bench.report import write_report
-from meshreel_bench.rooms import RoomOptions
 from meshreel_bench.rows import Point
 from meshreel_bench.scene_rows import BACKGROUND_S, FLOOR, MEMORY, SEGMENTATION, measure_scene, seams_of
-from meshreel_bench.scenes import SceneData, SceneFrames, open_scene
 
 from meshreel.capture.simulate import SceneFrame, SensorOptions, simulate_rig
 from meshreel.capture.truth import read_truth

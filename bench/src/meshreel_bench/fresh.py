@@ -133,7 +133,7 @@ def measure_scene_encode(name: str, data: str, cache: str, frames: str, quality:
     from meshreel.encoder.sequence import encode
     from meshreel.geometry.sequences import forth_and_back
 
-    from .scenes import open_scene
+    from .datasets.scenes import open_scene
 
     sequence = forth_and_back(open_scene(name, Path(data), Path(cache)).meshes, int(frames))
     start = time.process_time()

@@ -25,9 +25,9 @@ from .checked import Checked, decoder_of
 from .codec import Codec
 from .codecs import make_codec
 from .codecs.scenes import BackgroundDracoCodec
+from .datasets.scenes import SceneData, SceneFrames, open_scene
 from .peers import measure_fresh_decode, run_fresh
 from .rows import Point, Row
-from .scenes import SceneData, SceneFrames, open_scene
 from .segmentation import score_labels
 
 MEASURED_EVERY = 6  # frames: metrics of half a million faces take seconds

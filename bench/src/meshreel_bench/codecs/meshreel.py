@@ -16,14 +16,14 @@ from meshreel.encoder.sequence import Encoder
 from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Progress
-from ..variants import find_variant
+from .variants import find_variant
 
 
 @dataclass(frozen=True, slots=True)
 class MeshreelCodec:
     """A preset at a quality; what is None is the preset's own.
 
-    `basis_size` fixes the number of components m; a `variant` (`..variants`) changes one thing of the preset.
+    `basis_size` fixes the number of components m; a `variant` (`.variants`) changes one thing of the preset.
     """
 
     preset: str = "paper"

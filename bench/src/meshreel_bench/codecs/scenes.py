@@ -24,7 +24,7 @@ from meshreel.geometry.topology import concatenate, drop_unreferenced
 from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Progress
-from ..scenes import TRUE, SceneFrames
+from ..datasets.scenes import TRUE, SceneFrames
 from .draco import check_qp, encode_frame
 
 

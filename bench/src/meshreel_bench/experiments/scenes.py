@@ -13,11 +13,11 @@ from meshreel.metrics.bd_rate import BdRate, Curve, bd_bound, hull
 from meshreel.metrics.report import ComparisonOptions
 
 from ..curves import Measure, curve, value
+from ..datasets.scenes import FOUND, SCENES
 from ..names import BEST
 from ..promises import Promise
 from ..rows import Point, Row, curve_rows, select
 from ..scene_rows import BACKGROUND_S, FLOOR, MEASURED_EVERY, MEMORY, NOISE_FLOOR, SCENE, SEGMENTATION
-from ..scenes import FOUND, SCENES
 from .scenes_goals import own_goals, segmentation_goal
 
 COMPARISON = ComparisonOptions(ssim=True)  # scenes are looked at from where their cameras stood

@@ -34,8 +34,8 @@ from meshreel.io.meshes import read_mesh
 from meshreel.io.write import make_folder, replacing, write_mesh
 from meshreel.types import Mesh, MeshSequence, evenly
 
+from ..provenance import sources
 from .captured import Captured
-from .provenance import sources
 from .rooms import SPEEDS, RoomOptions, simulate_room
 
 SCENES = tuple(SPEEDS)
