@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from meshreel.capture.rig import DepthCamera, make_folders, write_rig
-from meshreel.io.depth import write_depth
+from meshreel.io.depth_pictures import write_depth
 
 RADIUS, WALL = 0.4, 1.2  # m; the ball is at the origin, the wall behind it at z = WALL
 

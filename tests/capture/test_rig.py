@@ -16,7 +16,7 @@ from meshreel.capture.record import open_recording
 from meshreel.capture.rig import read_rig
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
-from meshreel.io.depth import read_depth, write_depth
+from meshreel.io.depth_pictures import read_depth, write_depth
 from tests.capture.depth_scenes import camera, measured, record
 
 STILL = [(0.0, 0.0, 0.0)] * 3

@@ -12,7 +12,7 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.rig import read_rig
 from meshreel.capture.simulate import TRUTH, SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from meshreel.errors import InputError
-from meshreel.io.depth import read_depth
+from meshreel.io.depth_pictures import read_depth
 from meshreel.io.sequence import open_sequence
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured

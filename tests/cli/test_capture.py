@@ -9,7 +9,7 @@ import pytest
 
 from meshreel.cli import main
 from meshreel.geometry import tsdf
-from meshreel.io.depth import read_depth, write_depth
+from meshreel.io.depth_pictures import read_depth, write_depth
 from meshreel.io.sequence import open_sequence
 from tests.capture.depth_scenes import RADIUS, camera, record
 

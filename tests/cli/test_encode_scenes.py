@@ -13,7 +13,7 @@ import meshreel
 from meshreel.capture.record import open_recording
 from meshreel.cli.encode import describe
 from meshreel.encoder.paper import encode_window
-from meshreel.io.depth import write_depth
+from meshreel.io.depth_pictures import write_depth
 from meshreel.io.write import write_mesh
 from tests.capture.depth_scenes import camera, measured, record
 from tests.cli.conftest import failed

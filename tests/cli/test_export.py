@@ -130,7 +130,7 @@ def test_an_interrupt_leaves_nothing(run, tmp_path, monkeypatch, kind):
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("meshreel.export.video.vertex_normals", interrupted)
+    monkeypatch.setattr("meshreel.export.animated_file.vertex_normals", interrupted)
     said = run("export", FILE, "-o", tmp_path / f"a.{kind}")
     assert (said.code, said.err) == (130, "meshreel: interrupted\n")
     assert list(tmp_path.iterdir()) == []

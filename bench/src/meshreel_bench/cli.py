@@ -15,7 +15,7 @@ from rich.table import Table
 
 from meshreel.cli import run_app
 from meshreel.cli.console import Common
-from meshreel.cli.reading import Reading
+from meshreel.cli.flags import Reading
 from meshreel.errors import InputError
 
 from .apart import begin, end_all

@@ -21,8 +21,8 @@ from jaxtyping import Float64, UInt16
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import DepthPicture
-from ..io.depth import picture_size, read_depth
-from ..io.names import last_number
+from ..io.depth_pictures import picture_size, read_depth
+from ..io.file_names import last_number
 from ..io.write import make_folder, replacing
 from ..types import UP_AXES, UPS, Up
 

@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..geometry.nearest import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import concatenate, face_normals
-from ..io.depth import write_depth
+from ..io.depth_pictures import write_depth
 from ..io.write import make_folder, replacing, write_mesh
 from ..types import Mesh
 from .rig import RIG, DepthCamera, make_folders, write_rig

@@ -29,9 +29,9 @@ from ..metrics.sheet import SheetOptions, write_sheet
 from ..metrics.truth_comparison import compare_with_truth
 from ..types import Frames, Mesh, MeshSequence
 from .console import Common, StageBars
+from .flags import Knowing, Looking, Reading
 from .info import describe_file
-from .reading import Knowing, Looking, Reading
-from .scenes import open_source
+from .sources import open_source
 
 
 def command(

@@ -22,8 +22,8 @@ from ..encoder.sequence import Encoder
 from ..encoder.summary import SceneSummary, Summary
 from ..errors import InputError
 from .console import Common
-from .reading import Reading
-from .scenes import Masking, open_source
+from .flags import Reading
+from .sources import Masking, open_source
 
 DEFAULT_QUALITY = preset_options().quality
 

@@ -9,8 +9,8 @@ from cyclopts import Parameter
 
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
+from ..export.animated_file import ExportOptions, export
 from ..export.animated_usd import EXTENSIONS
-from ..export.video import ExportOptions, export
 from ..io.sequence import SequenceOptions
 from ..types import Up
 from .console import Common

@@ -20,12 +20,12 @@ from ..encoder.paper import EncoderOptions
 from ..encoder.presets import preset_options
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
-from ..io.masks import is_mask, write_picture
+from ..io.mask_pictures import is_mask, write_picture
 from ..io.write import frame_names, left_over, make_folder, replacing, write_colored
 from ..types import evenly
 from .console import Common
-from .reading import Reading
-from .scenes import Masking, Source, open_source
+from .flags import Reading
+from .sources import Masking, Source, open_source
 
 COLUMNS = 4  # views in the sheet
 MOST_PREVIEWS = 16  # frames whose pictures are in memory together

@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.write import replacing
-from .animation import Animation, Shape, changes, unit_normals
+from .shapes import Animation, Shape, changes, unit_normals
 
 MOST_BYTES = (1 << 32) - 1  # of a GLB file, which tells its length in 32 bits
 _FLOAT, _U16, _U32 = 5126, 5123, 5125

@@ -19,8 +19,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
-from ..io.names import is_text
-from .animation import Animation, Shape, changes, unit_normals
+from ..io.file_names import is_text
+from .shapes import Animation, Shape, changes, unit_normals
 
 EXTENSIONS = (".usdc", ".usda", ".usdz", ".usd")
 _GREY = (0.8, 0.8, 0.8)

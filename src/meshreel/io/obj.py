@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from .polygons import Dropped, Polygons, Unreadable
-from .rows import Lines
+from .text_lines import Lines
 
 _KNOWN = (
     *("vt", "vn", "vp", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "lod", "bevel"),

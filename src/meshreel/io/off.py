@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from .polygons import Polygons, Unreadable
-from .rows import Lines, whole
+from .text_lines import Lines, whole
 
 _DROPS = {"ST": "texture coordinates", "C": "vertex colors", "N": "normals"}
 

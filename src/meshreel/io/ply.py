@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .polygons import Dropped, Polygons, Unreadable
-from .rows import Lines, whole
+from .text_lines import Lines, whole
 
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),

@@ -15,9 +15,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Mesh, MeshSequence
-from .archive import Archive
+from .file_names import find_frames
 from .meshes import Loaded, read_mesh
-from .names import find_frames
+from .npz import Archive
 
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
 # Between the diagonals of two frames: more than a person who crouches or a second one who enters.

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..container.reader import ReelReader
 from ..container.sources import FileSource
 from ..errors import InputError, MeshreelError
-from ..io.names import is_text
+from ..io.file_names import is_text
 
 SUFFIX = ".reel"
 HIDDEN = "."  # what such names begin with

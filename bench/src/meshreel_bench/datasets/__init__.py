@@ -19,7 +19,7 @@ from meshreel.capture.truth import Truth
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.topology import weld
-from meshreel.io.names import find_frames, is_pattern
+from meshreel.io.file_names import find_frames, is_pattern
 from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
 from meshreel.types import MeshSequence
 

@@ -15,7 +15,7 @@ from jaxtyping import Bool, UInt8
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera, unpack_cameras
 from ...geometry.raycast import Seen
-from ...io.masks import find_masks, read_mask
+from ...io.mask_pictures import find_masks, read_mask
 
 CAMERAS = "cameras.json"  # Open3D's pinhole camera JSON, beside the folders of the views
 

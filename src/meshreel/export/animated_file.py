@@ -23,7 +23,7 @@ from ..geometry.topology import vertex_normals
 from ..types import Mesh, Up
 from .animated_glb import animated_glb
 from .animated_usd import EXTENSIONS, animated_usd
-from .animation import Animation, AnimationWriter, Points, Shape, check_target
+from .shapes import Animation, AnimationWriter, Points, Shape, check_target
 
 MOST_TOGETHER = 64  # frames of a shape: what viewers take as morph targets of one mesh, and what is in memory
 _FAR = 8.0  # diagonals from the origin from which float32 coordinates count from elsewhere

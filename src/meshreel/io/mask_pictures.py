@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from ..errors import InputError
-from .names import last_number
+from .file_names import last_number
 from .write import replacing
 
 _MODES = ("L", "P", "1")  # of the library that reads them: gray, palette, black and white

@@ -14,8 +14,8 @@ from meshreel.coding.intra import encode_intra
 from meshreel.container.writer import ReelWriter
 from meshreel.encoder.sequence import encode
 from meshreel.errors import FormatError, InputError
-from meshreel.export.video import ExportOptions
-from meshreel.export.video import export as export_file
+from meshreel.export.animated_file import ExportOptions
+from meshreel.export.animated_file import export as export_file
 from meshreel.geometry.topology import vertex_normals
 from meshreel.io.sequence import open_sequence
 from meshreel.types import Mesh, MeshList
@@ -191,7 +191,7 @@ def test_frames_coded_one_by_one_do_not_become_each_other_though_their_faces_are
 
 
 def test_a_long_group_is_several_meshes_and_moves_on_all_the_same(tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.export.video.MOST_TOGETHER", 3)
+    monkeypatch.setattr("meshreel.export.animated_file.MOST_TOGETHER", 3)
     video = meshreel.open(GOLDEN / "layers.reel")
     assert export(video, tmp_path / "a.glb") == 6
     played = PlayedGlb(tmp_path / "a.glb")

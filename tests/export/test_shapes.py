@@ -14,7 +14,7 @@ import pytest
 from meshreel.errors import InputError
 from meshreel.export.animated_glb import animated_glb
 from meshreel.export.animated_usd import animated_usd
-from meshreel.export.animation import Animation, AnimationWriter, Points, Shape, changes
+from meshreel.export.shapes import Animation, AnimationWriter, Points, Shape, changes
 from tests.play_glb import PlayedGlb
 
 WRITERS = {"glb": animated_glb, "usdc": animated_usd, "usda": animated_usd, "usdz": animated_usd}

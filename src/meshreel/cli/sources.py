@@ -20,7 +20,7 @@ from ..geometry.cameras import unpack_cameras
 from ..io.sequence import open_sequence
 from ..types import MeshSequence, Up, known_up
 from .capture import MADE
-from .reading import Reading
+from .flags import Reading
 
 _READ = Reading()
 
