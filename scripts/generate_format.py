@@ -13,7 +13,7 @@ from meshreel.format.typescript import typescript
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "FORMAT.md"
-MODULE = ROOT / "web/player-core/src/layout.gen.ts"
+MODULE = ROOT / "web/player-core/src/format/layout.gen.ts"
 
 
 def made() -> dict[Path, str]:

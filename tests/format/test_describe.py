@@ -30,7 +30,7 @@ def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     (tmp_path / "src").symlink_to(ROOT / "src")
     text = (ROOT / "FORMAT.md").read_text(encoding="utf-8")
     (tmp_path / "FORMAT.md").write_text(text, encoding="utf-8")
-    module = tmp_path / "web/player-core/src/layout.gen.ts"
+    module = tmp_path / "web/player-core/src/format/layout.gen.ts"
     module.parent.mkdir(parents=True)
     module.write_bytes((ROOT / module.relative_to(tmp_path)).read_bytes())
     command = ["bash", str(copied / "generate"), "--check"]

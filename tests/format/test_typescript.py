@@ -14,7 +14,7 @@ TEXT = typescript(RECORDS + PAYLOADS)
 
 
 def test_the_module_of_the_player_is_the_one_of_this_layout():
-    assert (CORE / "layout.gen.ts").read_text(encoding="utf-8") == TEXT
+    assert (CORE / "format" / "layout.gen.ts").read_text(encoding="utf-8") == TEXT
 
 
 def test_every_record_has_its_fields_in_their_order():
@@ -31,6 +31,6 @@ def test_a_record_stands_behind_those_that_it_is_made_of():
 
 def test_every_kind_of_field_has_a_reader_in_the_player():
     [imported] = re.findall(r'import {\n(.*?)} from "./records.ts"', TEXT, re.DOTALL)
-    declared = (CORE / "records.ts").read_text(encoding="utf-8")
+    declared = (CORE / "format" / "records.ts").read_text(encoding="utf-8")
     for name in re.findall(r"\w+", imported):
         assert re.search(rf"export (const|function) {name}\b", declared), name

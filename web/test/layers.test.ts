@@ -15,17 +15,21 @@ const ALLOWED: Readonly<Record<string, readonly RegExp[]>> = {
   "player-element": [/^three(\/|$)/, /^@meshreel\/(player-core|player-three|xr)(\/|$)/],
 };
 
-/** Within player-core, from the top down: a file imports those of its own layer and of those below. */
-const CORE: readonly RegExp[] = [
-  /^(index|worker_entry)$/,
-  /^(player|session|decoding|picture|adaptive|scheduler|fetcher|pool|worker|chunk_decoder|decoder|pack|tools|clock|events|links|opening|http_.*|whole_body|source|bandwidth|protocol|reader|checks)$/,
-  /^coding\//,
-  /^wasm\//,
-  /^(records|layout\.gen|mesh|bytes|crc|errors|types)$/,
-];
-
-/** The workers' half. */
-const DECODER = /^(coding|wasm)\/|^(worker|chunk_decoder|decoder|pack|tools)$/;
+/** The rooms of player-core and what each may import besides its own files; GROUND and what stands loose above the rooms are rooms, too. */
+const ROOMS: Readonly<Record<string, readonly string[]>> = {
+  door: ["player", "decode", "net", "time", "ground"], // the entries: of the page, and of a worker
+  player: ["time", "net", "format", "ground"], // the player and a session of it
+  time: ["net", "format", "ground"], // which chunk is needed when, and what is shown
+  net: ["format", "ground"], // ranges of a file
+  decode: ["wasm", "format", "ground"], // chunks to meshes: the workers' half
+  wasm: ["ground"], // calls of the compiled core
+  format: ["ground"], // the records of a file
+  ground: [],
+};
+const LOOSE: Readonly<Record<string, string>> = {
+  index: "door", worker_entry: "door", player: "player", session: "player",
+  events: "ground", protocol: "ground", mesh: "ground", bytes: "ground", errors: "ground", types: "ground",
+};
 
 const PAGE = /\b(document|window|HTMLElement|customElements|requestAnimationFrame|localStorage|WebGL2?RenderingContext)\b/;
 
@@ -47,10 +51,10 @@ function modulesOf(name: string): Module[] {
   });
 }
 
-function layerOf(name: string): number {
-  const layer = CORE.findIndex((pattern) => pattern.test(name));
-  expect(layer, `${name} is in no layer: add it to this test`).toBeGreaterThanOrEqual(0);
-  return layer;
+function roomOf(name: string): string {
+  const room = name.includes("/") ? name.slice(0, name.indexOf("/")) : LOOSE[name];
+  expect(Object.keys(ROOMS), `${name} is in no room: add it to this test`).toContain(room);
+  return room;
 }
 
 describe.each(Object.keys(ALLOWED))("%s", (name) => {
@@ -77,10 +81,16 @@ describe("player-core", () => {
   const targetsOf = ({ name, imports }: Module): string[] =>
     imports.filter((one) => one.startsWith(".")).map((one) => join(dirname(name), one).split(sep).join("/").replace(/\.ts$/, ""));
 
-  test("imports only downwards", () => {
+  test("imports only what its rooms may", () => {
     for (const module of modules) {
-      for (const target of targetsOf(module)) expect(layerOf(module.name), `${module.name} imports ${target}`).toBeLessThanOrEqual(layerOf(target));
+      const room = roomOf(module.name);
+      for (const target of targetsOf(module)) expect([room, ...ROOMS[room]], `${module.name} imports ${target}`).toContain(roomOf(target));
     }
+  });
+
+  test("has no rooms that import each other in a circle", () => {
+    const below = Object.keys(ROOMS);
+    for (const [k, room] of below.entries()) for (const other of ROOMS[room]) expect(below.indexOf(other), `${room} imports ${other}`).toBeGreaterThan(k);
   });
 
   test("has no decoder in what a page loads: that is the workers'", () => {
@@ -90,6 +100,6 @@ describe("player-core", () => {
       for (const target of targetsOf(module)) if (!reached.includes(target)) reached.push(target);
     }
     expect(reached).toContain("session");
-    expect(reached.filter((name) => DECODER.test(name))).toEqual([]);
+    expect(reached.filter((name) => ["decode", "wasm"].includes(roomOf(name)))).toEqual([]);
   });
 });

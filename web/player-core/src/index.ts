@@ -1,11 +1,11 @@
 // The public surface of player-core: the player without a picture.
 
 export { FormatError, SourceError, type FormatErrorKind, type SourceErrorKind } from "./errors.ts";
-export { HttpSource, type HttpOptions } from "./http_source.ts";
+export { HttpSource, type HttpOptions } from "./net/http_source.ts";
 export { Player, type PlayerOptions } from "./player.ts";
-export { WorkerPool, type WorkerLike, type WorkerSetup } from "./pool.ts";
+export { WorkerPool, type WorkerLike, type WorkerSetup } from "./time/pool.ts";
 export type { DecodeJob, FromWorker, ToWorker } from "./protocol.ts";
-export { BlobSource, BytesSource, type Source, type SourceWatch, type Take } from "./source.ts";
+export { BlobSource, BytesSource, type Source, type SourceWatch, type Take } from "./net/source.ts";
 export type {
   Box, Info, Packed, PackedGroup, PackedStatic, PackedVertices, Playback, PlaybackEvents, Quality, Shown, Stats,
 } from "./types.ts";

@@ -1,14 +1,14 @@
 // A player without a picture: fetches, decodes, keeps time. Its events and properties are those of a media element.
 
-import { Clock } from "./clock.ts";
+import { Clock } from "./time/clock.ts";
 import { SourceError } from "./errors.ts";
 import { PlaybackTarget } from "./events.ts";
-import { open } from "./opening.ts";
-import { WorkerPool } from "./pool.ts";
-import type { Share, WorkerSetup } from "./pool.ts";
+import { open } from "./net/opening.ts";
+import { WorkerPool } from "./time/pool.ts";
+import type { Share, WorkerSetup } from "./time/pool.ts";
 import { Session } from "./session.ts";
 import type { Limits } from "./session.ts";
-import type { Source } from "./source.ts";
+import type { Source } from "./net/source.ts";
 import { PLAYBACK_RATES } from "./types.ts";
 import type { Info, Playback, PlaybackEvents, Quality, Shown, Stats } from "./types.ts";
 

@@ -1,19 +1,19 @@
 // One open file: what of it is fetched, decoded and shown, kept in step with the play head.
 
-import { Adaptive } from "./adaptive.ts";
-import { Timeline } from "./clock.ts";
-import { Decoding } from "./decoding.ts";
-import type { DecodingEvents } from "./decoding.ts";
-import { Fetcher } from "./fetcher.ts";
-import { Form } from "./layout.gen.ts";
-import { Links, sizeOfLayers } from "./links.ts";
-import type { Opened } from "./opening.ts";
-import { Picture } from "./picture.ts";
-import type { Share } from "./pool.ts";
-import type { Chunk, Head } from "./reader.ts";
-import { plan } from "./scheduler.ts";
-import type { Plan, Step } from "./scheduler.ts";
-import type { Source } from "./source.ts";
+import { Adaptive } from "./time/adaptive.ts";
+import { Timeline } from "./time/clock.ts";
+import { Decoding } from "./time/decoding.ts";
+import type { DecodingEvents } from "./time/decoding.ts";
+import { Fetcher } from "./net/fetcher.ts";
+import { Form } from "./format/layout.gen.ts";
+import { Links, sizeOfLayers } from "./format/links.ts";
+import type { Opened } from "./net/opening.ts";
+import { Picture } from "./time/picture.ts";
+import type { Share } from "./time/pool.ts";
+import type { Chunk, Head } from "./format/reader.ts";
+import { plan } from "./time/scheduler.ts";
+import type { Plan, Step } from "./time/scheduler.ts";
+import type { Source } from "./net/source.ts";
 import type { Quality } from "./types.ts";
 
 export interface Limits {

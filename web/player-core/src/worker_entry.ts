@@ -1,6 +1,6 @@
 // What a `Worker` loads.
 
-import { serve } from "./worker.ts";
-import type { Scope } from "./worker.ts";
+import { serve } from "./decode/worker.ts";
+import type { Scope } from "./decode/worker.ts";
 
 serve(globalThis as unknown as Scope);

@@ -1,9 +1,9 @@
 import { describe, expect, test } from "vitest";
 
-import { Adaptive } from "../src/adaptive.ts";
-import type { Conditions } from "../src/adaptive.ts";
-import { Timeline } from "../src/clock.ts";
-import { Head } from "../src/reader.ts";
+import { Adaptive } from "../src/time/adaptive.ts";
+import type { Conditions } from "../src/time/adaptive.ts";
+import { Timeline } from "../src/time/clock.ts";
+import { Head } from "../src/format/reader.ts";
 import { stream } from "./reel.ts";
 
 const LAYERS = [10_000, 20_000, 40_000, 80_000]; // bytes a second

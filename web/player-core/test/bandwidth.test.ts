@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { Bandwidth } from "../src/bandwidth.ts";
+import { Bandwidth } from "../src/net/bandwidth.ts";
 
 /** So many milliseconds of bytes at a rate, in pieces of ten. */
 function fetchFor(bandwidth: Bandwidth, start: number, ms: number, bytesPerMs: number): number {

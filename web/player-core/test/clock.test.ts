@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 
-import { Clock, Timeline } from "../src/clock.ts";
+import { Clock, Timeline } from "../src/time/clock.ts";
 
 const STARTS = [0, 0.1, 0.15, 0.4, 0.5];
 const TIMES = new Timeline(4, (frame) => STARTS[frame]);

@@ -5,8 +5,8 @@ import { readFileSync, readdirSync } from "node:fs";
 
 import { beforeAll, describe, expect, test } from "vitest";
 
-import type { Tools } from "../src/coding/group.ts";
-import { Video } from "../src/decoder.ts";
+import type { Tools } from "../src/decode/group.ts";
+import { Video } from "../src/decode/decoder.ts";
 import type { Mesh } from "../src/mesh.ts";
 import { ROOT, nodeTools } from "./tools.ts";
 

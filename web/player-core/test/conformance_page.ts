@@ -1,8 +1,8 @@
 // The page of conformance.browser.test.ts: decodes a file that it is given, in Chromium.
 
-import { Video } from "../src/decoder.ts";
+import { Video } from "../src/decode/decoder.ts";
 import type { Mesh } from "../src/mesh.ts";
-import { makeTools } from "../src/tools.ts";
+import { makeTools } from "../src/decode/tools.ts";
 
 async function digest(values: Float64Array | Int32Array): Promise<string> {
   const bytes = new Uint8Array(values.buffer, values.byteOffset, values.byteLength).slice();

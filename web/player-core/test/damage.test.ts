@@ -3,10 +3,10 @@
 import { describe, expect, test } from "vitest";
 
 import { FormatError, SourceError } from "../src/errors.ts";
-import { Form } from "../src/layout.gen.ts";
+import { Form } from "../src/format/layout.gen.ts";
 import { Player } from "../src/player.ts";
-import { Head } from "../src/reader.ts";
-import { BytesSource } from "../src/source.ts";
+import { Head } from "../src/format/reader.ts";
+import { BytesSource } from "../src/net/source.ts";
 import { FakeWorkers } from "./fake_workers.ts";
 import { background, group, makeReel, stream } from "./reel.ts";
 import { frames, pass, useRig } from "./rig.ts";

@@ -5,9 +5,9 @@ import { readFileSync } from "node:fs";
 import { afterEach, beforeEach, expect, test } from "vitest";
 
 import { FormatError, SourceError } from "../src/errors.ts";
-import { HttpSource } from "../src/http_source.ts";
-import { open } from "../src/opening.ts";
-import { BytesSource } from "../src/source.ts";
+import { HttpSource } from "../src/net/http_source.ts";
+import { open } from "../src/net/opening.ts";
+import { BytesSource } from "../src/net/source.ts";
 import { FileServer } from "./server.ts";
 import type { Respond } from "./server.ts";
 import { ROOT } from "./tools.ts";

@@ -1,8 +1,8 @@
 // Stand-ins for decoding workers: they keep to the protocol, refuse what breaks its laws, and take the time they are told.
 
-import { crc32 } from "../src/crc.ts";
-import { Form } from "../src/layout.gen.ts";
-import type { WorkerLike, WorkerSetup } from "../src/pool.ts";
+import { crc32 } from "../src/format/crc.ts";
+import { Form } from "../src/format/layout.gen.ts";
+import type { WorkerLike, WorkerSetup } from "../src/time/pool.ts";
 import type { DecodeJob, FromWorker, ToWorker } from "../src/protocol.ts";
 import type { Packed } from "../src/types.ts";
 

@@ -2,10 +2,10 @@
 
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 
-import { Fetcher } from "../src/fetcher.ts";
-import type { When, Wish } from "../src/fetcher.ts";
-import { sizeOfLayers } from "../src/links.ts";
-import { Head } from "../src/reader.ts";
+import { Fetcher } from "../src/net/fetcher.ts";
+import type { When, Wish } from "../src/net/fetcher.ts";
+import { sizeOfLayers } from "../src/format/links.ts";
+import { Head } from "../src/format/reader.ts";
 import { stream } from "./reel.ts";
 import { pass } from "./rig.ts";
 import { noise } from "./server.ts";

@@ -4,11 +4,11 @@ import { readFileSync, readdirSync } from "node:fs";
 
 import { afterEach, describe, expect, test } from "vitest";
 
-import { HttpSource } from "../src/http_source.ts";
-import { Form } from "../src/layout.gen.ts";
+import { HttpSource } from "../src/net/http_source.ts";
+import { Form } from "../src/format/layout.gen.ts";
 import { Player } from "../src/player.ts";
-import { Head } from "../src/reader.ts";
-import { BytesSource } from "../src/source.ts";
+import { Head } from "../src/format/reader.ts";
+import { BytesSource } from "../src/net/source.ts";
 import type { Packed, PackedGroup, Shown } from "../src/types.ts";
 import { realWorkers } from "./real_workers.ts";
 import { FileServer } from "./server.ts";

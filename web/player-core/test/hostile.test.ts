@@ -4,14 +4,14 @@ import { readFileSync, readdirSync } from "node:fs";
 
 import { beforeAll, describe, expect, test, vi } from "vitest";
 
-import { ChunkDecoder } from "../src/chunk_decoder.ts";
-import type { Tools } from "../src/coding/group.ts";
-import { crc32 } from "../src/crc.ts";
+import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
+import type { Tools } from "../src/decode/group.ts";
+import { crc32 } from "../src/format/crc.ts";
 import { FormatError } from "../src/errors.ts";
-import { Links } from "../src/links.ts";
+import { Links } from "../src/format/links.ts";
 import type { DecodeJob } from "../src/protocol.ts";
-import { Head } from "../src/reader.ts";
-import type { Chunk } from "../src/reader.ts";
+import { Head } from "../src/format/reader.ts";
+import type { Chunk } from "../src/format/reader.ts";
 import { CoreStopped } from "../src/wasm/memory.ts";
 import { noise } from "./server.ts";
 import { ROOT, nodeTools } from "./tools.ts";

@@ -3,9 +3,9 @@
 import { afterEach, beforeEach, describe, expect, test } from "vitest";
 
 import { SourceError } from "../src/errors.ts";
-import { HttpSource } from "../src/http_source.ts";
+import { HttpSource } from "../src/net/http_source.ts";
 import { Player } from "../src/player.ts";
-import { readBytes } from "../src/source.ts";
+import { readBytes } from "../src/net/source.ts";
 import { FakeWorkers } from "./fake_workers.ts";
 import { FileServer, noise } from "./server.ts";
 import type { Respond } from "./server.ts";

@@ -1,8 +1,8 @@
 import { afterEach, beforeEach, describe, expect, test } from "vitest";
 
 import { SourceError } from "../src/errors.ts";
-import { HttpSource } from "../src/http_source.ts";
-import { readBytes } from "../src/source.ts";
+import { HttpSource } from "../src/net/http_source.ts";
+import { readBytes } from "../src/net/source.ts";
 import { FileServer, noise } from "./server.ts";
 import type { Respond } from "./server.ts";
 

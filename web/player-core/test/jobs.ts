@@ -1,7 +1,7 @@
 // The jobs that a player sends to its workers for the chunks of a file that is wholly there.
 
 import type { DecodeJob } from "../src/protocol.ts";
-import type { Chunk, Head } from "../src/reader.ts";
+import type { Chunk, Head } from "../src/format/reader.ts";
 
 /** The job that decodes a chunk with all its layers, its payload a copy. */
 export function jobOf(head: Head, chunk: Chunk, data: Uint8Array): DecodeJob {

@@ -4,16 +4,16 @@ import { readFileSync, readdirSync } from "node:fs";
 
 import { beforeAll, describe, expect, test } from "vitest";
 
-import { ChunkDecoder, MissingState, buffersOf } from "../src/chunk_decoder.ts";
-import type { Tools } from "../src/coding/group.ts";
-import { Video } from "../src/decoder.ts";
+import { ChunkDecoder, MissingState, buffersOf } from "../src/decode/chunk_decoder.ts";
+import type { Tools } from "../src/decode/group.ts";
+import { Video } from "../src/decode/decoder.ts";
 import { FormatError } from "../src/errors.ts";
 import type { Mesh } from "../src/mesh.ts";
-import { packStatic } from "../src/pack.ts";
+import { packStatic } from "../src/decode/pack.ts";
 import type { FromWorker, ToWorker } from "../src/protocol.ts";
 import type { PackedGroup, PackedStatic } from "../src/types.ts";
-import { serve } from "../src/worker.ts";
-import type { Scope } from "../src/worker.ts";
+import { serve } from "../src/decode/worker.ts";
+import type { Scope } from "../src/decode/worker.ts";
 import { decodeNormal, encodeNormal } from "../../test/octahedral.ts";
 import { jobOf } from "./jobs.ts";
 import { ROOT, coreWasm, dracoWasm, nodeTools } from "./tools.ts";

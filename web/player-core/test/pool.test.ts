@@ -2,10 +2,10 @@
 
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 
-import { crc32 } from "../src/crc.ts";
-import { Form } from "../src/layout.gen.ts";
-import { WorkerPool } from "../src/pool.ts";
-import type { Outcome, Share } from "../src/pool.ts";
+import { crc32 } from "../src/format/crc.ts";
+import { Form } from "../src/format/layout.gen.ts";
+import { WorkerPool } from "../src/time/pool.ts";
+import type { Outcome, Share } from "../src/time/pool.ts";
 import { FakeWorkers } from "./fake_workers.ts";
 import { pass } from "./rig.ts";
 

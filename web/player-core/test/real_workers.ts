@@ -1,9 +1,9 @@
 // The real inside of a worker, in this thread, behind the messages that a worker gets and gives.
 
-import type { WorkerLike, WorkerSetup } from "../src/pool.ts";
+import type { WorkerLike, WorkerSetup } from "../src/time/pool.ts";
 import type { FromWorker, ToWorker } from "../src/protocol.ts";
-import { serve } from "../src/worker.ts";
-import type { Scope } from "../src/worker.ts";
+import { serve } from "../src/decode/worker.ts";
+import type { Scope } from "../src/decode/worker.ts";
 import { coreWasm, dracoWasm } from "./tools.ts";
 
 export function realWorkers(count: number): WorkerSetup {

@@ -1,7 +1,7 @@
 // Files made of noise: an index as told, and payloads that nothing but a stand-in for a worker can decode.
 
-import { crc32 } from "../src/crc.ts";
-import { Form } from "../src/layout.gen.ts";
+import { crc32 } from "../src/format/crc.ts";
+import { Form } from "../src/format/layout.gen.ts";
 import { noise } from "./server.ts";
 
 export interface FakeChunk {

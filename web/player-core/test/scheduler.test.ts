@@ -2,13 +2,13 @@
 
 import { describe, expect, test } from "vitest";
 
-import { Timeline } from "../src/clock.ts";
-import { Form } from "../src/layout.gen.ts";
-import { Links, mostQuality } from "../src/links.ts";
-import { Head } from "../src/reader.ts";
-import type { Chunk } from "../src/reader.ts";
-import { plan } from "../src/scheduler.ts";
-import type { Holdings, Outlook, Plan } from "../src/scheduler.ts";
+import { Timeline } from "../src/time/clock.ts";
+import { Form } from "../src/format/layout.gen.ts";
+import { Links, mostQuality } from "../src/format/links.ts";
+import { Head } from "../src/format/reader.ts";
+import type { Chunk } from "../src/format/reader.ts";
+import { plan } from "../src/time/scheduler.ts";
+import type { Holdings, Outlook, Plan } from "../src/time/scheduler.ts";
 import { background, group, makeReel, stream } from "./reel.ts";
 import type { FakeChunk } from "./reel.ts";
 

@@ -1,7 +1,7 @@
 // A source whose bytes come at a rate, by timers, so that tests can turn the clock.
 
-import { Bandwidth } from "../src/bandwidth.ts";
-import type { Source, SourceWatch, Take } from "../src/source.ts";
+import { Bandwidth } from "../src/net/bandwidth.ts";
+import type { Source, SourceWatch, Take } from "../src/net/source.ts";
 
 const SLICE_MS = 10;
 

@@ -3,9 +3,9 @@
 import { beforeAll, expect, test } from "vitest";
 
 import { hasPython, runPython } from "../../test/python.ts";
-import { ChunkDecoder } from "../src/chunk_decoder.ts";
-import type { Tools } from "../src/coding/group.ts";
-import { Head } from "../src/reader.ts";
+import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
+import type { Tools } from "../src/decode/group.ts";
+import { Head } from "../src/format/reader.ts";
 import type { PackedGroup } from "../src/types.ts";
 import { jobOf } from "./jobs.ts";
 import { nodeTools } from "./tools.ts";

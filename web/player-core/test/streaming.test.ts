@@ -2,9 +2,9 @@
 
 import { afterEach, beforeEach, describe, expect, test } from "vitest";
 
-import { HttpSource } from "../src/http_source.ts";
+import { HttpSource } from "../src/net/http_source.ts";
 import { Player } from "../src/player.ts";
-import { Head } from "../src/reader.ts";
+import { Head } from "../src/format/reader.ts";
 import { FakeWorkers } from "./fake_workers.ts";
 import { stream } from "./reel.ts";
 import { FileServer, Throttle } from "./server.ts";

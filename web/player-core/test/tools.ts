@@ -4,8 +4,8 @@ import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { fileURLToPath } from "node:url";
 
-import type { Tools } from "../src/coding/group.ts";
-import { makeTools } from "../src/tools.ts";
+import type { Tools } from "../src/decode/group.ts";
+import { makeTools } from "../src/decode/tools.ts";
 
 export const ROOT = fileURLToPath(new URL("../../..", import.meta.url));
 

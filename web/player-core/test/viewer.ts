@@ -1,8 +1,8 @@
 // A display for tests: asks the player for a picture sixty times a second and finds out what no picture may be.
 
-import { Form } from "../src/layout.gen.ts";
+import { Form } from "../src/format/layout.gen.ts";
 import type { Player } from "../src/player.ts";
-import { Head } from "../src/reader.ts";
+import { Head } from "../src/format/reader.ts";
 import type { Packed, Shown } from "../src/types.ts";
 
 const EVENTS = [

@@ -1,6 +1,6 @@
 // What a web server may answer, and what is wrong with it.
 
-import { SourceError } from "./errors.ts";
+import { SourceError } from "../errors.ts";
 
 /** The connection failed, or the server for now: it may be tried again. */
 export class Lost extends Error {

@@ -1,10 +1,10 @@
 // What to fetch and decode next, from where the play head is. Plans only: nothing here fetches or decodes.
 
 import type { Timeline } from "./clock.ts";
-import { Form } from "./layout.gen.ts";
-import { mostQuality } from "./links.ts";
-import type { Links } from "./links.ts";
-import type { Chunk, Head } from "./reader.ts";
+import { Form } from "../format/layout.gen.ts";
+import { mostQuality } from "../format/links.ts";
+import type { Links } from "../format/links.ts";
+import type { Chunk, Head } from "../format/reader.ts";
 
 /** What a plan builds on. Qualities are layers beyond the first; -1: not at hand. */
 export interface Holdings {

@@ -1,8 +1,8 @@
 // Reading the head of a file, in one request where it is short.
 
-import { joined } from "./bytes.ts";
-import { FormatError } from "./errors.ts";
-import { FIRST_REQUEST, Head } from "./reader.ts";
+import { joined } from "../bytes.ts";
+import { FormatError } from "../errors.ts";
+import { FIRST_REQUEST, Head } from "../format/reader.ts";
 import type { Source } from "./source.ts";
 
 const MOST_HEAD = 1 << 26; // bytes; ten hours of groups have a tenth of that

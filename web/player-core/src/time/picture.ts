@@ -1,9 +1,9 @@
 // What is to be shown, in two objects that are used in turn: `update` allocates nothing.
 
 import type { Decoding } from "./decoding.ts";
-import { mostQuality } from "./links.ts";
-import type { Chunk, Head } from "./reader.ts";
-import type { Packed, PackedGroup, PackedStatic, Shown } from "./types.ts";
+import { mostQuality } from "../format/links.ts";
+import type { Chunk, Head } from "../format/reader.ts";
+import type { Packed, PackedGroup, PackedStatic, Shown } from "../types.ts";
 
 interface Mutable {
   frame: number;

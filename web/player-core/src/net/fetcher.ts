@@ -1,9 +1,9 @@
 // Keeps the bytes of chunks that have come, and asks a source for those that are wanted next.
 
-import { joined } from "./bytes.ts";
-import { SourceError } from "./errors.ts";
-import { sizeOfLayers } from "./links.ts";
-import type { Chunk, Head } from "./reader.ts";
+import { joined } from "../bytes.ts";
+import { SourceError } from "../errors.ts";
+import { sizeOfLayers } from "../format/links.ts";
+import type { Chunk, Head } from "../format/reader.ts";
 import type { Source } from "./source.ts";
 
 /** The first layers of a chunk. */

@@ -1,11 +1,11 @@
 // Displacement fields of a LAPLACIAN group: KLT, Laplacian coordinates, quantisation. Beside coding/displacements.py.
 
 import { FormatError } from "../errors.ts";
-import { AnchorRule, DisplacementHead } from "../layout.gen.ts";
-import type { Component } from "../layout.gen.ts";
+import { AnchorRule, DisplacementHead } from "../format/layout.gen.ts";
+import type { Component } from "../format/layout.gen.ts";
 import { vertexCount } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
-import { unpack } from "../records.ts";
+import { unpack } from "../format/records.ts";
 import { decodeWeights } from "../wasm/entropy.ts";
 import { farthestAnchors, kltInverse, laplacianInverse } from "../wasm/laplacian.ts";
 import type { LaplacianSystem } from "../wasm/laplacian.ts";

@@ -2,9 +2,9 @@
 // again.
 
 import { ChunkDecoder, MissingState, buffersOf } from "./chunk_decoder.ts";
-import type { DecodeJob, FromWorker, ToWorker } from "./protocol.ts";
+import type { DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
 import { makeTools } from "./tools.ts";
-import { CoreStopped } from "./wasm/memory.ts";
+import { CoreStopped } from "../wasm/memory.ts";
 
 /** What a worker's global scope is here, and what a test's stand-in has. */
 export interface Scope {

@@ -3,11 +3,11 @@
 
 import { checkHeader, checkIndex } from "./checks.ts";
 import { crc32 } from "./crc.ts";
-import { FormatError } from "./errors.ts";
+import { FormatError } from "../errors.ts";
 import { Checksum, ChunkKind, Form, Header, Index, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
 import type { Layer } from "./layout.gen.ts";
 import { unpack, unpackAll } from "./records.ts";
-import type { Box, Info } from "./types.ts";
+import type { Box, Info } from "../types.ts";
 
 export const FIRST_REQUEST = 16384; // bytes; the head of some minutes of video
 const PREAMBLE_SIZE = Preamble.least;

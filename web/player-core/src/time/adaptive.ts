@@ -1,8 +1,8 @@
 // Quality that follows the network and the processor: layers are dropped before frames are.
 
 import type { Timeline } from "./clock.ts";
-import { mostQuality, sizeOfLayers } from "./links.ts";
-import type { Head } from "./reader.ts";
+import { mostQuality, sizeOfLayers } from "../format/links.ts";
+import type { Head } from "../format/reader.ts";
 import { groupsBetween } from "./scheduler.ts";
 
 /** How playback goes. Seconds are of display time. */

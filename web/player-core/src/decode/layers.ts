@@ -4,10 +4,10 @@
 import type { DecoderModule } from "draco3d";
 
 import { FormatError } from "../errors.ts";
-import { LayersGroup, LayersLevel, Origin, Presence } from "../layout.gen.ts";
+import { LayersGroup, LayersLevel, Origin, Presence } from "../format/layout.gen.ts";
 import { vertexCount } from "../mesh.ts";
 import type { Mesh, Placement } from "../mesh.ts";
-import { unpack } from "../records.ts";
+import { unpack } from "../format/records.ts";
 import type { Neighbours } from "../wasm/entropy.ts";
 import { fieldInverse, framesOfRows, hierarchy, placeRows, refineField, refineFieldFrames, siblingWeights, siblings, subdivide } from "../wasm/layers.ts";
 import type { FieldValues, Level } from "../wasm/layers.ts";

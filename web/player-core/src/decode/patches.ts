@@ -3,7 +3,7 @@
 import type { DecoderModule } from "draco3d";
 
 import { FormatError } from "../errors.ts";
-import type { LayersPatches } from "../layout.gen.ts";
+import type { LayersPatches } from "../format/layout.gen.ts";
 import { EMPTY, faceCount, vertexCount } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
 import type { Core } from "../wasm/memory.ts";

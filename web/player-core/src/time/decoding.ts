@@ -1,15 +1,15 @@
 // Groups and states of the background that are decoded, and the jobs that decode them.
 
-import { FormatError } from "./errors.ts";
-import type { Fetcher } from "./fetcher.ts";
-import { Form } from "./layout.gen.ts";
-import { mostQuality } from "./links.ts";
-import type { Links } from "./links.ts";
+import { FormatError } from "../errors.ts";
+import type { Fetcher } from "../net/fetcher.ts";
+import { Form } from "../format/layout.gen.ts";
+import { mostQuality } from "../format/links.ts";
+import type { Links } from "../format/links.ts";
 import type { Outcome, Share } from "./pool.ts";
-import { describe } from "./reader.ts";
-import type { Chunk, Head } from "./reader.ts";
+import { describe } from "../format/reader.ts";
+import type { Chunk, Head } from "../format/reader.ts";
 import type { Holdings, Plan, Step } from "./scheduler.ts";
-import type { Packed } from "./types.ts";
+import type { Packed } from "../types.ts";
 
 export interface DecodingEvents {
   ready(packed: Packed): void;

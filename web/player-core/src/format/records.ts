@@ -1,7 +1,7 @@
 // Records: how fields lie in bytes. In: bytes. Out: values, or a FormatError that names record and field.
 // layout.gen.ts is made of these; reads beside src/meshreel/format/kinds.py.
 
-import { FormatError } from "./errors.ts";
+import { FormatError } from "../errors.ts";
 
 /** Where in some bytes a reader is. */
 export interface Cursor {

@@ -2,8 +2,8 @@
 
 import createDecoderModule from "draco3d/draco_decoder_nodejs.js";
 
-import type { Tools } from "./coding/group.ts";
-import { Core } from "./wasm/memory.ts";
+import type { Tools } from "./group.ts";
+import { Core } from "../wasm/memory.ts";
 
 /** Both, ready for use. */
 export async function makeTools(core: WebAssembly.Module, draco: ArrayBuffer): Promise<Tools> {

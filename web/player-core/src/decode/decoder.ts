@@ -1,14 +1,14 @@
 // A whole .reel file in memory, frame by frame. Beside decoder.py; the player decodes in workers instead.
 
-import { continueGroup, decodeStatic } from "./coding/group.ts";
-import type { Continued, Tools } from "./coding/group.ts";
-import { frameOf } from "./coding/decoded.ts";
-import { crc32 } from "./crc.ts";
-import { FormatError } from "./errors.ts";
-import { EMPTY, concatenate } from "./mesh.ts";
-import type { Mesh, Placement } from "./mesh.ts";
-import { Head, describe } from "./reader.ts";
-import type { Chunk } from "./reader.ts";
+import { continueGroup, decodeStatic } from "./group.ts";
+import type { Continued, Tools } from "./group.ts";
+import { frameOf } from "./decoded.ts";
+import { crc32 } from "../format/crc.ts";
+import { FormatError } from "../errors.ts";
+import { EMPTY, concatenate } from "../mesh.ts";
+import type { Mesh, Placement } from "../mesh.ts";
+import { Head, describe } from "../format/reader.ts";
+import type { Chunk } from "../format/reader.ts";
 
 /** FormatError where the checksum of a layer does not fit, or the payload is of another form than the index says. */
 export function checkPayload(name: string, form: number, payload: Uint8Array, layers: readonly { size: number; crc: number }[]): void {

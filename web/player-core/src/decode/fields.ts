@@ -1,7 +1,7 @@
 // Fields over a causal graph: the basis and the symbols of a CodedField. Beside coding/fields.py.
 
 import { FormatError } from "../errors.ts";
-import type { CodedField } from "../layout.gen.ts";
+import type { CodedField } from "../format/layout.gen.ts";
 import { decodeField } from "../wasm/entropy.ts";
 import { orthonormalInverse } from "../wasm/layers.ts";
 import type { FieldValues, Graph } from "../wasm/layers.ts";

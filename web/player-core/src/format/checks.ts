@@ -1,6 +1,6 @@
 // What the records of a head must satisfy beyond their bytes; FormatError where they do not. Beside format/checks.py.
 
-import { FormatError } from "./errors.ts";
+import { FormatError } from "../errors.ts";
 import { ChunkKind, Form } from "./layout.gen.ts";
 import type { Header, Index, IndexEntry } from "./layout.gen.ts";
 

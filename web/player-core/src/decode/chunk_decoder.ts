@@ -1,14 +1,14 @@
 // The inside of a decoding worker: jobs in, packed groups out. Keeps what groups that follow are predicted from.
 
-import type { Tools } from "./coding/group.ts";
-import { continueGroup, decodeStatic } from "./coding/group.ts";
-import type { LayersState } from "./coding/layers.ts";
+import type { Tools } from "./group.ts";
+import { continueGroup, decodeStatic } from "./group.ts";
+import type { LayersState } from "./layers.ts";
 import { checkPayload } from "./decoder.ts";
-import type { Mesh, Placement } from "./mesh.ts";
+import type { Mesh, Placement } from "../mesh.ts";
 import { packGroup, packStatic } from "./pack.ts";
-import type { DecodeJob } from "./protocol.ts";
-import { describe } from "./reader.ts";
-import type { Packed } from "./types.ts";
+import type { DecodeJob } from "../protocol.ts";
+import { describe } from "../format/reader.ts";
+import type { Packed } from "../types.ts";
 
 const MOST_STATES = 64; // of groups, of all tracks and files; the oldest goes first
 const MOST_STATICS = 4;

@@ -1,7 +1,7 @@
 // Decoding workers: as many as there are cores to spare, one job at a time in each.
 
-import type { DecodeJob, FromWorker, ToWorker } from "./protocol.ts";
-import type { Packed } from "./types.ts";
+import type { DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
+import type { Packed } from "../types.ts";
 
 /** What the pool needs of a Worker; one of Node's `worker_threads` needs a wrapper. */
 export interface WorkerLike {
@@ -12,7 +12,7 @@ export interface WorkerLike {
   onmessageerror: ((event: unknown) => void) | null;
 }
 
-/** How workers are made: for example `create: () => new Worker(new URL("./worker.ts", import.meta.url), { type: "module" })`. */
+/** How workers are made: for example `create: () => new Worker(new URL("../decode/worker.ts", import.meta.url), { type: "module" })`. */
 export interface WorkerSetup {
   readonly create: () => WorkerLike;
   readonly core: ArrayBuffer | string; // wasm bytes, or their URL

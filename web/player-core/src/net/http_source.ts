@@ -1,7 +1,7 @@
 // A file on a web server, by ranges; from a server that knows none, as one stream.
 
 import { Bandwidth } from "./bandwidth.ts";
-import { SourceError } from "./errors.ts";
+import { SourceError } from "../errors.ts";
 import { Lost, announcedSize, checkIdentity, checkRange, checkSize, checkStatus, checkUnsatisfiable } from "./http_answer.ts";
 import type { Known } from "./http_answer.ts";
 import { Answer, pause } from "./http_request.ts";

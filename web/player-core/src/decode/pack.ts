@@ -1,14 +1,14 @@
 // Decoded groups and backgrounds as the GPU takes them; what types.ts says of PackedGroup and PackedStatic.
 
-import { frameOf } from "./coding/decoded.ts";
-import type { DecodedGroup } from "./coding/decoded.ts";
-import { FormatError } from "./errors.ts";
-import { vertexCount } from "./mesh.ts";
-import type { Mesh } from "./mesh.ts";
-import type { Box, PackedGroup, PackedStatic } from "./types.ts";
-import type { Core } from "./wasm/memory.ts";
-import { growBox, noBounds, packVertices } from "./wasm/packing.ts";
-import type { Bounds } from "./wasm/packing.ts";
+import { frameOf } from "./decoded.ts";
+import type { DecodedGroup } from "./decoded.ts";
+import { FormatError } from "../errors.ts";
+import { vertexCount } from "../mesh.ts";
+import type { Mesh } from "../mesh.ts";
+import type { Box, PackedGroup, PackedStatic } from "../types.ts";
+import type { Core } from "../wasm/memory.ts";
+import { growBox, noBounds, packVertices } from "../wasm/packing.ts";
+import type { Bounds } from "../wasm/packing.ts";
 
 const TEXTURE_WIDTH = 2048; // that every WebGL 2 has
 const MOST_ROWS = 16384; // that nearly every one has; 33 million vertices

@@ -3,10 +3,10 @@
 import type { DecoderModule } from "draco3d";
 
 import { FormatError } from "../errors.ts";
-import { DracoGroup, EmptyGroup, Form, LaplacianGroup, LayersPatches, StaticPatch } from "../layout.gen.ts";
+import { DracoGroup, EmptyGroup, Form, LaplacianGroup, LayersPatches, StaticPatch } from "../format/layout.gen.ts";
 import { EMPTY, concatenate, faceCount, placed, vertexCount, without } from "../mesh.ts";
 import type { Mesh, Placement } from "../mesh.ts";
-import { unpackAll } from "../records.ts";
+import { unpackAll } from "../format/records.ts";
 import type { Core } from "../wasm/memory.ts";
 import { ofMeshes } from "./decoded.ts";
 import type { DecodedGroup } from "./decoded.ts";

@@ -1,7 +1,7 @@
 // Where bytes come from: ranges of a file that can be cancelled.
 
-import { joined } from "./bytes.ts";
-import { SourceError } from "./errors.ts";
+import { joined } from "../bytes.ts";
+import { SourceError } from "../errors.ts";
 
 /** Takes bytes as they come: `bytes` lie at `offset` of the file. The array is its own to keep. */
 export type Take = (bytes: Uint8Array, offset: number) => void;
