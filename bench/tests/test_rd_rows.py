@@ -13,7 +13,8 @@ from meshreel_bench.apart import make_apart
 from meshreel_bench.bench import Bench
 from meshreel_bench.cli import describe
 from meshreel_bench.codec import TwoStepCodec
-from meshreel_bench.codecs import CODECS, make_codec
+from meshreel_bench.codecs import codec_names, make_codec
+from meshreel_bench.codecs.tvmc import TvmcCodec
 from meshreel_bench.curves import SSIM_WITHOUT_KEYS, value
 from meshreel_bench.datasets import open_known
 from meshreel_bench.measure import measure_point
@@ -105,7 +106,7 @@ TWO_STEPS = {
 
 
 def test_codecs_in_two_steps_are_those_that_say_so():
-    assert {kind for kind in CODECS if isinstance(make_codec(kind, {}), TwoStepCodec)} == set(TWO_STEPS)
+    assert {kind for kind in codec_names() if isinstance(make_codec(kind, {}), TwoStepCodec)} == set(TWO_STEPS)
 
 
 @pytest.fixture
@@ -152,8 +153,8 @@ def test_points_of_one_analysis_are_measured_together_and_analysed_once(bench, m
     assert runs_of([points[0], draco, *points[1:]]) == [[points[0], points[2]], [draco], [points[1]]]
     assert runs_of([Point("ball", "draco", {"qp": -1}, kind=RATED)]) != []  # told when it is measured
     calls = []
-    track = CODECS["tvmc"].analyse
-    monkeypatch.setattr(CODECS["tvmc"], "analyse", lambda *a: calls.append(a) or track(*a))
+    track = TvmcCodec.analyse
+    monkeypatch.setattr(TvmcCodec, "analyse", lambda *a: calls.append(a) or track(*a))
     quick_bench = replace(bench, comparison=ComparisonOptions(ssim=False), cache=None)
     rows = run_points(points, tmp_path / "rows.jsonl", quick_bench, lambda *_: None)
     assert len(calls) == 2 and [row["options"]["qp"] for row in rows] == [6, 7, 8]

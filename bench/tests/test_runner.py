@@ -13,7 +13,7 @@ from meshreel_bench import measure
 from meshreel_bench.bench import Bench
 from meshreel_bench.bridges import count_bridges
 from meshreel_bench.codec import Codec
-from meshreel_bench.codecs import CODECS, make_codec
+from meshreel_bench.codecs import codec_names, make_codec
 from meshreel_bench.datasets import open_dataset
 from meshreel_bench.fresh import peak_rss_mb
 from meshreel_bench.locked import locked
@@ -44,7 +44,7 @@ def folder(tmp_path_factory):
 
 
 def test_every_codec_follows_the_protocol_and_tells_its_options():
-    for kind in CODECS:
+    for kind in codec_names():
         codec = make_codec(kind, {})
         assert isinstance(codec, Codec)
         assert make_codec(kind, codec.options) == codec

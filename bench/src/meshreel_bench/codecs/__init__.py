@@ -1,9 +1,11 @@
-"""Every codec that can be compared, by name, made at an operating point."""
+"""Codecs that can be compared: plug-ins of the entry point group `meshreel.codecs`, the baselines here included.
+
+In: the name of a codec and its operating point. Out: a Codec.
+"""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
@@ -11,60 +13,35 @@ from typing import Any
 from meshreel.errors import InputError
 
 from ..codec import Codec
-from .background_once import BackgroundOnceDracoCodec
-from .draco import DecimatedDracoCodec, DracoCodec
-from .klt_tsdf import KltTsdfCodec
-from .meshreel import MeshreelCodec
-from .necgs import NecgsCodec
-from .scenes import BackgroundDracoCodec, SceneDracoCodec
-from .tvmc import TvmcCodec
 
-ENTRY_POINTS = "meshreel.codecs"
-CODECS: dict[str, Callable[..., Codec]] = {
-    "background_once_draco": BackgroundOnceDracoCodec,
-    "draco": DracoCodec,
-    "decimated_draco": DecimatedDracoCodec,
-    "meshreel": MeshreelCodec,
-    "klt_tsdf": KltTsdfCodec,
-    "necgs": NecgsCodec,
-    "scene_draco": SceneDracoCodec,
-    "background_draco": BackgroundDracoCodec,
-    "labelled_draco": BackgroundDracoCodec,  # the same by labels that somebody else has found
-    "tvmc": TvmcCodec,
-}
+GROUP = "meshreel.codecs"
 
 
-def make_codec(kind: str, options: dict[str, Any]) -> Codec:
-    """The codec of that kind at the operating point `options`. Raises InputError for a kind or option it lacks.
+def codec_names() -> list[str]:
+    """Return the names of all installed codecs, sorted."""
+    return sorted({entry.name for entry in entry_points(group=GROUP)})
 
-    Other packages have theirs by an entry point of the group `meshreel.codecs`; names of ours stay ours.
-    """
-    make = CODECS.get(kind) or _of_another_package(kind)
-    try:
-        made = make(**options)
-        name, is_codec = getattr(made, "name", None), isinstance(made, Codec)  # either may run what others wrote
-    except InputError:
-        raise  # which says what it does not take
-    except (Exception, SystemExit) as error:
-        told = error if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
-        raise InputError(f"codec {kind!r} does not take {options}: {told}") from error
-    if not is_codec:
+
+def make_codec(name: str, options: dict[str, Any]) -> Codec:
+    """Return the codec of that name at the operating point `options`. Raises InputError where there is none."""
+    made = _called(name, _loaded(name), options)
+    if not isinstance(made, Codec):
         lacking = [part for part in ("name", "options", "encode", "decode") if not hasattr(made, part)]
-        raise InputError(f"codec {kind!r} is a {type(made).__name__} without {', '.join(lacking)}; see docs/codecs.md")
-    if kind not in CODECS and str(name).split()[:1] in [[ours] for ours in CODECS]:
-        raise InputError(f"codec {kind!r} calls itself {name!r}, as one of meshreel's own; give it another name")
+        raise InputError(f"codec {name!r} is a {type(made).__name__} without {', '.join(lacking)}; see docs/codecs.md")
     return made
 
 
-def codec_version(kind: str) -> str | None:
-    """The distribution that brings somebody else's codec, and its version; None for ours and where none says so."""
-    entry = None if kind in CODECS else _others().get(kind)
-    return None if entry is None or entry.dist is None else f"{entry.dist.name} {entry.dist.version}"
+def codec_version(name: str) -> str | None:
+    """Return the distribution that brings a codec, and its version; None for this one, whose version every row has."""
+    entry = _entry(name)
+    if entry is None or entry.dist is None or entry.module.partition(".")[0] == __name__.partition(".")[0]:
+        return None
+    return f"{entry.dist.name} {entry.dist.version}"
 
 
-def source_of(kind: str) -> Path | None:
-    """The file or the folder of somebody else's codec, once it is loaded; None for ours."""
-    entry = None if kind in CODECS else _others().get(kind)
+def source_of(name: str) -> Path | None:
+    """Return the file or the folder of a codec whose module is loaded, else None."""
+    entry = _entry(name)
     module = None if entry is None else sys.modules.get(entry.module)
     file = getattr(module, "__file__", None)
     if file is None:
@@ -72,19 +49,33 @@ def source_of(kind: str) -> Path | None:
     return Path(file).parent if hasattr(module, "__path__") else Path(file)
 
 
-def _others() -> dict[str, EntryPoint]:
-    return {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
+def _entry(name: str) -> EntryPoint | None:
+    """Return the entry point of that name. Raises InputError where two distributions have one."""
+    found = list(entry_points(group=GROUP, name=name))
+    if len(found) > 1:
+        owners = " and ".join(entry.dist.name if entry.dist else entry.value for entry in found)
+        raise InputError(f"{owners} both bring a codec {name!r}; uninstall one, or give its codec another name")
+    return found[0] if found else None
 
 
-def _of_another_package(kind: str) -> Callable[..., Codec]:
-    others = _others()
-    if kind not in others:
-        raise InputError(f"no codec is called {kind!r}; known: {', '.join(sorted({*CODECS, *others}))}")
+def _loaded(name: str) -> Any:
+    entry = _entry(name)
+    if entry is None:
+        raise InputError(f"no codec is called {name!r}; known: {', '.join(codec_names())}")
     try:
-        make: Callable[..., Codec] = others[kind].load()
-    except (Exception, SystemExit) as error:  # what runs when a package is imported may raise anything
-        told = error if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
-        raise InputError(f"codec {kind!r} cannot be loaded ({told}); install what its package needs") from error
+        return entry.load()
+    except (Exception, SystemExit) as error:  # importing a package may raise anything
+        reason = error if isinstance(error, ImportError) else f"{type(error).__name__}: {error}"
+        raise InputError(f"codec {name!r} cannot be loaded ({reason}); install what its package needs") from error
+
+
+def _called(name: str, make: Any, options: dict[str, Any]) -> Any:
     if not callable(make):
-        raise InputError(f"codec {kind!r} is a {type(make).__name__}; its entry point must name a class or a function")
-    return make
+        raise InputError(f"codec {name!r} is a {type(make).__name__}; its entry point must name a class or a function")
+    try:
+        return make(**options)
+    except InputError:
+        raise  # its message says which value is wrong
+    except (Exception, SystemExit) as error:  # a constructor may raise anything
+        reason = error if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
+        raise InputError(f"codec {name!r} does not take {options}: {reason}") from error
