@@ -20,8 +20,8 @@ from meshreel_bench.datasets.scenes import FOUND, SceneData, open_scene
 from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
 from meshreel.analysis.scene.background_depth import fuse_still_depth
 from meshreel.geometry.topology import drop_unreferenced
-from meshreel.metrics.truth import Scene, scene_row
-from meshreel.metrics.truth_comparison import true_scene
+from meshreel.metrics.scene_accuracy import Scene, scene_row
+from meshreel.metrics.scene_comparison import true_scene
 from meshreel.types import Mesh, evenly
 
 DECISION, VOXEL, FRAME = "backgrounds", 0.02, 30

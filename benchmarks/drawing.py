@@ -18,8 +18,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from meshreel.geometry.nearest import Surface
-from meshreel.metrics.cameras import Box, OrthographicCamera, parallel_views_around
 from meshreel.metrics.render import Window, look
+from meshreel.metrics.viewpoints import Box, OrthographicCamera, parallel_views_around
 from meshreel.types import Mesh
 
 DPI = 100

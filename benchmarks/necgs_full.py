@@ -20,7 +20,7 @@ from meshreel_bench.codecs.necgs import FULL, QUICK, SMALL, NecgsCodec
 from meshreel_bench.datasets import open_dataset
 from meshreel_bench.rows import Point, append_row, read_rows
 
-from meshreel.metrics.report import ComparisonOptions, compare_sequences
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.types import MeshSequence
 
 EXPERIMENT = "necgs"

@@ -32,9 +32,9 @@ from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import face_normals, part_of
 from meshreel.io.meshes import read_mesh
 from meshreel.metrics.bd_rate import Curve, bd_rate
-from meshreel.metrics.cameras import Box, parallel_views_around
 from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.ssim import ssim_normals
+from meshreel.metrics.viewpoints import Box, parallel_views_around
 from meshreel.types import Mesh
 
 DECISION, FRAME_RATE, EVERY, VIEW = "fused", 30.0, 4, 512

@@ -21,8 +21,8 @@ from PIL import Image
 from meshreel.analysis.reference.reference import MDS
 from meshreel.encoder.presets import preset_options
 from meshreel.geometry.topology import components as connected
-from meshreel.metrics.cameras import Box
-from meshreel.metrics.sheet import SheetOptions, write_sheet
+from meshreel.metrics.error_sheet import SheetOptions, write_sheet
+from meshreel.metrics.viewpoints import Box
 from meshreel.types import Mesh, MeshList
 
 sys.path.insert(0, str(Path(__file__).parent))

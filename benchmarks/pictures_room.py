@@ -21,7 +21,7 @@ from meshreel.decoder.video import open as open_video
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import encode
 from meshreel.geometry.topology import components, concatenate, part_of
-from meshreel.metrics.cameras import Box, OrthographicCamera
+from meshreel.metrics.viewpoints import Box, OrthographicCamera
 from meshreel.types import Mesh
 
 FRAMES, SHOWN = 20, 9

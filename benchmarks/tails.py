@@ -26,9 +26,9 @@ from meshreel.format.layout import Form
 from meshreel.format.records import pack
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import drop_unreferenced
-from meshreel.metrics.cameras import Box, parallel_views_around
 from meshreel.metrics.distance import SurfaceErrors, surface_errors
 from meshreel.metrics.ssim import ssim_normals
+from meshreel.metrics.viewpoints import Box, parallel_views_around
 from meshreel.types import Mesh
 
 DECISION, FRAME_RATE, VIEW = "tails", 30.0, 512

@@ -8,7 +8,7 @@ import numpy as np
 from meshreel_bench.row_form import FAILED
 from PIL import Image
 
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
 
 SIZE = 100  # pixels of a side
 

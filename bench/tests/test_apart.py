@@ -23,7 +23,7 @@ from meshreel_bench.runner import run_points, runs_of
 
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
 
 BALLS = sliding_sphere(2, levels=1)
 QUICK = ComparisonOptions(ssim=False)

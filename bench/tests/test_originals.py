@@ -14,10 +14,10 @@ from meshreel_bench.originals import KeptPictures
 from meshreel_bench.rd_rows import RATED
 from meshreel_bench.rows import Point
 
-from meshreel.metrics.cameras import Box, ViewOptions, parallel_views_around, views_around
+from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.metrics.render import Pixels, Visible, Window, window_of
-from meshreel.metrics.report import ComparisonOptions
 from meshreel.metrics.ssim import ssim_normals
+from meshreel.metrics.viewpoints import Box, ViewOptions, parallel_views_around, views_around
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, noisy, sphere
 

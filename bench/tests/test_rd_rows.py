@@ -27,8 +27,8 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder.sequence import encode
 from meshreel.errors import InputError
 from meshreel.geometry.sequences import Chosen
-from meshreel.metrics.cameras import ViewOptions
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
+from meshreel.metrics.viewpoints import ViewOptions
 from tests.small_options import quick
 from tests.small_scene import scene
 

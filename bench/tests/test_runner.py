@@ -26,7 +26,7 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.geometry.sequences import Backwards
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.types import Mesh, MeshList
 from tests.golden import GOLDEN
 from tests.small_options import TRIALS

@@ -22,7 +22,7 @@ from meshreel.capture.truth import read_truth
 from meshreel.errors import InputError
 from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import drop_unreferenced
-from meshreel.metrics.truth_comparison import compare_with_truth
+from meshreel.metrics.scene_comparison import compare_with_truth
 from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import camera
 from tests.metrics.shapes import moved, plane, sphere

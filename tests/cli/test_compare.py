@@ -17,7 +17,7 @@ from meshreel.capture.simulate import SceneFrame, simulate_rig
 from meshreel.container.writer import ReelWriter
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
-from meshreel.metrics.cameras import write_cameras
+from meshreel.metrics.viewpoints import write_cameras
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import camera
 from tests.cli.conftest import FILE, failed

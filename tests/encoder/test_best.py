@@ -14,8 +14,8 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder import layers as layered
 from meshreel.encoder.sequence import encode
 from meshreel.format.layout import Form
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.distance import surface_errors
-from meshreel.metrics.report import ComparisonOptions, compare_sequences
 from meshreel.types import Mesh, MeshList
 from tests.small_options import quick
 

@@ -18,7 +18,7 @@ from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.summary import GroupSummary, SceneSummary, Summary
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
-from meshreel.metrics.report import ComparisonOptions, compare_sequences
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.types import MeshList
 from tests.small_options import quick
 

@@ -16,8 +16,8 @@ from meshreel.encoder.sequence import encode
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import weld
 from meshreel.io.sequence import SequenceOptions, open_sequence
-from meshreel.metrics.cameras import ParallelViewOptions
-from meshreel.metrics.report import ComparisonOptions, compare_sequences
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
+from meshreel.metrics.viewpoints import ParallelViewOptions
 from meshreel.types import MeshList
 from tests.shared_data import performer
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from meshreel.metrics.cameras import Box, ViewOptions, parallel_views_around, views_around
 from meshreel.metrics.render import Window, look, render_normals, window_of
+from meshreel.metrics.viewpoints import Box, ViewOptions, parallel_views_around, views_around
 from meshreel.types import Mesh
 
 from .shapes import moved, noisy, plane, sphere

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from meshreel.metrics import render
-from meshreel.metrics.cameras import Box, ViewOptions, parallel_views_around, views_around
 from meshreel.metrics.render import Window, look, render_normals
 from meshreel.metrics.ssim import ssim_map, ssim_normals
+from meshreel.metrics.viewpoints import Box, ViewOptions, parallel_views_around, views_around
 from meshreel.types import Mesh
 
 from .shapes import moved, noisy, sphere

@@ -15,8 +15,8 @@ import numpy as np
 from meshreel.errors import InputError
 from meshreel.geometry.sequences import DerivedSequence
 from meshreel.io.meshes import FARTHEST
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.render import Looked, Visible
-from meshreel.metrics.report import ComparisonOptions, compare_sequences
 from meshreel.types import Frames, Mesh, MeshSequence
 
 from .codec import Codec

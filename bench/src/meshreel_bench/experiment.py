@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Protocol, runtime_checkable
 
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
 
 from .promises import Promise
 from .rows import Point, Row

@@ -17,7 +17,7 @@ import numpy as np
 from meshreel.coding.mesh import encode_mesh
 from meshreel.decoder.video import open as open_video
 from meshreel.geometry.sequences import Backwards
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.types import Frames, MeshSequence
 
 from .bench import Bench

@@ -15,9 +15,9 @@ from PIL import Image
 
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.io.write import make_folder, replacing
-from meshreel.metrics.cameras import Box, Camera, parallel_views_around
+from meshreel.metrics.error_sheet import error_at_pixels
 from meshreel.metrics.render import BACKGROUND, look, render_normals, window_of
-from meshreel.metrics.sheet import error_at_pixels
+from meshreel.metrics.viewpoints import Box, Camera, parallel_views_around
 from meshreel.types import Mesh
 
 from .rows import Row

@@ -18,8 +18,8 @@ from meshreel.errors import InputError
 from meshreel.geometry.sequences import Chosen
 from meshreel.io.sequence import SequenceOptions
 from meshreel.metrics.render import Visible
-from meshreel.metrics.truth import Scene, scene_means, scene_row
-from meshreel.metrics.truth_comparison import finite, true_scene
+from meshreel.metrics.scene_accuracy import Scene, scene_means, scene_row
+from meshreel.metrics.scene_comparison import finite, true_scene
 from meshreel.types import Frames, MeshSequence, evenly
 
 from .bench import Bench

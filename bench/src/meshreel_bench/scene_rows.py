@@ -16,9 +16,9 @@ from typing import Any, Protocol, runtime_checkable
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import ChunkKind
+from meshreel.metrics.scene_accuracy import Scene, scene_means, scene_row
+from meshreel.metrics.scene_comparison import finite, true_scene
 from meshreel.metrics.seams import measure_seam, seam_row
-from meshreel.metrics.truth import Scene, scene_means, scene_row
-from meshreel.metrics.truth_comparison import finite, true_scene
 from meshreel.types import Mesh
 
 from .checked import Checked, decoder_of

@@ -14,7 +14,7 @@ from typing import Any
 
 from meshreel.errors import InputError
 from meshreel.metrics.bd_rate import Curve, beats, have_range
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
 
 from .codecs import make_codec
 from .curves import Measure, against, curve, curve_of, value

@@ -21,8 +21,8 @@ from meshreel_bench.measure import run_curve_point
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.topology import border_edges, components, part_of
+from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.metrics.distance import surface_errors
-from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Mesh, MeshList
 
 SMALL = KltTsdfCodec(cells=80, basis=24, step=0.05)

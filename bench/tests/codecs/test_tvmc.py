@@ -24,8 +24,8 @@ from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
 from meshreel.geometry.nearest import distances
 from meshreel.geometry.topology import concatenate
+from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.metrics.distance import surface_errors
-from meshreel.metrics.report import ComparisonOptions
 from meshreel.types import Mesh, MeshList
 from tests.scenes import CELL, NOISE, ball, of_body, quick_scene, room, with_room
 from tests.small_options import quick

@@ -23,10 +23,10 @@ from ..format.layout import MAGIC
 from ..geometry.cameras import PinholeCamera
 from ..geometry.topology import weld
 from ..io.sequence import FileSequence, SequenceOptions, open_sequence
-from ..metrics.cameras import read_cameras
-from ..metrics.report import compare_sequences
-from ..metrics.sheet import SheetOptions, write_sheet
-from ..metrics.truth_comparison import compare_with_truth
+from ..metrics.comparison import compare_sequences
+from ..metrics.error_sheet import SheetOptions, write_sheet
+from ..metrics.scene_comparison import compare_with_truth
+from ..metrics.viewpoints import read_cameras
 from ..types import Frames, Mesh, MeshSequence
 from .console import Common, StageBars
 from .flags import Knowing, Looking, Reading

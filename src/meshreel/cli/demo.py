@@ -21,8 +21,8 @@ from ..decoder.video import open as open_video
 from ..encoder.presets import preset_options
 from ..encoder.sequence import encode
 from ..errors import InputError
-from ..metrics.sheet import SheetOptions, write_sheet
-from ..metrics.truth_comparison import compare_with_truth
+from ..metrics.error_sheet import SheetOptions, write_sheet
+from ..metrics.scene_comparison import compare_with_truth
 from ..types import MeshSequence
 from .compare import truth_table
 from .console import Common, StageBars, called_as

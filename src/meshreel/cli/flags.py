@@ -11,8 +11,8 @@ from cyclopts import Parameter
 from ..errors import InputError
 from ..geometry.topology import weld
 from ..io.sequence import SequenceOptions
-from ..metrics.cameras import ViewOptions
-from ..metrics.report import ComparisonOptions
+from ..metrics.comparison import ComparisonOptions
+from ..metrics.viewpoints import ViewOptions
 from ..types import Up
 
 _READ = SequenceOptions()

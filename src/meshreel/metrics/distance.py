@@ -15,7 +15,7 @@ from jaxtyping import Float64
 
 from ..types import Mesh
 from .normals import WORST_ANGLE, angles
-from .samples import RESOLUTION, Matches, Samples, match, sample_pair, used_surface
+from .surface_samples import RESOLUTION, Matches, Samples, match, sample_pair, used_surface
 
 _LEAST, _MOST = 1e-3, 1e6  # m, from the middle of two meshes: distances are asked for in m
 PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; a mean over frames counts an infinite PSNR as this

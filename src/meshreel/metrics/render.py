@@ -17,9 +17,9 @@ from jaxtyping import Bool, Float32, Float64, Int32
 from ..geometry.raycast import Rays
 from ..geometry.topology import blend
 from ..types import Mesh
-from .cameras import Camera
 from .normals import interpolate, welded_normals
-from .samples import used_surface
+from .surface_samples import used_surface
+from .viewpoints import Camera
 
 BACKGROUND = 1.0  # white
 

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..types import Mesh
-from .cameras import Camera
 from .render import Looked, Pixels, Visible, window_of
+from .viewpoints import Camera
 
 _SIDE = 7  # pixels, side of the SSIM window
 BORDER = _SIDE // 2

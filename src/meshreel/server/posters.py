@@ -72,8 +72,8 @@ def _picture(mesh: Mesh, up: str) -> bytes:
     from PIL import Image
 
     from ..geometry.raycast import Rays
-    from ..metrics.cameras import Box, ViewOptions, views_around
     from ..metrics.render import Window, look
+    from ..metrics.viewpoints import Box, ViewOptions, views_around
 
     box, rays = Box.of([mesh]), Rays(mesh)
     shown = []  # in each of the four views, pixels with the fronts of faces less those with backs: walls from outside

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any
 
-from meshreel.metrics.cameras import ParallelViewOptions
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
+from meshreel.metrics.viewpoints import ParallelViewOptions
 
 from ..curves import ANCHOR, ANCHORS, HULL, JUDGED, MEASURES, SYMMETRIC, Against, against_hull, hull_lines, on_hull
 from ..datasets import REMESHED

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from meshreel.metrics.bd_rate import BdRate, Curve, bd_bound, hull
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
 
 from ..curves import Measure, curve, value
 from ..datasets.scenes import FOUND, SCENES

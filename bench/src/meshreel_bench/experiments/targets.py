@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from meshreel.metrics.report import ComparisonOptions
+from meshreel.metrics.comparison import ComparisonOptions
 
 from ..curves import bd_lines
 from ..promises import Promise, flat_memory, of_row, of_rows

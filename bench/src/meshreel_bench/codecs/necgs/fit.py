@@ -13,7 +13,7 @@ from jaxtyping import Float32
 from torch import Tensor
 
 from meshreel.geometry.nearest import Surface
-from meshreel.metrics.scatter import scatter
+from meshreel.metrics.even_points import scatter
 from meshreel.types import Mesh
 
 from .cubes import cut, grid_points, place

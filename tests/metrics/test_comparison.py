@@ -7,7 +7,10 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.metrics.cameras import (
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
+from meshreel.metrics.distance import PSNR_CEILING, surface_errors
+from meshreel.metrics.ssim import ssim_normals
+from meshreel.metrics.viewpoints import (
     Box,
     ParallelViewOptions,
     ViewOptions,
@@ -15,9 +18,6 @@ from meshreel.metrics.cameras import (
     views_around,
     write_cameras,
 )
-from meshreel.metrics.distance import PSNR_CEILING, surface_errors
-from meshreel.metrics.report import ComparisonOptions, compare_sequences
-from meshreel.metrics.ssim import ssim_normals
 from meshreel.types import Mesh, MeshList
 
 from .shapes import noisy, sphere

@@ -20,7 +20,10 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..types import Mesh
-from .cameras import (
+from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
+from .render import Looked, Visible
+from .ssim import ssim_normals
+from .viewpoints import (
     Box,
     OrthographicCamera,
     ParallelViewOptions,
@@ -30,9 +33,6 @@ from .cameras import (
     read_cameras,
     views_around,
 )
-from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
-from .render import Looked, Visible
-from .ssim import ssim_normals
 
 Row = dict[str, Any]
 Cameras = Sequence[PinholeCamera] | Sequence[OrthographicCamera]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.metrics.cameras import (
+from meshreel.metrics.viewpoints import (
     Box,
     ViewOptions,
     parallel_views_around,

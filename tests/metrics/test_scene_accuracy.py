@@ -10,7 +10,7 @@ import pytest
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.metrics.distance import PSNR_CEILING
-from meshreel.metrics.truth import Scene, Sight, SightOptions, scene_means, scene_row, visible
+from meshreel.metrics.scene_accuracy import Scene, Sight, SightOptions, scene_means, scene_row, visible
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, noisy, plane, sphere
 

@@ -15,7 +15,7 @@ from jaxtyping import Bool
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..types import Frames, Mesh
-from .truth import Scene, Sight, SightOptions, scene_means, scene_row
+from .scene_accuracy import Scene, Sight, SightOptions, scene_means, scene_row
 
 Row = dict[str, Any]
 

@@ -20,10 +20,10 @@ from ..geometry.cameras import PinholeCamera
 from ..geometry.nearest import Surface
 from ..io.write import replacing
 from ..types import UP_AXES, Mesh, check_up
-from .cameras import Box, ViewOptions, views_around
 from .distance import surface_errors
 from .render import View, Window, look
-from .samples import box_center, used_surface
+from .surface_samples import box_center, used_surface
+from .viewpoints import Box, ViewOptions, views_around
 
 _COLUMNS = ("original", "decoded", "error (magenta: only decoded)")
 _LEFT, _RIGHT, _TOP, _GAP = 64, 100, 32, 8  # pixels around and between the pictures

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.metrics.cameras import Box, ViewOptions, views_around
+from meshreel.metrics.error_sheet import SheetOptions, error_at_pixels, write_sheet
 from meshreel.metrics.render import Window, look
-from meshreel.metrics.sheet import SheetOptions, error_at_pixels, write_sheet
+from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
 
 from .shapes import moved, noisy, sphere

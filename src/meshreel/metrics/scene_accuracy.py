@@ -30,11 +30,11 @@ from ..geometry.raycast import Rays
 from ..geometry.topology import face_normals
 from ..types import Mesh
 from .distance import PSNR_CEILING, psnr, quantile
+from .even_points import Scatter, scatter
 from .normals import WORST_ANGLE, angles, interpolate, welded_normals
 from .render import BACKGROUND
-from .samples import box_center
-from .scatter import Scatter, scatter
 from .ssim import BORDER, ssim_map
+from .surface_samples import box_center
 
 Row = dict[str, Any]
 PARTS = ("all", "people", "background")
