@@ -15,9 +15,9 @@ import numpy as np
 from captured import Case, Row, asked_cases, keep
 from jaxtyping import Float64
 
-from meshreel.analysis.fit.fit import FitOptions, fit_frames
 from meshreel.analysis.fit.match import Target
 from meshreel.analysis.fit.residual import Residual, residual_of
+from meshreel.analysis.fit.surface_fit import FitOptions, fit_frames
 from meshreel.analysis.follow.embedded import register
 from meshreel.analysis.reference.centers import ReferenceCenterOptions, affinity, largest_distances
 from meshreel.analysis.reference.deform import DeformOptions, bind, center_motions, move, neighbours

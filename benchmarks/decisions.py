@@ -17,16 +17,16 @@ from typing import Any
 import DracoPy
 import numpy as np
 
-from meshreel.analysis.fit.fit import fit_frames
+from meshreel.analysis.fit.surface_fit import fit_frames
 from meshreel.analysis.reference.centers import affinity, largest_distances
 from meshreel.analysis.reference.deform import neighbours
+from meshreel.analysis.reference.extraction import MDS
 from meshreel.analysis.reference.fuse import Group
-from meshreel.analysis.reference.reference import MDS
 from meshreel.coding.group import decode_group, encode_group
 from meshreel.coding.paper import quantize
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.paper.laplacian import System, anchors
-from meshreel.coding.reference import code_reference
+from meshreel.coding.reference_mesh import code_reference
 from meshreel.encoder.draco import cheapest_intra, measure
 from meshreel.encoder.presets import displacement_step, preset_options
 from meshreel.format.layout import AnchorRule

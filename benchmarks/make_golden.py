@@ -19,10 +19,10 @@ from meshreel.capture.procedural import deforming_sphere
 from meshreel.coding.background import decode_background, encode_background, encode_change
 from meshreel.coding.group import encode_group
 from meshreel.coding.intra import encode_empty, encode_intra
-from meshreel.coding.layers.layers import LayersOptions, LayersState, encode_layers
+from meshreel.coding.layers.coder import LayersOptions, LayersState, encode_layers
 from meshreel.coding.layers.patches import encode_patches
 from meshreel.coding.paper.displacements import DisplacementOptions
-from meshreel.coding.reference import CodedReference, code_reference
+from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video

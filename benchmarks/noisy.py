@@ -20,7 +20,7 @@ from captured import Row, keep
 from meshreel_bench.datasets.rooms import PEOPLE
 
 from meshreel.coding.intra import decode_intra, encode_intra
-from meshreel.coding.layers.layers import LayersState, place_layers, read_layers
+from meshreel.coding.layers.coder import LayersState, place_layers, read_layers
 from meshreel.coding.layers.patches import decode_patches
 from meshreel.encoder.layers import encode_segment
 from meshreel.encoder.paper import EncodedGroup

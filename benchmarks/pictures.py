@@ -18,7 +18,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from meshreel.analysis.reference.reference import MDS
+from meshreel.analysis.reference.extraction import MDS
 from meshreel.encoder.presets import preset_options
 from meshreel.geometry.topology import components as connected
 from meshreel.metrics.error_sheet import SheetOptions, write_sheet

@@ -12,7 +12,7 @@ import numpy as np
 from drawing import Sheet, shaded
 from jaxtyping import Float64
 
-from meshreel.analysis.scene.segment import segment
+from meshreel.analysis.scene.segmentation import segment
 from meshreel.capture.fusion import FusionOptions
 from meshreel.capture.record import Recording, open_recording
 from meshreel.capture.room import RoomOptions, furnished_room, room_cameras

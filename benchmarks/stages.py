@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.analysis.fit.fit import Fit, fit_frames
+from meshreel.analysis.fit.surface_fit import Fit, fit_frames
 from meshreel.analysis.reference.centers import largest_distances, reference_centers
 from meshreel.analysis.reference.deform import bind, center_motions, move
-from meshreel.analysis.reference.reference import Reference, extract_reference, predict
+from meshreel.analysis.reference.extraction import Reference, extract_reference, predict
 from meshreel.analysis.reference.track import track_centers
 from meshreel.analysis.survey import survey
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
 from meshreel.coding.group import decode_group, encode_group, payload_parts
-from meshreel.coding.reference import CodedReference, code_reference
+from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.encoder.paper import EncoderOptions
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList

@@ -17,7 +17,7 @@ import numpy as np
 from captured import Case, Row, asked_cases, keep
 from jaxtyping import Bool
 
-from meshreel.coding.layers.layers import LayersState, decode_layers
+from meshreel.coding.layers.coder import LayersState, decode_layers
 from meshreel.encoder.layers import encode_segment
 from meshreel.encoder.paper import EncodedGroup
 from meshreel.encoder.presets import preset_options

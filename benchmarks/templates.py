@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from captured import Case, Row, asked_cases, keep
 
-from meshreel.analysis.fit.fit import Guides, fit_targets
 from meshreel.analysis.fit.match import Target
+from meshreel.analysis.fit.surface_fit import Guides, fit_targets
 from meshreel.analysis.follow.correspond import choose_key
 from meshreel.analysis.follow.template import shared_detail
-from meshreel.coding.layers.layers import LayersOptions, encode_layers
-from meshreel.coding.reference import CodedReference, code_on_lattice
+from meshreel.coding.layers.coder import LayersOptions, encode_layers
+from meshreel.coding.reference_mesh import CodedReference, code_on_lattice
 from meshreel.encoder.draco import measure
 from meshreel.encoder.presets import preset_options
 from meshreel.geometry.decimate import decimate

@@ -39,7 +39,7 @@ def give() -> None:
 
 def small(preset_options: Any) -> Any:
     """A preset's options with little of everything, so that a page runs in seconds."""
-    from meshreel.analysis.reference.reference import ReferenceOptions
+    from meshreel.analysis.reference.extraction import ReferenceOptions
     from meshreel.analysis.reference.track import TrackOptions
     from meshreel.encoder.draco import IntraOptions
 

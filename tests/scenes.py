@@ -10,7 +10,7 @@ from skimage.measure import marching_cubes
 
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.places import PlacesOptions
-from meshreel.analysis.scene.segment import SegmentOptions
+from meshreel.analysis.scene.segmentation import SegmentOptions
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.encoder.paper import EncoderOptions
 from meshreel.geometry.topology import concatenate, weld

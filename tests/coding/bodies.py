@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.coding.reference import CodedReference, code_reference
+from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.types import Mesh
 
 from .paper.test_laplacian import icosahedron

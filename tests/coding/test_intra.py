@@ -9,7 +9,7 @@ import pytest
 
 from meshreel.coding.intra import decode_empty, decode_intra, encode_empty, encode_intra
 from meshreel.coding.mesh import MAX_FACES, encode_mesh
-from meshreel.coding.reference import code_on_lattice
+from meshreel.coding.reference_mesh import code_on_lattice
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import DracoGroup, Form
 from meshreel.format.records import pack

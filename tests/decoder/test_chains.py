@@ -11,7 +11,7 @@ import pytest
 
 import meshreel
 from meshreel.coding.intra import encode_empty
-from meshreel.coding.layers.layers import encode_layers
+from meshreel.coding.layers.coder import encode_layers
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import meshreel
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
-from meshreel.coding.layers.layers import encode_layers
+from meshreel.coding.layers.coder import encode_layers
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter, pack_head
 from meshreel.decoder import tracks

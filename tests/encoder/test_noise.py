@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.coding.layers.layers import decode_layers
+from meshreel.coding.layers.coder import decode_layers
 from meshreel.encoder.layers import encode_segment
 from meshreel.encoder.noise import above_noise
 from meshreel.encoder.paper import target_of
@@ -17,7 +17,7 @@ from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
 
-from ..analysis.follow.test_fused import SIDE, gaps, noisy, sheet, with_hole
+from ..analysis.follow.test_fused_template import SIDE, gaps, noisy, sheet, with_hole
 
 NOISE = 0.003
 BEST = preset_options("best")

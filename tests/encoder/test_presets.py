@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from meshreel.analysis.follow.template import TemplateOptions
-from meshreel.coding.layers.layers import LayersOptions
+from meshreel.coding.layers.coder import LayersOptions
 from meshreel.encoder.paper import EncoderOptions
 from meshreel.encoder.presets import PRESETS, displacement_step, preset_options, reference_vertices
 from meshreel.errors import InputError

@@ -12,7 +12,7 @@ import meshreel
 import meshreel.encoder.scene as scene
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.labelling import ByPlace
-from meshreel.analysis.scene.segment import scene_views
+from meshreel.analysis.scene.segmentation import scene_views
 from meshreel.analysis.scene.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background

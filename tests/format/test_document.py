@@ -12,12 +12,12 @@ import pytest
 
 from meshreel.coding import entropy
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
-from meshreel.coding.layers.layers import LayersOptions, LayersState, decode_layers, encode_layers
+from meshreel.coding.layers.coder import LayersOptions, LayersState, decode_layers, encode_layers
 from meshreel.coding.layers.patches import encode_patches
 from meshreel.coding.mesh import decode_mesh
 from meshreel.coding.paper import laplacian
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
-from meshreel.coding.reference import code_reference
+from meshreel.coding.reference_mesh import code_reference
 from meshreel.coding.steps import step_of
 from meshreel.format import records
 from meshreel.format.layout import AnchorRule, DisplacementHead, LayersGroup, LayersLevel, Origin, StaticPatch

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from meshreel_bench.codecs.tvmc.tracked import MOST_CELLS, decode_cloud, encode_cloud, surface_order
 
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.coding.reference import code_reference
+from meshreel.coding.reference_mesh import code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.types import Mesh
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..analysis.scene.segment import SegmentOptions
+from ..analysis.scene.segmentation import SegmentOptions
 from ..encoder.paper import EncoderOptions
 from ..encoder.presets import preset_options
 from ..encoder.quality import Goal, encode_to

@@ -17,11 +17,11 @@ from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh, Placement
 from .intra import decode_empty, decode_intra
-from .layers.layers import LayersState, layers_parts, place_layers, read_layers
+from .layers.coder import LayersState, layers_parts, place_layers, read_layers
 from .layers.patches import decode_patches
 from .mesh import check_growth, check_step, decode_mesh
 from .paper.displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
-from .reference import CodedReference
+from .reference_mesh import CodedReference
 
 
 def encode_group(

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..coding.background import decode_background, decode_change
 from ..coding.group import continue_group
-from ..coding.layers.layers import MOST_NUMBERS, LayersState
+from ..coding.layers.coder import MOST_NUMBERS, LayersState
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
 from ..format.layout import Form

@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from ..analysis.fit.fit import Fit, Guides, fit_targets
 from ..analysis.fit.match import Target
+from ..analysis.fit.surface_fit import Fit, Guides, fit_targets
 from ..analysis.follow.correspond import Course, choose_key, from_last
-from ..analysis.follow.fused import fused_mesh
+from ..analysis.follow.fused_template import fused_mesh
 from ..analysis.follow.template import base_mesh, shared_detail
 from ..analysis.groups import cut_at, leading
 from ..coding.intra import encode_empty
-from ..coding.layers.layers import EncodedLayers, LayersState, encode_layers
-from ..coding.reference import CodedReference, code_on_lattice
+from ..coding.layers.coder import EncodedLayers, LayersState, encode_layers
+from ..coding.reference_mesh import CodedReference, code_on_lattice
 from ..format.layout import Form
 from ..format.records import pack
 from ..types import Frames, Mesh

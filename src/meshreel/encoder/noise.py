@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ..analysis.fit.fit import FitOptions
+from ..analysis.fit.surface_fit import FitOptions
 from ..analysis.follow.embedded import EmbeddedOptions
 from .paper import EncoderOptions
 

@@ -15,22 +15,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float64
 
-from ..analysis.fit.fit import Fit, FitOptions, fit_frames
+from ..analysis.fit.surface_fit import Fit, FitOptions, fit_frames
 from ..analysis.follow.correspond import PLACES
 from ..analysis.follow.embedded import EmbeddedOptions
-from ..analysis.follow.fused import FusedOptions
+from ..analysis.follow.fused_template import FusedOptions
 from ..analysis.follow.template import TemplateOptions
 from ..analysis.groups import GroupOptions, cut_at
-from ..analysis.reference.reference import ReferenceOptions, extract_reference, predict
+from ..analysis.reference.extraction import ReferenceOptions, extract_reference, predict
 from ..analysis.reference.track import TrackOptions, track_centers
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.bodies import BodyOptions
-from ..analysis.scene.segment import SegmentOptions
+from ..analysis.scene.segmentation import SegmentOptions
 from ..coding.group import decode_group, encode_group
 from ..coding.intra import encode_empty
-from ..coding.layers.layers import LayersOptions
+from ..coding.layers.coder import LayersOptions
 from ..coding.paper.displacements import DisplacementOptions
-from ..coding.reference import CodedReference, code_reference
+from ..coding.reference_mesh import CodedReference, code_reference
 from ..errors import InputError, NoReferenceError
 from ..format.layout import Form
 from ..metrics.normals import WORST_ANGLE

@@ -18,7 +18,7 @@ from ..analysis.scene.background_depth import fuse_still_depth
 from ..analysis.scene.bodies import ring
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import Masker
-from ..analysis.scene.segment import segment, segment_by
+from ..analysis.scene.segmentation import segment, segment_by
 from ..analysis.survey import Survey, check_one_unit
 from ..errors import InputError
 from ..geometry.connected import connected

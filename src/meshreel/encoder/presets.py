@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ..analysis.fit.fit import FitOptions
+from ..analysis.fit.surface_fit import FitOptions
 from ..analysis.follow.template import TemplateOptions
 from ..analysis.groups import GroupOptions
-from ..analysis.reference.reference import ReferenceOptions
+from ..analysis.reference.extraction import ReferenceOptions
 from ..analysis.reference.track import TrackOptions
-from ..coding.layers.layers import LayersOptions
+from ..coding.layers.coder import LayersOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
 from ..format.layout import Form

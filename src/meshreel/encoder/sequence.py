@@ -19,7 +19,7 @@ import numpy as np
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.masks import Masker
 from ..analysis.scene.probe import is_scene
-from ..analysis.scene.segment import SegmentOptions
+from ..analysis.scene.segmentation import SegmentOptions
 from ..analysis.survey import Survey, survey
 from ..coding.background import decode_background
 from ..container.writer import ReelWriter, check_target

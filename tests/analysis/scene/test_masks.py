@@ -10,7 +10,7 @@ import pytest
 
 from meshreel.analysis.scene.masks import CAMERAS, ImageMasks, Masker, one_size, read_views
 from meshreel.analysis.scene.pictures import write_views
-from meshreel.analysis.scene.segment import SegmentOptions, scene_views, segment_by
+from meshreel.analysis.scene.segmentation import SegmentOptions, scene_views, segment_by
 from meshreel.analysis.scene.views import ViewsOptions, place_views
 from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError

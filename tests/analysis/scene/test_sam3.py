@@ -13,7 +13,7 @@ from meshreel.analysis.scene import sam3
 from meshreel.analysis.scene.hypotheses import HypothesisOptions, Tracked, reference_view
 from meshreel.analysis.scene.masks import Masker
 from meshreel.analysis.scene.pictures import normal_picture
-from meshreel.analysis.scene.segment import SegmentOptions, segment_by
+from meshreel.analysis.scene.segmentation import SegmentOptions, segment_by
 from meshreel.analysis.scene.views import ViewsOptions, place_views
 from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError

@@ -8,7 +8,7 @@ import pytest
 from meshreel.analysis.scene.cut import CutOptions
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.places import PlacesOptions
-from meshreel.analysis.scene.segment import SegmentOptions, segment
+from meshreel.analysis.scene.segmentation import SegmentOptions, segment
 from meshreel.analysis.scene.settle import NEVER, SettleOptions
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.analysis.survey import survey

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from meshreel import _core
 from meshreel.coding.group import continue_group, decode_group, payload_parts
-from meshreel.coding.layers.layers import encode_layers
+from meshreel.coding.layers.coder import encode_layers
 from meshreel.coding.layers.patches import (
     Patches,
     _parted,

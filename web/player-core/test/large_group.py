@@ -10,8 +10,8 @@ import sys
 
 import numpy as np
 
-from meshreel.coding.layers.layers import LayersOptions, LayersState, encode_layers
-from meshreel.coding.reference import code_reference
+from meshreel.coding.layers.coder import LayersOptions, LayersState, encode_layers
+from meshreel.coding.reference_mesh import code_reference
 from meshreel.container.writer import ReelWriter
 from meshreel.format.layout import Header
 from meshreel.types import Mesh

@@ -17,10 +17,10 @@ import numpy as np
 from jaxtyping import Bool
 
 from meshreel import geometry
-from meshreel.analysis.scene import segment as segmenter
+from meshreel.analysis.scene import segmentation as segmenter
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import fuse_still_depth
-from meshreel.analysis.scene.segment import SegmentOptions, segment
+from meshreel.analysis.scene.segmentation import SegmentOptions, segment
 from meshreel.capture import room as procedural
 from meshreel.capture.fusion import FusionOptions
 from meshreel.capture.record import open_recording

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
 from meshreel.coding.mesh import COMPRESSION_LEVEL, check_growth, check_step, decode_mesh
-from meshreel.coding.reference import CodedReference
+from meshreel.coding.reference_mesh import CodedReference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.kinds import U8, U16, U32, Bytes
 from meshreel.format.records import pack, unpack_all

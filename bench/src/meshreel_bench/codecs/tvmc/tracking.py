@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from meshreel.analysis.survey import Survey, survey
-from meshreel.coding.reference import CodedReference
+from meshreel.coding.reference_mesh import CodedReference
 from meshreel.encoder.paper import EncoderOptions, Span, displacement_field, intra_only
 from meshreel.encoder.scene import BodyRun, Static, all_windows, encode_static, options_of
 from meshreel.encoder.sequence import Encoder

@@ -17,8 +17,8 @@ from jaxtyping import Float64
 from ...errors import InputError
 from ...geometry.nearest import Surface
 from ...types import Centers, Mesh
-from ..fit.fit import FitOptions, fit_targets
 from ..fit.match import Target
+from ..fit.surface_fit import FitOptions, fit_targets
 from .centers import ReferenceCenterOptions, affinity, largest_distances, reference_centers
 from .deform import DeformOptions, Neighbours, bind, center_motions, move, neighbours
 from .fuse import FuseOptions, Group

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.reference.deform import DeformOptions
+from meshreel.analysis.reference.extraction import MDS, Reference, ReferenceOptions, extract_reference, predict
 from meshreel.analysis.reference.fuse import FuseOptions
-from meshreel.analysis.reference.reference import MDS, Reference, ReferenceOptions, extract_reference, predict
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import has_boundary
 from meshreel.geometry.nearest import Surface

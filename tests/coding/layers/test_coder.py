@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel.coding.group import continue_group, decode_group, payload_parts
-from meshreel.coding.layers import layers
-from meshreel.coding.layers.layers import EncodedLayers, LayersOptions, decode_layers, encode_layers
-from meshreel.coding.reference import CodedReference, code_reference
+from meshreel.coding.layers import coder
+from meshreel.coding.layers.coder import EncodedLayers, LayersOptions, decode_layers, encode_layers
+from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin
 from meshreel.format.records import pack, unpack
@@ -26,7 +26,7 @@ WANTED = moving(BALL, 4)
 CODED = encode_layers(BALL, WANTED)
 
 
-def assert_exact(coded: EncodedLayers, previous: layers.LayersState | None = None) -> None:
+def assert_exact(coded: EncodedLayers, previous: coder.LayersState | None = None) -> None:
     """Decoding gives what the encoder saw, to the bit."""
     faces, positions, state = decode_layers(coded.payload, None, previous)
     np.testing.assert_array_equal(positions, coded.positions)
@@ -126,7 +126,7 @@ def test_isolated_vertices_and_degenerate_faces_are_exact() -> None:
     points = 0.1 * np.random.default_rng(1).normal(size=(9, 3))
     points[7] = points[6]
     faces = np.array([[0, 1, 2], [2, 1, 3], [4, 4, 5], [6, 7, 6], [3, 3, 3], [6, 7, 0]], np.int32)
-    state = layers.LayersState(faces, points, ())  # Draco keeps no such faces: they come from a group before
+    state = coder.LayersState(faces, points, ())  # Draco keeps no such faces: they come from a group before
     levels = subdivide_midpoint(Mesh(points, faces), 2)
     reference = CodedReference(b"", 1.0, 2, Mesh.empty(), levels)
     assert_exact(encode_layers(reference, moving(reference, 3, noise=5e-3), previous=state), state)
@@ -186,7 +186,7 @@ def test_absurd_heads_are_refused(change: dict[str, object]) -> None:
 
 
 def test_frames_of_absurd_size_are_refused_before_memory_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(layers, "MOST_NUMBERS", WANTED.size - 1)
+    monkeypatch.setattr(coder, "MOST_NUMBERS", WANTED.size - 1)
     with pytest.raises(FormatError, match="exceed"):
         decode_layers(CODED.payload)
 

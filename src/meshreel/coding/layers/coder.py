@@ -18,7 +18,7 @@ from ...format.records import pack, unpack, unpack_all
 from ...geometry.levels import frames_of, heights, refine, subdivide
 from ...types import Mesh, Placement
 from ..mesh import check_growth, check_step, decode_mesh
-from ..reference import CodedReference
+from ..reference_mesh import CodedReference
 from ..steps import LEVELS, level_of, step_of
 from .details import Shown, decode_last, decode_level, encode_level
 from .fields import Rate

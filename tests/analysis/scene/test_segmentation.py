@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from meshreel.analysis.scene import labelling
 from meshreel.analysis.scene.labelling import ByPlace, without_islands
 from meshreel.analysis.scene.places import PlacesOptions
-from meshreel.analysis.scene.segment import SegmentOptions, segment, segment_by
+from meshreel.analysis.scene.segmentation import SegmentOptions, segment, segment_by
 from meshreel.analysis.scene.settle import Rest
 from meshreel.errors import InputError
 from meshreel.geometry.topology import components, concatenate, face_normals
