@@ -19,7 +19,7 @@ from meshreel.capture.procedural import deforming_sphere
 from meshreel.coding.background import decode_background, encode_background, encode_change
 from meshreel.coding.group import encode_group
 from meshreel.coding.intra import encode_empty, encode_intra
-from meshreel.coding.layers.coder import LayersOptions, LayersState, encode_layers
+from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
 from meshreel.coding.layers.patches import encode_patches
 from meshreel.coding.paper.displacements import DisplacementOptions
 from meshreel.coding.reference_mesh import CodedReference, code_reference
@@ -155,7 +155,9 @@ def layers_groups(reference: CodedReference, sizes: tuple[int, ...]) -> list[Gro
     for frames in sizes:
         time = (first + np.arange(frames))[:, None, None]
         wanted = points * (1 + 0.01 * time) + 0.004 * np.sin(30 * points[:, [1, 2, 0]] + 0.2 * time)
-        coded = encode_layers(reference, wanted, LayersOptions(step=0.001, detail_ratios=(0.8, 1.1), price=0.12), state)
+        coded = encode_layers(
+            reference, wanted, LayerCodingOptions(step=0.001, detail_ratios=(0.8, 1.1), price=0.12), state
+        )
         groups.append((frames, coded.payload, coded.layers, state is not None))
         state, first = coded.state, first + frames
     return groups

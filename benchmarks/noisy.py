@@ -22,7 +22,7 @@ from meshreel_bench.datasets.rooms import PEOPLE
 from meshreel.coding.intra import decode_intra, encode_intra
 from meshreel.coding.layers.coder import LayersState, place_layers, read_layers
 from meshreel.coding.layers.patches import decode_patches
-from meshreel.encoder.layers import encode_segment
+from meshreel.encoder.layers import encode_interval
 from meshreel.encoder.paper import EncodedGroup
 from meshreel.encoder.presets import preset_options
 from meshreel.format.layout import Form, LayersPatches
@@ -130,7 +130,7 @@ def _anchor(frame: Mesh, fraction: float) -> bytes:
 
 def _coded(body: Body, way: str, quality: float, noise: float) -> Row:
     begin = time.process_time()
-    groups = list(encode_segment(body.frames, replace(preset_options("best", quality), noise=noise)))
+    groups = list(encode_interval(body.frames, replace(preset_options("best", quality), noise=noise)))
     cost = (time.process_time() - begin) / len(body.frames)
     row = _row(body, way, sum(len(group.payload) for group in groups), cost, decoded(groups))
     return row | {"groups": [f"{group.form.name} {group.frame_count}" for group in groups]}

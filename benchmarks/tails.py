@@ -18,7 +18,7 @@ from captured import Case, Row, asked_cases, keep
 from jaxtyping import Bool
 
 from meshreel.coding.layers.coder import LayersState, decode_layers
-from meshreel.encoder.layers import encode_segment
+from meshreel.encoder.layers import encode_interval
 from meshreel.encoder.paper import EncodedGroup
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.tails import TailOptions, find_tails
@@ -52,7 +52,7 @@ def main() -> int:
     """Measures every case that was asked for and puts its rows in the place of older ones."""
     for case, frames in asked_cases(__doc__, CASES):
         for quality in QUALITIES:
-            groups = list(encode_segment(frames, replace(preset_options("best", quality), tails=None)))
+            groups = list(encode_interval(frames, replace(preset_options("best", quality), tails=None)))
             keep(rows_of(case, quality, frames, groups), "case", "quality")
     return 0
 

@@ -19,7 +19,7 @@ from meshreel.analysis.fit.match import Target
 from meshreel.analysis.fit.surface_fit import Guides, fit_targets
 from meshreel.analysis.follow.correspond import choose_key
 from meshreel.analysis.follow.template import shared_detail
-from meshreel.coding.layers.coder import LayersOptions, encode_layers
+from meshreel.coding.layers.coder import LayerCodingOptions, encode_layers
 from meshreel.coding.reference_mesh import CodedReference, code_on_lattice
 from meshreel.encoder.draco import measure
 from meshreel.encoder.presets import preset_options
@@ -64,7 +64,7 @@ def _measured(frames: list[Mesh]) -> Iterator[Row]:
                 yield {"template": name, "choice": choice, "step": step} | _point(frames, reference, positions, options)
 
 
-def _point(frames: list[Mesh], reference: CodedReference, positions: np.ndarray, options: LayersOptions) -> Row:
+def _point(frames: list[Mesh], reference: CodedReference, positions: np.ndarray, options: LayerCodingOptions) -> Row:
     coded = encode_layers(reference, positions, options)
     quality = measure(frames, [Mesh(places, reference.base.faces) for places in coded.positions])
     mbps = len(coded.payload) * 8 * 30 / len(frames) / 1e6

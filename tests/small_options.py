@@ -6,9 +6,10 @@ from dataclasses import replace
 
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
 from meshreel.analysis.scene.views import ViewsOptions
-from meshreel.encoder.draco import IntraOptions, Quality
-from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.draco import IntraOptions
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import preset_options
+from meshreel.encoder.target import Fidelity
 
 VIEWS = ViewsOptions(count=6, width=120, height=90, places=4, samples=500)
 TRIALS = IntraOptions(fractions=(1.0,), steps=(1.4, 0.7), levels=(0,))
@@ -40,7 +41,7 @@ def _quick_paper(options: EncoderOptions) -> EncoderOptions:
     fuse = replace(options.reference.fuse, poisson=replace(options.reference.fuse.poisson, depth=6))
     return replace(
         options,
-        target=Quality(distance=0.003, angle=15.0, worst=0.006),
+        target=Fidelity(distance=0.003, angle=15.0, worst=0.006),
         track=replace(options.track, centers=min(options.track.centers, 150), samples=3000),
         reference=replace(options.reference, vertices=150, keys=1, trial_depth=5, trial_vertices=150, fuse=fuse),
     )

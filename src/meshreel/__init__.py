@@ -14,7 +14,7 @@ from .errors import FormatError, InputError, MeshreelError
 from .types import Mesh, MeshList, MeshSequence
 
 if TYPE_CHECKING:
-    from .encoder.paper import EncoderOptions
+    from .encoder.options import EncoderOptions
     from .encoder.presets import preset_options
     from .encoder.sequence import encode
     from .io.sequence import open_sequence
@@ -38,7 +38,7 @@ __all__ = [
 
 # Found on first use, so that a player never imports the encoder.
 _LATER = {
-    "EncoderOptions": ".encoder.paper",
+    "EncoderOptions": ".encoder.options",
     "encode": ".encoder.sequence",
     "open_sequence": ".io.sequence",
     "preset_options": ".encoder.presets",

@@ -1,4 +1,4 @@
-"""The survey: bounding box, scale, and windows that hold frames of one kind."""
+"""The survey: bounding box, scale, and intervals that hold frames of one kind."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ def scaled(factor):
     return Mesh.of(TRIANGLE.vertices * factor, TRIANGLE.faces)
 
 
-def test_windows_cover_every_frame_once_and_are_of_even_length():
-    windows = survey(MeshList((TRIANGLE,) * 23)).windows(10)
-    assert [i for window in windows for i in window] == list(range(23))
-    assert {len(window) for window in windows} == {7, 8}
+def test_intervals_cover_every_frame_once_and_are_of_even_length():
+    intervals = survey(MeshList((TRIANGLE,) * 23)).intervals(10)
+    assert [i for interval in intervals for i in interval] == list(range(23))
+    assert {len(interval) for interval in intervals} == {7, 8}
 
 
-def test_a_window_is_all_empty_or_has_no_empty_frame():
-    windows = survey(MeshList((TRIANGLE, Mesh.empty(), Mesh.empty(), TRIANGLE))).windows(10)
-    assert [list(window) for window in windows] == [[0], [1, 2], [3]]
+def test_an_interval_is_all_empty_or_has_no_empty_frame():
+    intervals = survey(MeshList((TRIANGLE, Mesh.empty(), Mesh.empty(), TRIANGLE))).intervals(10)
+    assert [list(interval) for interval in intervals] == [[0], [1, 2], [3]]
 
 
-def test_frames_of_very_different_scale_are_not_in_one_window():
-    windows = survey(MeshList((scaled(1), scaled(3), scaled(100), scaled(150)))).windows(10)
-    assert [list(window) for window in windows] == [[0, 1], [2, 3]]
+def test_frames_of_very_different_scale_are_not_in_one_interval():
+    intervals = survey(MeshList((scaled(1), scaled(3), scaled(100), scaled(150)))).intervals(10)
+    assert [list(interval) for interval in intervals] == [[0, 1], [2, 3]]
 
 
 def test_normalised_frames_fit_a_box_of_diagonal_one_around_zero():

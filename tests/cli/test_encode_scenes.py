@@ -12,7 +12,7 @@ from PIL import Image
 import meshreel
 from meshreel.capture.record import open_recording
 from meshreel.cli.encode import describe
-from meshreel.encoder.paper import encode_window
+from meshreel.encoder.paper import encode_interval
 from meshreel.io.depth_pictures import write_depth
 from meshreel.io.write import write_mesh
 from tests.capture.depth_scenes import camera, measured, record
@@ -28,10 +28,10 @@ def quick_bodies(monkeypatch):
     """Bodies coded frame by frame: what is told of a scene does not depend on how its bodies are coded."""
 
     def frame_by_frame(frames, options, stages):
-        windows = [frames] if frames[0].is_empty else [[frame] for frame in frames]
-        return [group for window in windows for group in encode_window(window, options, stages)]
+        intervals = [frames] if frames[0].is_empty else [[frame] for frame in frames]
+        return [group for interval in intervals for group in encode_interval(interval, options, stages)]
 
-    monkeypatch.setattr("meshreel.encoder.scene.encode_segment", frame_by_frame)
+    monkeypatch.setattr("meshreel.encoder.layers.encode_interval", frame_by_frame)
 
 
 def test_a_scene_is_told_by_its_parts_and_info_agrees(run, scan, tmp_path):

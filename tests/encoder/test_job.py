@@ -8,12 +8,12 @@ import pytest
 from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
-from meshreel.encoder import job as work
-from meshreel.encoder import paper as windows
+from meshreel.encoder import job, paper
 from meshreel.encoder import sequence as encoding
-from meshreel.encoder.draco import Quality
-from meshreel.encoder.job import SpanStore, shared_options
+from meshreel.encoder.job import GroupStore, shared_options
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.sequence import Encoder, encode
+from meshreel.encoder.target import Fidelity
 from meshreel.format.layout import Form
 from meshreel.types import Mesh, MeshList
 from tests.scenes import ball, quick_scene, with_room
@@ -23,15 +23,15 @@ BODY = tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.04)))
 PAPER = quick("paper", group_size=2)
 
 
-def with_basis(size: int) -> windows.EncoderOptions:
+def with_basis(size: int) -> EncoderOptions:
     return replace(PAPER, displacements=replace(PAPER.displacements, basis_size=size))
 
 
 @pytest.fixture
 def looked(monkeypatch):
     """The windows that were looked at, by number of frames."""
-    seen, find = list[int](), windows.find_spans
-    monkeypatch.setattr(work, "find_spans", lambda frames, *rest: seen.append(len(frames)) or find(frames, *rest))
+    seen, find = list[int](), paper.find_groups
+    monkeypatch.setattr(job, "find_groups", lambda frames, *rest: seen.append(len(frames)) or find(frames, *rest))
     return seen
 
 
@@ -58,9 +58,9 @@ def test_an_encoder_that_was_prepared_for_other_options_looks_again(looked, tmp_
 @pytest.mark.parametrize("codec", ["meshreel", "tvmc"])
 def test_the_bodies_of_a_noisy_scene_are_looked_at_once_and_as_noisy_ones(codec, monkeypatch, tmp_path):
     """Whoever codes them: what `prepare` kept is what `encode` asks for."""
-    told, find = list[float](), windows.find_spans
+    told, find = list[float](), paper.find_groups
     monkeypatch.setattr(
-        work, "find_spans", lambda frames, options, *rest: told.append(options.noise) or find(frames, options, *rest)
+        job, "find_groups", lambda frames, options, *rest: told.append(options.noise) or find(frames, options, *rest)
     )
     options, rolling = quick_scene("paper", group_size=2), with_room([ball(0.5 + 0.35 * t) for t in range(4)])
     prepared = Encoder(MeshList(tuple(rolling)))
@@ -84,10 +84,10 @@ def test_with_workers_nothing_is_looked_at_ahead(looked):
 
 
 def test_spans_that_are_kept_are_those_that_are_found():
-    store, ball = SpanStore(), list(deforming_sphere(3, levels=2))
-    options = replace(PAPER, target=Quality(1e-7, 1.0, 1e-7), groups=replace(PAPER.groups, depth=1))  # never reached
+    store, ball = GroupStore(), list(deforming_sphere(3, levels=2))
+    options = replace(PAPER, target=Fidelity(1e-7, 1.0, 1e-7), groups=replace(PAPER.groups, depth=1))  # never reached
     store.keep(ball, options)
-    kept, found = store.find(ball, options), windows.find_spans(ball, options)
+    kept, found = store.find(ball, options), paper.find_groups(ball, options)
     assert [len(span.frames) for span in kept] == [len(span.frames) for span in found] and len(kept) > 1
     for ours, theirs in zip(kept, found, strict=True):
         assert all(a is b for a, b in zip(ours.frames, theirs.frames, strict=True))

@@ -13,9 +13,9 @@ from meshreel.analysis.fit.match import Target
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.group import continue_group
 from meshreel.encoder import layers as layered
-from meshreel.encoder.draco import measure
-from meshreel.encoder.layers import encode_segment
-from meshreel.encoder.paper import EncodedGroup
+from meshreel.encoder.forms import EncodedGroup
+from meshreel.encoder.layers import encode_interval
+from meshreel.encoder.target import measure
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
 from tests.small_options import quick
@@ -46,7 +46,7 @@ def decoded(groups: Sequence[EncodedGroup]) -> list[Mesh]:
 
 def coded(frames: Sequence[Mesh], options=OPTIONS) -> list[EncodedGroup]:
     """The groups, after a look at what holds for all: frames are all there, and qualities are those of the bytes."""
-    groups = list(encode_segment(frames, options))
+    groups = list(encode_interval(frames, options))
     assert sum(group.frame_count for group in groups) == len(frames)
     assert max(group.frame_count for group in groups) <= options.group_size or groups[0].form == Form.EMPTY
     assert not groups[0].predicted
@@ -55,7 +55,7 @@ def coded(frames: Sequence[Mesh], options=OPTIONS) -> list[EncodedGroup]:
     for group in groups:
         end = at + group.frame_count
         again = measure(frames[at:end], found[at:end])
-        assert again.distance == pytest.approx(group.quality.distance, rel=1e-6, abs=1e-12)
+        assert again.distance == pytest.approx(group.fidelity.distance, rel=1e-6, abs=1e-12)
         at = end
     return groups
 
@@ -63,14 +63,14 @@ def coded(frames: Sequence[Mesh], options=OPTIONS) -> list[EncodedGroup]:
 def test_one_frame_is_a_group_of_its_own():
     (group,) = coded([BALL])
     assert (group.frame_count, group.predicted) == (1, False)
-    assert group.quality.distance < 4e-4
+    assert group.fidelity.distance < 4e-4
 
 
 def test_of_a_body_that_stands_still_all_groups_but_the_first_are_predicted_and_tiny():
     groups = coded([FINE] * 7, quick(group_size=3))
     assert [(group.frame_count, group.predicted) for group in groups] == [(3, False), (3, True), (1, True)]
     assert len(groups[-1].payload) < 0.15 * len(groups[0].payload)
-    assert max(group.quality.distance for group in groups) < 4e-4
+    assert max(group.fidelity.distance for group in groups) < 4e-4
 
 
 def test_a_body_that_slides_is_followed_across_groups():
@@ -84,7 +84,7 @@ def test_a_body_that_becomes_another_cuts_the_group_there():
     groups = coded([BALL, BALL, BALL, other, other], quick(group_size=5))
     starts = np.cumsum([0, *(group.frame_count for group in groups)]).tolist()
     assert 3 in starts
-    assert max(group.quality.worst for group in groups) < 1e-3
+    assert max(group.fidelity.worst for group in groups) < 1e-3
 
 
 def test_a_frame_is_prepared_once_for_all_that_is_tried_with_it(monkeypatch: pytest.MonkeyPatch):
@@ -97,13 +97,13 @@ def test_a_frame_is_prepared_once_for_all_that_is_tried_with_it(monkeypatch: pyt
 
     monkeypatch.setattr(layered, "Target", Counted)
     other = Mesh.of(BALL.vertices * [1.6, 0.3, 0.8] + [0, 0.3, 0], BALL.faces)
-    first = next(encode_segment([BALL, BALL, BALL, other, other], quick(group_size=5)))
+    first = next(encode_interval([BALL, BALL, BALL, other, other], quick(group_size=5)))
     assert first.frame_count < 5 and len(prepared) == 5  # though it is cut, and tried anew
 
 
 def test_a_body_that_jumps_is_followed_or_cut_but_never_lost():
     groups = coded([BALL, BALL, moved(BALL, 0.4, 0, 0), moved(BALL, 0.4, 0, 0)])
-    assert max(group.quality.worst for group in groups) < 1e-3
+    assert max(group.fidelity.worst for group in groups) < 1e-3
 
 
 def test_frames_without_surface_are_one_empty_group_however_many():
@@ -118,7 +118,7 @@ def test_an_open_sheet_keeps_its_borders():
     faces = np.concatenate([np.stack(half, axis=1) for half in halves])
     frames = [Mesh.of(np.stack([x, 0.05 * np.sin(8 * x + 0.3 * t), z], axis=1), faces) for t in range(4)]
     groups = coded(frames)
-    assert max(group.quality.worst for group in groups) < 2e-3
+    assert max(group.fidelity.worst for group in groups) < 2e-3
     for frame, found in zip(frames, decoded(groups), strict=True):
         assert abs(np.ptp(found.vertices, axis=0) - np.ptp(frame.vertices, axis=0)).max() < 0.01
 
@@ -127,7 +127,7 @@ def test_two_bodies_that_go_apart_stay_two():
     small = Mesh.of(0.5 * BALL.vertices, BALL.faces)
     frames = [joined(moved(small, -0.2 - 0.01 * t, 0, 0), moved(small, 0.2 + 0.01 * t, 0, 0)) for t in range(4)]
     groups = coded(frames)
-    assert max(group.quality.worst for group in groups) < 1e-3
+    assert max(group.fidelity.worst for group in groups) < 1e-3
     for mesh in decoded(groups):
         sides = np.sign(mesh.vertices[mesh.faces][:, :, 0])
         assert (abs(sides.sum(axis=1)) == 3).all()  # no triangle bridges them
@@ -138,14 +138,14 @@ def test_a_sphere_that_becomes_two_is_never_lost():
     frames = [BALL] * 2 + [joined(moved(small, -0.16, 0, 0), moved(small, 0.16, 0, 0))] * 2
     groups = coded(frames)
     assert len(groups) > 1
-    assert max(group.quality.worst for group in groups) < 2e-3
+    assert max(group.fidelity.worst for group in groups) < 2e-3
 
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_meshes_of_one_face_are_kept(count: int):
     triangle = Mesh.of([[0, 0, 0], [0.5, 0, 0], [0, 0.5, 0]], [[0, 1, 2]])
     groups = coded([triangle] * count)
-    assert max(group.quality.worst for group in groups) < 2e-3
+    assert max(group.fidelity.worst for group in groups) < 2e-3
 
 
 def test_bodies_that_are_not_clean_are_kept():
@@ -179,7 +179,7 @@ class Asked(Sequence[Mesh]):
 
 def test_only_the_frames_of_one_group_are_asked_for_at_a_time():
     frames = Asked([BALL] * 6)
-    groups = encode_segment(frames, replace(OPTIONS, group_size=2))
+    groups = encode_interval(frames, replace(OPTIONS, group_size=2))
     for number in range(3):
         frames.asked.clear()
         next(groups)
@@ -189,7 +189,7 @@ def test_only_the_frames_of_one_group_are_asked_for_at_a_time():
 def test_the_same_frames_give_the_same_bytes():
     frames = list(deforming_sphere(2, levels=2))
     frames = [Mesh.of(mesh.vertices / 4, mesh.faces) for mesh in frames]
-    assert [list(encode_segment(frames, OPTIONS))] * 2 == [list(encode_segment(frames, OPTIONS)) for _ in range(2)]
+    assert [list(encode_interval(frames, OPTIONS))] * 2 == [list(encode_interval(frames, OPTIONS)) for _ in range(2)]
 
 
 def test_a_body_with_new_connectivity_in_every_frame_is_followed():
@@ -199,4 +199,4 @@ def test_a_body_with_new_connectivity_in_every_frame_is_followed():
     scale = np.linalg.norm(high - low)
     frames = [Mesh.of((mesh.vertices - (low + high) / 2) / scale, mesh.faces) for mesh in meshes]
     groups = coded(frames, quick(quality=20))
-    assert max(group.quality.worst for group in groups) < 4e-3
+    assert max(group.fidelity.worst for group in groups) < 4e-3

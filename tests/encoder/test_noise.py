@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from meshreel.coding.layers.coder import decode_layers
-from meshreel.encoder.layers import encode_segment
+from meshreel.encoder.layers import encode_interval
 from meshreel.encoder.noise import above_noise
-from meshreel.encoder.paper import target_of
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.tails import TailOptions
+from meshreel.encoder.target import target_of
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
@@ -40,8 +40,8 @@ def test_noise_makes_nothing_finer() -> None:
 
 def test_a_target_is_no_nearer_to_noisy_frames_than_the_truth_is() -> None:
     frames = [sheet()]
-    assert target_of(frames, replace(BEST, noise=NOISE)).distance >= NOISE
-    assert target_of(frames, BEST).distance < NOISE
+    assert target_of(frames, BEST.target, NOISE).distance >= NOISE
+    assert target_of(frames, BEST.target, 0.0).distance < NOISE
 
 
 @pytest.mark.parametrize("noise", [-0.001, 0.06, float("nan")])
@@ -56,7 +56,7 @@ def test_a_noisy_sheet_with_moving_holes_is_one_group_and_nearer_to_the_truth_th
     truth = [sheet(0.004 * t) for t in range(6)]
     holes = np.linspace(-0.15, 0.15, 6)
     frames = [with_hole(noisy(mesh, NOISE, t), holes[t], 0.05, 0.04) for t, mesh in enumerate(truth)]
-    (group,) = encode_segment(frames, replace(BEST, noise=NOISE))
+    (group,) = encode_interval(frames, replace(BEST, noise=NOISE))
     assert group.form == Form.LAYERS
     faces, positions, _ = decode_layers(group.payload[: group.layers[BEST.template.levels]])
     before, after = [], []

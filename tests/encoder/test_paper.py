@@ -7,15 +7,16 @@ from dataclasses import replace
 import pytest
 
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.encoder import paper as windows
-from meshreel.encoder.draco import IntraOptions, Quality, cheapest_intra
-from meshreel.encoder.paper import EncodedGroup, cheaper
+from meshreel.encoder import forms
+from meshreel.encoder.draco import IntraOptions, cheapest_intra
+from meshreel.encoder.forms import EncodedGroup, cheaper
+from meshreel.encoder.target import Fidelity
 from meshreel.format.layout import Form
 from tests.small_options import quick
 
 BALLS = list(sliding_sphere(2, levels=1))
 OPTIONS = replace(quick(), intra=IntraOptions(fractions=(1.0,), steps=(0.7,), levels=(0,)))
-ASKED = Quality(distance=0.002, angle=30.0, worst=0.004)
+ASKED = Fidelity(distance=0.002, angle=30.0, worst=0.004)
 
 
 @pytest.mark.parametrize(
@@ -30,21 +31,21 @@ ASKED = Quality(distance=0.002, angle=30.0, worst=0.004)
     ],
 )
 def test_draco_is_taken_where_it_is_the_better_bargain(monkeypatch, size, distance, form):
-    found = bytes(500), Quality(distance=0.001, angle=1.0, worst=0.001)
+    found = bytes(500), Fidelity(distance=0.001, angle=1.0, worst=0.001)
 
     def searched(_frames, target, most_bytes, _options):
         return found if found[1].reaches(target) and len(found[0]) < most_bytes else None
 
-    monkeypatch.setattr(windows, "cheapest_intra", searched)
-    group = EncodedGroup(Form.LAYERS, 2, bytes(size), (), Quality(distance, 2.0, distance))
+    monkeypatch.setattr(forms, "cheapest_intra", searched)
+    group = EncodedGroup(Form.LAYERS, 2, bytes(size), (), Fidelity(distance, 2.0, distance))
     assert cheaper(BALLS, group, OPTIONS).form == form
 
 
 def test_a_body_of_few_faces_is_left_to_draco():
     found = cheapest_intra(BALLS, ASKED, 1e6, OPTIONS.intra)
     assert found is not None
-    payload, quality = found
+    payload, fidelity = found
     group = EncodedGroup(Form.LAYERS, 2, bytes(len(payload) * 2 // 3), (), ASKED)
     chosen = cheaper(BALLS, group, OPTIONS)
-    assert (chosen.form, chosen.payload, chosen.quality) == (Form.DRACO, payload, quality)
-    assert chosen.frame_count == 2 and quality.distance < ASKED.distance / 2
+    assert (chosen.form, chosen.payload, chosen.fidelity) == (Form.DRACO, payload, fidelity)
+    assert chosen.frame_count == 2 and fidelity.distance < ASKED.distance / 2

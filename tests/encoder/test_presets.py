@@ -8,8 +8,8 @@ from itertools import pairwise
 import pytest
 
 from meshreel.analysis.follow.template import TemplateOptions
-from meshreel.coding.layers.coder import LayersOptions
-from meshreel.encoder.paper import EncoderOptions
+from meshreel.coding.layers.coder import LayerCodingOptions
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import PRESETS, displacement_step, preset_options, reference_vertices
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
@@ -22,7 +22,7 @@ def test_the_default_preset_is_best_and_bare_options_are_those_of_paper():
 
 def test_what_only_best_uses_defaults_to_its_values_at_50():
     best = preset_options("best", 50.0)
-    assert best.layers == LayersOptions()
+    assert best.layers == LayerCodingOptions()
     assert best.template.error == pytest.approx(TemplateOptions().error, rel=1e-3)
     assert best.template.levels == TemplateOptions().levels
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
-from meshreel.encoder.draco import Quality
 from meshreel.encoder.quality import TRIALS, Goal, Search, encode_to
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.summary import GroupSummary, SceneSummary, Summary
+from meshreel.encoder.target import Fidelity
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
@@ -79,14 +79,14 @@ def test_targets_that_mean_nothing_are_refused(wanted: dict[str, float], said: s
 
 
 def test_a_file_is_measured_in_the_unit_of_the_goal() -> None:
-    groups = tuple(GroupSummary(Form.DRACO, n, 10, Quality(0, 0, 0, psnr)) for n, psnr in ((1, 50.0), (3, 70.0)))
+    groups = tuple(GroupSummary(Form.DRACO, n, 10, Fidelity(0, 0, 0, psnr)) for n, psnr in ((1, 50.0), (3, 70.0)))
     summary = Summary(1000, groups)
     assert Goal(psnr=60).measured(summary, 25.0) == 65.0
     assert math.exp(Goal(mbps=1).measured(summary, 25.0)) == pytest.approx(1000 * 8 * 25 / 4 / 1e6)
 
 
 def test_a_background_is_too_large_for_a_rate_by_itself_and_for_no_psnr() -> None:
-    groups = (GroupSummary(Form.EMPTY, 10, 4, Quality(0, 0, 0)),)
+    groups = (GroupSummary(Form.EMPTY, 10, 4, Fidelity(0, 0, 0)),)
     summary = Summary(6000, groups, scene=SceneSummary(5000, 100, 0.001, 60.0, (0, 1), 1))
     assert "5000 bytes, 0.1 Mbps over 0.4 s" in Goal(mbps=0.09).exceeded_by_background(summary, 25.0)
     assert Goal(mbps=0.1).exceeded_by_background(summary, 25.0) == ""

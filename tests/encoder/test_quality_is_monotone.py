@@ -10,7 +10,7 @@ import pytest
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.draco import IntraOptions
-from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import encode
 from meshreel.geometry.decimate import decimate

@@ -17,12 +17,13 @@ from meshreel.analysis.scene.settle import Rest
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background
 from meshreel.coding.intra import decode_intra, encode_empty, encode_intra
-from meshreel.encoder.draco import NO_ERROR
-from meshreel.encoder.job import Work
-from meshreel.encoder.paper import EncodedGroup, Stages, target_of
+from meshreel.encoder.forms import EncodedGroup
+from meshreel.encoder.job import Job
 from meshreel.encoder.parts import Parts, take_apart
+from meshreel.encoder.progress import Stages
 from meshreel.encoder.scene import TrackGroup, encode_bodies, encode_static
 from meshreel.encoder.sequence import Encoder, encode
+from meshreel.encoder.target import NO_ERROR, target_of
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
@@ -80,7 +81,7 @@ def plainly(monkeypatch):
         assert not any(mesh.is_empty for mesh in frames)
         return [EncodedGroup(Form.DRACO, len(frames), encode_intra(list(frames), 1e-3, 0), (), NO_ERROR)]
 
-    monkeypatch.setattr("meshreel.encoder.scene.encode_segment", coded)
+    monkeypatch.setattr("meshreel.encoder.layers.encode_interval", coded)
 
 
 @pytest.fixture(scope="module")
@@ -155,15 +156,17 @@ def test_preset_paper_has_scenes_too(tmp_path):
 
 @pytest.mark.parametrize("preset", ["paper", "best"])
 def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, monkeypatch, tmp_path):
-    told, coded = [], scene._coded_runs
-    monkeypatch.setattr(scene, "_coded_runs", lambda runs, work: told.append(work.options) or coded(runs, work))
+    told, coded = [], scene._coded_intervals
+    monkeypatch.setattr(scene, "_coded_intervals", lambda runs, work: told.append(work.options) or coded(runs, work))
     video, _ = encoded(ROLLING, tmp_path / "a.reel", quick_scene(preset, group_size=1))
     assert told
     for options in told:
         noise = options.noise * video.reader.header.scale
         assert 0.5 * NOISE < noise < 3 * NOISE
-        clean = target_of(ROLLING, replace(options, noise=0.0)).distance
-        assert target_of(ROLLING, options).distance == pytest.approx(np.hypot(clean, options.noise))
+        clean = target_of(ROLLING, options.target, 0.0).distance
+        assert target_of(ROLLING, options.target, options.noise).distance == pytest.approx(
+            np.hypot(clean, options.noise)
+        )
 
 
 def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeypatch):
@@ -273,7 +276,7 @@ def tracks(frames: list[Mesh], segment: int = 2) -> list[str]:
     seen = replace(survey(sequence), scale=1.0)
     parts = Parts(seen, ALL, NONE, [], 0.0, 0.0)
     options = replace(OPTIONS, key_interval=float(segment))
-    coded = encode_bodies(Work(sequence, options, None, Stages(None, len(frames))), parts)
+    coded = encode_bodies(Job(sequence, options, None, Stages(None, len(frames))), parts)
     assert coded.dropped == 0
     assert coded.groups == sorted(coded.groups, key=lambda each: (each.first_frame, each.track))
     count = max(each.track for each in coded.groups) + 1
@@ -349,7 +352,7 @@ def test_more_bodies_than_a_file_has_tracks_share_some():
     many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
     sequence = MeshList((many, many), 1.0)
     seen = replace(survey(sequence), scale=1.0)
-    coded = encode_bodies(Work(sequence, OPTIONS, None, Stages(None, 2)), Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0))
+    coded = encode_bodies(Job(sequence, OPTIONS, None, Stages(None, 2)), Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0))
     assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
     faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
     assert sum(faces) == len(many.faces)

@@ -62,7 +62,7 @@ def test_what_the_summary_says_of_a_group_is_what_the_file_gives(body):
     video = meshreel.open(path)
     pairs = zip(sequence.meshes[:3], video[:3], strict=True)
     distances = [surface_errors(a, b).symmetric_rms for a, b in pairs]
-    assert np.sqrt(np.mean(np.square(distances))) == pytest.approx(summary.groups[0].quality.distance, rel=1e-3)
+    assert np.sqrt(np.mean(np.square(distances))) == pytest.approx(summary.groups[0].fidelity.distance, rel=1e-3)
     assert video.reader.metadata["preset"] == "paper"
     assert video.reader.metadata["rms_m"] > 0
 

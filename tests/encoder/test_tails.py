@@ -11,11 +11,11 @@ import meshreel
 from meshreel.coding.group import payload_parts
 from meshreel.coding.layers.patches import decode_patches
 from meshreel.encoder import tails
-from meshreel.encoder.draco import Quality, measure
-from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import encode
 from meshreel.encoder.tails import TailOptions, find_tails
+from meshreel.encoder.target import Fidelity, measure
 from meshreel.errors import InputError
 from meshreel.format.records import pack
 from meshreel.types import Mesh, MeshList
@@ -153,7 +153,7 @@ def options() -> EncoderOptions:
     """`best`, all frames in one group."""
     best = preset_options("best", 40.0, group_size=4)
     groups = replace(best.groups, limit=1e6, tolerance=1e6, worth=1e6)
-    return replace(best, groups=groups, target=Quality(0.01, 90.0, 0.01))
+    return replace(best, groups=groups, target=Fidelity(0.01, 90.0, 0.01))
 
 
 @pytest.fixture(scope="module")

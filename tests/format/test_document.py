@@ -12,7 +12,7 @@ import pytest
 
 from meshreel.coding import entropy
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
-from meshreel.coding.layers.coder import LayersOptions, LayersState, decode_layers, encode_layers
+from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, decode_layers, encode_layers
 from meshreel.coding.layers.patches import encode_patches
 from meshreel.coding.mesh import decode_mesh
 from meshreel.coding.paper import laplacian
@@ -130,7 +130,7 @@ def test_the_document_decodes_layers_to_the_bit(decoder: dict[str, Any], frames:
         shape = subdivide_midpoint(reference.mesh, 2).vertices
         time = np.arange(frames)[:, None, None] + round_number * frames
         wanted = shape * (1 + 0.02 * time) + 0.003 * generator.normal(size=(frames, *shape.shape))
-        payload = encode_layers(reference, wanted, LayersOptions(step=4e-3), state).payload
+        payload = encode_layers(reference, wanted, LayerCodingOptions(step=4e-3), state).payload
         faces, positions, state = decode_layers(payload, None, state)
         told, told_faces, left = told_by(decoder, payload, left)
         np.testing.assert_array_equal(told_faces, faces)

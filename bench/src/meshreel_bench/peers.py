@@ -18,7 +18,8 @@ import numpy as np
 
 from meshreel.analysis.survey import Survey, survey
 from meshreel.decoder.video import Video
-from meshreel.encoder.draco import IntraOptions, cheapest_intra, measure
+from meshreel.encoder.draco import IntraOptions, cheapest_intra
+from meshreel.encoder.target import measure
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 

@@ -1,4 +1,4 @@
-"""One pass over a sequence before anything is coded: its bounding box, its empty frames, its windows.
+"""One pass over a sequence before anything is coded: its bounding box, its empty frames, its intervals.
 
 In -> out: MeshSequence -> Survey. Errors of any frame surface here, before minutes are spent on the first ones.
 """
@@ -18,7 +18,7 @@ from ..geometry.topology import clean, drop_unreferenced
 from ..types import Mesh, MeshSequence
 
 UNLIKE = 30.0  # times the usual size: a frame of a room that large is in another unit
-LARGEST_RATIO = 10.0  # of the diagonals of two frames in one window
+LARGEST_RATIO = 10.0  # of the diagonals of two frames in one interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,17 +56,17 @@ class Survey:
         mesh = clean(mesh)
         return Mesh.of((mesh.vertices - self.center) / self.unit, mesh.faces)
 
-    def windows(self, size: int) -> list[range]:
-        """Runs of at most `size` frames, each all empty or all of about one scale, of even lengths."""
-        windows = []
+    def intervals(self, size: int) -> list[range]:
+        """Return intervals of at most `size` frames, of even lengths, each all empty or all of about one scale."""
+        intervals = []
         for start, stop in pairwise([0, *self._breaks(), len(self.diagonals)]):
             parts = -(-(stop - start) // size)
             cuts = [start + (stop - start) * k // parts for k in range(parts + 1)]
-            windows += [range(a, b) for a, b in pairwise(cuts)]
-        return windows
+            intervals += [range(a, b) for a, b in pairwise(cuts)]
+        return intervals
 
     def _breaks(self) -> Iterator[int]:
-        """Frames that cannot be in a window with the one before: with and without surface, or of another scale."""
+        """Frames that cannot share an interval with the one before: with and without surface, or of another scale."""
         least = most = self.diagonals[0]
         for number, diagonal in enumerate(self.diagonals):
             least, most = min(least, diagonal), max(most, diagonal)

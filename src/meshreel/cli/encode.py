@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..analysis.scene.segmentation import SegmentOptions
-from ..encoder.paper import EncoderOptions
+from ..encoder.options import EncoderOptions
 from ..encoder.presets import preset_options
 from ..encoder.quality import Goal, encode_to
 from ..encoder.sequence import Encoder
@@ -166,9 +166,9 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
                 "frames": group.frame_count,
                 "bytes": group.size,
                 "predicted": group.predicted,
-                "rms_m": group.quality.distance,
-                "worst_rms_m": group.quality.worst,
-                "normal_error_deg": group.quality.angle,
+                "rms_m": group.fidelity.distance,
+                "worst_rms_m": group.fidelity.worst,
+                "normal_error_deg": group.fidelity.angle,
             }
             for group in summary.groups
         ],

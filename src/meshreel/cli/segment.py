@@ -16,7 +16,7 @@ from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
 from ..analysis.scene.segmentation import scene_views, segment, segment_by
 from ..encoder.labels import FrameLabels, label_frames
-from ..encoder.paper import EncoderOptions
+from ..encoder.options import EncoderOptions
 from ..encoder.presets import preset_options
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras

@@ -1,4 +1,4 @@
-"""What is to be encoded, how, and what is known of it from before: what the stages of an encoder have in common."""
+"""Encoding job: a sequence, its options, and analyses reused when the same sequence is encoded at several rates."""
 
 from __future__ import annotations
 
@@ -11,52 +11,54 @@ import numpy as np
 
 from ..format.layout import Form
 from ..types import Mesh, MeshSequence
-from .paper import EncoderOptions, Fitted, Span, Stages, find_spans
+from .options import EncoderOptions
+from .paper import Fitted, FoundGroup, find_groups
+from .progress import Stages
 
-Found = tuple[tuple[int, Fitted | None], ...]  # of each span its number of frames, and what follows them
+Found = tuple[tuple[int, Fitted | None], ...]  # of each group its number of frames, and the reference that follows them
 
 
-class SpanStore:
-    """Spans of windows that were looked at before, for who codes a sequence at several rates.
+class GroupStore:
+    """Groups found by the paper's analysis, kept for encodes of the same sequence at several rates.
 
-    Spans do not depend on how displacements are coded. Kept are references and positions, no frames.
+    They do not depend on how displacements are coded. The store keeps references and positions, but no frames.
     """
 
     def __init__(self) -> None:
         self._known: dict[bytes, Found] = {}
 
     def keep(self, frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> None:
-        """Finds the spans of a window, frames all empty or none is, and keeps them."""
+        """Find and keep the groups of an interval, whose frames are all empty or none is."""
         if not frames[0].is_empty and (key := _key(frames, options)) not in self._known:
-            found = find_spans(frames, options, stages)
-            self._known[key] = tuple((len(span.frames), span.fitted) for span in found)
+            found = find_groups(frames, options, stages)
+            self._known[key] = tuple((len(group.frames), group.fitted) for group in found)
 
-    def find(self, frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> list[Span]:
-        """As `windows.find_spans`; those that were kept are not looked for again."""
+    def find(self, frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> list[FoundGroup]:
+        """Return what `paper.find_groups` returns, from the store where the interval is kept."""
         if not self._known or (known := self._known.get(_key(frames, options))) is None:
-            return find_spans(frames, options, stages)
-        spans, first = list[Span](), 0
+            return find_groups(frames, options, stages)
+        groups, first = list[FoundGroup](), 0
         for count, fitted in known:
-            spans.append(Span(frames[first : first + count], fitted))
+            groups.append(FoundGroup(frames[first : first + count], fitted))
             first += count
-        return spans
+        return groups
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
-    """What is to be encoded, and how."""
+class Job:
+    """A sequence to encode, its options, and the means to do it."""
 
     sequence: MeshSequence
     options: EncoderOptions
     executor: Executor | None
     stages: Stages
-    spans: SpanStore = field(default_factory=SpanStore)
+    store: GroupStore = field(default_factory=GroupStore)
 
 
 def shared_options(options: EncoderOptions) -> EncoderOptions:
-    """What decides about that which encodes at several rates share: the others have their defaults.
+    """Return the options with defaults for all that encodes at several rates need not share.
 
-    Of form LAPLACIAN all but how displacements are coded; of form LAYERS those alone that take a scene apart.
+    Form LAPLACIAN shares all but the coding of displacements; form LAYERS shares only how a scene is taken apart.
     """
     if options.form == Form.LAPLACIAN:
         plain = EncoderOptions()
@@ -66,7 +68,7 @@ def shared_options(options: EncoderOptions) -> EncoderOptions:
 
 
 def _key(frames: Sequence[Mesh], options: EncoderOptions) -> bytes:
-    """Equal where spans are."""
+    """Return a key that is equal where the groups are."""
     plain = EncoderOptions()  # how a scene was taken apart shows in the frames
     decisive = replace(shared_options(options), segment=plain.segment, background=plain.background)
     digest = hashlib.sha256(repr(decisive).encode())

@@ -15,8 +15,8 @@ from ..analysis.scene.bodies import with_ring
 from ..analysis.scene.labelling import Segmentation
 from ..geometry.topology import part_of
 from ..types import Mesh, MeshSequence
-from .paper import EncoderOptions
-from .scene import Tracks, segments
+from .options import EncoderOptions
+from .scene import Tracks, key_intervals
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: En
     """The labels of each frame; a body has the same number in all frames."""
     cell = segmentation.cell
     tracks = Tracks(cell, options)
-    for frames in segments(sequence, segmentation, options):
+    for frames in key_intervals(sequence, segmentation, options):
         moving = list[Bool[np.ndarray, " F"]]()
         parts, coded = list[Mesh](), list[Mesh]()
         for number in frames:

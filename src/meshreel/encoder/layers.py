@@ -15,26 +15,26 @@ from jaxtyping import Float64, Int32
 
 from ..analysis.fit.match import Target
 from ..analysis.fit.surface_fit import Fit, Guides, fit_targets
-from ..analysis.follow.correspond import Course, choose_key, from_last
+from ..analysis.follow.correspond import KeyMotion, choose_key, from_last
 from ..analysis.follow.fused_template import fused_mesh
 from ..analysis.follow.template import base_mesh, shared_detail
 from ..analysis.groups import cut_at, leading
-from ..coding.intra import encode_empty
 from ..coding.layers.coder import EncodedLayers, LayersState, encode_layers
 from ..coding.reference_mesh import CodedReference, code_on_lattice
 from ..format.layout import Form
 from ..format.records import pack
 from ..types import Frames, Mesh
-from .draco import NO_ERROR, measure
+from .forms import EncodedGroup, cheaper, empty_groups, intra_only, laplacian
 from .noise import above_noise
-from .paper import EncodedGroup, EncoderOptions, Stages, cheaper, intra_only, laplacian, target_of
+from .options import EncoderOptions
+from .progress import Stages
 from .tails import find_tails
+from .target import measure, target_of
 
 LATTICE = 0.33  # spacing of the base's lattice, in steps: what it rounds away is coded again with the motion
 LATTICE_ALONE = 0.8  # the same for one frame, whose base need not move
 TOO_COARSE = 1.5  # targets that the layers' distance may be before the Laplacian form is tried
 STILL = 1.1  # times what a template usually leaves over that it may leave where it was
-MOST_EMPTY = 65_535  # frames of a group without surface: what its field in the index holds
 SHORTEST = 4  # frames that a group predicted from the one before must follow, or a new key frame is taken
 
 
@@ -57,14 +57,13 @@ class Keyed:
     fit: Fit
 
 
-def encode_segment(frames: Frames, options: EncoderOptions, stages: Stages | None = None) -> Iterator[EncodedGroup]:
+def encode_interval(frames: Frames, options: EncoderOptions, stages: Stages | None = None) -> Iterator[EncodedGroup]:
     """The groups of a segment, frames all empty or none is; only those of one group are held at a time."""
     stages, options = stages or Stages(None, len(frames)), above_noise(options)
     if frames[0].is_empty:
-        for start in range(0, len(frames), MOST_EMPTY):
-            count = min(MOST_EMPTY, len(frames) - start)
-            stages.add("code", count)
-            yield EncodedGroup(Form.EMPTY, count, encode_empty(), (), NO_ERROR)
+        for group in empty_groups(len(frames)):
+            stages.add("code", group.frame_count)
+            yield group
         return
     at, before = 0, None
     while at < len(frames):
@@ -102,7 +101,7 @@ def _continued(
     levels = before.reference.levels
     guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), levels))
     fit = Fit.at(base.faces, fit_targets(base.faces, predictions, targets, options.fit, guides), targets)
-    target = target_of(ahead, options).distance
+    target = target_of(ahead, options.target, options.noise).distance
     count = leading(_residuals(fit, options) / target, before.residual / target, options.groups)
     if count < min(SHORTEST, len(ahead)):
         return None
@@ -125,9 +124,9 @@ def _alone(
     """A group with a key frame of its own, as long as its template fits; by Draco, the first frame that none fits."""
     count = len(ahead)
     while True:
-        course = _course(targets[:count], options)
-        frames = ahead[: course.count]
-        keyed = _keyed(frames, targets[: course.count], course, options)
+        motion = _key_motion(targets[:count], options)
+        frames = ahead[: motion.count]
+        keyed = _keyed(frames, targets[: motion.count], motion, options)
         count = _fitted(frames, keyed, options)
         if count == len(frames) and keyed is not None:
             group, followed = _coded(frames, keyed.reference, keyed.fit, None, options)
@@ -136,31 +135,31 @@ def _alone(
             return intra_only(frames, options), None
 
 
-def _course(targets: list[Target], options: EncoderOptions) -> Course:
+def _key_motion(targets: list[Target], options: EncoderOptions) -> KeyMotion:
     """The way of a key frame's surface through the first of these frames: as many as some key is followed back from."""
-    while (course := choose_key(targets, options.embedded, options.keys)).count == 0:
+    while (motion := choose_key(targets, options.embedded, options.keys)).count == 0:
         targets = targets[: len(targets) // 2]
-    return course
+    return motion
 
 
-def _keyed(frames: Sequence[Mesh], targets: list[Target], course: Course, options: EncoderOptions) -> Keyed | None:
-    """The template of the course's key and its fit to the frames; None where nothing is left of its base mesh.
+def _keyed(frames: Sequence[Mesh], targets: list[Target], motion: KeyMotion, options: EncoderOptions) -> Keyed | None:
+    """The template of the motion's key and its fit to the frames; None where nothing is left of its base mesh.
 
     That fused from all frames where there is noise; else the key frame's own, or the fused one where only that fits.
     """
     if options.noise > 0:
-        return _laid(targets, course, True, options) or _laid(targets, course, False, options)
-    own = _laid(targets, course, False, options)
+        return _laid(targets, motion, True, options) or _laid(targets, motion, False, options)
+    own = _laid(targets, motion, False, options)
     if own is None or len(frames) == 1 or _fitted(frames, own, options) == len(frames):
         return own
-    fused = _laid(targets, course, True, options)
+    fused = _laid(targets, motion, True, options)
     return own if fused is None else min(own, fused, key=lambda one: float(np.mean(one.fit.by_area**2)))
 
 
-def _laid(targets: list[Target], course: Course, fuse: bool, options: EncoderOptions) -> Keyed | None:
+def _laid(targets: list[Target], motion: KeyMotion, fuse: bool, options: EncoderOptions) -> Keyed | None:
     """A base mesh of the key frame's surface, or of the fused one, laid onto the frames; None where nothing is left."""
-    key = targets[course.key].mesh
-    surface = fused_mesh(course.motion, targets, options.noise, options.fused) if fuse else key
+    key = targets[motion.key].mesh
+    surface = fused_mesh(motion.motion, targets, options.noise, options.fused) if fuse else key
     if surface.is_empty:
         return None
     lattice = options.layers.step * (LATTICE if len(targets) > 1 else LATTICE_ALONE)
@@ -173,9 +172,9 @@ def _laid(targets: list[Target], course: Course, fuse: bool, options: EncoderOpt
     if fuse:
         rest = fit_targets(faces, template.vertices[None], [Target(surface)], options.fit)[0]
         template = Mesh(rest, faces)
-    fit = replace(options.fit, key=course.key)
-    positions = fit_targets(faces, course.move(template), targets, fit, Guides(rest, detail))
-    return Keyed(course.key, reference, Fit.at(faces, positions, targets))
+    fit = replace(options.fit, key=motion.key)
+    positions = fit_targets(faces, motion.move(template), targets, fit, Guides(rest, detail))
+    return Keyed(motion.key, reference, Fit.at(faces, positions, targets))
 
 
 def _residuals(fit: Fit, options: EncoderOptions) -> Float64[np.ndarray, " T"]:
@@ -187,7 +186,7 @@ def _fitted(frames: Sequence[Mesh], keyed: Keyed | None, options: EncoderOptions
     """How many of the first frames a key frame should be looked for in: all where the template fits, 0 for no more."""
     if keyed is None:
         return 1 if len(frames) > 1 else 0
-    residuals, target = _residuals(keyed.fit, options), target_of(frames, options).distance
+    residuals, target = _residuals(keyed.fit, options), target_of(frames, options.target, options.noise).distance
     if len(frames) == 1:
         return 0 if residuals[0] > options.groups.limit * target else 1
     cut = cut_at(residuals / target, options.groups)
@@ -200,13 +199,16 @@ def _coded(
     """The cheapest form of a group, and what the next may begin with."""
     encoded = encode_layers(reference, fit.positions, options.layers, before.state if before else None)
     payload, layers, decoded = _with_tails(frames, encoded, reference.base.faces, options)
-    quality = measure(frames, decoded)
-    group = EncodedGroup(Form.LAYERS, len(frames), payload, layers, quality, before is not None)
-    if options.noise == 0 and quality.distance > TOO_COARSE * target_of(frames, options).distance:
+    fidelity = measure(frames, decoded)
+    group = EncodedGroup(Form.LAYERS, len(frames), payload, layers, fidelity, before is not None)
+    if (
+        options.noise == 0
+        and fidelity.distance > TOO_COARSE * target_of(frames, options.target, options.noise).distance
+    ):
         other = laplacian(frames, reference, fit.positions, options.displacements)
-        if other.quality.reaches(quality) and len(other.payload) < len(group.payload):
+        if other.fidelity.reaches(fidelity) and len(other.payload) < len(group.payload):
             group = other
-    if not np.isfinite(group.quality.distance):
+    if not np.isfinite(group.fidelity.distance):
         return intra_only(frames, options), None  # the template has collapsed: nothing can be compared with it
     group = cheaper(frames, group, options)
     if group.form != Form.LAYERS:

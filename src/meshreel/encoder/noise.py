@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from ..analysis.fit.surface_fit import FitOptions
 from ..analysis.follow.embedded import EmbeddedOptions
-from .paper import EncoderOptions
+from .options import EncoderOptions
 
 LOST = 3.0  # RMS distances of the noise that a residual may have besides: legs come and go in noisy frames
 KEYS = 2  # tried at most: what one of them lacks, the fused template has from the other frames

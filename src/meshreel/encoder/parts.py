@@ -27,7 +27,8 @@ from ..geometry.nearest import Outline, distances
 from ..geometry.sequences import ChosenParts
 from ..geometry.topology import concatenate, face_normals, part_of
 from ..types import Mesh, MeshSequence, evenly
-from .paper import EncoderOptions, Stages
+from .options import EncoderOptions
+from .progress import Stages
 
 PROBES = 8  # frames, at most, that what moves is measured in
 LOST = 0.5  # of a frame's faces: as many stand still only where there is a background

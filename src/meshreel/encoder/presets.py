@@ -14,12 +14,12 @@ from ..analysis.follow.template import TemplateOptions
 from ..analysis.groups import GroupOptions
 from ..analysis.reference.extraction import ReferenceOptions
 from ..analysis.reference.track import TrackOptions
-from ..coding.layers.coder import LayersOptions
+from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
 from ..format.layout import Form
-from .draco import Quality
-from .paper import EncoderOptions
+from .options import EncoderOptions
+from .target import Fidelity
 
 PRESETS = ("best", "paper")
 
@@ -62,7 +62,7 @@ def _paper(quality: float, centers: int | None) -> EncoderOptions:
     centers = 2000 if centers is None else centers
     return EncoderOptions(
         track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
-        target=Quality(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
+        target=Fidelity(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
         displacements=DisplacementOptions(step=step),
     )
@@ -74,9 +74,9 @@ def _best(quality: float) -> EncoderOptions:
     return EncoderOptions(
         form=Form.LAYERS,
         group_size=16,
-        target=Quality(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
+        target=Fidelity(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
         template=TemplateOptions(error=0.00088 * (step / 0.0012) ** 0.55),
-        layers=LayersOptions(step=step),
+        layers=LayerCodingOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
         fit=FitOptions(restart=False, pull=0.3, second_smoothing=0.7),  # the defaults are those of `paper`
         groups=GroupOptions(worth=0.9),  # likewise

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
-from .paper import EncoderOptions
+from .options import EncoderOptions
 from .sequence import Encoder
 from .summary import Summary
 
@@ -68,8 +68,8 @@ class Goal:
         text = f"the background alone takes {summary.scene.background} bytes, {rate:.4g} Mbps over {seconds:.4g} s"
         return f"{text}, and the target is {self.mbps:g} Mbps; give more, more frames, or fewer copies of it"
 
-    def told(self, value: float) -> str:
-        """A measured value for people."""
+    def text_of(self, value: float) -> str:
+        """Format a measured value with its unit."""
         return f"{value:.2f} dB" if self.mbps is None else f"{math.exp(value):.4g} Mbps"
 
 
@@ -100,7 +100,7 @@ def encode_to(
             search.learn(quality, value)
     finally:
         partial.unlink(missing_ok=True)
-    raise InputError(f"{path}: no quality gives {goal.told(goal.wanted)}; {search.found()}")
+    raise InputError(f"{path}: no quality gives {goal.text_of(goal.wanted)}; {search.found()}")
 
 
 class Search:
@@ -133,7 +133,7 @@ class Search:
     def found(self) -> str:
         """What was tried, for a message."""
         tried = sorted(self._known.items())
-        return ", ".join(f"quality {quality:.4g} gives {self._goal.told(value)}" for quality, value in tried)
+        return ", ".join(f"quality {quality:.4g} gives {self._goal.text_of(value)}" for quality, value in tried)
 
     def _slope(self) -> float:
         """From the two outermost qualities known, where there are two."""

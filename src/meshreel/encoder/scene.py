@@ -21,17 +21,16 @@ from ..analysis.scene.bodies import at_most, find_bodies, same_bodies, with_ring
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.survey import Survey
 from ..coding.background import decode_background, decode_change, encode_background, encode_change
-from ..coding.intra import encode_empty
 from ..format.checks import MOST_TRACKS
 from ..format.layout import Form
 from ..geometry.decimate import decimate, decimate_faces
 from ..geometry.nearest import distances
-from ..types import Frames, Mesh, MeshSequence, Placement
-from .draco import NO_ERROR
-from .job import Work
-from .layers import MOST_EMPTY, encode_segment
-from .paper import MOST_NOISE, EncodedGroup, EncoderOptions, FindSpans, Stages, encode_window
+from ..types import Mesh, MeshSequence, Placement
+from .forms import EncodedGroup, empty_groups
+from .job import Job
+from .options import MOST_NOISE, EncoderOptions
 from .parts import Change, Parts
+from .recipe import encode_apart, encode_interval
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 HALFWAY = 0.3  # of the vertices: what has fewer than half as many is decimated from there, a third of the time
@@ -57,7 +56,7 @@ class TrackGroup:
 
 
 @dataclass(frozen=True, slots=True)
-class BodyRun:
+class TrackInterval:
     """Frames of one track that are coded together."""
 
     track: int
@@ -126,21 +125,21 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
     return Mesh((mesh.vertices - seen.center) / seen.unit, mesh.faces)
 
 
-def encode_bodies(work: Work, parts: Parts) -> CodedBodies:
+def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
     """The groups of all tracks; each track has all frames, and no group has frames with surface and without."""
-    sequence, stages = work.sequence, work.stages
-    options = options_of(parts, work.options)
+    sequence, stages = job.sequence, job.stages
+    options = options_of(parts, job.options)
     tracks, found = Tracks(parts.segmentation.cell, options), list[TrackGroup]()
-    for frames in segments(sequence, parts.segmentation, options):
-        runs = body_runs(sequence, parts, frames, tracks)
-        coded = _coded_runs([run.frames for run in runs], replace(work, options=options))
+    for frames in key_intervals(sequence, parts.segmentation, options):
+        runs = track_intervals(sequence, parts, frames, tracks)
+        coded = _coded_intervals([run.frames for run in runs], replace(job, options=options))
         done, count = 0, sum(len(run.frames) for run in runs)
         for run, groups in zip(runs, coded, strict=True):
             first = run.first_frame
             for group in groups:
                 found.append(TrackGroup(run.track, first, group))
                 first += group.frame_count
-                before, done = done, done + group.frame_count  # frames of all tracks are told as frames of the scene
+                before, done = done, done + group.frame_count  # frames of all tracks count as frames of the scene
                 stages.add("code", done * len(frames) // count - before * len(frames) // count)
         found += tracks.late(frames)
     return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
@@ -151,51 +150,37 @@ def options_of(parts: Parts | None, options: EncoderOptions) -> EncoderOptions:
     return options if parts is None else replace(options, noise=min(parts.noise / parts.seen.unit, MOST_NOISE))
 
 
-def body_runs(sequence: MeshSequence, parts: Parts, frames: range, tracks: Tracks) -> list[BodyRun]:
+def track_intervals(sequence: MeshSequence, parts: Parts, frames: range, tracks: Tracks) -> list[TrackInterval]:
     """What moves in the next segment, apart in tracks and in runs of frames that can be coded together."""
-    moving, found = [_moving(sequence[number], parts, number) for number in frames], list[BodyRun]()
+    moving, found = [_moving(sequence[number], parts, number) for number in frames], list[TrackInterval]()
     for track, meshes in tracks.of(moving):
         normalised = [parts.seen.normalise(mesh) for mesh in meshes]
         for run in _runs(normalised, frames, parts.seen, tracks.options):
-            found.append(BodyRun(track, frames.start + run.start, normalised[run.start : run.stop]))
+            found.append(TrackInterval(track, frames.start + run.start, normalised[run.start : run.stop]))
     return found
 
 
-def all_windows(
+def all_intervals(
     sequence: MeshSequence, seen: Survey, parts: Parts | None, options: EncoderOptions
-) -> Iterator[BodyRun]:
+) -> Iterator[TrackInterval]:
     """The windows of form LAPLACIAN: of a scene, or where there are no `parts` of a sequence that may all move."""
     if parts is None:
-        for window in seen.windows(options.group_size):
-            yield BodyRun(0, window.start, [seen.normalise(sequence[number]) for number in window])
+        for window in seen.intervals(options.group_size):
+            yield TrackInterval(0, window.start, [seen.normalise(sequence[number]) for number in window])
         return
     tracks = Tracks(parts.segmentation.cell, options)
-    for frames in segments(sequence, parts.segmentation, options):
-        yield from body_runs(sequence, parts, frames, tracks)
+    for frames in key_intervals(sequence, parts.segmentation, options):
+        yield from track_intervals(sequence, parts, frames, tracks)
 
 
-def _coded_runs(runs: Sequence[list[Mesh]], work: Work) -> Iterator[Iterable[EncodedGroup]]:
+def _coded_intervals(runs: Sequence[list[Mesh]], job: Job) -> Iterator[Iterable[EncodedGroup]]:
     """The groups of each run, in order."""
-    if work.executor is None:
-        return (encode_run(frames, work.options, None, work.spans.find) for frames in runs)
-    return work.executor.map(encode_run_apart, [(frames, work.options) for frames in runs])
+    if job.executor is None:
+        return (encode_interval(frames, job.options, None, job.store.find) for frames in runs)
+    return job.executor.map(encode_apart, [(frames, job.options) for frames in runs])
 
 
-def encode_run(
-    frames: Frames, options: EncoderOptions, stages: Stages | None = None, find: FindSpans | None = None
-) -> Iterable[EncodedGroup]:
-    """The groups of frames that are coded together, in order, in the form that is asked for."""
-    if options.form == Form.LAYERS:
-        return encode_segment(frames, options, stages)
-    return encode_window(frames, options, stages, find)
-
-
-def encode_run_apart(task: tuple[list[Mesh], EncoderOptions]) -> list[EncodedGroup]:
-    """As `encode_run`, in a worker."""
-    return list(encode_run(*task))
-
-
-def segments(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:
+def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:
     """Runs of frames that are coded on their own, of even lengths, cut also where the background is another."""
     count, frame_rate = len(sequence), sequence.frame_rate
     longest = max(1, round(options.key_interval * frame_rate))
@@ -215,7 +200,7 @@ def _runs(meshes: Sequence[Mesh], frames: range, seen: Survey, options: EncoderO
     runs = []
     for start, stop in pairwise([0, *cuts, len(frames)]):
         sizes = replace(seen, diagonals=tuple(mesh.diagonal for mesh in meshes[start:stop]))
-        runs += [range(start + run.start, start + run.stop) for run in sizes.windows(size)]
+        runs += [range(start + run.start, start + run.stop) for run in sizes.intervals(size)]
     return runs
 
 
@@ -248,9 +233,10 @@ class Tracks:
     def late(self, frames: range) -> Iterator[TrackGroup]:
         """The empty frames of tracks that began in this segment, up to it."""
         for track in self._new:
-            for start in range(0, frames.start, MOST_EMPTY):
-                count = min(MOST_EMPTY, frames.start - start)
-                yield TrackGroup(track, start, EncodedGroup(Form.EMPTY, count, encode_empty(), (), NO_ERROR))
+            first = 0
+            for group in empty_groups(frames.start):
+                yield TrackGroup(track, first, group)
+                first += group.frame_count
 
 
 def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:

@@ -30,17 +30,18 @@ from ..geometry.nearest import distances
 from ..geometry.topology import drop_unreferenced
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import Frames, Mesh, MeshSequence, as_sequence, evenly
-from .job import SpanStore, Work
-from .paper import EncodedGroup, EncoderOptions, Progress, Stages
+from .forms import EncodedGroup
+from .job import GroupStore, Job
+from .options import EncoderOptions
 from .parts import Parts, take_apart
 from .presets import preset_options
+from .progress import Progress, Stages
+from .recipe import encode_apart, encode_interval
 from .scene import (
     Static,
     TrackGroup,
-    all_windows,
+    all_intervals,
     encode_bodies,
-    encode_run,
-    encode_run_apart,
     encode_static,
     options_of,
 )
@@ -84,7 +85,7 @@ class Encoder:
         """
         self.sequence, self._executor, self._masker = sequence, executor, masker
         self.progress = progress
-        self.spans = SpanStore()  # those that `prepare` found
+        self.store = GroupStore()  # those that `prepare` found
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
         self._stands: bool | None = masker is not None or None  # whether most of it stands still; None: not looked at
 
@@ -99,32 +100,32 @@ class Encoder:
         The parts of a scene; and the spans of form LAPLACIAN, for as many sizes of its basis as are wanted, unless
         there is an executor. They take a few hundred kB a frame, as long as this object lives.
         """
-        work, parts = self._work(options), self.parts(options)
+        job, parts = self._job(options), self.parts(options)
         if options.form == Form.LAPLACIAN and self._executor is None:
-            self._keep_spans(work, parts)
+            self._keep_groups(job, parts)
 
-    def _keep_spans(self, work: Work, parts: Parts | None) -> None:
-        options, stages, count = options_of(parts, work.options), work.stages, len(work.sequence)
-        seen = survey(work.sequence, stages) if parts is None else parts.seen
-        for run in all_windows(work.sequence, seen, parts, options):
-            self.spans.keep(run.frames, options, stages if parts is None else None)
+    def _keep_groups(self, job: Job, parts: Parts | None) -> None:
+        options, stages, count = options_of(parts, job.options), job.stages, len(job.sequence)
+        seen = survey(job.sequence, stages) if parts is None else parts.seen
+        for run in all_intervals(job.sequence, seen, parts, options):
+            self.store.keep(run.frames, options, stages if parts is None else None)
             stages.reach("fit", (run.first_frame + len(run.frames)) / count)
 
     def parts(self, options: EncoderOptions) -> Parts | None:
         """What the sequence is made of; None where it is no scene, or is not to be taken for one."""
-        return self._parts(self._work(options)) if self._is_scene(options) else None
+        return self._parts(self._job(options)) if self._is_scene(options) else None
 
     def encode(self, path: str | Path, options: EncoderOptions) -> Summary:
         """As the function `encode`, which says what is raised."""
         if options.dynamic_only and self._masker is not None:
             raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
         check_target(Path(path))
-        work, parts = self._work(options), self.parts(options)
-        return _encode_bodies(work, Path(path)) if parts is None else _encode_scene(work, Path(path), parts)
+        job, parts = self._job(options), self.parts(options)
+        return _encode_bodies(job, Path(path)) if parts is None else _encode_scene(job, Path(path), parts)
 
-    def _work(self, options: EncoderOptions) -> Work:
+    def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence))
-        return Work(self.sequence, options, self._executor, stages, self.spans)
+        return Job(self.sequence, options, self._executor, stages, self.store)
 
     def _is_scene(self, options: EncoderOptions) -> bool:
         if options.dynamic_only or not len(self.sequence):
@@ -133,22 +134,22 @@ class Encoder:
             self._stands = is_scene(self.sequence)
         return self._stands
 
-    def _parts(self, work: Work) -> Parts:
+    def _parts(self, job: Job) -> Parts:
         """What the scene is made of; found anew where other options say otherwise."""
-        how = (work.options.segment, work.options.background)
+        how = (job.options.segment, job.options.background)
         if self._scene is None or self._scene[:2] != how:
-            seen = survey(work.sequence, work.stages, cleaned=False)
-            self._scene = (*how, take_apart(work.sequence, seen, work.options, work.stages, self._masker))
+            seen = survey(job.sequence, job.stages, cleaned=False)
+            self._scene = (*how, take_apart(job.sequence, seen, job.options, job.stages, self._masker))
         return self._scene[2]
 
 
-def _encode_bodies(work: Work, path: Path) -> Summary:
+def _encode_bodies(job: Job, path: Path) -> Summary:
     """As `encode`, for a sequence in which everything may move."""
-    sequence, options = work.sequence, work.options
-    seen = survey(sequence, work.stages)
+    sequence, options = job.sequence, job.options
+    seen = survey(sequence, job.stages)
     groups: list[GroupSummary] = []
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        for encoded in _encoded_windows(work, seen):
+        for encoded in _encoded_intervals(job, seen):
             for group in encoded:
                 each = TrackGroup(0, writer.frame_count, group)
                 groups.append(_added(writer, each, [], seen.diagonal))
@@ -156,12 +157,12 @@ def _encode_bodies(work: Work, path: Path) -> Summary:
     return Summary(path.stat().st_size, tuple(groups), _warnings(seen))
 
 
-def _encode_scene(work: Work, path: Path, parts: Parts) -> Summary:
+def _encode_scene(job: Job, path: Path, parts: Parts) -> Summary:
     """As `encode`, for a scene with a background."""
-    sequence, options, seen = work.sequence, work.options, parts.seen
+    sequence, options, seen = job.sequence, job.options, parts.seen
     states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        coded = encode_bodies(work, parts)
+        coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
         writer.header = make_header(sequence.frame_rate, seen, metadata | _upright(options))
@@ -195,8 +196,8 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     before = [last] if group.predicted and last is not None else []
     writer.add_group(each.first_frame, group.frame_count, group.payload, group.layers, (*static, *before), track)
     key = None if group.key is None else each.first_frame + group.key
-    quality = group.quality.scaled(unit)
-    return GroupSummary(group.form, group.frame_count, len(group.payload), quality, group.predicted, key, track)
+    fidelity = group.fidelity.scaled(unit)
+    return GroupSummary(group.form, group.frame_count, len(group.payload), fidelity, group.predicted, key, track)
 
 
 def _measured(sequence: MeshSequence, path: Path, diagonal: float, numbers: Sequence[int]) -> float:
@@ -260,20 +261,20 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
     )
 
 
-def _encoded_windows(work: Work, seen: Survey) -> Iterator[Iterable[EncodedGroup]]:
+def _encoded_intervals(job: Job, seen: Survey) -> Iterator[Iterable[EncodedGroup]]:
     """The groups of each run of frames that needs no other, in order; with an executor, a run a worker ahead."""
-    sequence, options, executor, stages = work.sequence, work.options, work.executor, work.stages
+    sequence, options, executor, stages = job.sequence, job.options, job.executor, job.stages
     layered = options.form == Form.LAYERS
     size = max(1, round(options.key_interval * sequence.frame_rate)) if layered else options.group_size
-    windows = (_Normalised(sequence, seen, window) for window in seen.windows(size))
+    intervals = (_Normalised(sequence, seen, numbers) for numbers in seen.intervals(size))
     if executor is None:
-        for frames in windows:
-            yield encode_run(frames, options, stages, work.spans.find)
+        for frames in intervals:
+            yield encode_interval(frames, options, stages, job.store.find)
         return
     ahead = getattr(executor, "_max_workers", 8)
     waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()
-    for frames in windows:
-        waiting.append((len(frames), executor.submit(encode_run_apart, (list(frames), options))))
+    for frames in intervals:
+        waiting.append((len(frames), executor.submit(encode_apart, (list(frames), options))))
         if len(waiting) > ahead:
             yield _arrived(waiting, stages)
     while waiting:
@@ -283,14 +284,14 @@ def _encoded_windows(work: Work, seen: Survey) -> Iterator[Iterable[EncodedGroup
 class _Normalised(Frames):
     """Frames of a sequence in normalised coordinates, read when they are asked for."""
 
-    def __init__(self, sequence: MeshSequence, seen: Survey, window: range) -> None:
-        self._sequence, self._seen, self._window = sequence, seen, window
+    def __init__(self, sequence: MeshSequence, seen: Survey, numbers: range) -> None:
+        self._sequence, self._seen, self._numbers = sequence, seen, numbers
 
     def __len__(self) -> int:
-        return len(self._window)
+        return len(self._numbers)
 
     def __getitem__(self, index: int) -> Mesh:
-        return self._seen.normalise(self._sequence[self._window[index]])
+        return self._seen.normalise(self._sequence[self._numbers[index]])
 
 
 def _arrived(waiting: deque[tuple[int, Future[list[EncodedGroup]]]], stages: Stages) -> list[EncodedGroup]:
@@ -303,15 +304,15 @@ def _arrived(waiting: deque[tuple[int, Future[list[EncodedGroup]]]], stages: Sta
 def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:
     """What `info` shows of the encoding: not needed to decode, but counted in the rate."""
     frames = sum(group.frame_count for group in groups)
-    mean_square = sum(group.frame_count * group.quality.distance**2 for group in groups) / frames
+    mean_square = sum(group.frame_count * group.fidelity.distance**2 for group in groups) / frames
     return {
         "preset": options.preset,
         "quality": _rounded(options.quality),
         "key_frames": [group.key for group in groups if group.key is not None],
         "rms_m": _rounded(mean_square**0.5),
-        "worst_rms_m": _rounded(max(group.quality.worst for group in groups)),
-        "d2_psnr_paper": _rounded(sum(g.frame_count * g.quality.psnr for g in groups) / frames),
-        "normal_error_deg": _rounded(sum(g.frame_count * g.quality.angle for g in groups) / frames),
+        "worst_rms_m": _rounded(max(group.fidelity.worst for group in groups)),
+        "d2_psnr_paper": _rounded(sum(g.frame_count * g.fidelity.psnr for g in groups) / frames),
+        "normal_error_deg": _rounded(sum(g.frame_count * g.fidelity.angle for g in groups) / frames),
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..format.layout import Form
-from .draco import Quality
+from .target import Fidelity
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,7 +15,7 @@ class GroupSummary:
     form: Form
     frame_count: int
     size: int  # bytes
-    quality: Quality
+    fidelity: Fidelity
     predicted: bool = False  # from the group before
     key: int | None = None  # the frame of the sequence whose surface the others follow
     track: int = 0  # the body of a scene
@@ -52,4 +52,4 @@ class Summary:
         """d2_psnr_paper, mean over the frames, dB; of a scene, over those that were measured."""
         if self.scene is not None:
             return self.scene.psnr
-        return sum(group.frame_count * group.quality.psnr for group in self.groups) / self.frame_count
+        return sum(group.frame_count * group.fidelity.psnr for group in self.groups) / self.frame_count

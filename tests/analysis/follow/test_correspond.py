@@ -43,49 +43,49 @@ def with_speck(mesh: Mesh) -> Mesh:
 @pytest.fixture
 def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The keys that are tried."""
-    keys, course = list[int](), correspond._course
+    keys, motion = list[int](), correspond._follow
 
-    def told(targets: list[Target], key: int, options: EmbeddedOptions) -> correspond.Course:
+    def told(targets: list[Target], key: int, options: EmbeddedOptions) -> correspond.KeyMotion:
         keys.append(key)
-        return course(targets, key, options)
+        return motion(targets, key, options)
 
-    monkeypatch.setattr(correspond, "_course", told)
+    monkeypatch.setattr(correspond, "_follow", told)
     return keys
 
 
 def test_of_an_even_motion_the_middle_frame_is_the_key_and_no_other_is_tried(tried: list[int]) -> None:
-    course = choose_key([Target(mesh) for mesh in frames(5)], OPTIONS)
-    assert (course.key, course.count, tried) == (2, 5, [2])
+    motion = choose_key([Target(mesh) for mesh in frames(5)], OPTIONS)
+    assert (motion.key, motion.count, tried) == (2, 5, [2])
     template = Mesh.of(wanted(5)[2], BASE.faces)
-    found = course.move(template)
+    found = motion.move(template)
     np.testing.assert_allclose(found[2], template.vertices, atol=1e-9)
     assert np.linalg.norm(found - wanted(5), axis=2).max() < 0.01
 
 
 def test_a_single_frame_keeps_the_template_as_it_is() -> None:
-    course = choose_key([Target(BALL)], OPTIONS)
-    assert (course.key, course.count) == (0, 1)
-    np.testing.assert_allclose(course.move(BASE), BASE.vertices[None], atol=1e-12)
+    motion = choose_key([Target(BALL)], OPTIONS)
+    assert (motion.key, motion.count) == (0, 1)
+    np.testing.assert_allclose(motion.move(BASE), BASE.vertices[None], atol=1e-12)
 
 
 def test_frames_are_followed_up_to_one_that_is_lost() -> None:
     other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
-    course = choose_key([Target(mesh) for mesh in [*frames(4), other]], OPTIONS)
-    assert course.key < course.count == 4
-    assert course.move(BASE).shape == (4, len(BASE.vertices), 3)
+    motion = choose_key([Target(mesh) for mesh in [*frames(4), other]], OPTIONS)
+    assert motion.key < motion.count == 4
+    assert motion.move(BASE).shape == (4, len(BASE.vertices), 3)
 
 
 def test_from_a_key_that_is_alone_with_what_it_has_none_is_followed() -> None:
     other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
-    course = choose_key([Target(mesh) for mesh in [other, *frames(2)]], OPTIONS, 1)
-    assert (course.key, course.count) == (1, 0)
+    motion = choose_key([Target(mesh) for mesh in [other, *frames(2)]], OPTIONS, 1)
+    assert (motion.key, motion.count) == (1, 0)
 
 
 def test_where_something_appears_that_the_middle_frame_has_not_another_is_the_key(tried: list[int]) -> None:
     first = frames(5)
     targets = [Target(mesh) for mesh in (*first[:3], *map(with_speck, first[3:]))]
-    course = choose_key(targets, OPTIONS)
-    assert (course.key, course.count) == (3, 5) and tried[:2] == [2, 3]
+    motion = choose_key(targets, OPTIONS)
+    assert (motion.key, motion.count) == (3, 5) and tried[:2] == [2, 3]
     tried.clear()
     assert choose_key(targets, OPTIONS, 1).key == 2 and tried == [2]
 

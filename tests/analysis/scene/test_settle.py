@@ -13,9 +13,9 @@ from meshreel.analysis.scene.settle import NEVER, SettleOptions
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
-from meshreel.encoder.paper import Stages
 from meshreel.encoder.parts import take_apart
 from meshreel.encoder.presets import preset_options
+from meshreel.encoder.progress import Stages
 from meshreel.encoder.scene import encode_static
 from meshreel.errors import InputError
 from meshreel.geometry.nearest import Surface

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from meshreel.coding.group import continue_group, decode_group, payload_parts
 from meshreel.coding.layers import coder
-from meshreel.coding.layers.coder import EncodedLayers, LayersOptions, decode_layers, encode_layers
+from meshreel.coding.layers.coder import EncodedLayers, LayerCodingOptions, decode_layers, encode_layers
 from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin
@@ -53,7 +53,7 @@ def test_decoding_gives_the_encoders_places_to_the_bit(reference: CodedReference
 
 
 def test_a_finer_step_costs_more_and_errs_less() -> None:
-    made = [encode_layers(BALL, WANTED, LayersOptions(step=step)) for step in (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)]
+    made = [encode_layers(BALL, WANTED, LayerCodingOptions(step=step)) for step in (8e-3, 4e-3, 2e-3, 1e-3, 5e-4)]
     sizes = [len(coded.payload) for coded in made]
     errors = [error(coded.positions, WANTED) for coded in made]
     assert sizes == sorted(sizes) and errors == sorted(errors, reverse=True)
@@ -134,7 +134,7 @@ def test_isolated_vertices_and_degenerate_faces_are_exact() -> None:
 
 def test_levels_without_anything_to_say_cost_a_few_bytes_and_still_subdivide() -> None:
     coded = encode_layers(
-        BALL, np.repeat(BALL.base.vertices[None], 3, axis=0), LayersOptions(step=0.05, curvatures=(0,))
+        BALL, np.repeat(BALL.base.vertices[None], 3, axis=0), LayerCodingOptions(step=0.05, curvatures=(0,))
     )
     np.testing.assert_array_equal(coded.positions[0], BALL.base.vertices)
     assert coded.layers[2] - coded.layers[0] < 16
@@ -216,7 +216,7 @@ WRONG = {
 @pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in WRONG.items() for value in values])
 def test_options_name_what_is_wrong(name: str, value: object) -> None:
     with pytest.raises(InputError):
-        LayersOptions(**{name: value})
+        LayerCodingOptions(**{name: value})
 
 
 def test_the_parts_of_a_payload_are_told_apart() -> None:

@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from meshreel.coding.layers.coder import LayersOptions, LayersState, encode_layers
+from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
 from meshreel.coding.reference_mesh import code_reference
 from meshreel.container.writer import ReelWriter
 from meshreel.format.layout import Header
@@ -33,7 +33,7 @@ def main() -> None:
         for group in range(2):
             time = (FRAMES * group + np.arange(FRAMES))[:, None, None]
             wanted = points * (1 + 0.01 * time) + 0.01 * np.sin(20 * points[:, [1, 2, 0]] + 0.3 * time)
-            coded = encode_layers(reference, wanted, LayersOptions(step=STEP), state)
+            coded = encode_layers(reference, wanted, LayerCodingOptions(step=STEP), state)
             before = () if state is None else (0,)
             writer.add_group(FRAMES * group, FRAMES, coded.payload, coded.layers, before, 0)
             state = coded.state

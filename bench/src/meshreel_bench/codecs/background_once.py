@@ -16,9 +16,9 @@ from meshreel.analysis.scene.probe import is_scene
 from meshreel.analysis.survey import Survey, survey
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.paper import Stages
 from meshreel.encoder.parts import take_apart
 from meshreel.encoder.presets import preset_options
+from meshreel.encoder.progress import Stages
 from meshreel.encoder.scene import Static, encode_static
 from meshreel.encoder.sequence import make_header
 from meshreel.geometry.topology import part_of

@@ -10,7 +10,7 @@ from typing import Any
 
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.job import shared_options
-from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import Encoder
 from meshreel.types import Mesh, MeshSequence

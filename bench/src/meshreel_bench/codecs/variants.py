@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.options import EncoderOptions
 from meshreel.errors import InputError
 
 Change = Callable[[EncoderOptions], EncoderOptions]

@@ -21,7 +21,7 @@ PLACES = (0.5, 0.7, 0.85, 0.25, 0.0)  # of the keys, in parts of the group; trie
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class KeyMotion:
     """How the key frame's surface moves through the frames that follow it."""
 
     key: int
@@ -33,19 +33,19 @@ class Course:
         return self.motion.move(template.vertices, vertex_normals(template))[: self.count]
 
 
-def choose_key(targets: Sequence[Target], options: EmbeddedOptions, most: int = len(PLACES)) -> Course:
-    """The course that is followed for longest; of equally long ones that which leaves least over.
+def choose_key(targets: Sequence[Target], options: EmbeddedOptions, most: int = len(PLACES)) -> KeyMotion:
+    """The motion that is followed for longest; of equally long ones that which leaves least over.
 
     At most so many keys are tried.
     """
-    courses = list[Course]()
+    motions = list[KeyMotion]()
     for key in dict.fromkeys(int(place * len(targets)) for place in PLACES[:most]):
-        courses.append(_course(targets, key, options))
-        residuals = courses[-1].motion.residuals
+        motions.append(_follow(targets, key, options))
+        residuals = motions[-1].motion.residuals
         usual = max(float(np.median(residuals)), options.settled)
         if residuals.max() <= min(options.rekeyed, options.uneven * usual):
             break
-    return max(courses, key=lambda course: (course.count, -float(np.sum(course.motion.residuals[: course.count] ** 2))))
+    return max(motions, key=lambda motion: (motion.count, -float(np.sum(motion.motion.residuals[: motion.count] ** 2))))
 
 
 def from_last(template: Mesh, targets: Sequence[Target], options: EmbeddedOptions) -> Float64[np.ndarray, "T V 3"]:
@@ -61,11 +61,11 @@ def from_last(template: Mesh, targets: Sequence[Target], options: EmbeddedOption
     return tracker.motion(range(count)).move(template.vertices, vertex_normals(template))
 
 
-def _course(targets: Sequence[Target], key: int, options: EmbeddedOptions) -> Course:
+def _follow(targets: Sequence[Target], key: int, options: EmbeddedOptions) -> KeyMotion:
     tracker = Tracker(targets[key].mesh, key, options)
     for frame in [*range(key + 1, len(targets)), *reversed(range(key))]:
         tracker.step(frame, targets[frame])
     motion = tracker.motion(range(len(targets)))
     lost = np.flatnonzero(motion.residuals > options.lost)
     count = int(lost[0]) if len(lost) else len(targets)
-    return Course(key, count if count > key else 0, motion)
+    return KeyMotion(key, count if count > key else 0, motion)

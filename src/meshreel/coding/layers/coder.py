@@ -30,7 +30,7 @@ MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
 
 
 @dataclass(frozen=True, slots=True)
-class LayersOptions:
+class LayerCodingOptions:
     """How a group of layers is coded; lengths relative to the sequence's diagonal."""
 
     step: float = 1.8e-3  # quantiser step of the base's motion
@@ -92,7 +92,7 @@ class EncodedLayers:
 def encode_layers(
     reference: CodedReference,
     positions: Float64[np.ndarray, "T V 3"],
-    options: LayersOptions = LayersOptions(),
+    options: LayerCodingOptions = LayerCodingOptions(),
     previous: LayersState | None = None,
 ) -> EncodedLayers:
     """The payload of a group whose subdivided base should lie at `positions`; predicted from `previous` if given.

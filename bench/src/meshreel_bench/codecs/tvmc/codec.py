@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from meshreel.coding.layers.patches import run_lengths
-from meshreel.encoder.paper import EncoderOptions, Stages
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import preset_options, quality_of_vertices
+from meshreel.encoder.progress import Stages
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from meshreel.encoder.paper import MOST_FRAMES
+from meshreel.encoder.options import MOST_FRAMES
 from meshreel.errors import FormatError
 from meshreel.format.checks import LARGEST, MOST_CHANGES, MOST_TRACKS, SMALLEST
 from meshreel.format.kinds import F64, U8, U32, Array, Blob, Bytes, Choice, List, Varint

@@ -13,8 +13,10 @@ from jaxtyping import Float64
 
 from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.reference_mesh import CodedReference
-from meshreel.encoder.paper import EncoderOptions, Span, displacement_field, intra_only
-from meshreel.encoder.scene import BodyRun, Static, all_windows, encode_static, options_of
+from meshreel.encoder.forms import displacement_field, intra_only
+from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.paper import FoundGroup
+from meshreel.encoder.scene import Static, TrackInterval, all_intervals, encode_static, options_of
 from meshreel.encoder.sequence import Encoder
 
 
@@ -62,20 +64,20 @@ def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
     """
     sequence, parts, groups = encoder.sequence, encoder.parts(options), list[Tracked | Untracked]()
     seen, options = survey(sequence) if parts is None else parts.seen, options_of(parts, options)
-    for run in all_windows(sequence, seen, parts, options):
+    for run in all_intervals(sequence, seen, parts, options):
         if not run.frames[0].is_empty:
-            groups += _groups(run, encoder.spans.find(run.frames, options), options)
+            groups += _groups(run, encoder.store.find(run.frames, options), options)
     states = [] if parts is None else encode_static(parts, len(sequence), sequence.frame_rate, options.background)
     return Tracking(seen, states, sorted(groups, key=lambda group: group.first_frame))
 
 
-def _groups(run: BodyRun, spans: Sequence[Span], options: EncoderOptions) -> Iterator[Tracked | Untracked]:
+def _groups(run: TrackInterval, found: Sequence[FoundGroup], options: EncoderOptions) -> Iterator[Tracked | Untracked]:
     """The groups of a window."""
     first = run.first_frame
-    for span in spans:
-        if span.fitted is None:
-            yield Untracked(first, len(span.frames), intra_only(span.frames, options).payload)
+    for group in found:
+        if group.fitted is None:
+            yield Untracked(first, len(group.frames), intra_only(group.frames, options).payload)
         else:
-            reference = span.fitted.reference
-            yield Tracked(first, reference, displacement_field(reference, span.fitted.positions))
-        first += len(span.frames)
+            reference = group.fitted.reference
+            yield Tracked(first, reference, displacement_field(reference, group.fitted.positions))
+        first += len(group.frames)

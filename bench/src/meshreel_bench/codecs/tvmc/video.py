@@ -9,7 +9,7 @@ from typing import overload
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.intra import decode_intra
 from meshreel.decoder.tracks import MOST_TOGETHER
-from meshreel.encoder.paper import MOST_FRAMES
+from meshreel.encoder.options import MOST_FRAMES
 from meshreel.errors import FormatError
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement

@@ -1,0 +1,87 @@
+"""Forms of a group: what both recipes produce, and the choice of the cheaper form.
+
+In -> out: the frames of a group, and a reference that follows them or none -> an EncodedGroup with its fidelity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..coding.group import decode_group, encode_group
+from ..coding.intra import encode_empty
+from ..coding.paper.displacements import DisplacementOptions
+from ..coding.reference_mesh import CodedReference
+from ..format.layout import Form
+from ..types import Mesh
+from .draco import cheapest_intra, finest_intra
+from .options import EncoderOptions
+from .target import NO_ERROR, Fidelity, measure, target_of
+
+MOST_FOR_HALF = 2  # times the bytes that half the distance (6 dB) may cost; a finer template gives 4 dB for that
+MOST_EMPTY = 65_535  # frames of a group without surface: what its field in the index holds
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedGroup:
+    """The payload of a group and the fidelity measured on it."""
+
+    form: Form
+    frame_count: int
+    payload: bytes
+    layers: tuple[int, ...]  # k + 1 layers decode with k components, or to k levels
+    fidelity: Fidelity
+    predicted: bool = False  # from the group before
+    key: int | None = None  # the frame, counted in the group, whose surface the others follow
+
+
+def laplacian(
+    frames: Sequence[Mesh],
+    reference: CodedReference,
+    positions: Float64[np.ndarray, "T V 3"],
+    options: DisplacementOptions,
+) -> EncodedGroup:
+    """Encode a group in the `laplacian` form."""
+    payload, layers = encode_group(reference, displacement_field(reference, positions), options)
+    fidelity = measure(frames, decode_group(payload, len(frames)))
+    return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, fidelity)
+
+
+def displacement_field(
+    reference: CodedReference, positions: Float64[np.ndarray, "T V 3"]
+) -> Float64[np.ndarray, "V T 3"]:
+    """Return the offsets of a reference's vertices to their positions in each frame (paper, section 3.3.2)."""
+    return np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])
+
+
+def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions) -> EncodedGroup:
+    """Return the group, or its `draco` form where that is the better bargain.
+
+    That is where Draco is as good and smaller, or so much better that no finer template would reach it for the bytes,
+    as on bodies of few, large faces.
+    """
+    size = len(group.payload)
+    found = cheapest_intra(frames, group.fidelity, MOST_FOR_HALF * size, options.intra)
+    if found is None:
+        return group
+    payload, fidelity = found
+    if len(payload) >= size and fidelity.distance > group.fidelity.distance / 2:
+        return group
+    return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
+
+
+def intra_only(frames: Sequence[Mesh], options: EncoderOptions) -> EncodedGroup:
+    """Encode frames in the `draco` form at the target's fidelity, or as finely as that form can."""
+    target = target_of(frames, options.target, options.noise)
+    found = cheapest_intra(frames, target, np.inf, options.intra)
+    payload, fidelity = found or finest_intra(frames, target.distance)
+    return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
+
+
+def empty_groups(count: int) -> Iterator[EncodedGroup]:
+    """Yield the groups of `count` frames without surface."""
+    for start in range(0, count, MOST_EMPTY):
+        yield EncodedGroup(Form.EMPTY, min(MOST_EMPTY, count - start), encode_empty(), (), NO_ERROR)
