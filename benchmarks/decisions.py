@@ -27,8 +27,9 @@ from meshreel.coding.paper import quantize
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
 from meshreel.coding.paper.laplacian import System, anchors
 from meshreel.coding.reference_mesh import code_reference
-from meshreel.encoder.draco import cheapest_intra, measure
+from meshreel.encoder.draco import cheapest_intra
 from meshreel.encoder.presets import displacement_step, preset_options
+from meshreel.encoder.target import measure
 from meshreel.format.layout import AnchorRule
 from meshreel.types import Mesh
 

@@ -22,8 +22,8 @@ from meshreel_bench.datasets.rooms import PEOPLE
 from meshreel.coding.intra import decode_intra, encode_intra
 from meshreel.coding.layers.coder import LayersState, place_layers, read_layers
 from meshreel.coding.layers.patches import decode_patches
+from meshreel.encoder.forms import EncodedGroup
 from meshreel.encoder.layers import encode_interval
-from meshreel.encoder.paper import EncodedGroup
 from meshreel.encoder.presets import preset_options
 from meshreel.format.layout import Form, LayersPatches
 from meshreel.format.records import unpack_all

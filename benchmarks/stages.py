@@ -20,7 +20,7 @@ from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
 from meshreel.coding.group import decode_group, encode_group, payload_parts
 from meshreel.coding.reference_mesh import CodedReference, code_reference
-from meshreel.encoder.paper import EncoderOptions
+from meshreel.encoder.options import EncoderOptions
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
 

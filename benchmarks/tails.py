@@ -18,8 +18,8 @@ from captured import Case, Row, asked_cases, keep
 from jaxtyping import Bool
 
 from meshreel.coding.layers.coder import LayersState, decode_layers
+from meshreel.encoder.forms import EncodedGroup
 from meshreel.encoder.layers import encode_interval
-from meshreel.encoder.paper import EncodedGroup
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.tails import TailOptions, find_tails
 from meshreel.format.layout import Form

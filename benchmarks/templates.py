@@ -21,8 +21,8 @@ from meshreel.analysis.follow.correspond import choose_key
 from meshreel.analysis.follow.template import shared_detail
 from meshreel.coding.layers.coder import LayerCodingOptions, encode_layers
 from meshreel.coding.reference_mesh import CodedReference, code_on_lattice
-from meshreel.encoder.draco import measure
 from meshreel.encoder.presets import preset_options
+from meshreel.encoder.target import measure
 from meshreel.geometry.decimate import decimate
 from meshreel.types import Mesh
 
