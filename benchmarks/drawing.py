@@ -17,7 +17,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
 
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.metrics.render import Window, look
 from meshreel.metrics.viewpoints import Box, OrthographicCamera, parallel_views_around
 from meshreel.types import Mesh

@@ -27,8 +27,8 @@ from meshreel.encoder.layers import encode_interval
 from meshreel.encoder.presets import preset_options
 from meshreel.format.layout import Form, LayersPatches
 from meshreel.format.records import unpack_all
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate
-from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import face_normals, part_of
 from meshreel.io.meshes import read_mesh
 from meshreel.metrics.bd_rate import Curve, bd_rate

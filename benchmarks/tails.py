@@ -24,7 +24,7 @@ from meshreel.encoder.presets import preset_options
 from meshreel.encoder.tails import TailOptions, find_tails
 from meshreel.format.layout import Form
 from meshreel.format.records import pack
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.metrics.distance import SurfaceErrors, surface_errors
 from meshreel.metrics.ssim import ssim_normals

@@ -26,7 +26,7 @@ from PIL import Image
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.encoder.sequence import encode
 from meshreel.errors import InputError
-from meshreel.geometry.sequences import Chosen
+from meshreel.geometry.derived_sequences import Chosen
 from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.metrics.viewpoints import ViewOptions
 from tests.small_options import quick

@@ -25,7 +25,7 @@ from meshreel_bench.runner import run_points
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
-from meshreel.geometry.sequences import Backwards
+from meshreel.geometry.derived_sequences import Backwards
 from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.types import Mesh, MeshList
 from tests.golden import GOLDEN

@@ -20,7 +20,7 @@ from meshreel_bench.scene_rows import BACKGROUND_S, FLOOR, MEMORY, SEGMENTATION,
 from meshreel.capture.simulate import SceneFrame, SensorOptions, simulate_rig
 from meshreel.capture.truth import read_truth
 from meshreel.errors import InputError
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.metrics.scene_comparison import compare_with_truth
 from meshreel.types import Mesh, MeshList

@@ -27,7 +27,7 @@ from meshreel.encoder.target import NO_ERROR, target_of
 from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
-from meshreel.geometry.nearest import distances
+from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Mesh, MeshList, Placement

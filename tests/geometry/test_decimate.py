@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate, decimate_faces, has_boundary
-from meshreel.geometry.nearest import Surface
 from meshreel.geometry.topology import clean, subdivide_midpoint
 from meshreel.types import Mesh
 

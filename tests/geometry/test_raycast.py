@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from meshreel.geometry.cameras import PinholeCamera
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.raycast import Rays
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Int64
 
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import components, drop_unreferenced, face_normals, weld
 from meshreel.types import Mesh
 

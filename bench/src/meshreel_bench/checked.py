@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from meshreel.errors import InputError
-from meshreel.geometry.sequences import DerivedSequence
+from meshreel.geometry.derived_sequences import DerivedSequence
 from meshreel.io.meshes import FARTHEST
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.render import Looked, Visible

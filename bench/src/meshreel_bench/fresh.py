@@ -131,7 +131,7 @@ def measure_scene_encode(name: str, data: str, cache: str, frames: str, quality:
     """The same of a captured scene and the preset `best`; longer than it is, it is played forth and back."""
     from meshreel.encoder.presets import preset_options
     from meshreel.encoder.sequence import encode
-    from meshreel.geometry.sequences import forth_and_back
+    from meshreel.geometry.derived_sequences import forth_and_back
 
     from .datasets.scenes import open_scene
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from meshreel.coding.mesh import encode_mesh
 from meshreel.decoder.video import open as open_video
-from meshreel.geometry.sequences import Backwards
+from meshreel.geometry.derived_sequences import Backwards
 from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.types import Frames, MeshSequence
 

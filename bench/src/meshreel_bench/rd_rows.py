@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from meshreel.errors import InputError
-from meshreel.geometry.sequences import Chosen
+from meshreel.geometry.derived_sequences import Chosen
 from meshreel.io.sequence import SequenceOptions
 from meshreel.metrics.render import Visible
 from meshreel.metrics.scene_accuracy import Scene, scene_means, scene_row

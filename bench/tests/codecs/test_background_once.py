@@ -12,7 +12,7 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import ChunkKind
-from meshreel.geometry.nearest import Surface, distances
+from meshreel.geometry.closest_points import Surface, distances
 from meshreel.types import Mesh, MeshList
 from tests.small_options import quick
 from tests.small_scene import balls, scene

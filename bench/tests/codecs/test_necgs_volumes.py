@@ -14,7 +14,7 @@ from meshreel_bench.codecs.necgs.stream import Coded, decode_stream, encode_stre
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.errors import FormatError, InputError
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import border_edges, concatenate, face_normals, unique_edges
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh

@@ -22,7 +22,7 @@ from meshreel.encoder.presets import quality_of_vertices, reference_vertices
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
-from meshreel.geometry.nearest import distances
+from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate
 from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.metrics.distance import surface_errors

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, UInt16
 
 from ..errors import InputError
-from ..geometry.nearest import Surface, carried_labels
+from ..geometry.closest_points import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import concatenate, face_normals
 from ..io.depth_pictures import write_depth

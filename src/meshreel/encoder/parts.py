@@ -21,10 +21,10 @@ from ..analysis.scene.masks import Masker
 from ..analysis.scene.segmentation import segment, segment_by
 from ..analysis.survey import Survey, check_one_unit
 from ..errors import InputError
+from ..geometry.closest_points import Outline, distances
 from ..geometry.connected import connected
 from ..geometry.depth import SeesDepth
-from ..geometry.nearest import Outline, distances
-from ..geometry.sequences import ChosenParts
+from ..geometry.derived_sequences import ChosenParts
 from ..geometry.topology import concatenate, face_normals, part_of
 from ..types import Mesh, MeshSequence, evenly
 from .options import EncoderOptions

@@ -23,8 +23,8 @@ from ..analysis.survey import Survey
 from ..coding.background import decode_background, decode_change, encode_background, encode_change
 from ..format.checks import MOST_TRACKS
 from ..format.layout import Form
+from ..geometry.closest_points import distances
 from ..geometry.decimate import decimate, decimate_faces
-from ..geometry.nearest import distances
 from ..types import Mesh, MeshSequence, Placement
 from .forms import EncodedGroup, empty_groups
 from .job import Job

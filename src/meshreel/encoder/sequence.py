@@ -26,7 +26,7 @@ from ..container.writer import ReelWriter, check_target
 from ..decoder.video import open as open_video
 from ..errors import InputError
 from ..format.layout import Form, Header
-from ..geometry.nearest import distances
+from ..geometry.closest_points import distances
 from ..geometry.topology import drop_unreferenced
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import Frames, Mesh, MeshSequence, as_sequence, evenly

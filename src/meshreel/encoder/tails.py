@@ -20,8 +20,8 @@ from ..coding.steps import level_of, step_of
 from ..errors import InputError
 from ..format.layout import LayersPatches
 from ..format.records import pack
+from ..geometry.closest_points import Surface
 from ..geometry.decimate import decimate
-from ..geometry.nearest import Surface
 from ..geometry.topology import clean, components, concatenate, drop_unreferenced, face_normals
 from ..types import Mesh
 

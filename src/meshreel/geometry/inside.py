@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ..types import Mesh
-from .nearest import Surface
+from .closest_points import Surface
 from .topology import components, face_normals, weld
 
 BLOCK = 4  # grid points a side of a block that is decided at once where no surface passes through it

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float32, Float64, Int32
 
 from ..types import Mesh
 from .cameras import PinholeCamera
-from .nearest import Surface
+from .closest_points import Surface
 from .topology import face_normals
 
 

@@ -17,7 +17,7 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
-from ..geometry.nearest import Surface
+from ..geometry.closest_points import Surface
 from ..io.write import replacing
 from ..types import UP_AXES, Mesh, check_up
 from .distance import surface_errors

@@ -25,7 +25,7 @@ from jaxtyping import Bool, Float32, Float64
 
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
-from ..geometry.nearest import Surface, carried_labels
+from ..geometry.closest_points import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import face_normals
 from ..types import Mesh

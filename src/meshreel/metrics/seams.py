@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Bool, Float64
 
 from ..errors import InputError
-from ..geometry.nearest import Surface
+from ..geometry.closest_points import Surface
 from ..geometry.topology import border_edges, edge_lengths, face_normals, part_of
 from ..geometry.voxels import spread
 from ..types import Mesh

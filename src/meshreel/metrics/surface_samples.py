@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from ..geometry.nearest import Surface
+from ..geometry.closest_points import Surface
 from ..geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint
 from ..types import Mesh
 from .normals import interpolate, unit, welded_normals

@@ -13,7 +13,7 @@ from meshreel.analysis.follow.embedded import Motion
 from meshreel.analysis.follow.embedded_graph import area_samples, build_graph, farthest_first
 from meshreel.analysis.follow.fused_template import FusedOptions, fused_mesh
 from meshreel.errors import InputError
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import clean, concatenate
 from meshreel.types import Mesh
 

@@ -11,8 +11,8 @@ from meshreel.analysis.follow import template
 from meshreel.analysis.follow.template import CURVATURE, FEWEST, TemplateOptions, base_mesh, shared_detail
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
-from meshreel.geometry.levels import heights, levels_of, refine
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.subdivision import heights, levels_of, refine
 from meshreel.types import Mesh
 
 BALL = Mesh.of(sliding_sphere(1, levels=4)[0].vertices / 12**0.5, sliding_sphere(1, levels=4)[0].faces)  # diagonal 1

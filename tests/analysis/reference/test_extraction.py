@@ -11,8 +11,8 @@ from meshreel.analysis.reference.deform import DeformOptions
 from meshreel.analysis.reference.extraction import MDS, Reference, ReferenceOptions, extract_reference, predict
 from meshreel.analysis.reference.fuse import FuseOptions
 from meshreel.errors import InputError
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import has_boundary
-from meshreel.geometry.nearest import Surface
 from meshreel.geometry.poisson import PoissonOptions
 from meshreel.geometry.topology import components, face_normals, subdivide_midpoint
 from meshreel.types import Centers, Mesh

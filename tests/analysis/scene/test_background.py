@@ -9,7 +9,7 @@ import pytest
 
 from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
 from meshreel.errors import InputError
-from meshreel.geometry.nearest import distances
+from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, noisy, plane, sphere

@@ -8,8 +8,8 @@ import pytest
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import fuse_still_depth, usual_pictures
 from meshreel.capture.fusion import FusionOptions, fuse_depths
+from meshreel.geometry.closest_points import distances
 from meshreel.geometry.depth import SeesDepth
-from meshreel.geometry.nearest import distances
 from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from meshreel.analysis.scene.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies, with_ring
 from meshreel.errors import InputError
-from meshreel.geometry.nearest import Outline
+from meshreel.geometry.closest_points import Outline
 from meshreel.geometry.topology import concatenate, part_of
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere

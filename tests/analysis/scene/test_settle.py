@@ -18,7 +18,7 @@ from meshreel.encoder.presets import preset_options
 from meshreel.encoder.progress import Stages
 from meshreel.encoder.scene import encode_static
 from meshreel.errors import InputError
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld
 from meshreel.types import Mesh, MeshList, Placement
 

@@ -15,7 +15,7 @@ from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin
 from meshreel.format.records import pack, unpack
-from meshreel.geometry.levels import heights, refine, subdivide
+from meshreel.geometry.subdivision import heights, refine, subdivide
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 

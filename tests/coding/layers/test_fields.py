@@ -13,7 +13,7 @@ from meshreel.coding.layers.fields import Rate, SurfaceWeight, decode_field, enc
 from meshreel.coding.layers.graph import hierarchy, siblings
 from meshreel.coding.steps import LEVELS
 from meshreel.errors import FormatError, InputError
-from meshreel.geometry.levels import subdivide
+from meshreel.geometry.subdivision import subdivide
 from meshreel.geometry.topology import vertex_normals
 
 from ..bodies import ball, moving

@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Float64
 
 from meshreel.errors import InputError
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate
-from meshreel.geometry.nearest import Surface
-from meshreel.geometry.sequences import DerivedSequence
+from meshreel.geometry.derived_sequences import DerivedSequence
 from meshreel.geometry.topology import subdivide_midpoint, unique_edges, vertex_normals
 from meshreel.io.meshes import read_mesh
 from meshreel.io.write import write_mesh

@@ -29,7 +29,7 @@ from meshreel.capture.simulate import TRUTH
 from meshreel.capture.truth import Truth, read_truth
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate_faces
-from meshreel.geometry.sequences import Chosen
+from meshreel.geometry.derived_sequences import Chosen
 from meshreel.io.meshes import read_mesh
 from meshreel.io.write import make_folder, replacing, write_mesh
 from meshreel.types import Mesh, MeshSequence, evenly

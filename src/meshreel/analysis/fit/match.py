@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from ...geometry.nearest import Hits, Surface
+from ...geometry.closest_points import Hits, Surface
 from ...geometry.topology import border_edges, face_normals, vertex_normals
 from ...types import Mesh
 from .border import border_sides, match_borders, sample_border

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from ...geometry.nearest import Surface
+from ...geometry.closest_points import Surface
 from ...geometry.topology import vertex_areas, vertex_normals
 from ...types import Mesh
 from .match import ON_BORDER, Target, interpolated, interpolated_scalar

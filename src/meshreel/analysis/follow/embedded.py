@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
-from ...geometry.nearest import Surface
+from ...geometry.closest_points import Surface
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
 from ..fit.conjugate_gradients import Limits

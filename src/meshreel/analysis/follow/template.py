@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float64, Int32
 
 from ...errors import InputError
+from ...geometry.closest_points import Surface
 from ...geometry.decimate import BOUNDARY_WEIGHT, decimate
-from ...geometry.levels import heights, levels_of, refine
-from ...geometry.nearest import Surface
+from ...geometry.subdivision import heights, levels_of, refine
 from ...types import Mesh
 
 FEWEST = 40  # vertices of a base mesh: below, a body has no limbs

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...errors import InputError
-from ...geometry.nearest import Surface
+from ...geometry.closest_points import Surface
 from ...types import Centers, Mesh
 from ..fit.match import Target
 from ..fit.surface_fit import FitOptions, fit_targets

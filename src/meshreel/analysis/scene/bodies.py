@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ...errors import InputError
+from ...geometry.closest_points import Outline
 from ...geometry.connected import connected_faces
-from ...geometry.nearest import Outline
 from ...geometry.topology import concatenate, face_normals, part_of, with_neighbours
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh

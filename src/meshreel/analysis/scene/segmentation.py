@@ -15,9 +15,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
+from ...geometry.closest_points import distances
 from ...geometry.depth import DepthPicture, SeesDepth
-from ...geometry.nearest import distances
-from ...geometry.sequences import Chosen, TurnedOver
+from ...geometry.derived_sequences import Chosen, TurnedOver
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly

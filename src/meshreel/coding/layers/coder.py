@@ -15,7 +15,7 @@ from jaxtyping import Float64, Int32
 from ...errors import FormatError, InputError
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ...format.records import pack, unpack, unpack_all
-from ...geometry.levels import frames_of, heights, refine, subdivide
+from ...geometry.subdivision import frames_of, heights, refine, subdivide
 from ...types import Mesh, Placement
 from ..mesh import check_growth, check_step, decode_mesh
 from ..reference_mesh import CodedReference

@@ -14,7 +14,7 @@ from jaxtyping import Float64
 from ... import _core
 from ...errors import FormatError
 from ...format.layout import LayersLevel, Origin
-from ...geometry.levels import Level, checked
+from ...geometry.subdivision import Level, checked
 from ...types import Placement
 from .fields import EncodedField, FieldValues, Rate, encode_field, read_field
 from .graph import Connectivity, Siblings, siblings

@@ -14,7 +14,7 @@ from jaxtyping import Float64, Int32, Int64
 
 from ... import _core
 from ...errors import FormatError
-from ...geometry.levels import Level, subdivide
+from ...geometry.subdivision import Level, subdivide
 from ...types import Mesh
 
 GraphArrays: TypeAlias = tuple[Int64[np.ndarray, " S"], Int32[np.ndarray, " E"], Float64[np.ndarray, " E"]]

@@ -12,7 +12,7 @@ from jaxtyping import Float64
 from ... import _core
 from ...errors import FormatError
 from ...format.layout import CodedField
-from ...geometry.levels import frames_of
+from ...geometry.subdivision import frames_of
 from ...geometry.topology import vertex_normals
 from ...types import Mesh
 from .fields import EncodedField, Rate, SurfaceWeight, decode_field, encode_field

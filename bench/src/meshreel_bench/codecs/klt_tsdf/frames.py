@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from meshreel.errors import FormatError, InputError
-from meshreel.geometry.nearest import Surface
+from meshreel.geometry.closest_points import Surface
 from meshreel.types import Mesh
 
 from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols

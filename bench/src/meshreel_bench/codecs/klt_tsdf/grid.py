@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
+from meshreel.geometry.closest_points import Hits, Surface
 from meshreel.geometry.inside import winding_inside
-from meshreel.geometry.nearest import Hits, Surface
 from meshreel.geometry.topology import clean, unique_edges, weld
 from meshreel.geometry.voxels import Lattice, around, distinct, spread
 from meshreel.types import Mesh

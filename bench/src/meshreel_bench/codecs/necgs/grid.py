@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
 from meshreel.errors import InputError
+from meshreel.geometry.closest_points import Hits, Surface
 from meshreel.geometry.inside import winding_numbers
-from meshreel.geometry.nearest import Hits, Surface
 from meshreel.geometry.topology import border_edges, face_normals, weld
 from meshreel.types import Mesh
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.geometry.sequences import Chosen, forth_and_back
+from meshreel.geometry.derived_sequences import Chosen, forth_and_back
 
 
 def test_chosen_frames_are_those_of_the_source():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.geometry.nearest import Outline, Surface, distances
+from meshreel.geometry.closest_points import Outline, Surface, distances
 from tests.metrics.shapes import brute_force_distances, moved, plane, sphere
 
 
