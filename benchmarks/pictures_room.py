@@ -13,10 +13,10 @@ from drawing import Sheet, shaded
 from jaxtyping import Float64
 
 from meshreel.analysis.scene.segmentation import segment
+from meshreel.capture.demo_room import RoomOptions, furnished_room, room_cameras
 from meshreel.capture.fusion import FusionOptions
-from meshreel.capture.record import Recording, open_recording
-from meshreel.capture.room import RoomOptions, furnished_room, room_cameras
-from meshreel.capture.simulate import SensorOptions, simulate_rig
+from meshreel.capture.recording import Recording, open_recording
+from meshreel.capture.simulated_rig import SensorOptions, simulate_rig
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import encode

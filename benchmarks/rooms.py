@@ -12,7 +12,7 @@ from pathlib import Path
 
 from meshreel_bench.datasets.rooms import CAMERAS, FRAMES, SPEEDS, RoomOptions, simulate_room
 
-from meshreel.capture.simulate import SensorOptions
+from meshreel.capture.simulated_rig import SensorOptions
 
 
 def main(arguments: list[str]) -> int:

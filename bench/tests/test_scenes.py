@@ -17,7 +17,7 @@ from meshreel_bench.report import write_report
 from meshreel_bench.rows import Point
 from meshreel_bench.scene_rows import BACKGROUND_S, FLOOR, MEMORY, SEGMENTATION, measure_scene, seams_of
 
-from meshreel.capture.simulate import SceneFrame, SensorOptions, simulate_rig
+from meshreel.capture.simulated_rig import SceneFrame, SensorOptions, simulate_rig
 from meshreel.capture.truth import read_truth
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.capture.record import open_recording
+from meshreel.capture.recording import open_recording
 from meshreel.capture.rig import read_rig
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays

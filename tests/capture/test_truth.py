@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 
-from meshreel.capture.simulate import LABELS, TRUTH, SceneFrame, simulate_rig
+from meshreel.capture.simulated_rig import LABELS, TRUTH, SceneFrame, simulate_rig
 from meshreel.capture.truth import read_truth
 from meshreel.errors import InputError
 from meshreel.io.write import write_mesh

@@ -13,7 +13,7 @@ from PIL import Image
 import meshreel
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.rig import read_rig
-from meshreel.capture.simulate import SceneFrame, simulate_rig
+from meshreel.capture.simulated_rig import SceneFrame, simulate_rig
 from meshreel.container.writer import ReelWriter
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh

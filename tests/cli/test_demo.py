@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import meshreel
-from meshreel.capture.record import open_recording
-from meshreel.capture.room import RoomOptions, record_room
+from meshreel.capture.demo_room import RoomOptions, record_room
+from meshreel.capture.recording import open_recording
 from meshreel.capture.truth import read_truth
 from meshreel.cli.console import called_as
 from tests.capture.depth_scenes import camera, record

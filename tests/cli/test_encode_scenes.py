@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import meshreel
-from meshreel.capture.record import open_recording
+from meshreel.capture.recording import open_recording
 from meshreel.cli.encode import describe
 from meshreel.encoder.paper import encode_interval
 from meshreel.io.depth_pictures import write_depth

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import InputError
 from ..io.meshes import read_mesh
 from .rig import DepthCamera, read_cameras
-from .simulate import LABELS, SceneFrame
+from .simulated_rig import LABELS, SceneFrame
 
 _DAMAGED = (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError)
 

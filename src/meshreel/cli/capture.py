@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..capture.fusion import FusionOptions
-from ..capture.record import Recording, open_recording
+from ..capture.recording import Recording, open_recording
 from ..errors import InputError
 from ..io.write import frame_names, make_folder, replacing, write_mesh
 from .console import Common

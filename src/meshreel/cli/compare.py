@@ -11,9 +11,9 @@ import numpy as np
 from cyclopts import Parameter
 from rich.table import Table
 
-from ..capture.record import Recording
+from ..capture.recording import Recording
 from ..capture.rig import DepthCamera
-from ..capture.simulate import SceneFrame
+from ..capture.simulated_rig import SceneFrame
 from ..capture.truth import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder.video import Video

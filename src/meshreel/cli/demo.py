@@ -10,11 +10,11 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from ..capture.demo_room import VOXEL, WIDTH, RoomOptions, record_room, room_cameras
 from ..capture.fusion import FusionOptions
-from ..capture.record import Recording, open_recording
+from ..capture.recording import Recording, open_recording
 from ..capture.rig import RIG, read_cameras
-from ..capture.room import VOXEL, WIDTH, RoomOptions, record_room, room_cameras
-from ..capture.simulate import TRUTH
+from ..capture.simulated_rig import TRUTH
 from ..capture.truth import read_truth
 from ..decoder.video import Video
 from ..decoder.video import open as open_video

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from ..analysis.scene.masks import ImageMasks, Masker, one_size
 from ..analysis.scene.sam3 import Sam3Masks, Sam3Options
 from ..analysis.scene.segmentation import SegmentOptions
-from ..capture.record import open_recording
+from ..capture.recording import open_recording
 from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
 from ..geometry.cameras import unpack_cameras

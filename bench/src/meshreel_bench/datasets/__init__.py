@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.capture.record import open_recording
+from meshreel.capture.recording import open_recording
 from meshreel.capture.truth import Truth
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from meshreel.capture.record import Recording
+from meshreel.capture.recording import Recording
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.depth import DepthPicture
 from meshreel.io.sequence import open_sequence

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.capture.simulate import SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from meshreel.capture.simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from meshreel.errors import InputError
 from meshreel.io.meshes import read_mesh
 from meshreel.types import Mesh

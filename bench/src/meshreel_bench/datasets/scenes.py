@@ -21,11 +21,11 @@ from meshreel.analysis.scene import segmentation as segmenter
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import fuse_still_depth
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment
-from meshreel.capture import room as procedural
+from meshreel.capture import demo_room as procedural
 from meshreel.capture.fusion import FusionOptions
-from meshreel.capture.record import open_recording
+from meshreel.capture.recording import open_recording
 from meshreel.capture.rig import RIG
-from meshreel.capture.simulate import TRUTH
+from meshreel.capture.simulated_rig import TRUTH
 from meshreel.capture.truth import Truth, read_truth
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate_faces

@@ -10,7 +10,7 @@ import pytest
 from meshreel.capture.fusion import FusionOptions, fuse_depths
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.rig import read_rig
-from meshreel.capture.simulate import TRUTH, SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from meshreel.capture.simulated_rig import TRUTH, SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from meshreel.errors import InputError
 from meshreel.io.depth_pictures import read_depth
 from meshreel.io.sequence import open_sequence

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.capture.room import FURNITURE, SIZE, RoomOptions, furnished_room, room_cameras
+from meshreel.capture.demo_room import FURNITURE, SIZE, RoomOptions, furnished_room, room_cameras
 from meshreel.errors import InputError
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.topology import components, face_normals, unique_edges

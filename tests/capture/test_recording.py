@@ -7,8 +7,8 @@ import shutil
 import numpy as np
 import pytest
 
-from meshreel.capture import record
-from meshreel.capture.record import Kept, open_recording
+from meshreel.capture import recording as record
+from meshreel.capture.recording import Kept, open_recording
 from meshreel.geometry.depth import SeesDepth
 from meshreel.types import Mesh
 from tests.capture import depth_scenes

@@ -23,7 +23,7 @@ from .figure import Pose, figure
 from .implicit import polygonize
 from .procedural import grid_of_frame
 from .rig import DepthCamera
-from .simulate import SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from .simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
 
 WIDTH = 256  # pixels of a depth picture
 NOISE = 0.3  # of a sensor, as `SensorOptions` has it
