@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64, UInt8
-from meshreel.metrics.cameras import Box, OrthographicCamera
 from PIL import Image, ImageDraw, ImageFont
 
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.metrics.render import Window, look
+from meshreel.metrics.viewpoints import Box, OrthographicCamera
 from meshreel.types import Mesh
 
 OUTPUT = Path(__file__).resolve().parents[2] / "docs" / "pictures" / "moving.gif"

@@ -7,7 +7,6 @@ import shutil
 import numpy as np
 import pytest
 
-from meshreel.capture import recording as record
 from meshreel.capture.recording import Kept, open_recording
 from meshreel.geometry.depth import SeesDepth
 from meshreel.types import Mesh
@@ -26,7 +25,7 @@ def recording(tmp_path):
 
 def test_a_frame_is_fused_once_and_is_the_same_again(recording, monkeypatch):
     first = recording[1]
-    monkeypatch.setattr(record, "fuse_depths", None)
+    monkeypatch.setattr("meshreel.capture.recording.fuse_depths", None)
     again = recording[1]
     assert np.array_equal(first.vertices, again.vertices) and np.array_equal(first.faces, again.faces)
 
@@ -44,14 +43,14 @@ def test_where_there_is_no_room_frames_are_made_again(recording, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(record.np, "savez", full)
+    monkeypatch.setattr("meshreel.capture.recording.np.savez", full)
     first, again = recording[0], recording[0]
     assert np.array_equal(first.vertices, again.vertices) and not recording._kept._files
 
 
 def test_who_reads_each_frame_once_has_nothing_kept(tmp_path, monkeypatch):
     folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0)])
-    monkeypatch.setattr(record, "Kept", None)
+    monkeypatch.setattr("meshreel.capture.recording.Kept", None)
     assert not open_recording(folder, keep=False)[0][0].is_empty
 
 

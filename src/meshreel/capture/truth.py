@@ -1,4 +1,4 @@
-"""The truth beside a simulated rig, as `simulate.py` writes it: clean meshes, which of their faces move, true cameras.
+"""The truth beside a simulated rig: clean meshes, which of their faces move, true cameras (see `simulated_rig.py`).
 
 In: the folder `truth` of a rig. Out: a SceneFrame a frame, read when it is asked for.
 """

@@ -1,4 +1,4 @@
-"""A decoded scene and its noisy input against the truth of a simulated rig (`metrics.truth` says what is measured).
+"""Accuracy of a decoded scene and of its noisy input, measured against the truth of a simulated rig.
 
 In: two sequences of meshes, the clean frames, their cameras -> rows of means and of frames.
 """

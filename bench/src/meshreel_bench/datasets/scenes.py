@@ -21,7 +21,7 @@ from meshreel.analysis.scene import segmentation as segmenter
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import fuse_still_depth
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment
-from meshreel.capture import demo_room as procedural
+from meshreel.capture import demo_room
 from meshreel.capture.fusion import FusionOptions
 from meshreel.capture.recording import open_recording
 from meshreel.capture.rig import RIG
@@ -110,7 +110,7 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
         _simulate(name, rig, data, frames)
-    fusion = FusionOptions(procedural.VOXEL) if name == PROCEDURAL else FusionOptions()
+    fusion = FusionOptions(demo_room.VOXEL) if name == PROCEDURAL else FusionOptions()
     recording, _ = open_recording(rig, fusion, keep=False)
     return SceneData(name, folder, Captured(recording, meshes), read_truth(rig / TRUTH))
 
@@ -118,8 +118,8 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
 def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
     """Writes the rig and the truth of a scene."""
     if name == PROCEDURAL:
-        room = procedural.RoomOptions(PROCEDURAL_FRAMES if frames is None else frames)
-        procedural.record_room(rig, room)
+        room = demo_room.RoomOptions(PROCEDURAL_FRAMES if frames is None else frames)
+        demo_room.record_room(rig, room)
     else:
         simulate_room(rig, data, RoomOptions(name) if frames is None else RoomOptions(name, frames))
 

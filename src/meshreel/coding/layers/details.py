@@ -1,7 +1,7 @@
 """One level of subdivision <-> CodedField: a scalar for each new vertex and frame, along the decoded normal there.
 
-In: the scalars that would place the new vertices on the wanted surface (geometry.levels). Out: the scalars as decoded,
-from which both sides place them; the decoder as they come about.
+In: the scalars that would place the new vertices on the wanted surface (geometry.subdivision). Out: the scalars as
+decoded, from which both sides place them; the decoder as they come about.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Where the frames' grids lie, and the truncated signed distances of a mesh at their points.
 
 In -> out: meshes, m -> a placement of one grid a frame; a mesh in cells -> K x K x K values, negative inside. Distances
-are those to the closest point (`geometry.nearest`). Inside is where the winding number is above 1/2
+are those to the closest point (`geometry.closest_points`). Inside is where the winding number is above 1/2
 (`geometry.inside`), but for points whose closest face has no inside on either side, a sheet's: behind it is inside
 there, as of the walls of a room that was seen from within, whose number is below -1/2. What flips its sign far from any
 surface, past a sheet's border, is trimmed by the decoder.
