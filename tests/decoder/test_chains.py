@@ -16,7 +16,8 @@ from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder import tracks
-from meshreel.decoder.tracks import Track, _Decoded
+from meshreel.decoder.cache import CachedGroup, CachedStates
+from meshreel.decoder.tracks import Track
 from meshreel.errors import FormatError
 from meshreel.format.layout import Header
 from tests.coding.bodies import ball, moving
@@ -89,20 +90,20 @@ def test_a_frame_costs_its_chain_and_the_next_group_only_itself():
     assert source.offsets == [*offsets[:3], *offsets[3:5]]
 
 
-@pytest.mark.parametrize("quality", [0, 1, 2, 9])
-def test_a_coarser_video_has_the_first_vertices_of_the_whole(quality: int):
-    whole, coarse = meshreel.open(DATA), meshreel.open(DATA).at(quality)
+@pytest.mark.parametrize("layers", [0, 1, 2, 9])
+def test_a_coarser_video_has_the_first_vertices_of_the_whole(layers: int):
+    whole, coarse = meshreel.open(DATA), meshreel.open(DATA).at(layers)
     for frame in [11, 8, 2, 4]:  # the last is predicted from the one before, which was not kept
         few, all = coarse[frame].vertices, whole[frame].vertices
-        assert len(few) == len(all) if quality > 1 else len(few) < len(all) / 3
+        assert len(few) == len(all) if layers > 1 else len(few) < len(all) / 3
         np.testing.assert_array_equal(few, all[: len(few)])
 
 
 def test_coarser_videos_read_fewer_bytes_and_never_the_finest_layers():
     sizes = []
-    for quality in (0, 1, 2):
+    for layers in (0, 1, 2):
         reader = meshreel.open(DATA).reader
-        sizes.append(sum(len(reader.read_chunk(group.number, quality + 1)) for group in reader.groups))
+        sizes.append(sum(len(reader.read_chunk(group.number, layers + 1)) for group in reader.groups))
     assert sizes[0] < sizes[1] < sizes[2]
 
 
@@ -173,13 +174,13 @@ class Contended(Track):
     """As if another thread had always just put group 1 in the place of the last one."""
 
     @property
-    def _group(self) -> _Decoded:
+    def _group(self) -> CachedGroup:
         video = meshreel.open(DATA)
         video[3]
         return video.tracks[0]._group
 
     @_group.setter
-    def _group(self, group: _Decoded) -> None:
+    def _group(self, group: CachedGroup) -> None:
         pass
 
 
@@ -200,27 +201,27 @@ def test_what_is_kept_of_a_chain_is_bounded_and_frames_stay_the_same(monkeypatch
     free, bound = meshreel.open(DATA), meshreel.open(DATA)
     for frame in range(COUNT - EMPTY):
         assert frame_record(free[frame]) == WHOLE[frame]
-    alone = _states_after(DATA, 0).size
+    alone = _states_after(DATA, 0).nbytes
     monkeypatch.setattr(tracks, "MOST_KEPT", most)
     for frame in [*range(COUNT), *reversed(range(COUNT)), 7, 2, 8, 4]:
         assert frame_record(bound[frame]) == WHOLE[frame]
         states = bound.tracks[0]._states
-        assert _size(states) == states.size <= max(most, alone)
+        assert _size(states) == states.nbytes <= max(most, alone)
     assert most > 0 or len(states.known) == 1
 
 
 def test_groups_of_a_chain_share_what_follows_from_their_faces():
     first, both = _states_after(DATA, 0), _states_after(DATA, 3)
     assert list(both.known) == [0, 1]
-    assert first.size < both.size < 1.5 * first.size
+    assert first.nbytes < both.nbytes < 1.5 * first.nbytes
 
 
-def _size(states: tracks._States) -> int:
+def _size(states: CachedStates) -> int:
     known = [None, *states.known.values()]
     return sum(state.nbytes_beyond(before) for before, state in pairwise(known) if state is not None)
 
 
-def _states_after(data: bytes, frame: int) -> tracks._States:
+def _states_after(data: bytes, frame: int) -> CachedStates:
     video = meshreel.open(data)
     video[frame]
     return video.tracks[0]._states

@@ -181,16 +181,16 @@ def test_a_background_is_decoded_once_while_it_is_shown():
     assert len(states[0].faces) != len(states[-1].faces)
 
 
-@pytest.mark.parametrize("quality", [0, 1, 2, 9])
-def test_a_coarser_scene_has_its_whole_background(quality: int):
-    whole, coarse = meshreel.open(SCENE), meshreel.open(SCENE).at(quality)
+@pytest.mark.parametrize("layers", [0, 1, 2, 9])
+def test_a_coarser_scene_has_its_whole_background(layers: int):
+    whole, coarse = meshreel.open(SCENE), meshreel.open(SCENE).at(layers)
     for frame in (0, 6, 8, 12):
         few, all = coarse.parts(frame), whole.parts(frame)
         np.testing.assert_array_equal(few["background"].vertices, all["background"].vertices)
         for name in ("track 0", "track 1"):
             count = len(few[name].vertices)
             np.testing.assert_array_equal(few[name].vertices, all[name].vertices[:count])
-            assert quality > 0 or count < len(all[name].vertices) or count == 0
+            assert layers > 0 or count < len(all[name].vertices) or count == 0
 
 
 NEEDED = {0: range(COUNT), 1: range(COUNT), 2: range(4), 3: range(CHANGED, COUNT), 4: VISITS, 5: range(6, COUNT)} | {
@@ -331,14 +331,14 @@ def test_all_tracks_together_keep_no_more_than_one_alone_would(monkeypatch: pyte
     video = meshreel.open(data)
     for frame in [*range(6), *reversed(range(6)), 1, 5, 3]:
         assert frame_record(video[frame]) == whole[frame]
-        kept = [track._states.size for track in video.tracks]
-        assert sum(kept) <= max(most, 3 * alone._states.size)
+        kept = [track._states.nbytes for track in video.tracks]
+        assert sum(kept) <= max(most, 3 * alone._states.nbytes)
         assert most > 0 or [len(track._states.known) for track in video.tracks] == [1, 1, 1]
 
 
 def test_groups_that_together_are_too_large_are_refused_and_each_is_still_there(monkeypatch: pytest.MonkeyPatch):
     video = meshreel.open(chains(3))
-    _, size = video.tracks[0].look(0)
+    _, size = video.tracks[0].frame_and_memory(0)
     first, second = video.tracks[0][0], video.tracks[0][1]
     assert size == first.vertices.nbytes + second.vertices.nbytes + first.faces.nbytes  # which both share
     monkeypatch.setattr(tracks, "MOST_TOGETHER", 3 * size)

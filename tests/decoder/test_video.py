@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from contextlib import suppress
 
 import numpy as np
@@ -13,7 +14,8 @@ from meshreel.coding.group import decode_group
 from meshreel.coding.mesh import encode_mesh
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
-from meshreel.decoder.tracks import Track, _Decoded
+from meshreel.decoder.cache import NO_GROUP
+from meshreel.decoder.tracks import Track
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import AnchorRule, DisplacementHead, Form, LaplacianGroup
 from meshreel.format.records import pack
@@ -44,6 +46,36 @@ def test_a_path_a_string_bytes_and_a_source_open_the_same_video():
     path = GOLDEN / "mixed.reel"
     videos = [meshreel.open(source) for source in (path, str(path), MIXED, BytesSource(MIXED))]
     assert all(digests(video) == digests(videos[0]) for video in videos)
+
+
+def test_a_file_object_opens_and_stays_open_for_its_owner():
+    with (GOLDEN / "mixed.reel").open("rb") as file:
+        with meshreel.open(file) as video:
+            assert digests(video) == WHOLE
+        assert not file.closed
+    assert digests(meshreel.open(io.BytesIO(MIXED))) == WHOLE
+
+
+def test_a_file_opened_as_text_is_refused(tmp_path):
+    (tmp_path / "a.reel").write_text("solid")
+    with (tmp_path / "a.reel").open() as file, pytest.raises(InputError, match="open it with mode 'rb'"):
+        meshreel.open(file)
+
+
+def test_a_video_knows_its_duration_its_metadata_and_its_up_axis():
+    video = meshreel.open(MIXED)
+    assert video.duration == pytest.approx(video.timestamps[-1] - video.timestamps[0] + 1 / 25)
+    assert video.metadata == video.reader.metadata
+    assert video.up == "y"
+
+
+def test_a_video_is_shown_by_its_facts():
+    video = meshreel.open(MIXED)
+    facts = f"10 frames, 25 frames/s, {video.duration:.3g} s, {len(MIXED)} bytes, 1 track, no background"
+    assert repr(video) == f"<meshreel.Video: {facts}>"
+    assert repr(video.at(layers=1)) == f"<meshreel.Video: {facts}, at most 1 layer>"
+    assert f"<tr><th>size</th><td>{len(MIXED)} bytes</td></tr>" in video._repr_html_()
+    assert "with background" in repr(meshreel.open(GOLDEN / "scene.reel"))
 
 
 def test_a_video_is_a_sequence_of_meshes():
@@ -207,7 +239,7 @@ class Contended(Track):
 
     @property
     def _group(self):
-        return _Decoded(-1, [], None)
+        return NO_GROUP
 
     @_group.setter
     def _group(self, group):

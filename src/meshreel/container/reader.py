@@ -77,8 +77,13 @@ class ReelReader:
         return self.header.frame_rate
 
     @property
+    def duration(self) -> float:
+        """Time from the first frame to the end of the last one, s."""
+        return self.timestamp(self.frame_count - 1) - self.timestamp(0) + 1 / self.frame_rate
+
+    @property
     def up(self) -> Up:
-        """The axis that points up, for who shows the frames: y, z, -y or -z; y where the file does not tell."""
+        """The axis that points up: y, z, -y or -z; y if the file does not name one."""
         return known_up(self.metadata.get("up"))
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from ..errors import InputError
 
@@ -24,8 +24,21 @@ class Source(Protocol):
         ...
 
 
+@runtime_checkable
+class Stream(Protocol):
+    """The part of a binary file object that is used."""
+
+    def read(self, size: int, /) -> Any: ...
+
+    def seek(self, offset: int, whence: int = 0, /) -> int: ...
+
+    def seekable(self) -> bool: ...
+
+    def close(self) -> object: ...
+
+
 class BytesSource:
-    """A file that is in memory already."""
+    """A file that is in memory."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -38,17 +51,16 @@ class BytesSource:
         return bytes(self._data[offset : offset + length])
 
 
-class FileSource:
-    """A file on disk, held open until `close`; threads may share it. InputError where it cannot be read."""
+class StreamSource:
+    """A binary file object that can seek; threads may share it. Raises InputError if it cannot be read."""
 
-    def __init__(self, path: str | Path) -> None:
-        self.path = Path(path)
-        try:
-            self._file = self.path.open("rb")
-            self._size = self._file.seek(0, 2)
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be opened: {error.strerror}") from error
-        self._lock = threading.Lock()
+    def __init__(self, file: Stream, name: str | None = None) -> None:
+        """Read from `file`; `name` is what error messages call it."""
+        self._file, self._lock = file, threading.Lock()
+        self._name = type(file).__name__ if name is None else name
+        if not file.seekable() or not isinstance(file.read(0), bytes):
+            raise InputError(f"{self._name} is no binary file that can seek; open it with mode 'rb', or give its bytes")
+        self._size = file.seek(0, 2)
 
     @property
     def size(self) -> int:
@@ -58,12 +70,24 @@ class FileSource:
         try:
             with self._lock:
                 self._file.seek(offset)
-                return self._file.read(length)
+                data: bytes = self._file.read(length)
+                return data
         except OSError as error:
-            raise InputError(f"{self.path}: cannot be read at byte {offset}: {error.strerror}") from error
+            raise InputError(f"{self._name}: cannot be read at byte {offset}: {error.strerror}") from error
 
     def close(self) -> None:
         self._file.close()
+
+
+class FileSource(StreamSource):
+    """A file on disk, held open until `close`; threads may share it. Raises InputError if it cannot be read."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        try:
+            super().__init__(self.path.open("rb"), str(self.path))
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be opened: {error.strerror}") from error
 
     def __enter__(self) -> FileSource:
         return self

@@ -1,69 +1,90 @@
-"""Opens .reel files: a Video gives meshes by frame number, from nothing but the bytes.
+"""Videos: the frames of a .reel file as meshes, decoded from the bytes of the file and nothing else.
 
-Reads beside encoder.py. Imports NumPy, DracoPy and the compiled core only: no Open3D, SciPy or torch.
+In: a path, a URL, bytes or a file object. Out: a Video, a sequence of meshes in metres. Imports NumPy, DracoPy and the
+compiled core only.
 """
 
 from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Sequence
+from html import escape
 from pathlib import Path
-from typing import overload
+from typing import TYPE_CHECKING, Any, overload
 
 from ..container.reader import ReelReader
-from ..container.sources import BytesSource, FileSource, Source
+from ..container.sources import BytesSource, FileSource, Source, Stream, StreamSource
 from ..errors import FormatError, InputError
 from ..geometry.topology import concatenate
-from ..types import Mesh
+from ..types import Mesh, Up
 from .tracks import Background, Track, moving_of_frame
+
+if TYPE_CHECKING:
+    from ..container.http import HttpSource
 
 BACKGROUND = "background"  # its name among the parts of a frame
 
 
-def open(source: str | Path | bytes | Source) -> Video:
-    """The video in a .reel file, in bytes, or behind any source of byte ranges.
+def open(source: str | Path | bytes | Stream | Source) -> Video:
+    """Open the video in a .reel file: a path, an http(s) URL, bytes, a binary file object, or a source of byte ranges.
 
-    Raises FormatError where the header or the index are damaged, or of a version this reader does not know.
+    Raises InputError if it cannot be read, and FormatError if the header or the index are damaged or of a version that
+    this reader does not know.
     """
-    if isinstance(source, (str, Path)):
-        file = FileSource(source)
-        try:
-            return Video(ReelReader(file), close=file.close)
-        except FormatError as error:
-            file.close()
-            raise FormatError(f"{source}: {error}") from error
-    return Video(ReelReader(BytesSource(source) if isinstance(source, bytes) else source))
+    if not isinstance(source, str | Path):
+        return Video(ReelReader(_source_of(source)))
+    ranges = _source_at(source)
+    try:
+        return Video(ReelReader(ranges), close=ranges.close)
+    except FormatError as error:
+        ranges.close()
+        raise FormatError(f"{source}: {error}") from error
+
+
+def _source_of(source: bytes | Stream | Source) -> Source:
+    if isinstance(source, bytes):
+        return BytesSource(source)
+    return source if isinstance(source, Source) else StreamSource(source)
+
+
+def _source_at(place: str | Path) -> StreamSource | HttpSource:
+    if str(place).startswith(("http://", "https://")):
+        from ..container.http import HttpSource
+
+        return HttpSource(str(place))
+    return FileSource(place)
 
 
 class Video(Sequence[Mesh]):
-    """Frames of a .reel file as a sequence of meshes; random access decodes one group a track, and those it depends on.
+    """Frames of a .reel file as a sequence of meshes, decoded on access.
 
-    A frame is its background, where it has one, and its moving bodies, one a track; `parts` has them apart. A file
-    stays open until `close`, or until the end of a `with` block. The arrays of its meshes are read-only, and those of a
-    group may be parts of one array: copy a frame to change it, or to keep it without the others.
+    A frame is its background, if it has one, and its moving bodies, one in each track; `parts` returns them separately.
+    Random access decodes one group of each track, and the groups that it is predicted from. A file stays open until
+    `close`, or until the end of a `with` block. The arrays of the meshes are read-only, and those of a group may be
+    parts of one array: `mesh.copy()` gives arrays that can be changed, and kept without the rest of the group.
     """
 
-    def __init__(self, reader: ReelReader, quality: int | None = None, close: Callable[[], None] | None = None) -> None:
+    def __init__(self, reader: ReelReader, layers: int | None = None, close: Callable[[], None] | None = None) -> None:
         self.reader = reader
-        self.quality = quality
-        self.tracks = tuple(Track(reader, number, quality) for number in range(len(reader.tracks)))
+        self.layers = layers
+        self.tracks = tuple(Track(reader, number, layers) for number in range(len(reader.tracks)))
         self._background = Background(reader)
         self._close = close
 
-    def at(self, quality: int | None) -> Video:
-        """The same video from at most this many layers of a group beyond the first: fewer bytes, still valid.
+    def at(self, layers: int | None) -> Video:
+        """Return the same video decoded from at most `layers` layers of each group beyond its first; None: from all.
 
-        A layer is one subdivision of a group of form LAYERS, whose mesh is coarser without it, or its patches, which
-        come last; and one displacement component of a group of form LAPLACIAN. None: all of them. The background is
-        always whole.
+        Fewer bytes are read, and each frame is a coarser, valid mesh. A layer is one subdivision of a group of form
+        LAYERS, or its patches, which come last; of a group of form LAPLACIAN it is one displacement component. The
+        background has no layers and is always whole.
         """
-        quality = None if quality is None else operator.index(quality)
-        if quality is not None and quality < 0:
-            raise InputError(f"quality must not be negative, got {quality}: give a number of layers, or None for all")
-        return Video(self.reader, quality, self._close)
+        layers = None if layers is None else operator.index(layers)
+        if layers is not None and layers < 0:
+            raise InputError(f"layers must not be negative, got {layers}: give a number of layers, or None for all")
+        return Video(self.reader, layers, self._close)
 
     def close(self) -> None:
-        """Closes the file; frames of other groups than the last ones decoded can no longer be read."""
+        """Close the file. Afterwards only frames of the groups that were decoded last can be read."""
         if self._close is not None:
             self._close()
 
@@ -79,9 +100,24 @@ class Video(Sequence[Mesh]):
         return self.reader.frame_rate
 
     @property
+    def duration(self) -> float:
+        """Time from the first frame to the end of the last one, s."""
+        return self.reader.duration
+
+    @property
     def timestamps(self) -> list[float]:
-        """When each frame is shown, s from the start."""
+        """Time at which each frame is shown, s."""
         return [self.reader.timestamp(frame) for frame in range(len(self))]
+
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """What the encoder recorded in the file, such as preset and quality; decoding does not need it."""
+        return self.reader.metadata
+
+    @property
+    def up(self) -> Up:
+        """The axis that points up: y, z, -y or -z; y if the file does not name one."""
+        return self.reader.up
 
     def __len__(self) -> int:
         return self.reader.frame_count
@@ -91,9 +127,9 @@ class Video(Sequence[Mesh]):
     @overload
     def __getitem__(self, index: slice) -> list[Mesh]: ...
     def __getitem__(self, index: int | slice) -> Mesh | list[Mesh]:
-        """Frame `index` in metres: its background, then its tracks, as one mesh.
+        """Return frame `index` in metres: its background, then its tracks, as one mesh; for a slice, a list of frames.
 
-        Raises IndexError out of range and FormatError where one of its chunks is damaged.
+        Raises IndexError out of range and FormatError if one of its chunks is damaged.
         """
         if isinstance(index, slice):
             return [self[i] for i in range(*index.indices(len(self)))]
@@ -103,9 +139,9 @@ class Video(Sequence[Mesh]):
         return (self[i] for i in range(len(self)))
 
     def parts(self, index: int) -> dict[str, Mesh]:
-        """The meshes that frame `index` is made of, as they are kept: "background" where it has one, "track 0" ...
+        """Return the meshes that make up frame `index` by name: "background", if it has one, "track 0", "track 1" ...
 
-        A body that is not there is an empty mesh. Raises as the frame itself does.
+        A body that is not in the frame is an empty mesh. Raises as indexing does.
         """
         frame = self._frame(index)
         background = self._background.of_frame(frame)
@@ -114,13 +150,32 @@ class Video(Sequence[Mesh]):
         return parts | {f"track {number}": mesh for number, mesh in enumerate(moving)}
 
     def background(self, index: int) -> Mesh:
-        """What does not move in frame `index`, the same mesh while nothing changes; empty where the frame has none."""
+        """Return the background of frame `index`: the same object while it does not change, empty if there is none."""
         mesh = self._background.of_frame(self._frame(index))
         return Mesh.empty() if mesh is None else mesh
 
     def moving(self, index: int) -> Mesh:
-        """Frame `index` without its background, which is not read."""
+        """Return frame `index` without its background, which is not read."""
         return _joined(moving_of_frame(self.tracks, self._frame(index)))
+
+    def __repr__(self) -> str:
+        return f"<meshreel.Video: {', '.join(self._facts().values())}>"
+
+    def _repr_html_(self) -> str:
+        """Return a table for notebooks."""
+        rows = (f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in self._facts().items())
+        return f"<table>{''.join(rows)}</table>"
+
+    def _facts(self) -> dict[str, str]:
+        facts = {
+            "frames": _counted(len(self), "frame"),
+            "frame rate": f"{self.frame_rate:g} frames/s",
+            "duration": f"{self.duration:.3g} s",
+            "size": _counted(self.reader.size, "byte"),
+            "tracks": _counted(len(self.tracks), "track"),
+            "background": "with background" if self.reader.has_background else "no background",
+        }
+        return facts if self.layers is None else facts | {"layers": f"at most {_counted(self.layers, 'layer')}"}
 
     def _frame(self, index: int) -> int:
         frame = index + len(self) if index < 0 else index
@@ -129,8 +184,12 @@ class Video(Sequence[Mesh]):
         return frame
 
 
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
 def _joined(meshes: list[Mesh]) -> Mesh:
-    """All meshes as one, not to be written to, as they are not."""
+    """Return all meshes as one, read-only as each of them is."""
     mesh = concatenate(meshes)
     mesh.vertices.flags.writeable = mesh.faces.flags.writeable = False
     return mesh

@@ -89,10 +89,9 @@ class Library:
                 reader = ReelReader(source)
         except (MeshreelError, OSError) as error:
             return Entry(name, error=str(error).removeprefix(f"{path}: "))  # who reads it need not know our folders
-        last = reader.timestamp(reader.frame_count - 1) - reader.timestamp(0)
         lost, whole = len(reader.missing), len(reader.chunks)
         cut = f"{lost} of {whole} chunks are missing: the file is truncated" if lost else ""
-        return Entry(name, reader.size, reader.frame_count, last + 1 / reader.frame_rate, cut)
+        return Entry(name, reader.size, reader.frame_count, reader.duration, cut)
 
 
 def as_text(name: str) -> str:

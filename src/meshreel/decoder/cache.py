@@ -1,0 +1,70 @@
+"""Cache of one track: the last group decoded, and the states from which the next groups of its chain continue.
+
+In: decoded meshes and states. Out: the same, within a bound on memory. Values are replaced as a whole and never
+changed, so that threads can share a track without a lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..coding.layers.coder import LayersState
+from ..types import Mesh
+
+# Bytes of states that the tracks of a video keep together (a guess): a few bytes of a file can describe groups that
+# each take as much memory as a group may.
+MOST_KEPT = 1 << 29
+
+
+@dataclass(frozen=True, slots=True)
+class CachedGroup:
+    """Last group that a track decoded."""
+
+    number: int  # of its chunk; -1 before any group is decoded
+    frames: list[Mesh]
+    nbytes: int  # memory of all frames
+
+
+NO_GROUP = CachedGroup(-1, [], 0)
+
+
+@dataclass(frozen=True, slots=True)
+class CachedStates:
+    """States of the groups of one chain, by chunk number. All are kept while they fit: playing backwards needs each."""
+
+    known: dict[int, LayersState | None]
+    nbytes: int = 0
+
+    def copy(self) -> CachedStates:
+        """Return a cache that can grow while other threads read this one."""
+        return CachedStates(dict(self.known), self.nbytes)
+
+    def add(self, number: int, state: LayersState | None, before: LayersState | None, most: int) -> CachedStates:
+        """Return the cache with the state of a group, which was decoded from the state `before`.
+
+        If all states would take over `most` bytes, only the new one is kept.
+        """
+        if number in self.known:
+            return self
+        size = 0 if state is None else state.nbytes_beyond(before)
+        if self.nbytes + size > most:
+            return CachedStates({number: state}, 0 if state is None else state.nbytes_beyond(None))
+        self.known[number] = state
+        return CachedStates(self.known, self.nbytes + size)
+
+
+def memory_of(meshes: Sequence[Mesh]) -> int:
+    """Return the memory of meshes in bytes; arrays that are views of one array count once."""
+    arrays = [array for mesh in meshes for array in (mesh.vertices, mesh.faces)]
+    owners = [array.base if isinstance(array.base, np.ndarray) else array for array in arrays]
+    return sum({id(owner): owner.nbytes for owner in owners}.values())
+
+
+def read_only(mesh: Mesh) -> Mesh:
+    """Return read-only views of a mesh that is cached and shares its faces with other frames and groups."""
+    vertices, faces = mesh.vertices.view(), mesh.faces.view()
+    vertices.flags.writeable = faces.flags.writeable = False
+    return Mesh(vertices, faces)

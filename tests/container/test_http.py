@@ -1,0 +1,110 @@
+"""Files behind a URL: whole, by ranges, and where the server fails."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+import meshreel
+from meshreel.container.http import HttpSource
+from meshreel.container.reader import FIRST_REQUEST
+from meshreel.errors import FormatError, InputError
+from tests.golden import GOLDEN, frame_record
+
+DATA = (GOLDEN / "scene.reel").read_bytes()
+LONG = bytes(range(256)) * (FIRST_REQUEST // 64)  # four first requests
+
+
+class Server(ThreadingHTTPServer):
+    """Serves `data` at any path; `ranges` switches answers by range, `asked` has the ranges of all requests."""
+
+    def __init__(self, data: bytes, ranges: bool = True) -> None:
+        super().__init__(("127.0.0.1", 0), Handler)
+        self.data, self.ranges, self.asked = data, ranges, list[str]()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server_address[1]}/a.reel"
+
+
+class Handler(BaseHTTPRequestHandler):
+    def do_GET(self) -> None:
+        assert isinstance(self.server, Server)
+        data, asked = self.server.data, self.headers.get("Range", "")
+        self.server.asked.append(asked)
+        first, last = (int(number) for number in asked.removeprefix("bytes=").split("-"))
+        if self.server.ranges:
+            part = data[first : last + 1]
+            self.send_response(206)
+            self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(data)}")
+        else:
+            part = data
+            self.send_response(200)
+        self.send_header("Content-Length", str(len(part)))
+        self.end_headers()
+        self.wfile.write(part)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Keep the test's output clean."""
+
+
+@pytest.fixture
+def serve() -> Iterator[Callable[..., Server]]:
+    servers: list[Server] = []
+
+    def start(data: bytes, ranges: bool = True) -> Server:
+        server = Server(data, ranges)
+        threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True).start()
+        servers.append(server)
+        return server
+
+    yield start
+    for server in servers:
+        server.shutdown()
+        server.server_close()
+
+
+@pytest.mark.parametrize("ranges", [True, False])
+def test_a_url_opens_the_same_video_as_the_file(serve, ranges):
+    server = serve(DATA, ranges)
+    with meshreel.open(server.url) as video:
+        assert [frame_record(mesh) for mesh in video] == [frame_record(mesh) for mesh in meshreel.open(DATA)]
+    assert server.asked[0] == f"bytes=0-{FIRST_REQUEST - 1}"
+
+
+def test_the_first_request_has_the_head_and_each_range_behind_it_is_one_request(serve):
+    server = serve(LONG)
+    source = HttpSource(server.url)
+    assert source.size == len(LONG)
+    assert source.get_bytes(100, 50) == LONG[100:150] and len(server.asked) == 1
+    assert source.get_bytes(FIRST_REQUEST, 1000) == LONG[FIRST_REQUEST : FIRST_REQUEST + 1000]
+    assert source.get_bytes(len(LONG) - 5, 100) == LONG[-5:]
+    assert server.asked[1:] == [
+        f"bytes={FIRST_REQUEST}-{FIRST_REQUEST + 999}",
+        f"bytes={len(LONG) - 5}-{len(LONG) - 1}",
+    ]
+
+
+def test_a_server_without_ranges_is_asked_once(serve):
+    server = serve(LONG, ranges=False)
+    source = HttpSource(server.url)
+    assert source.get_bytes(FIRST_REQUEST, 1000) == LONG[FIRST_REQUEST : FIRST_REQUEST + 1000]
+    assert len(server.asked) == 1
+
+
+def test_a_server_that_stops_answering_by_range_is_an_input_error(serve):
+    server = serve(LONG)
+    source = HttpSource(server.url)
+    server.ranges = False
+    with pytest.raises(InputError, match=f"without bytes {FIRST_REQUEST}"):
+        source.get_bytes(FIRST_REQUEST, 10)
+
+
+def test_a_url_of_another_file_or_without_a_server_names_the_url(serve):
+    with pytest.raises(FormatError, match=r"http://127.0.0.1:\d+/a.reel: not a \.reel file"):
+        meshreel.open(serve(LONG).url)
+    with pytest.raises(InputError, match=r"127.0.0.1:1/a\.reel: cannot be read .*; check the address"):
+        meshreel.open("http://127.0.0.1:1/a.reel")
