@@ -26,6 +26,7 @@ def coarse(monkeypatch):
     monkeypatch.setattr("meshreel.cli.demo.VOXEL", 0.06)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_tells_its_numbers(run, tmp_path):
     said = run("demo", "-o", tmp_path / "demo", "--frames", "6", "--json")
@@ -60,6 +61,7 @@ def test_the_rig_of_somebody_else_is_not_overwritten(run, tmp_path):
     assert sorted(path for path in (tmp_path / "rig").rglob("*") if path.is_file()) == before
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
 def test_the_same_seed_gives_the_same_bytes_and_another_one_other_noise(run, tmp_path):
     """Also where a longer demo was before, of which nothing is left."""

@@ -2,6 +2,7 @@
 
 import { describe, expect, test } from "vitest";
 
+import { slowTest } from "../../test/slow.ts";
 import { group, makeReel, stream } from "./reel.ts";
 import { frames, pass, useRig } from "./rig.ts";
 
@@ -55,7 +56,7 @@ describe("auto", () => {
     expect(rig.viewer.count("qualitychange")).toBeLessThan(12);
   });
 
-  test("settles where the network gives just what a level takes", async () => {
+  slowTest("settles where the network gives just what a level takes", async () => {
     for (const share of [0.3, 0.47, 0.6, 0.9, 1, 1.1]) {
       rig.begin(stream(60, FULL, 5), share * RATE);
       await play(62);

@@ -3,6 +3,7 @@
 import { beforeAll, expect, test } from "vitest";
 
 import { hasPython, runPython } from "../../test/python.ts";
+import { ALL } from "../../test/slow.ts";
 import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
 import type { Tools } from "../src/decode/group.ts";
 import { Head } from "../src/format/reader.ts";
@@ -18,7 +19,7 @@ beforeAll(async () => {
   tools = await nodeTools();
 });
 
-test.skipIf(!hasPython)("a group of 10 frames of 20k vertices takes at most half of its duration, alone or predicted", () => {
+test.runIf(ALL && hasPython)("a group of 10 frames of 20k vertices takes at most half of its duration, alone or predicted", () => {
   const data = new Uint8Array(runPython(new URL("large_group.py", import.meta.url)));
   const head = Head.parse(data);
   const times: number[][] = head.chunks.map(() => []);

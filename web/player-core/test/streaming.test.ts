@@ -2,6 +2,7 @@
 
 import { afterEach, beforeEach, describe, expect, test } from "vitest";
 
+import { slowTest } from "../../test/slow.ts";
 import { HttpSource } from "../src/net/http_source.ts";
 import { Player } from "../src/player.ts";
 import { Head } from "../src/format/reader.ts";
@@ -59,7 +60,7 @@ function everyFrame(): void {
 }
 
 describe("throttled", () => {
-  test("to twice the rate, it plays at best, without a stall", AGAIN, async () => {
+  slowTest("to twice the rate, it plays at best, without a stall", AGAIN, async () => {
     throttle(2 * RATE);
     await ended();
     expect(new Set(viewer.qualities)).toEqual(new Set([3]));
@@ -102,7 +103,7 @@ describe("throttled", () => {
 });
 
 describe("a server", () => {
-  test("that ignores ranges is played from one stream, as it arrives", AGAIN, async () => {
+  slowTest("that ignores ranges is played from one stream, as it arrives", AGAIN, async () => {
     const limit = new Throttle(2 * RATE);
     server.respond = async (response) => {
       response.writeHead(200, { "Content-Length": FILE.length });
@@ -118,7 +119,7 @@ describe("a server", () => {
     expect(player.stats.fetchedBytes).toBe(FILE.length);
   });
 
-  test("that cuts connections in mid-stream is asked again: warnings, and every frame", AGAIN, async () => {
+  slowTest("that cuts connections in mid-stream is asked again: warnings, and every frame", AGAIN, async () => {
     server.respond = (response, asked, count) => {
       const body = server.begin(response, asked);
       if (count % 2 === 1) response.write(body.subarray(0, body.length / 3), () => response.destroy());
@@ -164,7 +165,7 @@ describe("a server", () => {
     expect(seen.offences).toEqual([]);
   });
 
-  test("with a part of the file plays that part", async () => {
+  slowTest("with a part of the file plays that part", async () => {
     await server.close();
     player.dispose();
     viewer.stop();

@@ -6,6 +6,7 @@ import { gzipSync } from "node:zlib";
 import type { Frame, Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { describeInBrowser } from "../../test/browser.ts";
+import { slowTest } from "../../test/slow.ts";
 import { buildPlayer, Site } from "./product.ts";
 
 const PLAYER = '<meshreel-player src="scene.reel" controls style="width:320px;height:240px;aspect-ratio:auto"></meshreel-player>';
@@ -290,7 +291,7 @@ describeInBrowser("the built player", () => {
     await page.close();
   }, 90_000);
 
-  test("twenty loops leave heap and GPU memory as they were", async () => {
+  slowTest("twenty loops leave heap and GPU memory as they were", async () => {
     const { page, errors } = await site.visit("player/index.html?src=/scene.reel&autoplay&loop&speed=4");
     await ready(page);
     const devtools = await page.context().newCDPSession(page);

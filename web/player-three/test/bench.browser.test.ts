@@ -1,7 +1,8 @@
 import { fileURLToPath } from "node:url";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { afterAll, beforeAll, expect } from "vitest";
 import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
+import { slowTest } from "../../test/slow.ts";
 import { formatReport } from "../src/bench.ts";
 import type {} from "./pages/bench.ts";
 
@@ -16,7 +17,7 @@ describeInBrowser("what a picture costs the main thread", () => {
   }, 120_000);
   afterAll(async () => open?.close());
 
-  test("1 ms of JavaScript (three times that here, where others work too) with 50k moving and 300k still vertices", async () => {
+  slowTest("1 ms of JavaScript (three times that here, where others work too) with 50k moving and 300k still vertices", async () => {
     const { moving, still } = await open.page.evaluate(() => window.bench.vertices);
     expect(moving).toBeGreaterThanOrEqual(50_000);
     expect(still).toBeGreaterThanOrEqual(300_000);

@@ -1,4 +1,4 @@
-// What the GPU draws of a recording is where Python decodes it: positions read back through the shaders, of every golden file.
+// What the GPU draws of a recording is where Python decodes it: positions read back through the shaders, of two golden files, or of all.
 
 import { readFileSync, readdirSync } from "node:fs";
 import { join } from "node:path";
@@ -12,10 +12,11 @@ import { nodeTools } from "../../player-core/test/tools.ts";
 import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
 import { hasPython, ROOT, runPython } from "../../test/python.ts";
+import { ALL } from "../../test/slow.ts";
 import type {} from "./pages/scene.ts";
 
 const FOLDER = join(ROOT, "conformance/v1");
-const NAMES = readdirSync(FOLDER).filter((name) => name.endsWith(".reel"));
+const NAMES = ALL ? readdirSync(FOLDER).filter((name) => name.endsWith(".reel")) : ["layers_patched.reel", "scene.reel"];
 const FLOAT32 = 2 ** -22; // of a coordinate: what the shader's own arithmetic may lose
 
 function positionsByPython(name: string, frame: number): Float64Array {
