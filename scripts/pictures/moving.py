@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float64, UInt8
-from meshreel.metrics.cameras import Box, OrthographicCamera
 from PIL import Image, ImageDraw, ImageFont
 
 import meshreel
