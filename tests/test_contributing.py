@@ -14,7 +14,14 @@ from tests.run_page import blocks
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "CONTRIBUTING.md"
 DECISIONS = sorted((ROOT / "docs" / "decisions").glob("0*.md"))
+PRESETS = ("best", "paper")
 NAMING_PATHS = [PAGE, ROOT / "README.md", ROOT / "docs" / "pipeline.md", *DECISIONS]
+
+
+def _answers() -> list[str]:
+    """The rows of the table below "Where to find things"."""
+    part = PAGE.read_text(encoding="utf-8").split("## Where to find things")[1].split("\n## ")[0]
+    return [line for line in part.splitlines() if line.startswith("| Where")]
 
 
 def test_the_diagram_shows_the_layers_that_are_checked() -> None:
@@ -32,6 +39,15 @@ def test_the_diagram_shows_the_siblings_that_are_checked() -> None:
 def test_paths_of_code_in_the_docs_exist(page: Path) -> None:
     named = re.findall(r"`([\w./{},*-]+/[\w.{},*-]*\.(?:py|cpp|h|ts|md))`", page.read_text(encoding="utf-8"))
     assert [path for path in named if not all(map(_exists, _spelled_out(path)))] == []
+
+
+@pytest.mark.parametrize("row", _answers(), ids=lambda row: row.split("|")[1].strip())
+def test_functions_are_where_the_page_says(row: str) -> None:
+    named = re.findall(r"`([^`]+)`", row.split("|")[2])
+    files = [path for name in named for path in (ROOT / "src" / "meshreel").glob(name) if path.is_file()]
+    code = "\n".join(path.read_text(encoding="utf-8") for path in files)
+    functions = [name for name in named if re.fullmatch(r"[a-z]+_?[a-z_]*", name) and name not in PRESETS]
+    assert [name for name in functions if not re.search(rf"def {name}\b", code)] == []
 
 
 @pytest.mark.parametrize("page", DECISIONS, ids=lambda page: page.name)
