@@ -1,6 +1,6 @@
 """The picture of docs/tutorial.md: the procedural room as it is captured, taken apart, coded and decoded.
 
-In: nothing; the room is simulated. Called by pictures.py.
+In: nothing; the room is simulated. Out: a PNG. Called by `pictures`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from drawing import Sheet, shaded
 from jaxtyping import Float64
 
 from meshreel.analysis.scene.segmentation import segment
@@ -24,11 +23,12 @@ from meshreel.geometry.topology import components, concatenate, part_of
 from meshreel.metrics.viewpoints import Box, OrthographicCamera
 from meshreel.types import Mesh
 
+from .drawing import BODIES, Sheet, shaded
+
 FRAMES, SHOWN = 20, 9
 WIDTH, NOISE, VOXEL = 256, 0.3, 0.03  # as `meshreel demo` has them
 PANEL = 300  # pixels
 GREY = np.full(3, 0.82)
-BODIES = np.array([[0.87, 0.45, 0.20], [0.20, 0.45, 0.70], [0.35, 0.65, 0.35]])
 FROM = np.array([0.42, 0.42, 1.0])  # where the picture is seen from
 
 

@@ -1,6 +1,6 @@
 """Makes the golden files of a format version: tiny .reel files and, beside each, what they must decode to, bit for bit.
 
-`PYTHONPATH=. python benchmarks/make_golden.py conformance/v1` writes those that are not there. The others stay as they
+`PYTHONPATH=. python conformance/make_golden.py conformance/v1` writes those that are not there. The others stay as they
 are for ever, whatever today's encoder would make of them: a reader that no longer decodes them to these bits is wrong.
 """
 

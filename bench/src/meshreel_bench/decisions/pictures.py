@@ -1,12 +1,10 @@
 """The pictures of docs/pipeline.md, one a stage, and that of docs/tutorial.md, from procedural data only.
 
-python benchmarks/pictures.py            # all, into docs/pictures (about two minutes)
-python benchmarks/pictures.py --room     # that of the tutorial alone
+`python -m meshreel_bench.decisions.pictures [FOLDER]` draws all into docs/pictures, in some two minutes.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,9 +23,9 @@ from meshreel.metrics.error_sheet import SheetOptions, write_sheet
 from meshreel.metrics.viewpoints import Box
 from meshreel.types import Mesh, MeshList
 
-sys.path.insert(0, str(Path(__file__).parent))
-import pictures_room
-from drawing import (
+from . import room_picture
+from .drawing import (
+    BODIES,
     DPI,
     Sheet,
     camera_for,
@@ -38,34 +36,20 @@ from drawing import (
     shaded,
     write_figure,
 )
-from stages import CONTACT, FIRST, Stages, compute, story
+from .stages import CONTACT, FIRST, Stages, compute, story
 
-OUTPUT = Path(__file__).resolve().parents[1] / "docs" / "pictures"
-BODIES = np.array([[0.87, 0.45, 0.20], [0.20, 0.45, 0.70], [0.35, 0.65, 0.35]])
 Picture = Callable[[Stages, Path], None]
 
 
-def main(arguments: list[str]) -> int:
-    """Draws everything."""
-    parser = argparse.ArgumentParser(description="Draw the pictures of docs/pipeline.md.")
-    parser.add_argument("-o", "--output", type=Path, default=OUTPUT)
-    parser.add_argument("--room", action="store_true", help="only the room of docs/tutorial.md")
-    chosen = parser.parse_args(arguments)
-    output: Path = chosen.output
-    output.mkdir(parents=True, exist_ok=True)
+def main(folder: Path = Path("docs/pictures")) -> None:
+    """Draw every picture into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
     matplotlib.rcParams["font.family"] = "DejaVu Sans"  # comes with matplotlib: the same letters everywhere
-    pictures_room.draw(output / "room.png")
-    if chosen.room:
-        return 0
-    draw_all(compute(story(), preset_options("paper")), output)
-    return 0
-
-
-def draw_all(stages: Stages, output: Path) -> None:
-    """One file for each stage."""
+    room_picture.draw(folder / "room.png")
+    stages = compute(story(), preset_options("paper"))
     for name, draw in PICTURES.items():
-        draw(stages, output / f"{name}.png")
-        print(f"{output / name}.png")
+        draw(stages, folder / f"{name}.png")
+        print(folder / f"{name}.png")
 
 
 def frames(stages: Stages, path: Path) -> None:
@@ -249,4 +233,4 @@ def _inside(mesh: Mesh, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main(*map(Path, sys.argv[1:]))

@@ -28,6 +28,7 @@ LIGHT = np.array([0.3, 0.5, 0.8]) / np.linalg.norm([0.3, 0.5, 0.8])
 BOTTOM = 8  # pixels under them
 FINE = 3  # rays a pixel and axis, averaged
 COLORS = 256  # of a picture's palette
+BODIES = np.array([[0.87, 0.45, 0.20], [0.20, 0.45, 0.70], [0.35, 0.65, 0.35]])  # RGB of three bodies
 
 
 class Sheet:

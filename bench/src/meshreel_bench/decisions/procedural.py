@@ -1,18 +1,13 @@
-"""The numbers in docs/decisions, measured on one group of the procedural story: one JSON row a line.
+"""Decisions 1, 2, 5, 6, 7 and 10, measured on one group of the procedural story at quality 50.
 
-python benchmarks/decisions.py > docs/decisions/measured.jsonl        # some minutes
-That drops the rows of captured bodies, which benchmarks/correspondence.py and benchmarks/tails.py put in again.
+In: nothing; the frames are procedural. Out: rows; some minutes in all.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
-from itertools import chain
-from pathlib import Path
-from typing import Any
+from functools import cache
 
 import DracoPy
 import numpy as np
@@ -33,39 +28,30 @@ from meshreel.encoder.target import measure
 from meshreel.format.layout import AnchorRule
 from meshreel.types import Mesh
 
-sys.path.insert(0, str(Path(__file__).parent))
-from stages import Stages, compute, story
-
-Row = dict[str, Any]
+from .rows import Row, Sources
+from .stages import FIRST, Stages, compute, story
 
 
-def main() -> int:
-    """Prints every row as soon as it is there."""
-    apart, meeting = compute(story(0), preset_options("paper")), compute(story(), preset_options("paper"))
-    rows = (float_rows(), lattice_rows(apart), noise_rows(apart.frames[0]), anchor_rows(apart))
-    for row in chain(*rows, floor_rows(apart), second_fit_rows(apart), pose_rows(meeting)):
-        print(json.dumps(row), flush=True)
-    return 0
+@cache
+def stages_of(first: int = 0) -> Stages:
+    """Return the stages of ten frames of the story: apart from the first on, taking hands from `FIRST` on."""
+    return compute(story(first), preset_options("paper"))
 
 
 def float_rows() -> Iterator[Row]:
-    """The distance from one float32 to the next, for a coordinate as geo-referenced captures have them."""
+    """Yield the distance from one float32 to the next, at coordinates up to those of geo-referenced captures."""
     for coordinate in (1.0, 1e3, 1e6):
-        yield {
-            "decision": "float64",
-            "coordinate_m": coordinate,
-            "float32_gap_m": float(np.spacing(np.float32(coordinate))),
-        }
+        yield {"coordinate_m": coordinate, "float32_gap_m": float(np.spacing(np.float32(coordinate)))}
 
 
 def lattice_rows(stages: Stages) -> Iterator[Row]:
-    """How far the positions that Draco gives are from the lattice, in its steps."""
+    """Yield the largest distance of Draco's positions from the lattice, in its steps."""
     cells = np.asarray(DracoPy.decode(stages.coded.data).points, dtype=np.float64) / stages.coded.step
-    yield {"decision": "lattice", "largest_distance_steps": float(np.abs(cells - np.rint(cells)).max())}
+    yield {"largest_distance_steps": float(np.abs(cells - np.rint(cells)).max())}
 
 
 def noise_rows(base: Mesh) -> Iterator[Row]:
-    """The variance of the error that rounding leaves in smooth weights on a mesh, in units of step^2 / 12."""
+    """Yield the variance of the error that rounding leaves in smooth weights on a mesh, in units of step^2 / 12."""
     points = base.vertices
     weights = np.concatenate([np.sin(k * points + k) for k in range(1, 5)], axis=1)
     steps, free = np.full(weights.shape[1], 1e-3), np.zeros(weights.shape[1])
@@ -77,12 +63,17 @@ def noise_rows(base: Mesh) -> Iterator[Row]:
         deltas = system.forward(weights)
         symbols = system.quantize(deltas, steps, free) if rounding == "shaped" else quantize.forward(deltas, steps)
         variance = float(np.mean(np.square(system.inverse(symbols * steps) - weights)))
-        yield {"decision": "noise", "rounding": rounding, "anchors": count, "anchor_weight": weight,
-               "vertices": len(points), "variance": variance / (steps[0] ** 2 / 12)}  # fmt: skip
+        yield {
+            "rounding": rounding,
+            "anchors": count,
+            "anchor_weight": weight,
+            "vertices": len(points),
+            "variance": variance / (steps[0] ** 2 / 12),
+        }
 
 
 def anchor_rows(stages: Stages) -> Iterator[Row]:
-    """Rate and error of the displacements: plain or shaped rounding, few or many anchors, some steps."""
+    """Yield rate and error of the displacements: plain or shaped rounding, few or many anchors, some steps."""
     base = stages.coded.base
     field = np.moveaxis(stages.fit.positions, 0, 1) - base.vertices[:, None]
     few, many = 12, len(base.vertices) // 20
@@ -98,11 +89,11 @@ def anchor_rows(stages: Stages) -> Iterator[Row]:
             data = encode_displacements(field, base, options)
             error = decode_displacements(data, base) - field
             rms = float(np.sqrt(np.mean(np.sum(np.square(error), axis=2))))
-            yield {"decision": "anchors", "rounding": name, "step": options.step, "bytes": len(data), "rms": rms}
+            yield {"rounding": name, "step": options.step, "bytes": len(data), "rms": rms}
 
 
 def pose_rows(stages: Stages) -> Iterator[Row]:
-    """The fit of the reference that each pose would have given, mean and worst frame, and which was chosen."""
+    """Yield the residual of the fit from each pose, of all frames and of the worst one, and which pose was chosen."""
     options = preset_options("paper")
     distances = largest_distances(stages.centers)
     kin = neighbours(affinity(distances, options.reference.centers), options.reference.deform)
@@ -116,32 +107,54 @@ def pose_rows(stages: Stages) -> Iterator[Row]:
         fit = fit_frames(base.faces, group.sent(base, pose), stages.frames, replace(options.fit, key=key))
         rms = [residual.rms for residual in fit.residuals]
         chosen = (frame, key) == (stages.reference.frame, stages.reference.key)
-        yield {"decision": "pose", "pose": "MDS" if frame == MDS else f"frame {frame}", "key": key,
-               "chosen": chosen, "mean_rms": float(np.mean(rms)), "worst_rms": max(rms)}  # fmt: skip
+        yield {
+            "pose": "MDS" if frame == MDS else f"frame {frame}",
+            "key": key,
+            "chosen": chosen,
+            "mean_rms": float(np.mean(rms)),
+            "worst_rms": max(rms),
+        }
 
 
 def floor_rows(stages: Stages) -> Iterator[Row]:
-    """Bytes of the group in the laplacian form, and in the draco form that is as good."""
+    """Yield bytes of the group in the laplacian form, and in the draco form of the same fidelity."""
     quality = measure(stages.frames, stages.decoded)
     found = cheapest_intra(stages.frames, quality, np.inf, preset_options("paper").intra)
-    yield {"decision": "floor", "laplacian_bytes": len(stages.payload), "draco_bytes": len(found[0]) if found else None,
-           "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
+    yield {
+        "laplacian_bytes": len(stages.payload),
+        "draco_bytes": len(found[0]) if found else None,
+        "rms": quality.distance,
+        "normal_error_deg": quality.angle,
+    }
 
 
 def second_fit_rows(stages: Stages) -> Iterator[Row]:
-    """Bytes and distance of fits made without a second fit, or with one from few or many components of the first."""
+    """Yield bytes and distance of fits without a second fit, or with one from few or many components of the first."""
     options = preset_options("paper")
-    key, base = stages.reference.key, stages.coded.base
-    for start in (0, 3, 15):
-        fit = fit_frames(base.faces, stages.predictions, stages.frames, replace(options.fit, key=key, components=start))
-        field = np.ascontiguousarray(np.moveaxis(fit.positions, 0, 1) - base.vertices[:, None])
-        for sent in (3, 10, None):
-            how = replace(options.displacements, basis_size=sent)
-            payload, layers = encode_group(stages.coded, field, how)
-            quality = measure(stages.frames, decode_group(payload, len(stages.frames)))
-            yield {"decision": "second fit", "start": start, "basis_size": sent, "components": len(layers) - 1,
-                   "bytes": len(payload), "rms": quality.distance, "normal_error_deg": quality.angle}  # fmt: skip
+    faces, how = stages.coded.base.faces, replace(options.fit, key=stages.reference.key)
+    starts = (0, 3, 15)
+    fits = [fit_frames(faces, stages.predictions, stages.frames, replace(how, components=start)) for start in starts]
+    for sent in (3, 10, None):
+        for start, fit in zip(starts, fits, strict=True):
+            field = np.ascontiguousarray(np.moveaxis(fit.positions, 0, 1) - stages.coded.base.vertices[:, None])
+            payload, layers = encode_group(stages.coded, field, replace(options.displacements, basis_size=sent))
+            shown = measure(stages.frames, decode_group(payload, len(stages.frames)))
+            yield {
+                "start": start,
+                "basis_size": sent,
+                "components": len(layers) - 1,
+                "bytes": len(payload),
+                "rms": shown.distance,
+                "normal_error_deg": shown.angle,
+            }
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+MEASURE: dict[str, Callable[[Sources], Iterable[Row]]] = {
+    "float64": lambda _: float_rows(),
+    "lattice": lambda _: lattice_rows(stages_of()),
+    "noise": lambda _: noise_rows(stages_of().frames[0]),
+    "anchors": lambda _: anchor_rows(stages_of()),
+    "floor": lambda _: floor_rows(stages_of()),
+    "second_fit": lambda _: second_fit_rows(stages_of()),
+    "pose": lambda _: pose_rows(stages_of(FIRST)),
+}

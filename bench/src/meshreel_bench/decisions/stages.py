@@ -1,6 +1,6 @@
-"""One group of procedural frames taken through every stage of the encoder, with what each stage made kept for pictures.
+"""One group of procedural frames taken through every stage of preset `paper`, for pictures and for decisions.
 
-In: a window of the procedural story in which two people walk up to each other and take hands. Out: Stages.
+In: frames of the procedural story, in which two people walk up to each other and take hands. Out: Stages.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CONTACT = 5  # of these: the two surfaces are melted into one
 
 @dataclass(frozen=True, slots=True)
 class Moved:
-    """A frame's vertices in another pose, with the normals they had in their own to color them by."""
+    """A frame in another pose, colored by the normals of its own pose."""
 
     mesh: Mesh
     colors: Float64[np.ndarray, "V 3"]  # RGB, 0 to 1
@@ -38,7 +38,7 @@ class Moved:
 
 @dataclass(frozen=True, slots=True)
 class Stages:
-    """What every stage of one group gives; coordinates are normalised: the sequence's diagonal is 1."""
+    """Results of every stage on one group; coordinates are normalised: the sequence's diagonal is 1."""
 
     frames: tuple[Mesh, ...]
     centers: Centers
