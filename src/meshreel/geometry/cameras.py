@@ -1,7 +1,7 @@
-"""Pinhole cameras, and their record: Open3D's pinhole camera JSON.
+"""Pinhole cameras, packed into and unpacked from Open3D's pinhole camera JSON.
 
-Cameras look along +z of their own frame, x right and y down, as Open3D's and OpenCV's do. Pixel (column i, row j)
-covers [i, i + 1) x [j, j + 1); its ray goes through the middle.
+A camera looks along +z of its own frame, with x to the right and y down, as in Open3D and OpenCV. Pixel (column i,
+row j) covers [i, i + 1) x [j, j + 1); its ray goes through the middle.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 
-_RIGID = 1e-3  # that an entry of R R^T may be off: some tools write few digits
-_LARGEST = 1e9  # of a matrix's numbers: keeps all that is computed from them finite
+_RIGID = 1e-3  # largest error of an entry of R R^T: some tools write few digits (guess)
+_LARGEST = 1e9  # largest number of a matrix: keeps everything computed from it finite (guess)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PinholeCamera:
-    """A perspective camera; equal to one of the same numbers, so that options with cameras can be compared."""
+    """Perspective camera; cameras with equal numbers are equal, so that options with cameras can be compared."""
 
     width: int
     height: int
@@ -41,23 +41,23 @@ class PinholeCamera:
 
     @property
     def eye(self) -> Float64[np.ndarray, " 3"]:
-        """Where the camera stands, world."""
+        """Position of the camera in world coordinates."""
         return -np.linalg.solve(self.extrinsic[:3, :3], self.extrinsic[:3, 3])
 
     def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
-        """Rays from the eye through image positions, camera frame; directions have unit length."""
+        """Return the rays from the eye through image positions: origins and unit directions in the camera frame."""
         homogeneous = np.column_stack([pixels, np.ones(len(pixels))])
         directions = homogeneous @ np.linalg.inv(self.intrinsic).T
         return np.zeros_like(directions), directions / np.linalg.norm(directions, axis=1)[:, None]
 
     def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
-        """Perspective projection of points in the camera frame; not finite for those that are not in front of it."""
+        """Project points of the camera frame to image positions; points that are not in front give NaN."""
         depth = np.where(points[:, 2:] > 0, points[:, 2:], np.nan)
         return (points @ self.intrinsic.T)[:, :2] / depth
 
 
 def pinhole_record(camera: PinholeCamera) -> dict[str, Any]:
-    """The camera as Open3D's JSON has it: matrices column by column."""
+    """Return the camera as a record of Open3D's JSON, in which matrices are stored column by column."""
     return {
         "class_name": "PinholeCameraParameters",
         "extrinsic": camera.extrinsic.T.reshape(-1).tolist(),
@@ -72,7 +72,7 @@ def pinhole_record(camera: PinholeCamera) -> dict[str, Any]:
 
 
 def pack_cameras(cameras: Sequence[PinholeCamera]) -> bytes:
-    """The cameras as an Open3D PinholeCameraTrajectory, JSON."""
+    """Pack cameras into the JSON of an Open3D PinholeCameraTrajectory."""
     record = {
         "class_name": "PinholeCameraTrajectory",
         "parameters": [pinhole_record(camera) for camera in cameras],
@@ -83,7 +83,7 @@ def pack_cameras(cameras: Sequence[PinholeCamera]) -> bytes:
 
 
 def unpack_cameras(data: bytes, name: str) -> list[PinholeCamera]:
-    """The cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory; `name` is what an error calls it."""
+    """Unpack an Open3D PinholeCameraParameters or PinholeCameraTrajectory; errors name the data `name`."""
     found: list[PinholeCamera] = []
     try:
         record = json.loads(data)

@@ -1,6 +1,6 @@
-"""Closest points on a surface: Open3D's ray-casting scene behind one small class (the extra `encode`).
+"""Closest points on a surface, by Open3D's ray-casting scene (needs the extra `encode`).
 
-Queries run in float32 inside Open3D: give coordinates near the origin.
+Open3D answers queries in float32: give coordinates near the origin.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from jaxtyping import Bool, Float32, Float64, Int64
 from ..types import Mesh
 from .topology import blend, border_mask, face_normals, unique_edges
 
-_AT_BORDER = 1e-4  # a barycentric weight below it is on an edge
-_CURVE_BITS = 10  # of each coordinate: cells along a curve that fills space
+_AT_BORDER = 1e-4  # barycentric weight below which a point is on an edge (guess)
+_CURVE_BITS = 10  # per coordinate, of the cells along the space-filling curve: three fit into 32 bits
 
 
 @dataclass(frozen=True, slots=True)
 class Hits:
-    """Closest surface points of N queries."""
+    """Closest points of a surface to N queries."""
 
     points: Float64[np.ndarray, "N 3"]
     faces: Int64[np.ndarray, " N"]
@@ -28,7 +28,7 @@ class Hits:
 
 
 class Surface:
-    """A mesh prepared for closest-point queries; the mesh must have at least one face."""
+    """A mesh with at least one face, prepared for closest-point queries."""
 
     def __init__(self, mesh: Mesh) -> None:
         import open3d as o3d
@@ -43,26 +43,27 @@ class Surface:
 
     @property
     def normals(self) -> Float64[np.ndarray, "F 3"]:
-        """Of the faces, of unit length."""
+        """Unit normals of the faces."""
         return self._oriented[0]
 
     @property
     def areas(self) -> Float64[np.ndarray, " F"]:
-        """Of the faces, squared units of the vertices."""
+        """Areas of the faces, in squared units of the vertices."""
         return self._oriented[1]
 
     @cached_property
     def _oriented(self) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]:
-        return face_normals(self.mesh)  # when they are first asked for: most callers want points only
+        return face_normals(self.mesh)  # computed on first use: most callers want points only
 
     def closest(self, queries: Float64[np.ndarray, "N 3"]) -> Hits:
-        """The closest point of the surface to each query, its face and its barycentric weights."""
+        """Find the closest point of the surface to each query, with its face and barycentric weights."""
         import open3d as o3d
 
         points = queries.astype(np.float32)
-        order = _along_curve(points)  # neighbours visit the same boxes: a fifth of the time, two thirds if shuffled
+        order = _along_curve(points)  # neighbours visit the same boxes: a fifth of the time
         sorted_points = o3d.core.Tensor.from_numpy(points[order])
-        answer = self.scene.compute_closest_points(sorted_points, nthreads=1)  # more cost a tenth and win nothing
+        # more threads cost a tenth and gain nothing
+        answer = self.scene.compute_closest_points(sorted_points, nthreads=1)
         faces, uv = np.empty(len(queries), np.int64), np.empty((len(queries), 2))
         faces[order], uv[order] = answer["primitive_ids"].numpy(), answer["primitive_uvs"].numpy()
         barycentric = np.stack([1 - uv[:, 0] - uv[:, 1], uv[:, 0], uv[:, 1]], axis=1)
@@ -70,7 +71,7 @@ class Surface:
         return Hits(found, faces, barycentric)
 
     def past_border(self, hits: Hits) -> Bool[np.ndarray, " N"]:
-        """Where the closest point is on the mesh's border: what it was asked for lies past the surface, not above."""
+        """Return which closest points are on the mesh's border: their queries lie beside the surface, not above it."""
         edges, corners = self._border
         on_edge = edges[hits.faces] & (hits.barycentric[:, [2, 0, 1]] < _AT_BORDER)  # opposite corners
         on_corner = corners[hits.faces] & (hits.barycentric > 1 - _AT_BORDER)
@@ -78,7 +79,7 @@ class Surface:
 
     @cached_property
     def _border(self) -> tuple[Bool[np.ndarray, "F 3"], Bool[np.ndarray, "F 3"]]:
-        """Which edges (01, 12, 20) and which corners of each face are on the border."""
+        """Edges (01, 12, 20) and corners of each face that are on the border."""
         edges, face_edges = unique_edges(self.mesh.faces)
         border = border_mask(edges, face_edges)
         ends = np.zeros(len(self.mesh.vertices), bool)
@@ -87,7 +88,7 @@ class Surface:
 
 
 def _along_curve(points: Float32[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
-    """An order in which neighbours follow each other: that of Morton codes of the cells they are in."""
+    """Return an order in which neighbours follow each other: by the Morton code of each point's cell."""
     if len(points) == 0:
         return np.zeros(0, np.int64)
     low = points.min(axis=0)
@@ -99,26 +100,26 @@ def _along_curve(points: Float32[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
 
 
 class Outline:
-    """The border of a mesh that has faces, prepared to be asked often; the mesh may be anywhere in the world."""
+    """Border of a mesh that has faces, prepared for repeated queries; the mesh may be far from the origin."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._origin = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
         self._surface = Surface(Mesh(mesh.vertices - self._origin, mesh.faces))
 
     def leaves_out(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Which points lie past the border."""
+        """Return which points lie past the border."""
         return self._surface.past_border(self._surface.closest(points - self._origin))
 
 
 def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndarray, " N"]:
-    """How far points are from a mesh that has faces, wherever in the world both are."""
+    """Return the distance of each point from a mesh that has faces; both may be far from the origin."""
     origin = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
     local = points - origin
     return np.linalg.norm(Surface(Mesh(mesh.vertices - origin, mesh.faces)).closest(local).points - local, axis=1)
 
 
 def carried_labels(surface: Surface, labels: Bool[np.ndarray, " F"], mesh: Mesh) -> Bool[np.ndarray, " G"]:
-    """The labels of a surface's faces on another mesh: each face takes that of the face nearest to its middle."""
+    """Carry face labels from a surface to another mesh: each face takes that of the face nearest to its middle."""
     if mesh.is_empty:
         return np.zeros(0, bool)
     return labels[surface.closest(mesh.vertices[mesh.faces].mean(axis=1)).faces]

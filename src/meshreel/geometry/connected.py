@@ -1,4 +1,7 @@
-"""Connected pieces of large meshes by SciPy (`encode`): what topology.components gives, a tenth of the time."""
+"""Connected components of large meshes with SciPy: the labels of `topology.components` in a tenth of the time.
+
+Needs the extra `encode`; the decoder uses `topology.components`.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from .topology import face_normals, part_of
 
 
 def connected(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:
-    """A label 0, 1, ... for each of `count` vertices: the connected component, in order of its first vertex."""
+    """Label each of `count` vertices with its connected component; components are numbered by their first vertex."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import connected_components
 
@@ -22,12 +25,12 @@ def connected(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, 
 
 
 def connected_faces(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " F"]:
-    """The label of each face's component of `count` vertices; not all labels are of a face."""
+    """Label each face with its connected component; labels of vertices without faces do not occur."""
     return connected(faces, count)[faces[:, 0]]
 
 
 def without_fragments(mesh: Mesh, least: float) -> Mesh:
-    """The mesh without connected pieces of less area, m^2."""
+    """Remove connected components whose area is below `least`, m^2."""
     if mesh.is_empty:
         return mesh
     labels = connected_faces(mesh.faces, len(mesh.vertices))

@@ -1,7 +1,7 @@
-"""Fewer vertices for the same surface: quadric error metrics (the extra `encode`; paper, section 3.3.2).
+"""Decimation of meshes by quadric error metrics (paper, section 3.3.2; needs the extra `encode`).
 
-Closed meshes go to fast-simplification; open ones to Open3D, which can hold a border in place.
-Both stop at absolute errors, so the mesh is brought to one scale first.
+Closed meshes are decimated by fast-simplification, open ones by Open3D, which can hold a border in place.
+Both libraries stop at absolute errors, so the mesh is brought to one scale first.
 """
 
 from __future__ import annotations
@@ -14,18 +14,20 @@ from ..errors import InputError
 from ..types import Mesh
 from .topology import border_edges, clean
 
-CLOSED_DIAGONAL = 10.0  # at this size AGGRESSION 4 reaches the target and loses nothing; at 1 and at 1000 it may not
+# Size of the bounding box's diagonal for each library, in its own unit; found by trial, not recorded as rows.
+CLOSED_DIAGONAL = 10.0  # here AGGRESSION 4 reaches the target and loses nothing; at 1 and at 1000 it may not
 OPEN_DIAGONAL = 100.0  # below it Open3D takes whole regions for flat
-AGGRESSION = 4.0
-BOUNDARY_WEIGHT = 10.0
-ROUNDS = 3  # collapses at a border take one face, inside two: the count of faces is corrected this often
-_ONE_AT_A_TIME = threading.Lock()  # the library keeps its mesh in statics
+AGGRESSION = 4.0  # of fast-simplification; see CLOSED_DIAGONAL
+BOUNDARY_WEIGHT = 10.0  # of planes on open borders against planes of faces (guess)
+ROUNDS = 3  # corrections of the number of faces: a collapse takes one face at a border and two elsewhere (guess)
+_ONE_AT_A_TIME = threading.Lock()  # fast-simplification keeps its mesh in static variables
 
 
 def decimate(mesh: Mesh, vertices: int, border: float = BOUNDARY_WEIGHT) -> Mesh:
-    """The mesh with about `vertices` vertices (within 2 % where it can be), cleaned; itself where it has no more.
+    """Decimate a mesh to about `vertices` vertices, within 2 % where possible, and clean it.
 
-    `border` is the weight of planes that stand on open borders against those of the faces.
+    A mesh that has no more vertices is only cleaned. `border` weighs the planes that stand on open borders against
+    those of the faces.
     """
     if vertices < 4:
         raise InputError(f"vertices is {vertices}: give at least 4, the corners of the smallest solid")
@@ -44,9 +46,10 @@ def decimate(mesh: Mesh, vertices: int, border: float = BOUNDARY_WEIGHT) -> Mesh
 
 
 def decimate_faces(mesh: Mesh, faces: int) -> Mesh:
-    """The mesh with `faces` faces or a few less after one collapse, cleaned; itself where it has no more.
+    """Decimate a mesh to `faces` faces or a few less in one pass, and clean it.
 
-    Cheaper than a number of vertices, which may take some rounds: seconds for a scene of half a million faces.
+    A mesh that has no more faces is only cleaned. Cheaper than `decimate`, which may take several passes: seconds for a
+    scene of half a million faces.
     """
     if faces < 4:
         raise InputError(f"faces is {faces}: give at least 4, those of the smallest solid")
@@ -59,7 +62,7 @@ def decimate_faces(mesh: Mesh, faces: int) -> Mesh:
 
 
 def has_boundary(mesh: Mesh) -> bool:
-    """True where some edge belongs to one face only."""
+    """Return whether some edge belongs to one face only."""
     return len(border_edges(mesh)) > 0
 
 

@@ -1,4 +1,4 @@
-"""Sequences made of another one, frame by frame, when a frame is asked for: as many frames, as fast."""
+"""Sequences derived lazily from another sequence: each frame is made when it is read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .topology import part_of
 
 
 class DerivedSequence(MeshSequence):
-    """A MeshSequence of as many frames as its source; a subclass says what a frame is."""
+    """Base of sequences with the length and frame rate of their source; a subclass makes the frames."""
 
     def __init__(self, source: MeshSequence) -> None:
         self._source = source

@@ -1,6 +1,6 @@
-"""Small holes closed: boundary loops that a cut has left, each filled by a fan around its middle.
+"""Closing of small holes: each boundary loop that a cut has left is filled by a fan around its middle.
 
-In -> out: a mesh and the longest perimeter to close -> the mesh with more faces and one more vertex a hole.
+A mesh and the longest perimeter to close -> the mesh with additional faces and one additional vertex per hole.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from ..types import Mesh
 
 
 def close_holes(mesh: Mesh, perimeter: float) -> Mesh:
-    """The mesh with every simple boundary loop closed whose perimeter (units of the vertices) is at most this.
+    """Close every simple boundary loop of at most this perimeter, in the unit of the vertices.
 
-    Longer loops stay open: soles that a capture does not have, sleeves, the rim of what a camera saw.
+    Longer loops stay open: soles missing from a capture, sleeves, the rim of what a camera saw.
     """
     vertices, faces = [mesh.vertices], [mesh.faces]
     count = len(mesh.vertices)
@@ -29,12 +29,12 @@ def close_holes(mesh: Mesh, perimeter: float) -> Mesh:
 
 
 def _fan(loop: Int64[np.ndarray, " n"], middle: int) -> Int64[np.ndarray, "n 3"]:
-    """Faces from the loop to one vertex; a loop runs as the faces beside it do, so these run the other way."""
+    """Return faces that join the loop to one vertex, wound against the loop, which follows the faces beside it."""
     return np.stack([np.roll(loop, -1), loop, np.full(len(loop), middle)], axis=1)
 
 
 def _boundary_loops(mesh: Mesh) -> list[Int64[np.ndarray, " n"]]:
-    """Closed chains of half-edges that no face meets from the other side; vertices with several such are left out."""
+    """Return closed chains of half-edges without an opposite one; vertices where several chains meet are left out."""
     f = mesh.faces.astype(np.int64)
     half = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
     count = len(mesh.vertices)

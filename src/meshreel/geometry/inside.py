@@ -1,7 +1,8 @@
-"""Points spread evenly through the volume that a mesh encloses: libigl's fast winding number (the extra `encode`).
+"""Points spread evenly through the volume that a mesh encloses, found by libigl's fast winding number.
 
-Mesh in, jittered grid points with |winding number| > 1/2 out (Barill et al. 2018), so that slightly open and inside-out
-meshes work. A component that encloses nothing (an open sheet) is sampled on its surface instead. Encoder only.
+Mesh -> jittered grid points where |winding number| > 1/2 (Barill et al. 2018), so that slightly open and inside-out
+meshes work. A component that encloses nothing (an open sheet) is sampled on its surface instead. Used by the encoder
+only (paper, section 3.1); needs the extra `encode`.
 """
 
 from __future__ import annotations
@@ -15,22 +16,22 @@ from ..types import Mesh
 from .closest_points import Surface
 from .topology import components, face_normals, weld
 
-BLOCK = 4  # grid points a side of a block that is decided at once where no surface passes through it
-MOST_BLOCKS = 1 << 19  # of the sampling grid; bounds memory when a few small bodies lie far apart
-SPECK = 0.002  # a component of a smaller share of all samples is noise
-SHEET = 0.05  # interior samples per area h^2 below which a component counts as a sheet, h the samples' distance
+BLOCK = 4  # grid points along a side of a block, which is classified at once where no surface crosses it (guess)
+MOST_BLOCKS = 1 << 19  # of the sampling grid; bounds memory when a few small bodies lie far apart (guess)
+SPECK = 0.002  # share of all samples below which a component is noise (guess)
+SHEET = 0.05  # interior samples per area h^2 below which a component is a sheet, h the samples' distance (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """N points of a mesh's volume and the body each belongs to; specks have none."""
+    """N points in the volume of a mesh, each with the body it belongs to; specks are not sampled."""
 
     points: Float64[np.ndarray, "N 3"]
     bodies: Int64[np.ndarray, " N"]  # 0, 1, ..., largest volume first
 
 
 def interior_samples(mesh: Mesh, count: int, generator: np.random.Generator) -> Samples:
-    """About `count` samples of the volume of a mesh that has faces, one per equal cell, jittered by `generator`.
+    """Sample the volume of a mesh that has faces at about `count` points, one per equal cell, jittered by `generator`.
 
     Bodies are the connected components of the surface; one that lies inside another is a part of it.
     """
@@ -49,12 +50,15 @@ def interior_samples(mesh: Mesh, count: int, generator: np.random.Generator) -> 
 
 
 def winding_inside(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-    """Whether each query lies inside: |winding number| > 1/2, whichever way the faces look."""
+    """Return whether each query lies inside the mesh: |winding number| > 1/2, whatever the faces' orientation."""
     return np.abs(winding_numbers(mesh, queries)) > 0.5
 
 
 def winding_numbers(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
-    """How often the mesh, whose faces have areas, goes around each query: 1 where all faces look away, -1 towards."""
+    """Return the winding number of the mesh around each query: inside, 1 if faces point outward and -1 if inward.
+
+    All faces must have an area above 0.
+    """
     import igl
 
     if len(queries) == 0:
@@ -63,7 +67,7 @@ def winding_numbers(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Float64[
 
 
 def _spacing(mesh: Mesh, count: int, generator: np.random.Generator) -> float:
-    """Side of the cells of which about `count` fall inside; 0 where a pilot grid finds next to no interior."""
+    """Return the cell side at which about `count` cells fall inside; 0 where a pilot grid finds no interior."""
     low, size = mesh.vertices.min(axis=0), np.ptp(mesh.vertices, axis=0)
     for pilot in (16_384, 131_072):
         if size.min() <= 0:
@@ -79,14 +83,14 @@ def _spacing(mesh: Mesh, count: int, generator: np.random.Generator) -> float:
 
 
 def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> Float64[np.ndarray, "N 3"]:
-    """The jittered grid points inside; whole blocks at once where the surface is not near."""
+    """Return the jittered grid points inside the mesh; blocks far from the surface are classified as a whole."""
     low, side = mesh.vertices.min(axis=0), BLOCK * spacing
     shape = np.floor(np.ptp(mesh.vertices, axis=0) / side).astype(np.int64) + 1
     centers = low + (np.indices(tuple(shape)).reshape(3, -1).T + 0.5) * side
     near = _touched(mesh, low, side, shape)
     winding = np.zeros(len(centers))
     winding[~near] = np.abs(winding_numbers(mesh, centers[~near]))
-    near |= np.abs(winding - 0.5) < 0.3  # in the mouth of a hole the number changes smoothly, with no surface to tell
+    near |= np.abs(winding - 0.5) < 0.3  # in the mouth of a hole it changes smoothly, without a surface
     offsets = (np.indices((BLOCK,) * 3).reshape(3, -1).T - BLOCK / 2) * spacing
     points = (centers[near | (winding > 0.5), None] + offsets).reshape(-1, 3)
     points += generator.random(points.shape) * spacing
@@ -99,7 +103,7 @@ def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> 
 def _touched(
     mesh: Mesh, low: Float64[np.ndarray, " 3"], side: float, shape: Int64[np.ndarray, " 3"]
 ) -> Bool[np.ndarray, " B"]:
-    """Blocks that the bounding box of some face meets."""
+    """Return which blocks the bounding box of some face meets."""
     corners = np.floor((mesh.vertices[mesh.faces] - low) / side).astype(np.int64)
     first, last = corners.min(axis=1), corners.max(axis=1)
     touched = np.zeros(tuple(shape), dtype=bool)
@@ -112,9 +116,9 @@ def _touched(
 
 
 def _parts(mesh: Mesh) -> Int64[np.ndarray, " F"]:
-    """The body of each face: its component, or the component that encloses that."""
+    """Label each face with its body: its connected component, or the component that encloses it."""
     labels = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
-    if labels.max() > 0:  # seams look like gaps; positions tell
+    if labels.max() > 0:  # UV seams look like gaps until equal positions are welded
         welded = weld(mesh)
         if len(welded.faces) == len(mesh.faces):
             labels = components(welded.faces, len(welded.vertices))[welded.faces[:, 0]]
@@ -137,7 +141,7 @@ def _with_sheets(
     labels: Int64[np.ndarray, " N"],
     spacing: float,
 ) -> tuple[Float64[np.ndarray, "S 3"], Int64[np.ndarray, " S"]]:
-    """Points and labels with those of the surface added for parts that enclose next to nothing."""
+    """Add samples of the surface of parts that enclose next to nothing."""
     areas = np.bincount(parts, face_normals(mesh)[1])
     sheet = np.bincount(labels, minlength=len(areas)) < SHEET * areas / spacing**2
     weights = face_normals(mesh)[1] * sheet[parts]
@@ -151,7 +155,10 @@ def _with_sheets(
 def _on_surface(
     mesh: Mesh, weights: Float64[np.ndarray, " F"], count: int
 ) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]:
-    """Points at equal steps of the faces' summed weights, by a low-discrepancy pattern inside a face; their faces."""
+    """Return points at equal steps of the summed face weights, and the face of each.
+
+    Inside a face, points follow a low-discrepancy pattern (R2, M. Roberts 2018).
+    """
     total = np.cumsum(weights)
     faces = np.searchsorted(total, (np.arange(count) + 0.5) * total[-1] / count)
     u, v = np.mod(np.arange(1, count + 1)[:, None] * np.array([0.7548776662466927, 0.5698402909980532]), 1).T
@@ -162,7 +169,7 @@ def _on_surface(
 
 
 def _without_specks(points: Float64[np.ndarray, "N 3"], labels: Int64[np.ndarray, " N"]) -> Samples:
-    """Samples of the parts that matter, renumbered from the largest."""
+    """Drop the samples of specks and renumber the bodies, largest first."""
     sizes = np.bincount(labels)
     order = np.argsort(-sizes, kind="stable")
     rank = np.full(len(sizes), -1)

@@ -1,6 +1,7 @@
-"""A surface through oriented points: screened Poisson reconstruction, trimmed (the extra `encode`; section 3.3.2).
+"""Screened Poisson reconstruction of a surface through oriented points, trimmed (paper, section 3.3.2).
 
-Poisson closes whatever is open; what it invents far from the points is cut away by density and by distance.
+Poisson reconstruction closes whatever is open; the surface that it invents far from the points is cut away by density
+and by distance. Needs the extra `encode`.
 """
 
 from __future__ import annotations
@@ -22,19 +23,19 @@ from .decimate import decimate
 from .topology import clean, components
 
 _LEAVES = re.compile(rb"\[WARNING\] [^\n]*\n[^\n]*_getValues\n[^\n]*getValue assumes leaf node\n")
-_ONE_AT_A_TIME = threading.Lock()  # the library keeps its state in statics: two threads would spoil each other's bits
+_ONE_AT_A_TIME = threading.Lock()  # the library keeps state in static variables: two threads would change the bits
 
 
 @dataclass(frozen=True, slots=True)
 class PoissonOptions:
-    """How finely to reconstruct and how much of the result to believe."""
+    """Resolution of the reconstruction, and how much of its result to trust."""
 
     depth: int = 9  # of the octree
     trim: float = 2.0  # octree levels below the median density at which surface is cut away
     reach: float = 0.01  # surface farther than this from all points is cut away, in units of the points
-    hole: float = 0.002  # patches to be cut away with less than this share of all faces stay: no pinholes
+    hole: float = 0.002  # untrusted patches with less than this share of all faces are kept, to avoid pinholes
     vertices: int = 15_000  # the closed surface is decimated to this many before it is trimmed
-    smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
+    smallest: float = 0.01  # connected components with less than this share of the largest one's faces are dropped
 
     def __post_init__(self) -> None:
         if self.vertices < 4:
@@ -51,9 +52,9 @@ class PoissonOptions:
 def reconstruct(
     points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], options: PoissonOptions
 ) -> Mesh:
-    """The surface through points with outward normals, where there are points; the empty mesh for too few.
+    """Reconstruct the surface through points with outward normals; fewer than 10 points give the empty mesh.
 
-    One thread, so that the same points give the same bits.
+    Runs in one thread, so that the same points give the same bits.
     """
     import open3d as o3d
 
@@ -61,7 +62,7 @@ def reconstruct(
         return Mesh.empty()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.normals = o3d.utility.Vector3dVector(normals)
-    with _ONE_AT_A_TIME, _no_word_of_leaves():
+    with _ONE_AT_A_TIME, _without_leaf_warnings():
         build = o3d.geometry.TriangleMesh.create_from_point_cloud_poisson
         solid, density = build(cloud, depth=options.depth, n_threads=1)
     whole = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
@@ -74,16 +75,16 @@ def reconstruct(
 
 
 @contextmanager
-def _no_word_of_leaves() -> Iterator[None]:
-    """Holds back what is written to standard error, and gives it on without the library's warnings about leaves.
+def _without_leaf_warnings() -> Iterator[None]:
+    """Filter Open3D's warnings about octree leaves out of what is written to standard error meanwhile.
 
-    There are thousands, whatever is asked of the library, about nothing that a user could mend; no setting ends them.
+    There are thousands of them, they concern nothing that a user could change, and no setting of Open3D ends them.
     """
     with ExitStack() as stack:
         try:
             kept = stack.enter_context(tempfile.TemporaryFile())
             shown = os.dup(2)
-        except OSError:  # no room, or no standard error: then they are seen, or not
+        except OSError:  # no space or no standard error: nothing is filtered
             yield
             return
         os.dup2(kept.fileno(), 2)
@@ -98,7 +99,7 @@ def _no_word_of_leaves() -> Iterator[None]:
 
 
 def drop_small(mesh: Mesh, share: float) -> Mesh:
-    """The mesh without connected bits that have less than this share of the largest one's faces."""
+    """Remove connected components that have less than this share of the faces of the largest one."""
     if mesh.is_empty:
         return mesh
     label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
@@ -109,7 +110,7 @@ def drop_small(mesh: Mesh, share: float) -> Mesh:
 def thin_out(
     points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], cell: float
 ) -> tuple[Float64[np.ndarray, "M 3"], Float64[np.ndarray, "M 3"]]:
-    """One mean point and unit mean normal for each cell of this size and each side of a thin sheet in it."""
+    """Return one mean point and unit mean normal per cell of this size and per side of a thin sheet in it."""
     if len(points) == 0:
         return points, normals
     grid = np.floor((points - points.min(axis=0)) / cell).astype(np.int64)
@@ -125,21 +126,21 @@ def thin_out(
 
 
 def _dense(mesh: Mesh, whole: Mesh, levels: Float64[np.ndarray, " W"], trim: float) -> Bool[np.ndarray, " V"]:
-    """Vertices of the decimated mesh where the points were not much sparser than in the middle."""
+    """Return which vertices of the decimated mesh lie where the points are not much sparser than in the median."""
     from scipy.spatial import cKDTree
 
     return levels[cKDTree(whole.vertices).query(mesh.vertices)[1]] >= np.median(levels) - trim
 
 
 def _gaps(queries: Float64[np.ndarray, "V 3"], points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " V"]:
-    """The distance from each query to the nearest point."""
+    """Return the distance from each query to the nearest point."""
     from scipy.spatial import cKDTree
 
     return cKDTree(points).query(queries)[0]
 
 
 def _holes(mesh: Mesh, cut: Bool[np.ndarray, " F"], share: float) -> Bool[np.ndarray, " F"]:
-    """Of the faces to be cut, those in connected patches so small that a hole there would be worse than a guess."""
+    """Return which of the faces to cut are in patches so small that a hole would be worse than a guessed surface."""
     label = np.zeros(len(mesh.faces), dtype=np.int64)
     label[cut] = 1 + components(mesh.faces[cut], len(mesh.vertices))[mesh.faces[cut][:, 0]]
     size = np.bincount(label)

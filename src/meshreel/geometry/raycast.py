@@ -1,6 +1,7 @@
-"""What rays meet of a mesh: Open3D's ray-casting scene behind one small class (the extra `encode`).
+"""Ray casting on a mesh, by Open3D's ray-casting scene (needs the extra `encode`).
 
-Inside, coordinates are float32 about an origin of the mesh's own, so that far-away worlds keep their millimetres.
+Open3D works in float32; coordinates are taken about an origin near the mesh, so that meshes far from the world's origin
+keep their millimetres.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from .topology import face_normals
 
 @dataclass(frozen=True, slots=True)
 class Hit:
-    """Where each of N rays first meets the surface."""
+    """First intersection of each of N rays with the surface."""
 
     faces: Int32[np.ndarray, " N"]  # -1: none
     distances: Float64[np.ndarray, " N"]  # in lengths of the ray's direction; infinite: none
@@ -29,17 +30,17 @@ class Hit:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a camera sees, pixel by pixel."""
+    """Face and depth that a camera sees at each pixel."""
 
     faces: Int32[np.ndarray, "H W"]  # the paper's eq. 1; -1: none
     depth: Float32[np.ndarray, "H W"]  # m, along the optical axis; infinite: none
 
 
 class Rays:
-    """A mesh prepared for ray casting; faces are met from both sides, and an empty mesh by no ray."""
+    """A mesh prepared for ray casting; rays meet faces from both sides, and no ray meets an empty mesh."""
 
     def __init__(self, mesh: Mesh, origin: Float64[np.ndarray, " 3"] | None = None) -> None:
-        """`origin` is the point about which coordinates are float32; the middle of the box where none is given."""
+        """Prepare a mesh; `origin` is the point about which coordinates become float32, by default the box's middle."""
         import open3d as o3d
 
         self._tensor = o3d.core.Tensor.from_numpy
@@ -52,20 +53,20 @@ class Rays:
 
     @staticmethod
     def of(surface: Surface) -> Rays:
-        """For a mesh that is prepared for closest points, about 0: what has been built for these serves rays, too."""
+        """Reuse the scene of a mesh that is prepared for closest points; coordinates are float32 about 0."""
         rays = Rays(Mesh.empty(), np.zeros(3))
         rays._mesh, rays._scene = surface.mesh, surface.scene
         return rays
 
     def cast(self, origins: Float64[np.ndarray, "N 3"], directions: Float64[np.ndarray, "N 3"]) -> Hit:
-        """What N rays meet first."""
+        """Find the first intersection of each of N rays."""
         answer = self._cast(origins, directions)
         uv = answer["primitive_uvs"].numpy().astype(np.float64)
         barycentric = np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)
         return Hit(_faces(answer), answer["t_hit"].numpy().astype(np.float64), barycentric)
 
     def look(self, camera: PinholeCamera) -> Seen:
-        """What a camera sees."""
+        """Find the face and the depth that a camera sees at each pixel."""
         rays = np.empty((camera.height, camera.width, 6), np.float32)
         rays[..., :3] = camera.eye - self._origin
         for axis, ways in enumerate(_ways(camera)):
@@ -74,7 +75,7 @@ class Rays:
         return Seen(_faces(answer), answer["t_hit"].numpy())
 
     def backs(self, camera: PinholeCamera, seen: Seen) -> Bool[np.ndarray, "H W"]:
-        """Where a camera sees the back of a face; `seen` is what it sees."""
+        """Return where a camera sees the back of a face; `seen` is the result of `look`."""
         if self._mesh.is_empty:
             return np.zeros(seen.faces.shape, bool)
         normals = self._normals[seen.faces]  # of some face where none is seen
@@ -91,14 +92,14 @@ class Rays:
 
 
 def _ways(camera: PinholeCamera) -> Iterator[Float64[np.ndarray, "H W"]]:
-    """Where the ray of each pixel goes, axis by axis of the world; one metre along the optical axis."""
+    """Yield the ray directions of all pixels, one world axis at a time; each goes one metre along the optical axis."""
     columns, rows = np.arange(camera.width) + 0.5, np.arange(camera.height)[:, None] + 0.5
     for right, down, ahead in np.linalg.inv(camera.extrinsic[:3, :3]) @ np.linalg.inv(camera.intrinsic):
         yield right * columns + (down * rows + ahead)
 
 
 def _faces(answer: dict) -> Int32[np.ndarray, "..."]:
-    """A miss is 2^32 - 1 there and -1 here."""
+    """Return the faces that rays hit; a miss, 2^32 - 1 in Open3D, becomes -1."""
     return answer["primitive_ids"].numpy().view(np.int32)
 
 

@@ -1,6 +1,6 @@
 """Rigid motions: weighted least-squares fits, and unit dual quaternions that blend them (paper, section 3.3.2).
 
-Batched array functions. A dual quaternion is a row of 8: real part (w, x, y, z), then dual part (w, x, y, z).
+All functions are batched. A dual quaternion is a row of 8: real part (w, x, y, z), then dual part (w, x, y, z).
 """
 
 from __future__ import annotations
@@ -8,15 +8,15 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64
 
-DEGENERATE = 1e-10  # a singular value below this share of the largest one tells nothing about the rotation
+DEGENERATE = 1e-10  # share of the largest singular value below which one does not constrain the rotation (guess)
 
 
 def fit_rigid(
     source: Float64[np.ndarray, "N n 3"], target: Float64[np.ndarray, "N n 3"], weights: Float64[np.ndarray, "N n"]
 ) -> tuple[Float64[np.ndarray, "N 3 3"], Float64[np.ndarray, "N 3"]]:
-    """Rotations R and translations t that minimise sum w |R source + t - target|^2 in each of N rows (Kabsch).
+    """Fit rotations R and translations t that minimise sum w |R source + t - target|^2 in each of N rows (Kabsch).
 
-    Points on a line, or a single one, leave part of the rotation open: it is then the one nearest to no rotation.
+    Points on a line, or a single point, leave part of the rotation open: the smallest rotation is then taken.
     """
     share = weights / np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
     middle_s = np.einsum("ni,nid->nd", share, source)
@@ -29,16 +29,16 @@ def fit_rigid(
 def from_rigid(
     rotations: Float64[np.ndarray, "N 3 3"], translations: Float64[np.ndarray, "N 3"]
 ) -> Float64[np.ndarray, "N 8"]:
-    """Unit dual quaternions of the motions x -> R x + t."""
+    """Return the unit dual quaternions of the motions x -> R x + t."""
     real = _quaternions(rotations)
     pure = np.concatenate([np.zeros((len(real), 1)), translations], axis=1)
     return np.concatenate([real, multiply(pure, real) / 2], axis=1)
 
 
 def blend(motions: Float64[np.ndarray, "N n 8"], weights: Float64[np.ndarray, "N n"]) -> Float64[np.ndarray, "N 8"]:
-    """The weighted mean of each row's n motions as a unit dual quaternion.
+    """Blend each row's n motions into their weighted mean, a unit dual quaternion.
 
-    q and -q are one rotation: each motion is first flipped to the hemisphere of its row's first one.
+    q and -q are one rotation: each motion is first flipped to the hemisphere of its row's first motion.
     """
     real = motions[..., :4]
     sign = np.where(np.einsum("nik,nk->ni", real, real[:, 0]) < 0, -1.0, 1.0)
@@ -46,32 +46,32 @@ def blend(motions: Float64[np.ndarray, "N n 8"], weights: Float64[np.ndarray, "N
 
 
 def normalize(motions: Float64[np.ndarray, "N 8"]) -> Float64[np.ndarray, "N 8"]:
-    """The nearest unit dual quaternions: |real| = 1 and real . dual = 0."""
+    """Return the nearest unit dual quaternions: |real| = 1 and real . dual = 0."""
     length = np.linalg.norm(motions[:, :4], axis=1, keepdims=True)
     real, dual = motions[:, :4] / length, motions[:, 4:] / length
     return np.concatenate([real, dual - np.sum(real * dual, axis=1, keepdims=True) * real], axis=1)
 
 
 def apply(motions: Float64[np.ndarray, "N 8"], points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-    """Each point moved by its unit dual quaternion."""
+    """Move each point by its unit dual quaternion."""
     real, dual = motions[:, :4], motions[:, 4:]
     translation = 2 * (real[:, :1] * dual[:, 1:] - dual[:, :1] * real[:, 1:] + np.cross(real[:, 1:], dual[:, 1:]))
     return rotate(motions, points) + translation
 
 
 def rotate(motions: Float64[np.ndarray, "N 8"], vectors: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-    """Each vector (a normal, say) turned by its unit dual quaternion, not shifted."""
+    """Rotate each vector, such as a normal, by its unit dual quaternion without translating it."""
     w, axis = motions[:, :1], motions[:, 1:4]
     return vectors + 2 * np.cross(axis, np.cross(axis, vectors) + w * vectors)
 
 
 def inverse(motions: Float64[np.ndarray, "N 8"]) -> Float64[np.ndarray, "N 8"]:
-    """The motions that undo the given ones: the conjugate of a unit dual quaternion."""
+    """Invert motions by conjugating their unit dual quaternions."""
     return motions * np.array([1.0, -1, -1, -1, 1, -1, -1, -1])
 
 
 def multiply(a: Float64[np.ndarray, "N 4"], b: Float64[np.ndarray, "N 4"]) -> Float64[np.ndarray, "N 4"]:
-    """Hamilton products of quaternions (w, x, y, z), row by row."""
+    """Multiply quaternions (w, x, y, z) row by row (Hamilton product)."""
     scalar = a[:, 0] * b[:, 0] - np.sum(a[:, 1:] * b[:, 1:], axis=1)
     vector = a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:] + np.cross(a[:, 1:], b[:, 1:])
     return np.concatenate([scalar[:, None], vector], axis=1)
@@ -88,7 +88,7 @@ def _nearest_rotations(covariances: Float64[np.ndarray, "N 3 3"]) -> Float64[np.
 
 
 def _quaternions(rotations: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 4"]:
-    """Unit quaternions of rotations, from the largest of w, x, y, z so that none is divided by a small one."""
+    """Return unit quaternions of rotations, from the largest of w, x, y, z, to avoid a division by a small one."""
     r = rotations
     trace = np.trace(r, axis1=1, axis2=2)
     d0, d1, d2 = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]

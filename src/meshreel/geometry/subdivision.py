@@ -1,7 +1,7 @@
-"""Midpoint subdivision as levels: connectivity, curved midpoints, and vertices placed along the normals there.
+"""Midpoint subdivision by levels: connectivity, curved midpoints, and new vertices placed along the normals there.
 
-In: faces and the coarser level's vertices in T frames. Out: the finer level's. Both sides of the coder and the analysis
-use it; the arithmetic is the core's, the same to the last bit everywhere.
+Faces and the coarser level's vertices in T frames -> the finer level's vertices. Encoder, decoder and analysis share
+it; the arithmetic is in the core and gives the same bits everywhere.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from ..errors import FormatError
 from ..types import Mesh, Placement
 from .topology import vertex_normals
 
-LEAST_COSINE = 0.3  # between direction and the surface's normal; below, the tangent plane says nothing
+LEAST_COSINE = 0.3  # between direction and surface normal; below it the tangent plane is of no use (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """One midpoint subdivision: what it does to the connectivity."""
+    """Connectivity before and after one midpoint subdivision."""
 
     coarse: Int32[np.ndarray, "F 3"]
     edges: Int32[np.ndarray, "E 2"]  # sorted; edge e has the vertex `vertices + e` in its middle
@@ -30,12 +30,12 @@ class Level:
 
     @property
     def count(self) -> int:
-        """Vertices of the finer mesh."""
+        """Number of vertices of the finer mesh."""
         return self.vertices + len(self.edges)
 
 
 def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
-    """The next level, its vertices in the order of `topology.subdivide_midpoint`.
+    """Subdivide the connectivity once; vertices are in the order of `topology.subdivide_midpoint`.
 
     Raises FormatError where a face names none of the vertices.
     """
@@ -47,7 +47,7 @@ def subdivide(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Level:
 
 
 def levels_of(faces: Int32[np.ndarray, "F 3"], vertices: int, count: int) -> tuple[Level, ...]:
-    """So many levels, one on the other."""
+    """Subdivide the connectivity `count` times and return every level."""
     levels = list[Level]()
     for _ in range(count):
         levels.append(subdivide(faces, vertices))
@@ -58,10 +58,11 @@ def levels_of(faces: Int32[np.ndarray, "F 3"], vertices: int, count: int) -> tup
 def heights(
     wanted: Float64[np.ndarray, "T W 3"], known: Float64[np.ndarray, "T V 3"], level: Level, curvature: int
 ) -> Float64[np.ndarray, "T E"]:
-    """Where each new vertex's line meets the wanted surface, from its curved midpoint; at most an edge's length away.
+    """Return the signed distance from each curved midpoint, along its direction, to the wanted surface.
 
-    `wanted` are places of the finer level's vertices: the surface is the tangent plane there, or, where the line runs
-    along it, the place itself. `known` are the coarser level's, as both sides have them.
+    `wanted` are positions of the finer level's vertices: the surface is the tangent plane at such a vertex or, where
+    the direction runs along that plane, the vertex itself. `known` are the coarser level's vertices as both encoder and
+    decoder have them. No distance exceeds the length of its edge.
     """
     scalars = np.empty((len(wanted), len(level.edges)))
     for t, (target, coarse) in enumerate(zip(wanted, known, strict=True)):
@@ -81,22 +82,22 @@ def heights(
 def refine(
     known: Float64[np.ndarray, "T V 3"], level: Level, scalars: Float64[np.ndarray, "T E"], curvature: int
 ) -> Float64[np.ndarray, "T W 3"]:
-    """The finer level's vertices: the coarser one's, then curved midpoint + scalar x direction for each edge.
+    """Return the finer level's vertices: the coarser ones, then curved midpoint + scalar x direction for each edge.
 
-    The direction is the unit sum of the normals at both ends; `curvature` / 64 of the sagitta that they say is how far
-    the midpoint lies from the edge's.
+    The direction is the unit sum of the normals at both ends. The curved midpoint lies `curvature` / 64 of the sagitta
+    that these normals imply away from the middle of the edge.
     """
     rows = np.ascontiguousarray(known.transpose(1, 2, 0))
     return checked(*_core.refine(rows, level.coarse, level.edges, np.ascontiguousarray(scalars.T), curvature))
 
 
 def frames_of(rows: Float64[np.ndarray, "V 3 T"], place: Placement | None = None) -> Float64[np.ndarray, "T V 3"]:
-    """The frames of rows: all frames of a number are neighbours in memory. FormatError where they are not finite."""
+    """Transpose rows, which hold all frames of a number, to frames. Raises FormatError if a number is not finite."""
     return checked(*_core.frames_of_rows(rows, None if place is None else place.numbers))
 
 
 def checked(frames: Float64[np.ndarray, "T V 3"], finite: bool) -> Float64[np.ndarray, "T V 3"]:
-    """Frames which the core says are finite. Raises FormatError where it does not."""
+    """Return frames that the core found finite; raise FormatError otherwise."""
     if not finite:
         raise FormatError("vertices that are not finite")
     return frames

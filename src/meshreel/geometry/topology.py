@@ -1,6 +1,6 @@
-"""Connectivity: edges, components, welding, normals and midpoint subdivision of triangle meshes.
+"""Connectivity of triangle meshes: edges, components, welding, normals and midpoint subdivision.
 
-Pure array functions on vertices (V x 3) and faces (F x 3); no I/O, no heavy imports: the decoder uses this file.
+Pure array functions on vertices (V x 3) and faces (F x 3), without heavy imports: the decoder uses this file.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..types import Mesh
 
 
 def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]:
-    """Undirected edges (i < j, sorted) and, per face, the edges opposite to none: (01, 12, 20)."""
+    """Return the undirected edges (i < j, sorted) and, for each face, the numbers of its edges 01, 12 and 20."""
     f = faces.astype(np.int64)
     pairs = np.sort(np.stack([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
     count = int(pairs.max()) + 1 if len(pairs) else 1
@@ -23,26 +23,26 @@ def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 
 
 
 def border_mask(edges: Int64[np.ndarray, "E 2"], face_edges: Int64[np.ndarray, "F 3"]) -> Bool[np.ndarray, " E"]:
-    """Which of the `unique_edges` belong to one face only."""
+    """Return which of the `unique_edges` belong to one face only."""
     return np.bincount(face_edges.reshape(-1), minlength=len(edges)) == 1
 
 
 def border_edges(mesh: Mesh) -> Int64[np.ndarray, "B 2"]:
-    """The edges that belong to one face only; none for a closed mesh."""
+    """Return the edges that belong to one face only; a closed mesh has none."""
     edges, face_edges = unique_edges(mesh.faces)
     return edges[border_mask(edges, face_edges)]
 
 
 def edge_lengths(mesh: Mesh) -> Float64[np.ndarray, " E"]:
-    """The length of each of the `unique_edges`, in the unit of the vertices."""
+    """Return the length of each of the `unique_edges`, in the unit of the vertices."""
     ends = mesh.vertices[unique_edges(mesh.faces)[0]]
     return np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
 
 
 def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
-    """The mesh with each triangle cut in four at its edge midpoints, `levels` times (paper, section 3.3.2).
+    """Cut each triangle into four at its edge midpoints, `levels` times (paper, section 3.3.2).
 
-    Old vertices come first and in order; new ones follow in the order of their sorted edges.
+    Old vertices come first, in order; new ones follow in the order of the sorted edges.
     """
     for _ in range(levels):
         edges, face_edges = unique_edges(mesh.faces)
@@ -63,8 +63,8 @@ def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
 
 
 def face_normals(mesh: Mesh) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]:
-    """Unit normals and areas (squared units of the vertices) of the faces; zero normals for zero areas."""
-    axes = [np.ascontiguousarray(axis) for axis in mesh.vertices.T]  # one by one: half the time, the same sums
+    """Return unit normals and areas (squared units of the vertices) of the faces; a zero area has a zero normal."""
+    axes = [np.ascontiguousarray(axis) for axis in mesh.vertices.T]  # axis by axis: half the time, the same sums
     a, b, c = (np.ascontiguousarray(corner) for corner in mesh.faces.T)
     (ux, uy, uz), (vx, vy, vz) = ([axis[to] - axis[a] for axis in axes] for to in (b, c))
     cross = (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
@@ -84,7 +84,7 @@ def blend(
 
 
 def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
-    """Area-weighted unit normals of the vertices; zero where a vertex has no face of positive area."""
+    """Return area-weighted unit normals of the vertices; zero where a vertex has no face with an area."""
     normals, areas = face_normals(mesh)
     weighted = normals * areas[:, None]
     total = np.zeros((len(mesh.vertices), 3))
@@ -96,13 +96,13 @@ def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
 
 
 def vertex_areas(mesh: Mesh) -> Float64[np.ndarray, " V"]:
-    """A third of the area of each vertex's faces, squared units of the vertices."""
+    """Return a third of the area of each vertex's faces, in squared units of the vertices."""
     thirds = np.repeat(face_normals(mesh)[1] / 3, 3)
     return np.bincount(mesh.faces.reshape(-1), thirds, len(mesh.vertices))
 
 
 def weld(mesh: Mesh) -> Mesh:
-    """The mesh with vertices at exactly equal positions merged; faces that collapse are dropped.
+    """Merge vertices at exactly equal positions and drop the faces that collapse.
 
     UV seams duplicate positions; codecs and normals need them to be one vertex.
     """
@@ -117,7 +117,7 @@ def weld(mesh: Mesh) -> Mesh:
 
 
 def clean(mesh: Mesh) -> Mesh:
-    """The mesh without collapsed, zero-area and repeated faces and without vertices that no face uses."""
+    """Remove collapsed, zero-area and repeated faces, then vertices that no face uses."""
     faces = mesh.faces[~_collapsed(mesh.faces)]
     faces = faces[face_normals(Mesh.of(mesh.vertices, faces))[1] > 0]
     _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
@@ -125,26 +125,26 @@ def clean(mesh: Mesh) -> Mesh:
 
 
 def drop_unreferenced(mesh: Mesh) -> Mesh:
-    """The mesh without vertices that no face uses, the others in their order."""
+    """Remove vertices that no face uses; the others keep their order."""
     used = np.zeros(len(mesh.vertices), dtype=bool)
     used[mesh.faces.reshape(-1)] = True
     return Mesh.of(mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces])
 
 
 def part_of(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
-    """The chosen faces alone, and the vertices that they use."""
+    """Return the mesh of the chosen faces and the vertices that they use."""
     return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen]))
 
 
 def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
-    """The chosen faces and all that share a vertex with one of them."""
+    """Return the chosen faces and all faces that share a vertex with one of them."""
     touched = np.zeros(int(faces.max(initial=-1)) + 1, bool)
     touched[faces[chosen]] = True
     return touched[faces].any(axis=1)
 
 
 def concatenate(meshes: Sequence[Mesh]) -> Mesh:
-    """All meshes as one, vertices and faces in their order; the mesh itself where no other has vertices."""
+    """Join meshes into one, vertices and faces in order; if only one has vertices, it is returned itself."""
     meshes = [mesh for mesh in meshes if len(mesh.vertices)] or list(meshes[:1])
     if len(meshes) <= 1:
         return meshes[0] if meshes else Mesh.empty()
@@ -159,7 +159,7 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:
-    """A label 0, 1, ... for each of `count` vertices: the connected component, in order of its first vertex."""
+    """Label each of `count` vertices with its connected component; components are numbered by their first vertex."""
     labels = np.arange(count)
     f = faces.astype(np.int64)
     while True:  # label propagation with pointer jumping: O(log V) rounds

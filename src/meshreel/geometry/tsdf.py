@@ -1,7 +1,7 @@
-"""Signed distances on a sparse grid of blocks, and the surface where they are zero: Open3D's voxel blocks (`encode`).
+"""Truncated signed distances on a sparse grid of Open3D's voxel blocks, and extraction of their zero level.
 
-A voxel is known where its weight is above a threshold; surface is extracted between known voxels only. What is
-extracted is in an order that follows from its place alone, so the same distances give the same mesh.
+A voxel is known where its weight is above a threshold; surface is extracted between known voxels only. Vertices and
+faces are ordered by position alone, so the same distances give the same mesh. Needs the extra `encode`.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ..types import Mesh
 from .depth import DepthPicture
 from .topology import clean, weld
 
-SIDE = 8  # voxels, of a block
-ROOM = 20_000  # blocks that there is room for at first; more is made when needed
-TRUNCATION = 3.0  # voxels that a depth says something about before and behind it
-SEEN = 0.5  # measurements of a voxel above which it counts: one is enough
-MOST_BLOCKS = 500_000  # 2 GB, and as much again while room is made
+SIDE = 8  # voxels along a side of a block (guess)
+ROOM = 20_000  # initial capacity of a grid, blocks; it grows when needed (guess)
+TRUNCATION = 3.0  # voxels before and behind a depth that it constrains (guess)
+SEEN = 0.5  # weight above which a voxel is known: one measurement is enough
+MOST_BLOCKS = 500_000  # bounds memory: 2 GB, and as much again while the grid grows
 
 
 def new_grid(voxel: float, room: int = ROOM) -> Any:
-    """An empty grid with the attributes `tsdf` and `weight`; its voxels are at whole multiples of `voxel`, m."""
+    """Make an empty grid with the attributes `tsdf` and `weight`; its voxels are at whole multiples of `voxel`, m."""
     import open3d as o3d
 
     kinds, one = (o3d.core.float32, o3d.core.float32), o3d.core.SizeVector([1])
@@ -38,9 +38,9 @@ def fill_grid(
     distances: Float32[np.ndarray, "B S S S"],
     weights: Float32[np.ndarray, "B S S S"],
 ) -> Any:
-    """The grid with these blocks; voxel (i, j, k) of a block at its coordinates times SIDE plus i, j, k is [k, j, i].
+    """Make a grid of the given blocks, whose voxel (i, j, k) has the array index [k, j, i].
 
-    Distances are in any unit; the sign is positive outside.
+    A voxel's coordinates are its block's times SIDE, plus (i, j, k). Distances are in any unit, positive outside.
     """
     import open3d as o3d
 
@@ -56,10 +56,11 @@ def fill_grid(
 
 
 def integrate(pictures: Sequence[DepthPicture], voxel: float, truncation: float) -> Any:
-    """The grid of what depth pictures say within `truncation` voxels of their surfaces.
+    """Integrate depth pictures into a grid, within `truncation` voxels of their surfaces.
 
-    Each is integrated into the blocks of all: where one camera sees through what another took for surface (flying
-    pixels, noise), it carves it away. Raises InputError where the surface takes more than `MOST_BLOCKS` blocks.
+    Every picture is integrated into the blocks of all pictures: where one camera sees through what another took for
+    surface (flying pixels, noise), it carves it away. Raises InputError where the surface takes more than `MOST_BLOCKS`
+    blocks.
     """
     grid, blocks = new_grid(voxel), []
     for picture in pictures:
@@ -75,10 +76,10 @@ def integrate(pictures: Sequence[DepthPicture], voxel: float, truncation: float)
 
 
 def _pinhole(picture: DepthPicture) -> tuple[Any, Any, Any]:
-    """Picture, intrinsics and extrinsics as Open3D takes them."""
+    """Return depth, intrinsics and extrinsics of a picture as Open3D takes them."""
     import open3d as o3d
 
-    camera = picture.camera  # whose pixels have their middles at halves: integration cuts projections off
+    camera = picture.camera  # pixel centers at halves, since integration truncates projected positions
     return o3d.t.geometry.Image(_tensor(picture.depth)), _tensor(camera.intrinsic), _tensor(camera.extrinsic)
 
 
@@ -89,13 +90,13 @@ def _tensor(values: np.ndarray) -> Any:
 
 
 def extract(grid: Any, least: float) -> Mesh:
-    """The zero level between voxels whose weight is above `least`; the empty mesh where there is none."""
+    """Extract the zero level between voxels whose weight is above `least`; the mesh may be empty."""
     if grid.hashmap().size() == 0:
         return Mesh.empty()
     try:
         found = grid.extract_triangle_mesh(weight_threshold=least)
     except RuntimeError as error:
-        if "shape {0}" not in str(error):  # it has made no vertices, and fails to color them
+        if "shape {0}" not in str(error):  # Open3D made no vertices and fails to color them
             raise
         return Mesh.empty()
     if "indices" not in found.triangle or len(found.triangle["indices"]) == 0:
@@ -105,7 +106,7 @@ def extract(grid: Any, least: float) -> Mesh:
 
 
 def _ordered(mesh: Mesh) -> Mesh:
-    """No two vertices are in one place."""
+    """Order vertices and faces by position; no two vertices may share one."""
     order = np.lexsort(mesh.vertices.T[::-1])
     rank = np.empty(len(order), np.int32)
     rank[order] = np.arange(len(order), dtype=np.int32)
