@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
-from meshreel.geometry.poisson import PoissonOptions, _no_word_of_leaves, drop_small, reconstruct, thin_out
+from meshreel.geometry.poisson import PoissonOptions, _without_leaf_warnings, drop_small, reconstruct, thin_out
 from meshreel.geometry.topology import face_normals
 from meshreel.types import Mesh
 
@@ -33,7 +33,7 @@ def test_a_coarse_tree_does_not_flood_the_terminal_and_what_else_is_said_is_hear
     monkeypatch.setattr("meshreel.geometry.poisson.decimate", lambda mesh, _: (mesh, os.write(2, b"after\n"))[0])
     reconstruct(0.3 * n, n, PoissonOptions(depth=4, reach=0.1))  # the library warns about its leaves
     assert capfd.readouterr().err == "after\n"
-    with _no_word_of_leaves():
+    with _without_leaf_warnings():
         os.write(2, b"[WARNING] a (Line 1)\n    _getValues\n    getValue assumes leaf node\n[WARNING] another\n")
     assert capfd.readouterr().err == "[WARNING] another\n"
 
