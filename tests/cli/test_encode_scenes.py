@@ -161,7 +161,7 @@ def test_depth_that_is_all_zero_is_told_and_gives_empty_frames(run, rig, tmp_pat
     said = run("encode", rig, "-o", tmp_path / "a.reel")
     assert said.code == 0 and "1 group of form empty" in said.out
     assert said.err.count("measures nothing in 3 of 3 frames looked at") == 2
-    assert failed(run("segment", rig, "-o", tmp_path / "out"), "has a surface; views need one")
+    assert failed(run("segment", rig, "-o", tmp_path / "out"), "has a surface; give a frame with faces")
 
 
 def test_depth_of_eight_bits_is_refused(run, rig, tmp_path):

@@ -76,7 +76,7 @@ def test_masks_move_the_faces_that_they_show(run, scan, painted, tmp_path):
 
 def test_masks_of_more_frames_than_are_read_are_told(run, scan, painted, tmp_path):
     said = run("segment", scan, "-o", tmp_path / "out", "--masks", painted, "--frames", "1:3", "--previews", "0")
-    assert said.code == 0 and "has masks of 2 more frames than the 2 there are" in said.err
+    assert said.code == 0 and "has masks for 2 more frames than the 2 of the sequence" in said.err
 
 
 def test_masks_that_were_painted_in_place_are_not_replaced_by_pictures(run, scan, painted, tmp_path):
@@ -168,4 +168,4 @@ def test_the_help_says_how_labels_are_read(run):
 def test_frames_without_a_surface_have_no_views_and_are_told(run, tmp_path):
     for number in range(2):
         (tmp_path / f"frame_{number}.obj").write_text("v 0 0 0\n")
-    assert failed(run("segment", tmp_path, "-o", tmp_path / "out"), "has a surface; views need one")
+    assert failed(run("segment", tmp_path, "-o", tmp_path / "out"), "has a surface; give a frame with faces")

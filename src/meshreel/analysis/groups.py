@@ -1,6 +1,6 @@
-"""Where a group is cut: by the measured fit of its frames, not by a fixed grid (paper, section 3.3.2: GoF).
+"""Cut groups by the measured fit of their frames rather than on a fixed grid (paper, section 3.3.2: GoF; decision 15).
 
-In -> out: the symmetric residual of each frame's fit -> a frame to cut before, or nothing.
+In -> out: the symmetric residual of each frame's fit -> the frame before which to cut, or None.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from ..errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class GroupOptions:
-    """When a group is cut in two."""
+    """Conditions under which a group is cut in two; the defaults are guesses, `best` sets those of decision 15."""
 
-    limit: float = 2.0  # a frame whose residual is above this many times the target is not followed
-    tolerance: float = 2.0  # nor is one above the target and this many times the group's median
-    depth: int = 1  # cuts inside cuts; frames that are still not followed are coded one by one
-    worth: float = math.inf  # squared targets, mean over a group's frames, that a group more is worth
+    limit: float = 2.0  # a frame is lost if its residual is larger than this many times the target
+    tolerance: float = 2.0  # or larger than the target and than this many times the group's median
+    depth: int = 1  # largest number of nested cuts; frames that are lost after them are coded one by one
+    worth: float = math.inf  # mean squared residual over a group, in squared targets, that is worth another group
 
     def __post_init__(self) -> None:
         if self.limit < 1 or self.tolerance < 1 or self.depth < 0 or not self.worth > 0:
@@ -32,10 +32,10 @@ class GroupOptions:
 
 
 def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int | None:
-    """The frame that should begin a second group, or None where one reference follows all frames.
+    """Return the frame that should begin a second group, or None if one reference follows all frames.
 
-    Residuals are in units of the distance to reach. Of all cuts that one is taken which leaves residuals on both sides
-    most alike (least squares on their logarithms): frames that are followed well and those that are not end up apart.
+    Residuals are in units of the distance to reach. The cut is the one that leaves the residuals on each side most
+    alike (least squares on their logarithms), which separates frames that are followed well from those that are not.
     """
     limit = min(options.limit, max(1.0, options.tolerance * float(np.median(residuals))))
     if len(residuals) < 2 or (residuals.max() <= limit and _excess(residuals).mean() <= options.worth):
@@ -46,9 +46,10 @@ def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int |
 
 
 def leading(residuals: Float64[np.ndarray, " T"], usual: float, options: GroupOptions) -> int:
-    """How many of the first frames a template still follows that usually left `usual`; units of the distance to reach.
+    """Return how many of the first frames a template still follows.
 
-    Until a frame is lost, or until what a new template would save is worth a new group.
+    It stops at the first lost frame, or when the squared residuals beyond `usual`, which it left so far, are worth a
+    new group. Residuals are in units of the distance to reach.
     """
     lost = residuals > options.limit * max(usual, 1.0)
     spent = np.cumsum(np.maximum(residuals**2 - usual**2, 0.0)) > options.worth * len(residuals)
@@ -57,7 +58,7 @@ def leading(residuals: Float64[np.ndarray, " T"], usual: float, options: GroupOp
 
 
 def _excess(residuals: Float64[np.ndarray, " T"]) -> Float64[np.ndarray, " T"]:
-    """Squared residuals above those of the better half of the frames, which a template of their own would leave too."""
+    """Return squared residuals beyond those of the better half of the frames, which any template would leave, too."""
     usual = np.median(np.sort(residuals)[: (len(residuals) + 1) // 2])
     return np.maximum(residuals**2 - usual**2, 0.0)
 

@@ -1,6 +1,6 @@
-"""One pass over a sequence before anything is coded: its bounding box, its empty frames, its intervals.
+"""Survey a sequence in one pass before coding: bounding box, empty frames, intervals, invalid input.
 
-In -> out: MeshSequence -> Survey. Errors of any frame surface here, before minutes are spent on the first ones.
+In -> out: MeshSequence -> Survey. Errors in any frame surface here, before minutes are spent on the first frames.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from ..errors import InputError
 from ..geometry.topology import clean, drop_unreferenced
 from ..types import Mesh, MeshSequence
 
-UNLIKE = 30.0  # times the usual size: a frame of a room that large is in another unit
-LARGEST_RATIO = 10.0  # of the diagonals of two frames in one interval
+UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
+LARGEST_RATIO = 10.0  # largest ratio of the diagonals of two frames in one interval: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """What the encoder must know of the whole sequence."""
+    """Facts about a whole sequence that the encoder needs before it codes the first frame."""
 
     low: Float64[np.ndarray, "3"]  # corner of the sequence's bounding box, m
     high: Float64[np.ndarray, "3"]  # the opposite corner, m
     diagonals: tuple[float, ...]  # of each frame's bounding box, m; 0 for a frame without surface
-    flattened: tuple[int, ...] = ()  # frames that have faces, all without area: they count as empty
-    scale: float | None = None  # m, the unit of normalised coordinates where it is not the bounding box's diagonal
-    dropped: int = 0  # faces without area, or the same three vertices as another, in all frames: they are not kept
+    flattened: tuple[int, ...] = ()  # frames whose faces all have no area: they count as empty
+    scale: float | None = None  # m, unit of normalised coordinates; None: the bounding box's diagonal
+    dropped: int = 0  # faces, over all frames, without area or with the three vertices of another: they are dropped
 
     @property
     def center(self) -> Float64[np.ndarray, "3"]:
@@ -39,20 +39,20 @@ class Survey:
 
     @property
     def diagonal(self) -> float:
-        """Length of the bounding box's diagonal, m."""
+        """Length of the bounding box's diagonal, m; 1 for a box without extent."""
         return float(np.linalg.norm(self.high - self.low)) or 1.0
 
     @property
     def unit(self) -> float:
-        """The unit of normalised coordinates, m."""
+        """Unit of normalised coordinates, m."""
         return self.diagonal if self.scale is None else self.scale
 
     def is_bare(self, frame: int) -> bool:
-        """True for a frame without surface."""
+        """Return whether a frame has no surface."""
         return self.diagonals[frame] == 0
 
     def normalise(self, mesh: Mesh) -> Mesh:
-        """The mesh in normalised coordinates, cleaned and centered."""
+        """Return the mesh cleaned and in normalised coordinates: centered, in multiples of `unit`."""
         mesh = clean(mesh)
         return Mesh.of((mesh.vertices - self.center) / self.unit, mesh.faces)
 
@@ -66,7 +66,7 @@ class Survey:
         return intervals
 
     def _breaks(self) -> Iterator[int]:
-        """Frames that cannot share an interval with the one before: with and without surface, or of another scale."""
+        """Yield the frames that cannot share an interval with the previous ones: empty or not, or of another scale."""
         least = most = self.diagonals[0]
         for number, diagonal in enumerate(self.diagonals):
             least, most = min(least, diagonal), max(most, diagonal)
@@ -77,15 +77,15 @@ class Survey:
 
 @runtime_checkable
 class Counter(Protocol):
-    """Counts frames through stages."""
+    """Counter of the frames that have passed each stage."""
 
     def add(self, stage: str, count: int) -> None: ...
 
 
 def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool = True) -> Survey:
-    """The survey of a sequence, one frame in memory at a time. Raises InputError where there are no frames.
+    """Survey a sequence with one frame in memory at a time. Raises InputError if it is empty or a frame is invalid.
 
-    Where it is not `cleaned`, faces without area count as any others: scenes have too many to look for them.
+    Unless `cleaned`, faces without area count like any others: scenes have too many faces to search for them.
     """
     if len(sequence) == 0:
         raise InputError("the sequence has no frames; give at least one mesh")
@@ -108,9 +108,9 @@ def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool 
 
 
 def check_one_unit(seen: Survey) -> None:
-    """Raises InputError where a frame is far larger than the others, which a room's are not.
+    """Raise InputError if a frame of a scene is far larger than the others, as if its unit were another.
 
-    It would be looked at in as many cells as the square of the ratio.
+    Its segmentation would need more cells by the square of the ratio.
     """
     sizes = [size for size in seen.diagonals if size > 0]
     usual, largest = float(np.median(sizes or [0.0])), max(sizes, default=0.0)
@@ -118,11 +118,14 @@ def check_one_unit(seen: Survey) -> None:
         text = (
             f"frame {seen.diagonals.index(largest)} is {largest:.3g} m large, half of the frames at most {usual:.3g} m"
         )
-        raise InputError(f"{text}; mend its unit, leave it out with --frames, or encode with --dynamic-only")
+        raise InputError(f"{text}; correct its unit, leave it out with --frames, or encode with --dynamic-only")
 
 
 def check(mesh: Mesh, where: str) -> None:
-    """Raises InputError for what files cannot have either (io checks those), but a mesh made in memory may."""
+    """Raise InputError for vertices that are not finite and faces that refer to missing vertices.
+
+    `io` checks files for the same; this is for meshes made in memory.
+    """
     if not np.isfinite(mesh.vertices).all():
         vertex = int(np.argmin(np.isfinite(mesh.vertices).all(axis=1)))
         raise InputError(f"{where}: vertex {vertex} is at {mesh.vertices[vertex].tolist()}; all must be finite")

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from ..analysis.scene.background import BackgroundOptions, fuse_background
-from ..analysis.scene.background_depth import fuse_still_depth
+from ..analysis.scene.background_depth import Moment, fuse_still_depth
 from ..analysis.scene.bodies import ring
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import Masker
@@ -108,7 +108,7 @@ def _background(sequence: MeshSequence, segmentation: Segmentation, options: Bac
 
     if options.depth and isinstance(sequence, SeesDepth):
         meshes = ((number, sequence[number]) for number in numbers)
-        moments = ((sequence.pictures(k), mesh, stands(k, mesh)) for k, mesh in meshes)
+        moments = (Moment(sequence.pictures(k), mesh, stands(k, mesh)) for k, mesh in meshes)
         return fuse_still_depth(moments, cell, options)
 
     def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:

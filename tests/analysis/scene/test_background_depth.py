@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.scene.background import BackgroundOptions
-from meshreel.analysis.scene.background_depth import fuse_still_depth, usual_pictures
+from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth, usual_pictures
 from meshreel.capture.fusion import FusionOptions, fuse_depths
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.depth import SeesDepth
@@ -31,7 +31,7 @@ def moments(depths: list[np.ndarray], moves: float | None = None):
         still = np.ones(len(mesh.faces), bool)
         if moves is not None:
             still = mesh.vertices[mesh.faces].mean(axis=1)[:, 2] > moves
-        found.append(([AHEAD.picture(depth)], mesh, still))
+        found.append(Moment([AHEAD.picture(depth)], mesh, still))
     return found
 
 
@@ -63,7 +63,7 @@ def test_the_usual_depth_is_the_median_of_what_is_measured_and_needs_enough():
     depth = np.full((AHEAD.height, AHEAD.width), 1000, np.uint16)
     others = [depth, np.where(np.arange(AHEAD.width) < 8, 0, depth + 4), depth + 400]
     nothing = Mesh.empty(), np.zeros(0, bool)
-    pictures = [([AHEAD.picture(one.astype(np.uint16))], *nothing) for one in others]
+    pictures = [Moment([AHEAD.picture(one.astype(np.uint16))], *nothing) for one in others]
     usual = usual_pictures(pictures, BackgroundOptions(seen=0.9))[0].depth
     assert (usual[:, :8] == 0).all() and (usual[:, 8:] == 1004).all()
     usual = usual_pictures(pictures, BackgroundOptions(seen=0.1))[0].depth
@@ -80,8 +80,8 @@ def test_faces_that_no_camera_sees_from_the_front_are_dropped():
 
 @pytest.mark.parametrize("pictures", [[None], [], [AHEAD.picture(np.zeros((AHEAD.height, AHEAD.width), np.uint16))]])
 def test_of_nothing_there_is_nothing(pictures):
-    empty = Mesh.empty()
-    assert fuse_still_depth([(pictures, empty, np.zeros(0, bool))] * 3, VOXEL).is_empty
+    empty = Moment(pictures, Mesh.empty(), np.zeros(0, bool))
+    assert fuse_still_depth([empty] * 3, VOXEL).is_empty
 
 
 def test_plain_meshes_have_no_depth():

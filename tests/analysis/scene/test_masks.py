@@ -78,16 +78,16 @@ def test_damage_is_told_before_the_first_mask_is_asked_for(masks: Path):
 def test_masks_of_more_frames_are_remarked(masks: Path):
     assert ImageMasks(masks, 2).remarks == ()
     [line] = ImageMasks(masks, 1).remarks
-    assert "masks of 1 more frames than the 1 there are" in line and str(masks) in line
+    assert "masks for 1 more frames than the 1 of the sequence" in line and str(masks) in line
 
 
 def test_cameras_that_see_nothing_of_the_scene_are_refused(masks: Path):
     away = tuple(replace(view, extrinsic=view.extrinsic + np.diag([0, 0, 1e4], 1)) for view in VIEWS)
     (masks / CAMERAS).write_bytes(pack_cameras(away))
     frames = MeshList((Mesh.empty(), ROOM))
-    with pytest.raises(InputError, match="the 3 cameras that are given see no face of 1 frames, as 1; give cameras of"):
+    with pytest.raises(InputError, match=r"the 3 given cameras see no face in any of 1 frames \(the first is 1\)"):
         segment_by(ImageMasks(masks, 2), frames)
-    with pytest.raises(InputError, match="the 3 cameras that are given see no face"):
+    with pytest.raises(InputError, match="the 3 given cameras see no face"):
         scene_views(frames, SegmentOptions(cameras=away))
 
 
@@ -96,7 +96,7 @@ def test_a_folder_without_cameras_or_with_cameras_of_two_sizes_is_refused(masks:
     with pytest.raises(InputError, match=r"cameras of 80 x 60 and 100 x 60 pixels; give cameras of one size"):
         ImageMasks(masks, 2)
     (masks / CAMERAS).unlink()
-    with pytest.raises(InputError, match=rf"{CAMERAS}: cannot be read .*give the cameras that the masks were made for"):
+    with pytest.raises(InputError, match=rf"{CAMERAS}: cannot be read .*give the cameras of the masks"):
         ImageMasks(masks, 2)
     with pytest.raises(InputError, match="nothing: has 0 cameras"):
         one_size([], "nothing")

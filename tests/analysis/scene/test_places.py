@@ -10,7 +10,7 @@ import pytest
 
 from meshreel.analysis.scene import places as module
 from meshreel.analysis.scene.cut import moving_places
-from meshreel.analysis.scene.places import Places, PlacesOptions, Watched, find_places, look
+from meshreel.analysis.scene.places import Observations, Places, PlacesOptions, find_places, states
 from meshreel.analysis.scene.views import place_views
 from meshreel.errors import InputError
 from meshreel.geometry.depth import DepthPicture
@@ -39,14 +39,14 @@ class Seen:
 
 
 def each_frame(frames, views, options: PlacesOptions = PlacesOptions()) -> Seen:
-    found = find_places(Watched(frames, views), LATTICE, options)
-    occupied, free = zip(*look(Watched(frames, views), range(len(frames)), found, options), strict=True)
+    found = find_places(Observations(frames, views), LATTICE, options)
+    occupied, free = zip(*states(Observations(frames, views), range(len(frames)), found, options), strict=True)
     return Seen(np.stack(occupied), np.stack(free))
 
 
 @pytest.fixture(scope="module")
 def places(views) -> Places:
-    return find_places(Watched(FRAMES, views), LATTICE)
+    return find_places(Observations(FRAMES, views), LATTICE)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_normals_are_those_of_what_was_there(places):
 
 
 def test_the_order_of_time_does_not_matter(places, views, seen):
-    back = find_places(Watched(FRAMES[::-1], views), LATTICE)
+    back = find_places(Observations(FRAMES[::-1], views), LATTICE)
     assert np.array_equal(back.keys, places.keys) and np.array_equal(back.beside, places.beside)
     rows = each_frame(FRAMES[::-1], views)
     assert np.array_equal(rows.free, seen.free[::-1]) and np.array_equal(rows.occupied, seen.occupied[::-1])
@@ -95,7 +95,7 @@ def test_the_order_of_time_does_not_matter(places, views, seen):
 
 
 def test_the_same_frames_have_the_same_places(places, views):
-    again = find_places(Watched(list(FRAMES), views), LATTICE)
+    again = find_places(Observations(list(FRAMES), views), LATTICE)
     for name in ("keys", "beside", "normals"):
         assert getattr(again, name).tobytes() == getattr(places, name).tobytes()
     for name in ("occupied", "free"):
@@ -117,7 +117,7 @@ def test_what_is_counted_is_what_each_frame_says(places, seen):
 
 def test_places_do_not_depend_on_how_many_frames_are_in_memory_together(places, views, monkeypatch):
     monkeypatch.setattr(module, "_TOGETHER", 1)
-    alone = find_places(Watched(FRAMES, views), LATTICE)
+    alone = find_places(Observations(FRAMES, views), LATTICE)
     for name in ("keys", "beside", "normals", "free_share"):
         assert getattr(alone, name).tobytes() == getattr(places, name).tobytes()
     for name in ("before", "after"):
@@ -129,7 +129,7 @@ def test_memory_does_not_grow_with_the_number_of_frames(views):
 
     def peak(count: int) -> int:
         tracemalloc.start()
-        find_places(Watched(Again(count), views), LATTICE)
+        find_places(Observations(Again(count), views), LATTICE)
         size = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return size
@@ -167,7 +167,7 @@ def test_the_back_of_a_face_says_nothing_of_what_is_before_it():
     wall = Mesh.of(room().vertices, room().faces[:, ::-1])
     frames = [wall, moved(wall, (0, 0, 0.3))]
     there = place_views([room()], SEGMENT.views)
-    assert not find_places(Watched(frames, there), LATTICE).tally.free.any()
+    assert not find_places(Observations(frames, there), LATTICE).tally.free.any()
 
 
 TABLE = moved(plane(0.8, 14), (0.8, 0.8, 0.5))
@@ -188,7 +188,7 @@ def test_what_no_camera_looked_past_is_not_known_to_be_free(views, hidden, free)
     """A hole in a surface: something went, or somebody stands before it. The views look through it either way."""
     frames = [WITH, WITHOUT]
     pictures = [[measured(WITH, view) for view in views], [measured(WITHOUT, view, hidden) for view in views]]
-    places, known = (find_places(Watched(frames, views, sees), LATTICE) for sees in (None, pictures.__getitem__))
+    places, known = (find_places(Observations(frames, views, sees), LATTICE) for sees in (None, pictures.__getitem__))
     table = (np.abs(places.middles[:, 2] - 0.5) < CELL) & (np.abs(places.middles[:, :2] - 1.2) < 0.3).all(axis=1)
     assert table.sum() > 50 and (places.tally.free[table] == 1).mean() > 0.9
     share = (known.tally.free[table] == 1).mean()
@@ -199,7 +199,7 @@ def test_what_one_camera_looks_past_is_free_though_no_view_sees_it(views):
     """Somebody close to the camera: the views see surfaces from where these are seen best, and not what is before."""
     frames, away = [WITH, WITHOUT], [turned_away(view) for view in views]
     pictures = [[measured(mesh, views[0])] for mesh in frames]
-    none, known = (find_places(Watched(frames, away, sees), LATTICE) for sees in (None, pictures.__getitem__))
+    none, known = (find_places(Observations(frames, away, sees), LATTICE) for sees in (None, pictures.__getitem__))
     assert not none.tally.free.any()
     looked_past = known.tally.free > 0
     depth = (known.middles @ views[0].extrinsic[2, :3]) + views[0].extrinsic[2, 3]
@@ -215,11 +215,11 @@ def turned_away(view):
 def test_where_no_camera_usually_measures_anything_views_decide(views):
     """In a window, beyond the range, or where all cameras lack the frames."""
     frames = [WITH, WITHOUT]
-    alone = find_places(Watched(frames, views), LATTICE)
+    alone = find_places(Observations(frames, views), LATTICE)
     blind = measured(WITHOUT, views[0])
     blind = DepthPicture(views[0], np.zeros_like(blind.depth), 1.0, 10.0)
     for pictures in ([blind], [None]):
-        found = find_places(Watched(frames, views, lambda _, given=pictures: given), LATTICE)
+        found = find_places(Observations(frames, views, lambda _, given=pictures: given), LATTICE)
         assert np.array_equal(found.tally.free, alone.tally.free)
 
 

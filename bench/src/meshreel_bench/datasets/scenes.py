@@ -19,7 +19,7 @@ from jaxtyping import Bool
 from meshreel import geometry
 from meshreel.analysis.scene import segmentation as segmenter
 from meshreel.analysis.scene.background import BackgroundOptions
-from meshreel.analysis.scene.background_depth import fuse_still_depth
+from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment
 from meshreel.capture import demo_room
 from meshreel.capture.fusion import FusionOptions
@@ -89,7 +89,7 @@ class SceneData:
     def _fused(self, source: str) -> Mesh:
         options = BackgroundOptions()
         meshes = ((number, self.meshes[number]) for number in evenly(len(self.meshes), options.frames))
-        moments = ((self.meshes.pictures(k), mesh, ~self.labels(k, source)) for k, mesh in meshes)
+        moments = (Moment(self.meshes.pictures(k), mesh, ~self.labels(k, source)) for k, mesh in meshes)
         return fuse_still_depth(moments, FusionOptions().voxel, options)
 
 

@@ -1,7 +1,7 @@
-"""The room without the people: what stands still in many frames, fused over time (paper, section 3.2).
+"""Fuse the still surface of many frames into one background mesh (paper, section 3.2; decision 19).
 
-In: what does not move of some frames. Out: one mesh. Signed distances to each frame's surface are averaged, so noise
-averages out; what people hide in one frame is there in others.
+In: the still faces of some frames. Out: one mesh. Signed distances to the surfaces of the frames are averaged, so noise
+averages out, and surface that people hide in one frame comes from others.
 """
 
 from __future__ import annotations
@@ -20,46 +20,46 @@ from ...geometry.tsdf import SIDE, extract, fill_grid
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
-_REACH = 1.5  # voxels on both sides of a surface that know their distance to it: cubes that it goes through, and noise
+_REACH = 1.5  # voxels: distances are kept this far from a surface, enough for the cubes it crosses, and noise; a guess
 
 
 @dataclass(frozen=True, slots=True)
 class BackgroundOptions:
-    """How frames become one background."""
+    """Options of the fusion of frames into one background (values: decision 19)."""
 
-    frames: int = 20  # fused, at most, spread over the sequence
-    depth: bool = True  # from the cameras' depth where the sequence has it
-    seen: float = 0.15  # share of the frames that must have surface somewhere
-    steady: float = 0.6  # voxels, standard deviation: where distances vary more, something has flown
-    past: float = 0.5  # voxels past a border that its surface is taken to go on: less, and borders recede
-    finer: float = 0.75  # voxels of the frames' grid that one is from depth: what is averaged has less noise
-    facing: float = 0.3  # cosine: faces that no camera sees more from the front are of pixels between two surfaces
+    frames: int = 20  # largest number of fused frames, spread over the sequence
+    depth: bool = True  # fuse the cameras' depth pictures if the sequence has them
+    seen: float = 0.15  # smallest share of the frames that must have surface at a voxel
+    steady: float = 0.6  # voxels: where the standard deviation of the distances is larger, the surface was not still
+    past: float = 0.5  # voxels by which a surface is continued past its border, so that borders do not recede
+    finer: float = 0.75  # voxel of a fusion from depth, in voxels of the frames: averaged depth has less noise
+    facing: float = 0.3  # cosine: faces that no camera sees more frontally lie between two real surfaces
     fragment: float = 0.02  # m^2: connected pieces with less area are dropped
     coarse: float = 0.75  # RMS distance from the fused surface that decimation may cost, in RMS noise of a frame
-    lattice: float = 0.67  # spacing of the lattice, in the same
-    refresh: float | None = None  # s from one copy of the background in the file to the next; None: one for all
+    lattice: float = 0.67  # spacing of the lattice, in RMS noise of a frame
+    refresh: float | None = None  # s between two copies of the background in the file; None: one copy
 
     def __post_init__(self) -> None:
         if not (self.coarse > 0 and self.lattice > 0 and (self.refresh is None or self.refresh > 0)):
             raise InputError(
-                f"background: coarse {self.coarse:g}, lattice {self.lattice:g}, refresh {self.refresh} s: give above 0"
+                f"background: coarse {self.coarse:g}, lattice {self.lattice:g}, refresh {self.refresh} s: give > 0"
             )
         if self.frames < 1 or not 0 <= self.seen < 1 or not 0 <= self.fragment < np.inf or not self.steady > 0:
             raise InputError(
                 f"background of {self.frames} frames, seen {self.seen:g}, fragment {self.fragment:g}, steady "
-                f"{self.steady:g}: give >= 1, 0 to below 1, from 0 on, and above 0"
+                f"{self.steady:g}: give >= 1, 0 to below 1, >= 0, and > 0"
             )
         if not 0 <= self.past <= 1 or not 0.1 <= self.finer <= 1 or not 0 <= self.facing < 1:
             text = f"background past {self.past:g}, finer {self.finer:g}, facing {self.facing:g}"
             raise InputError(f"{text}: give 0 to 1, 0.1 to 1, and 0 to below 1")
 
     def least(self, count: int) -> int:
-        """How many of so many frames must have surface somewhere."""
+        """Return how many of `count` frames must have surface at a voxel."""
         return max(1, math.ceil(self.seen * count))
 
 
 def fuse_background(frames: Iterable[Mesh], voxel: float, options: BackgroundOptions = BackgroundOptions()) -> Mesh:
-    """The mean surface of meshes of one still scene, about a voxel (m) fine; one of them in memory at a time."""
+    """Fuse meshes of one still scene into their mean surface, on a grid of `voxel` (m); reads one mesh at a time."""
     sums = _Sums(voxel, options)
     count = 0
     for mesh in frames:
@@ -69,9 +69,9 @@ def fuse_background(frames: Iterable[Mesh], voxel: float, options: BackgroundOpt
 
 
 class _Sums:
-    """Distances of voxels near any surface so far: their sum, that of their squares, and of how many frames.
+    """Sums of the signed distances of voxels near any added surface, of their squares, and counts of frames.
 
-    Inside, coordinates are about an origin near the first surface: distances are float32, and scenes may be far away.
+    Coordinates are taken relative to a point near the first surface: distances are float32, and a scene may be far off.
     """
 
     def __init__(self, voxel: float, options: BackgroundOptions) -> None:
@@ -81,7 +81,7 @@ class _Sums:
         self._sums, self._squares, self._counts = np.zeros(0), np.zeros(0), np.zeros(0, np.int32)
 
     def add(self, mesh: Mesh) -> None:
-        """Takes in a frame."""
+        """Add the distances of the voxels near the surface of a frame."""
         if mesh.is_empty:
             return
         if self._origin is None:
@@ -98,7 +98,7 @@ class _Sums:
         self._keys, self._sums, self._squares, self._counts = union, sums, squares, counts
 
     def surface(self, least: int) -> Mesh:
-        """Where the mean distance is zero, among voxels that at least so many frames know, and all alike."""
+        """Extract the zero of the mean distance, over voxels that at least `least` frames know and agree on."""
         means = self._sums / np.maximum(self._counts, 1)
         varies = np.sqrt(np.maximum(self._squares / np.maximum(self._counts, 1) - means**2, 0))
         known = (self._counts >= least) & (varies <= self._options.steady * self._lattice.size)
@@ -117,9 +117,12 @@ class _Sums:
         return Mesh(mesh.vertices + self._origin, mesh.faces)
 
     def _signed(self, mesh: Mesh) -> tuple[Int64[np.ndarray, " M"], Float64[np.ndarray, " M"]]:
-        """The voxels within reach of a surface, and their distances; past a border, from the plane of its face."""
+        """Return the keys of the voxels within reach of a surface and their signed distances to it.
+
+        Past a border the distance is that to the plane of the nearest face.
+        """
         size = self._lattice.size
-        keys = around(distinct(self._lattice.keys(spread(mesh, size)[0])))  # all that is nearer than `_REACH`
+        keys = around(distinct(self._lattice.keys(spread(mesh, size)[0])))  # includes all within `_REACH`
         points, surface = self._lattice.centers(keys), Surface(mesh)
         hits = surface.closest(points)
         away = points - hits.points

@@ -1,13 +1,14 @@
-"""The room without the people from what depth cameras measured over time: the usual depth of each pixel, fused.
+"""Fuse the usual depth of every pixel over time into one background mesh (docs/decisions/0019-background.md).
 
-In: frames' depth pictures, with their meshes and what stands still of them. Out: one mesh. Of pixels between two
-surfaces a median takes one of both, and noise goes before there is a surface, so the voxels may be finer than those of
-the frames. Cameras stand still: a sequence that knows its depths has made sure of it.
+In: the depth pictures of frames, their meshes, and the still faces of these. Out: one mesh. The median over time avoids
+depths between two surfaces and removes noise before fusion, so voxels may be finer than those of the frames. Cameras
+must not move; a sequence that offers depth pictures has checked that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float32
@@ -20,13 +21,20 @@ from ...geometry.tsdf import SEEN, TRUNCATION, extract, integrate
 from ...types import Mesh
 from .background import BackgroundOptions
 
-BESIDE = 3  # pixels around what moves that are not believed
+BESIDE = 3  # pixels around moving surface that are ignored: a guess
 
-Moment = tuple[list[DepthPicture | None], Mesh, Bool[np.ndarray, " _"]]  # pictures, the mesh of them, its still faces
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One frame of a scene: its depth pictures, its mesh, and the still faces of the mesh."""
+
+    pictures: list[DepthPicture | None]  # one for each camera
+    mesh: Mesh
+    still: Bool[np.ndarray, " F"]
 
 
 def fuse_still_depth(moments: Iterable[Moment], voxel: float, options: BackgroundOptions = BackgroundOptions()) -> Mesh:
-    """The surface that stands still in what cameras measured in some moments; `voxel` is that of the frames, m."""
+    """Fuse the still surface in the depth pictures of some moments; `voxel` (m) is that of the frames' meshes."""
     usual = usual_pictures(moments, options)
     if not usual:
         return Mesh.empty()
@@ -35,15 +43,15 @@ def fuse_still_depth(moments: Iterable[Moment], voxel: float, options: Backgroun
 
 
 def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = BackgroundOptions()) -> list[DepthPicture]:
-    """For each camera the median depth of every pixel, over the moments in which it sees what stands still."""
+    """Return for each camera the median depth of every pixel over the moments in which it sees still surface."""
     stacks: dict[int, list[np.ndarray]] = {}
     cameras: dict[int, DepthPicture] = {}
-    for pictures, mesh, still in moments:
-        rays = Rays(mesh)
-        for number, picture in enumerate(pictures):
+    for moment in moments:
+        rays = Rays(moment.mesh)
+        for number, picture in enumerate(moment.pictures):
             if picture is not None:
                 cameras[number] = picture
-                stacks.setdefault(number, []).append(_still(picture, rays, still))
+                stacks.setdefault(number, []).append(_still(picture, rays, moment.still))
     found = list[DepthPicture]()
     for number, stack in sorted(stacks.items()):
         depth = _medians(np.stack(stack), options.least(len(stack)))
@@ -53,7 +61,7 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
 
 
 def _still(picture: DepthPicture, rays: Rays, still: Bool[np.ndarray, " F"]) -> np.ndarray:
-    """The depths that are not of what moves, nor beside it; 0 for the others."""
+    """Return the depths of a picture with 0 for pixels that see moving faces or lie within `BESIDE` pixels of those."""
     from scipy.ndimage import binary_dilation
 
     faces = rays.look(picture.camera).faces
@@ -63,7 +71,7 @@ def _still(picture: DepthPicture, rays: Rays, still: Bool[np.ndarray, " F"]) -> 
 
 
 def _medians(stack: np.ndarray, least: int) -> Float32[np.ndarray, "H W"]:
-    """Of what is not 0; 0 where that is fewer than `least`."""
+    """Return for each pixel the median of its depths other than 0; 0 if there are fewer than `least`."""
     depths = np.sort(np.where(stack > 0, stack, np.inf).astype(np.float32), axis=0)
     count = np.isfinite(depths).sum(axis=0)
     low, high = (np.take_along_axis(depths, np.maximum(at, 0)[None], 0)[0] for at in ((count - 1) // 2, count // 2))
@@ -71,7 +79,7 @@ def _medians(stack: np.ndarray, least: int) -> Float32[np.ndarray, "H W"]:
 
 
 def _facing(mesh: Mesh, pictures: list[DepthPicture], least: float) -> Mesh:
-    """Without faces that no camera sees from the front: cosine of the angle to its ray, at least."""
+    """Drop the faces that no camera sees frontally, with at least this cosine between its ray and the normal."""
     if mesh.is_empty:
         return mesh
     normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)

@@ -1,8 +1,8 @@
-"""The bodies in a run of frames: connected pieces of what moves, followed over time (paper, section 3.3).
+"""Find the bodies of an interval: connected pieces of moving surface, followed over time (paper, section 3.3).
 
-In: the moving part of each frame. Out: bodies, each with a mesh in every frame, empty where it is not there. Pieces
-that touch in any frame are one body for the whole run. Bits that last are bodies, too: a template that follows a
-person does not follow what lies beside him. Others belong to the body that they are beside.
+In: the moving faces of each frame. Out: bodies, each with one mesh per frame, empty in frames without it. Pieces that
+touch in any frame are one body in the whole interval. Small pieces that last are separate bodies, because a template
+that follows a person does not follow an object at their side; other small pieces join the body near them.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from ...geometry.topology import concatenate, face_normals, part_of, with_neighb
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
-MOST_RINGS = 4  # around what moves, where the background ends short of it
-RING = 2.0  # cells: the longest edges of a body's ring; a wall of a few faces is no part of it
+MOST_RINGS = 4  # largest number of rings added around moving faces where the background has a gap: a guess
+RING = 2.0  # cells, the longest edge of a face in a ring, so that large faces of a wall stay out of it: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class BodyOptions:
-    """What counts as one body."""
+    """Options that decide which pieces form one body; all values are guesses."""
 
-    cell: float = 3.0  # cells of the scene: pieces of neighbour frames that come as near as this are one
-    least: float = 0.1  # m^2: pieces that never have as much surface are bits
-    lasts: int = 5  # frames; bits that are there for as many are a body of their own
-    beside: float = 0.5  # m: bits that do not last, no farther from a body, belong to it; the others are dropped
+    cell: float = 3.0  # cells of the scene: pieces of consecutive frames nearer than this are one
+    least: float = 0.1  # m^2: pieces that never reach this area are bits
+    lasts: int = 5  # frames: bits that are present in at least this many are a body of their own
+    beside: float = 0.5  # m: other bits at most this far from a body join it; those farther off are dropped
 
     def __post_init__(self) -> None:
         if not self.cell >= 1 or not min(self.least, self.beside) >= 0 or self.lasts < 1:
@@ -43,27 +43,27 @@ class BodyOptions:
 
 @dataclass(frozen=True, slots=True)
 class Bodies:
-    """The bodies of a run of frames, and what belongs to none."""
+    """Bodies of consecutive frames, and the number of faces that belong to none."""
 
-    meshes: list[list[Mesh]]  # of each body, of each frame
-    dropped: int  # faces of bits that were only there for a moment
+    meshes: list[list[Mesh]]  # for each body, one mesh per frame
+    dropped: int  # faces of short-lived bits far from every body
 
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """A connected piece of one frame."""
+    """A connected component of the moving surface of one frame."""
 
     frame: int
     mesh: Mesh
     area: float  # m^2
-    cells: Int64[np.ndarray, " C"]  # keys of the coarse cells it lies in
+    cells: Int64[np.ndarray, " C"]  # keys of the coarse cells in which it has surface
 
 
 def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndarray, " F"]:
-    """Small faces around those that move, which go with the body and not into the background; cells are in m.
+    """Return True for the small faces next to moving ones, which go with the body; `cell` is in m.
 
     Where a foot stands, fused surface runs from the floor up to it, a cell wide: it rests as long as the foot does, but
-    the floor is all that is there in other frames. Without it bodies would hover by a cell.
+    other frames have only the floor there. Without these faces bodies would hover by a cell.
     """
     found = with_neighbours(mesh.faces, moves) & ~moves
     corners = mesh.vertices[mesh.faces[found]]
@@ -73,8 +73,10 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
 
 
 def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Outline | None = None) -> Mesh:
-    """What moves of a frame, as bodies are coded: with its `ring`, and more of them as far as the background ends
-    short of it. A background of depth pictures leaves out some pixels around what moves: coarse ones are wide.
+    """Cut the moving faces out of a frame together with the `ring` around them, as bodies are coded.
+
+    Where the background has a gap there, more rings are added: a background fused from depth pictures lacks some pixels
+    around moving surface, and pixels of coarse pictures are wide.
     """
     found = moves | ring(mesh, moves, cell)
     if background is None or not moves.any():
@@ -89,7 +91,7 @@ def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background
 
 
 def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = BodyOptions()) -> Bodies:
-    """The bodies in what moves of consecutive frames; `size` is that of the scene's cells, m."""
+    """Find the bodies in the moving surface of consecutive frames; `size` is the width of the scene's cells, m."""
     lattice = _lattice(moving, options.cell * size)
     pieces = [piece for frame, mesh in enumerate(moving) for piece in _pieces(frame, mesh, lattice)]
     label = _linked(pieces)
@@ -105,7 +107,7 @@ def find_bodies(moving: Sequence[Mesh], size: float, options: BodyOptions = Body
 
 
 def at_most(bodies: Sequence[list[Mesh]], most: int) -> list[list[Mesh]]:
-    """So many bodies: the smallest of more become part of that which they are nearest to, by their middles."""
+    """Reduce the number of bodies to `most`: each of the smallest joins the kept body with the nearest middle."""
     if len(bodies) <= most:
         return list(bodies)
     middles = np.array([np.concatenate([mesh.vertices for mesh in body]).mean(axis=0) for body in bodies])
@@ -118,9 +120,10 @@ def at_most(bodies: Sequence[list[Mesh]], most: int) -> list[list[Mesh]]:
 
 
 def same_bodies(before: Sequence[Mesh], now: Sequence[Mesh], size: float, options: BodyOptions) -> list[int]:
-    """For each mesh of a frame the number, among those of the frame before, of the one it continues; -1 for none.
+    """Match the bodies of a frame to those of the frame before by the cells that they share.
 
-    Each is continued by one at most: by that which shares most cells with it.
+    Return for each body in `now` the index in `before` of the body that it continues, -1 for none. No body is continued
+    twice.
     """
     lattice = _lattice([*before, *now], options.cell * size)
     cells = [[around(_cells(mesh, lattice)) for mesh in meshes] for meshes in (before, now)]
@@ -154,7 +157,7 @@ def _cells(mesh: Mesh, lattice: Lattice) -> Int64[np.ndarray, " C"]:
 
 
 def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
-    """A number for each piece: the same for those that come near each other in frames one behind the other."""
+    """Label the pieces: pieces that come near each other in consecutive frames have one label."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -180,7 +183,7 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
 
 
 def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, options: BodyOptions) -> int:
-    """Makes bits that last a body, and gives each of the others to the nearest body of its frame. Faces dropped."""
+    """Make lasting bits a body, else add each to the nearest body of its frame; return the number of dropped faces."""
     if len({bit.frame for bit in bits}) >= options.lasts:
         body: list[list[Mesh]] = [[] for _ in range(frames)]
         for bit in bits:
@@ -199,7 +202,7 @@ def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, opti
 
 
 def _gap(mesh: Mesh, others: list[Mesh]) -> float:
-    """The distance of a bit's nearest vertex to the nearest vertex of others, m."""
+    """Return the smallest distance between a vertex of `mesh` and one of `others`, m."""
     from scipy.spatial import cKDTree
 
     points: Float64[np.ndarray, "N 3"] = np.concatenate([other.vertices for other in others])

@@ -1,9 +1,9 @@
-"""Which places belong to what moves: a minimum cut between what is seen free and what never is.
+"""Separate moving places from resting ones by a minimum cut (docs/decisions/0018-places.md).
 
-In: what happens at each place over time. Out: the places that are not the room's. A place that is seen free now and
-then is left or entered by something that moves; one that never is may still be part of it (the trunk of somebody who
-stands), so the border between both runs where it is short and where surfaces meet at a hollow edge: under a foot, not
-through a leg. What leaves its places for long has no part that never moves, so growth ends there.
+In: the counts of what was observed at each place. Out: the moving places. A place that is sometimes seen free is left
+or entered by something that moves. One that never is may be part of it, too (the trunk of a standing person), so the
+border runs where it is short and where surfaces meet at a concave edge: under a foot, not through a leg. A body that
+leaves all its places has no part that never moves, so growth from such places is expensive.
 """
 
 from __future__ import annotations
@@ -17,34 +17,34 @@ from jaxtyping import Bool, Float64, Int32, Int64
 from ...errors import InputError
 from .places import Places
 
-_UNIT = 20  # integer capacity of a link of weight 1
-_AROUND = 64  # places seen free whose share is taken for that of their neighbourhood
+_UNIT = 20  # integer capacity of a link of weight 1: a guess
+_AROUND = 64  # nearest places seen free whose mean share describes a neighbourhood: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class CutOptions:
-    """What a place costs on either side of the cut, in links between neighbours."""
+    """Costs of a place on either side of the cut, in units of a link between neighbours (decision 18)."""
 
-    share: float = 0.03  # of the frames that know a place: seen free in more, it is evidence
-    evidence: float = 30.0  # of a place that is always seen free
-    still: tuple[float, float] = (0.2, 0.3)  # of a place that moves: always, and where the places around are all free
-    hollow: float = 6.0  # how fast a link weakens with the turn of the normals towards each other
-    reach: float = 0.8  # m, that what moves may go beyond what is seen free
-    fewest: int = 60  # connected places seen free, or they are noise
-    least: float = 0.32  # m^2 that connected moving places cover over time, or they are flicker
+    share: float = 0.03  # smallest share of frames in which a place must be seen free to be evidence of motion
+    evidence: float = 30.0  # cost of calling a place still that is always seen free
+    still: tuple[float, float] = (0.2, 0.3)  # cost of calling a place moving: constant, and times the shares around it
+    hollow: float = 6.0  # rate at which a link weakens as the normals at its ends turn towards each other
+    reach: float = 0.8  # m: moving places lie no farther than this from places that are seen free
+    fewest: int = 60  # smaller connected sets of places that are seen free are noise
+    least: float = 0.32  # m^2: connected moving places that cover less area over time are flicker
 
     def __post_init__(self) -> None:
         if not 0 < self.share < 1 or min(self.evidence, *self.still, self.hollow, self.fewest) < 0:
             raise InputError(
                 f"share {self.share:g}, evidence {self.evidence:g}, still {self.still}, hollow {self.hollow:g}, "
-                f"fewest {self.fewest}: give a share in (0, 1), the others from 0 on"
+                f"fewest {self.fewest}: give a share in (0, 1), and >= 0 for the others"
             )
         if not (self.reach > 0 and self.least >= 0):
-            raise InputError(f"reach {self.reach:g} m, least {self.least:g} m^2: give above 0, and from 0 on")
+            raise InputError(f"reach {self.reach:g} m, least {self.least:g} m^2: give > 0 and >= 0")
 
 
 def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np.ndarray, " P"]:
-    """The places where what is there, whenever something is, moves."""
+    """Return True for each place whose surface belongs to something that moves."""
     share = places.free_share
     seeds = _large(places, share >= options.share, options.fewest)
     moving = np.zeros(len(places.keys), bool)
@@ -65,7 +65,10 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
 def connected(
     places: Places, chosen: Int64[np.ndarray, " C"], alike: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
 ) -> Int64[np.ndarray, " C"]:
-    """A number for each of some places: the same for those connected by neighbours that are alike, if that is asked."""
+    """Label the connected components among the chosen places; C labels from 0 on.
+
+    `alike` receives the ends of all links, as indices into `chosen`, and returns which links connect; all by default.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -78,7 +81,7 @@ def connected(
 
 
 def _large(places: Places, chosen: Bool[np.ndarray, " P"], fewest: int) -> Bool[np.ndarray, " P"]:
-    """The chosen places that are connected to so many others."""
+    """Return the chosen places whose connected component has at least `fewest` places."""
     own = np.flatnonzero(chosen)
     label = connected(places, own)
     kept = np.zeros(len(chosen), bool)
@@ -87,7 +90,7 @@ def _large(places: Places, chosen: Bool[np.ndarray, " P"], fewest: int) -> Bool[
 
 
 def _links(places: Places, chosen: Int64[np.ndarray, " C"]) -> tuple[Int64[np.ndarray, " L"], Int64[np.ndarray, " L"]]:
-    """Neighbours among the chosen places, each pair once, by their numbers among the chosen."""
+    """Return the pairs of neighbours among the chosen places, each once, as indices into `chosen`."""
     number = np.full(len(places.keys), -1)
     number[chosen] = np.arange(len(chosen))
     first = np.repeat(np.arange(len(chosen)), places.beside.shape[1])
@@ -99,7 +102,7 @@ def _links(places: Places, chosen: Int64[np.ndarray, " C"]) -> tuple[Int64[np.nd
 def _within(
     points: Float64[np.ndarray, "N 3"], others: Float64[np.ndarray, "M 3"], reach: float
 ) -> Bool[np.ndarray, " N"]:
-    """Which points have one of the others within reach; not looking beyond is ten times as fast."""
+    """Return which points have one of the others within reach; bounding the search makes it ten times as fast."""
     from scipy.spatial import cKDTree
 
     return cKDTree(others).query(points, distance_upper_bound=np.nextafter(reach, np.inf))[0] <= reach
@@ -108,7 +111,7 @@ def _within(
 def _around(
     points: Float64[np.ndarray, "N 3"], seeds: Float64[np.ndarray, "M 3"], share: Float64[np.ndarray, " M"]
 ) -> Float64[np.ndarray, " N"]:
-    """The mean share of the seeds nearest to each point."""
+    """Return the mean share of the seeds nearest to each point."""
     from scipy.spatial import cKDTree
 
     thin = slice(None, None, max(1, len(seeds) // 20_000))
@@ -123,7 +126,7 @@ def _hollow(
     first: Int64[np.ndarray, " L"],
     second: Int64[np.ndarray, " L"],
 ) -> Float64[np.ndarray, " L"]:
-    """How much the normals of two neighbours turn towards each other, 0 to 2; 0 where the surface bulges."""
+    """Return how much the normals of two neighbours turn towards each other, 0 to 2; 0 where the surface is convex."""
     apart = middles[second] - middles[first]
     apart /= np.linalg.norm(apart, axis=1)[:, None]
     return np.maximum(((normals[first] - normals[second]) * apart).sum(axis=1), 0.0)
@@ -135,13 +138,16 @@ def _cut(
     links: Int64[np.ndarray, "2 L"],
     weights: Float64[np.ndarray, " L"],
 ) -> Bool[np.ndarray, " C"]:
-    """The side of the source: places are bound to it by `moves`, to the sink by `rests`, to each other by links."""
+    """Return the source's side of a minimum cut.
+
+    `moves` and `rests` are the capacities between each place and the source, and the sink; `weights` those of links.
+    """
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
     count = len(moves)
     source, sink, own = count, count + 1, np.arange(count)
-    common = np.minimum(moves, rests)  # flows through anyway
+    common = np.minimum(moves, rests)  # this flow passes in any case, so it is left out
     to, back = (_whole(side - common) for side in (moves, rests))
     link = np.maximum(_whole(weights), 1)
     rows = np.concatenate([links[0], links[1], np.full(count, source), own])

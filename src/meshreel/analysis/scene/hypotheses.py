@@ -1,7 +1,7 @@
-"""Which tracked objects move, and where they are in views they were not tracked in (paper, section 3.2).
+"""Decide which tracked objects move, and find them in the other views (paper, section 3.2).
 
-In: objects that a tracker follows through a reference view over time, and through the views of one moment. Out: the
-objects of the moment that move, by the numbers they have in the reference view. Pure arrays; `sam3` has the tracker.
+In: objects tracked through a reference view over time, and through all views of one moment. Out: the moving objects of
+that moment, with their numbers in the reference view. Arrays only; the tracker is in `sam3`.
 """
 
 from __future__ import annotations
@@ -16,45 +16,45 @@ from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Seen
 
-_APART = (0.06, 0.02)  # m, and of the depth: what changes by more is something else
+_APART = (0.06, 0.02)  # m, and share of the depth: a pixel whose depth varies by more sees a change; guesses
 
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """Objects that are followed through a video; each pixel belongs to one at most."""
+    """Objects tracked through a video; each pixel belongs to at most one."""
 
     objects: Int32[np.ndarray, "T H W"]  # numbers from 1 on; 0: none
-    kinds: dict[int, str]  # what each number is, as the prompt says
+    kinds: dict[int, str]  # for each number, the prompt that found the object
 
 
 @dataclass(frozen=True, slots=True)
 class HypothesisOptions:
-    """When a tracked object counts as moving, and when two masks are of one object."""
+    """Thresholds for moving objects and for masks of one object; guesses, untried with real weights (decision 17)."""
 
-    variation: float = 0.1  # of an object's mask over time, from which on it moves
-    overlap: float = 0.3  # intersection over union from which on masks are of one object
+    variation: float = 0.1  # smallest variation over time of a moving object's mask
+    overlap: float = 0.3  # smallest intersection over union of two masks of one object
 
     def __post_init__(self) -> None:
         if not (0 < self.variation <= 1 and 0 < self.overlap <= 1):
             text = f"variation {self.variation:g}, overlap {self.overlap:g}"
-            raise InputError(f"{text}: give shares above 0, up to 1")
+            raise InputError(f"{text}: give shares above 0 and at most 1")
 
 
 @dataclass(frozen=True, slots=True)
 class Hypotheses:
-    """What of a reference view moves."""
+    """Moving objects of a reference view over time."""
 
     objects: Int32[np.ndarray, "T H W"]  # numbers of objects that move; 0: none
-    kinds: frozenset[str]  # of which every object that the reference view sees moves
+    kinds: frozenset[str]  # kinds of which all objects in the reference view move
 
     @property
     def elsewhere(self) -> int:
-        """The number of moving objects that the reference view does not see."""
+        """Common number given to moving objects that the reference view does not see."""
         return int(self.objects.max(initial=0)) + 1
 
 
 def hypotheses(tracked: Tracked, options: HypothesisOptions = HypothesisOptions()) -> Hypotheses:
-    """The objects of a video over time whose masks vary."""
+    """Select the objects of a video whose masks vary over time."""
     moving = {number for number in tracked.kinds if variation(tracked.objects, number) >= options.variation}
     still = {tracked.kinds[number] for number in tracked.kinds if number not in moving}
     kinds = frozenset(tracked.kinds[number] for number in moving) - still
@@ -63,9 +63,10 @@ def hypotheses(tracked: Tracked, options: HypothesisOptions = HypothesisOptions(
 
 
 def variation(objects: Int32[np.ndarray, "T H W"], number: int) -> float:
-    """How much an object's mask varies, 0 to 1: one less its mean overlap with its mask in most of its frames.
+    """Return how much an object's mask varies, 0 to 1: 1 minus its mean overlap with its usual mask.
 
-    Only frames count in which it is seen; 0 where it never is.
+    The usual mask has the pixels covered in at least half of the frames in which the object is seen; other frames do
+    not count. 0 for an object that is never seen.
     """
     masks = objects == number
     masks = masks[masks.any(axis=(1, 2))]
@@ -78,10 +79,10 @@ def variation(objects: Int32[np.ndarray, "T H W"], number: int) -> float:
 def moving_in_views(
     tracked: Tracked, moving: Hypotheses, frame: int, options: HypothesisOptions = HypothesisOptions()
 ) -> Int32[np.ndarray, "X H W"]:
-    """The objects of one moment that move, in every view, the reference view first; 0: none.
+    """Return the moving objects of one moment in every view, the reference view first; 0: none.
 
-    An object that the reference view sees moves where it is one of the hypotheses; one that it does not see goes by
-    its kind.
+    An object in the reference view moves if it matches one of the hypotheses; one that this view does not see moves
+    if its kind does.
     """
     numbers = np.zeros(max(tracked.kinds, default=0) + 1, np.int32)
     for number, kind in tracked.kinds.items():
@@ -94,15 +95,16 @@ def moving_in_views(
 
 
 def overlap(one: np.ndarray, other: np.ndarray) -> float:
-    """Intersection over union of two masks; 1 where both are empty."""
+    """Return the intersection over union of two masks; 1 if both are empty."""
     union = int((one | other).sum())
     return int((one & other).sum()) / union if union else 1.0
 
 
 def tour(views: Sequence[PinholeCamera], start: int) -> list[int]:
-    """All views from one on, each next the one most alike, so that they make a video: as far apart as eyes and axes.
+    """Return the order of the views from `start` on, the most similar one next each time, so that they form a video.
 
-    One turned by 180 degrees counts as one that stands as far off as the views do at most.
+    Views differ by the distance of their eyes and by the angle of their axes; opposite axes count as much as the
+    largest distance between two eyes.
     """
     eyes = np.array([view.eye for view in views])
     axes = np.array([np.linalg.inv(view.extrinsic[:3, :3])[:, 2] for view in views])
@@ -116,7 +118,7 @@ def tour(views: Sequence[PinholeCamera], start: int) -> list[int]:
 
 
 def reference_view(moments: Sequence[Sequence[Seen]]) -> int:
-    """The view, of what all views see at a few moments, in which depth changes in most pixels."""
+    """Return the number of the view in which depth changes in most pixels between a few moments."""
     changes = []
     for seen in zip(*moments, strict=True):
         depths = np.stack([one.depth for one in seen])
@@ -127,7 +129,7 @@ def reference_view(moments: Sequence[Sequence[Seen]]) -> int:
 
 
 def _match(mask: np.ndarray, objects: Int32[np.ndarray, "H W"], least: float) -> int:
-    """The number of the object whose mask is most alike; 0 where none is enough."""
+    """Return the number of the object with the largest overlap with a mask; 0 if none reaches `least`."""
     shares = {int(number): overlap(mask, objects == number) for number in np.unique(objects[mask]) if number}
     best = max(shares, key=lambda number: (shares[number], -number), default=0)
     return best if shares.get(best, 0.0) >= least else 0

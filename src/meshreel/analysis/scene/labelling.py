@@ -1,6 +1,6 @@
-"""What is known of which faces move, by place or by masks: one protocol for both (paper, section 3.2).
+"""Labels of moving faces, from moving places or from masks, behind one protocol (paper, section 3.2).
 
-In: a frame's number and mesh. Out: a label a face; and what the room is like when it changes.
+In: the number and the mesh of a frame. Out: a label for each face; and the faces that a change of the room concerns.
 """
 
 from __future__ import annotations
@@ -22,55 +22,55 @@ from .masks import Masker
 from .settle import Rest
 from .votes import Votes
 
-_REMEMBERED = 600  # frames whose labels by place are kept: with some 50 kB each, a scene of seconds at several rates
-_ELSEWHERE = 2.0  # cells from the middle of the nearest known place, from which on a surface is at none
+_REMEMBERED = 600  # frames whose labels are kept, some 50 kB each: a guess, enough for seconds of a scene
+_ELSEWHERE = 2.0  # cells: surface farther from the middle of every known place is at no place (decision 18)
 
 
 @runtime_checkable
 class Segmentation(Protocol):
-    """Says which faces of each frame of a scene move, and when the room is another from then on."""
+    """Labels of the moving faces of every frame of a scene, and the frames in which the room itself changes."""
 
     @property
     def cell(self) -> float:
-        """How long the edges of the frames usually are, m."""
+        """Usual length of the frames' edges, m."""
         ...
 
     @property
     def noise(self) -> float:
-        """What is farther from a surface than some of this, m, is no noise of it; no less than a cell."""
+        """Scale of the frames' noise, m, at least one cell: surface farther off than a few of these is not noise."""
         ...
 
     @property
     def changes(self) -> list[int]:
-        """The frames with which the room is another, rising."""
+        """Numbers of the first frames after each change of the room, ascending."""
         ...
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """True for the faces of frame `frame`, which is `mesh`, that move."""
+        """Return True for each moving face of `mesh`, which is frame number `frame`."""
         ...
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """The faces of frame `frame` that belong to the room as it is in the first frame."""
+        """Return True for each face of frame `frame` that belongs to the room as it is in the first frame."""
         ...
 
     def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """The faces of any frame that stand where something has come to stand with a change."""
+        """Return True for each face of `mesh`, any frame, where surface has become part of the room at `change`."""
         ...
 
     def gone(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """The faces of any mesh of the room where something is no more from a change on."""
+        """Return True for each face of `mesh`, any mesh of the room, where surface has left the room at `change`."""
         ...
 
 
 @dataclass(slots=True)
-class _Answers:
-    """Labels that were asked for before, a bit a face: of the last so many frames, or of all."""
+class _LabelCache:
+    """Labels of earlier calls, one bit per face, for the `most` frames that were added last."""
 
     most: float = np.inf  # frames
     _known: dict[tuple[int, int, float], UInt8[np.ndarray, " B"]] = field(default_factory=dict, repr=False)
 
     def of(self, frame: int, mesh: Mesh, find: Callable[[], Bool[np.ndarray, " F"]]) -> Bool[np.ndarray, " F"]:
-        """What `find` says of a frame, which is asked where that is not known."""
+        """Return the labels of a frame, calling `find` if they are not in the cache."""
         key = (frame, len(mesh.faces), float(mesh.vertices.sum()))
         if key not in self._known:
             if len(self._known) >= self.most:
@@ -81,50 +81,51 @@ class _Answers:
 
 @dataclass(frozen=True, slots=True)
 class ByPlace:
-    """What is at a moving place moves, whenever it is there; and what is at none that is known: the room is known."""
+    """Segmentation by place: surface at a moving place moves, and so does surface far from every known place."""
 
     cell: float  # m
     lattice: Lattice
     keys: Int64[np.ndarray, " P"]  # of the places, sorted
     chosen: Bool[np.ndarray, " P"]
-    rest: Rest  # when what is there belongs to the room after all
+    rest: Rest  # the frames in which surface at a moving place belongs to the room nevertheless
     island: float  # m^2
-    _asked: _Answers = field(default_factory=lambda: _Answers(_REMEMBERED), init=False, repr=False, compare=False)
+    _cache: _LabelCache = field(default_factory=lambda: _LabelCache(_REMEMBERED), init=False, repr=False, compare=False)
 
     @property
     def noise(self) -> float:
-        """The cells of the lattice are so wide that noise moves no surface by two of them, m."""
+        """Width of the lattice's cells, m, chosen so that noise moves no surface by two of them."""
         return self.lattice.size
 
     @property
     def changes(self) -> list[int]:
-        """The frames with which the room is another, rising."""
+        """Numbers of the first frames after each change of the room, ascending."""
         return self.rest.changes
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """By where the faces are; the frame's number matters where the room changes."""
-        return self._asked.of(frame, mesh, lambda: self._moving(frame, mesh))
+        """Return True for each face at a moving place; `frame` matters only where the room changes."""
+        return self._cache.of(frame, mesh, lambda: self._moving(frame, mesh))
 
     def _moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         chosen = self.chosen & (frame >= self.rest.until) & (frame < self.rest.since)
         return without_islands(mesh, self.faces_at(mesh, chosen, elsewhere=True), self.island)
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """The faces of frame `frame` that belong to the room as it is in the first frame."""
+        """Return True for each face of frame `frame` that belongs to the room as it is in the first frame."""
         return self.faces_at(mesh, ~self.chosen | (self.rest.until > frame))
 
     def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """The faces at places that rest from a change on."""
+        """Return True for each face at a place that rests from `change` on."""
         return self.faces_at(mesh, self.rest.since == change)
 
     def gone(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """The faces at places that rest until a change."""
+        """Return True for each face at a place that rests until `change`."""
         return self.faces_at(mesh, self.rest.until == change)
 
     def faces_at(self, mesh: Mesh, chosen: Bool[np.ndarray, " P"], elsewhere: bool = False) -> Bool[np.ndarray, " F"]:
-        """The faces most of whose surface is at chosen places, or, where that is asked for, at none that is known.
+        """Return True for each face with at least half of its surface at chosen places.
 
-        What is beside a known place counts as there.
+        Surface less than two cells from a known place counts as at that place. With `elsewhere`, surface at no known
+        place counts as chosen.
         """
         if mesh.is_empty or not (chosen.any() or (elsewhere and len(self.keys))):
             return np.zeros(len(mesh.faces), bool)
@@ -133,7 +134,7 @@ class ByPlace:
         return there >= 0.5 * np.bincount(faces, minlength=len(mesh.faces))
 
     def _place(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
-        """The number of the place that each point is at, or of the nearest; P where none is near."""
+        """Return the number of the place of each point, or of the nearest place; P if none is near."""
         from scipy.spatial import cKDTree
 
         asked = self.lattice.keys(points)
@@ -147,40 +148,43 @@ class ByPlace:
 
 @dataclass(frozen=True, slots=True)
 class ByMasks:
-    """What most pixels that see it call moving (eqs. 1 to 4)."""
+    """Segmentation by masks: each pixel that sees a face votes on its label (eqs. 1 to 4)."""
 
     masker: Masker
     views: Sequence[PinholeCamera]
     cell: float  # m
     threshold: float  # share of the pixels that see a face
     island: float  # m^2
-    _asked: _Answers = field(default_factory=_Answers, init=False, repr=False, compare=False)
+    _cache: _LabelCache = field(default_factory=_LabelCache, init=False, repr=False, compare=False)
 
     @property
     def noise(self) -> float:
-        """Masks know of no noise: a cell, m."""
+        """Width of a cell, m: masks contain no estimate of the noise."""
         return self.cell
 
     @property
     def changes(self) -> list[int]:
-        """Masks know of no changes of the room."""
+        """Empty list: masks do not record changes of the room."""
         return []
 
     def still_at_first(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """The faces of frame `frame` that do not move."""
+        """Return True for each face of frame `frame` that does not move."""
         return ~self.moving(frame, mesh)
 
     def came(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """There is no change to ask for."""
+        """Raise ValueError: `changes` is empty, so there is no valid argument."""
         raise ValueError(f"change {change} of a mesh of {len(mesh.faces)} faces: masks know of no changes")
 
     def gone(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """There is no change to ask for."""
+        """Raise ValueError: `changes` is empty, so there is no valid argument."""
         raise ValueError(f"change {change} of a mesh of {len(mesh.faces)} faces: masks know of no changes")
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """By the votes of the pixels; faces that no view sees take their neighbours' label. A frame is asked once."""
-        return self._asked.of(frame, mesh, lambda: self._voted(frame, mesh))
+        """Return True for each face that the votes of the pixels call moving; the masks of a frame are made once.
+
+        Faces that no view sees take the label of their neighbours.
+        """
+        return self._cache.of(frame, mesh, lambda: self._voted(frame, mesh))
 
     def _voted(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         if mesh.is_empty:
@@ -194,15 +198,15 @@ class ByMasks:
 
 
 def looks(mesh: Mesh, views: Sequence[PinholeCamera]) -> list[Seen]:
-    """What each view sees of a mesh."""
+    """Return what each view sees of a mesh."""
     rays = Rays(mesh)
     return [rays.look(view) for view in views]
 
 
 def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) -> Bool[np.ndarray, " F"]:
-    """The labels with connected faces of one label and less area given the other; the moving ones first.
+    """Give connected faces of one label with an area below `least` (m^2) the other label, moving faces first.
 
-    A connected piece of the mesh that has one label keeps it if it rests: there is nothing around it.
+    A connected component of the mesh that is labelled still as a whole keeps its label: no moving face touches it.
     """
     moving = chosen.copy()
     moving[chosen] = _areas(mesh, chosen)[0] >= least
@@ -212,21 +216,21 @@ def without_islands(mesh: Mesh, chosen: Bool[np.ndarray, " F"], least: float) ->
     touched[mesh.faces[moving].reshape(-1)] = True
     rests = ~moving
     area, label = _areas(mesh, rests)
-    beside = np.zeros(len(mesh.vertices), bool)  # whether a piece has something that moves around it
+    beside = np.zeros(len(mesh.vertices), bool)  # whether a piece touches a moving face
     beside[label[touched[mesh.faces[rests]].any(axis=1)]] = True
     moving[rests] = (area < least) & beside[label]
     return moving
 
 
 def _areas(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> tuple[Float64[np.ndarray, " C"], Int64[np.ndarray, " C"]]:
-    """The area of the connected chosen faces that each chosen face belongs to, and their label, less than V."""
+    """Return for each chosen face the area of its connected component of chosen faces, and its label (0 to V - 1)."""
     some = Mesh(mesh.vertices, mesh.faces[chosen])
     label = connected_faces(some.faces, len(some.vertices))
     return np.bincount(label, face_normals(some)[1], len(some.vertices))[label].astype(np.float64), label
 
 
 def _filled(mesh: Mesh, moves: Bool[np.ndarray, " F"], known: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
-    """Labels carried from faces that are seen to their neighbours that are not, ring by ring."""
+    """Carry labels from the faces that are seen to neighbours that are not, ring by ring, by majority."""
     edges, face_edges = unique_edges(mesh.faces)
     moves, known = moves & known, known.copy()
     while True:

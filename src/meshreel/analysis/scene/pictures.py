@@ -1,7 +1,7 @@
-"""What the views see as pictures that a person, or a tool that makes masks, can look at (paper, section 3.2).
+"""Render the views as pictures for people and for tools that make masks (paper, section 3.2).
 
-In: what a view sees. Out: normals as colors, the paper's coloring; and folders of such pictures, laid out as the
-folders of masks are that `ImageMasks` reads.
+In: what a view sees. Out: normals as colors, the paper's coloring; and folders of such pictures in the layout of the
+mask folders that `ImageMasks` reads.
 """
 
 from __future__ import annotations
@@ -21,9 +21,10 @@ from .masks import CAMERAS, one_size
 
 
 def normal_picture(seen: Seen, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"]:
-    """Normals n in world axes as colors (n + 1) / 2; white where nothing is seen.
+    """Render normals n in world axes as colors (n + 1) / 2; white where nothing is seen.
 
-    They follow from the depths of neighbouring pixels, so they face the camera whatever the order of a face's corners.
+    Normals are computed from the depths of neighbouring pixels, so they face the camera whatever the orientation of the
+    faces.
     """
     rows, columns = np.mgrid[: view.height, : view.width]
     ahead = np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1) @ np.linalg.inv(view.intrinsic).T
@@ -38,12 +39,12 @@ def normal_picture(seen: Seen, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"
 
 
 def write_views(
-    folder: Path, frames: Frames, views: Sequence[PinholeCamera], tell: Callable[[int], None] = lambda _done: None
+    folder: Path, frames: Frames, views: Sequence[PinholeCamera], report: Callable[[int], None] = lambda _done: None
 ) -> None:
-    """Writes what the views see of each frame: view00/frame_00000.png ..., and `cameras.json` last.
+    """Write pictures of each frame from each view: view00/frame_00000.png ..., and `cameras.json` last.
 
-    A tool that keeps names and sizes makes of it the folder of masks; it needs the same `cameras.json`.
-    `tell` hears how many frames are done.
+    A tool that makes masks from them keeps names and sizes, and puts the same `cameras.json` beside its masks.
+    `report` is called with the number of finished frames.
     """
     views = one_size(views, "views")
     places = [folder / f"view{number:02}" for number in range(len(views))]
@@ -53,13 +54,16 @@ def write_views(
         rays = Rays(frames[number])
         for view, place in zip(views, places, strict=True):
             write_picture(normal_picture(rays.look(view), view), place / name)
-        tell(number + 1)
+        report(number + 1)
     with replacing(folder / CAMERAS) as file:
         file.write(pack_cameras(views))
 
 
 def _step(points: Float64[np.ndarray, "H W 3"], axis: int) -> Float64[np.ndarray, "H W 3"]:
-    """From each pixel's point to its neighbour's: to the one whose depth is nearer, so that edges stay sharp."""
+    """Return the vector to the next point along an axis: ahead or behind, whichever differs less in depth.
+
+    Edges stay sharp that way.
+    """
     ahead = np.diff(points, axis=axis)
     none = np.full_like(np.take(points, [0], axis=axis), np.nan)
     after, before = np.concatenate([ahead, none], axis=axis), np.concatenate([none, ahead], axis=axis)

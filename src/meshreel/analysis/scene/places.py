@@ -1,13 +1,11 @@
-"""What happens at each place of a scene over time: occupied, seen free, or not known (free-space carving).
+"""State of each place of a scene over time: occupied, seen free, or unknown (free-space carving, decision 18).
 
-In: some frames of a scene, spread over the sequence, and views of them. Out: for every cell that any of the frames has
-surface in, in how many frames there is surface in or beside it, in how many views see past it, and how long it stayed.
+In: some frames, spread over the sequence, and views of them. Out: for every cell that has surface in any of the frames,
+counts of the frames in which it is occupied (surface in it or beside it) and of those in which views see past it.
 
-A cell beside surface counts as occupied, whatever is seen: noise moves a surface from cell to cell, and rays graze it.
-Views stand where no camera did, and look through the holes that shadows leave in a surface. So where cameras usually
-measure something, a cell is seen free only if one of them, too, measured something past it; and it is, whatever views
-see, if a camera did so in the pixels around, too: what comes close to a camera is often in no other view.
-Memory does not grow with the number of frames: what happens in a frame is counted, and forgotten.
+Noise moves surface by a cell, and rays graze it, so a cell beside surface is never seen free. Views look through holes
+that camera shadows leave, so where cameras usually measure, one of them must have measured past a cell, too; and that
+suffices if it did so in all nine pixels around. Memory does not grow with the number of frames.
 """
 
 from __future__ import annotations
@@ -27,72 +25,72 @@ from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
 from ...types import Frames, Mesh, evenly
 
-_DEEPEST = 65_535  # of a stored depth; 0: nothing seen
-_FINENESS = 16  # units of a stored depth in a cell
-_TOGETHER = 32  # frames whose pictures are in memory together: what each view sees of the places is worked out once
+_DEEPEST = 65_535  # largest stored depth (uint16), in units of a cell / _FINENESS; 0: nothing seen
+_FINENESS = 16  # units of a stored depth in a cell: a guess
+_TOGETHER = 32  # frames whose pictures are in memory together, so that places are projected once for all: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class PlacesOptions:
-    """How finely a scene is looked at, and what counts as seen free."""
+    """Options of free-space carving: which frames are inspected, and when a place is seen free (decision 18)."""
 
-    frames: int = 16  # looked at, at least, spread over the sequence, or all where it has fewer
-    rate: float = 4.0  # 1/s, looked at, at least: who is there only between frames that are looked at is not carved
-    past: float = 2.0  # cells that a view must see past a cell's middle
-    views: int = 2  # that must see past it
+    frames: int = 16  # smallest number of inspected frames, spread over the sequence; all if it has fewer
+    rate: float = 4.0  # 1/s, lowest rate of inspected frames: a body present only between two of them is not carved
+    past: float = 2.0  # cells by which a view must see past the middle of a place
+    views: int = 2  # smallest number of views that must see past it
 
     def __post_init__(self) -> None:
         if self.frames < 2 or not 0 <= self.rate < math.inf or not self.past > 0 or self.views < 1:
-            text = f"{self.frames} frames, {self.rate:g} a second, past {self.past:g}, {self.views} views"
-            raise InputError(f"{text}: give >= 2, from 0 on, > 0, >= 1")
+            text = f"{self.frames} frames, {self.rate:g} per second, past {self.past:g}, {self.views} views"
+            raise InputError(f"{text}: give >= 2, >= 0, > 0, >= 1")
 
     def chosen(self, count: int, frame_rate: float) -> list[int]:
-        """The frames to look at of a sequence of `count`."""
+        """Return the numbers of the frames to inspect in a sequence of `count` frames."""
         return evenly(count, max(self.frames, math.ceil((count - 1) / frame_rate * self.rate) + 1))
 
 
-Tell = Callable[[float], None]  # the share of the work that is done
+Report = Callable[[float], None]  # receives the share of the work that is done, 0 to 1
 
 
-def nobody(share: float) -> None:
-    """Hears how far the work is, and does nothing."""
+def silent(share: float) -> None:
+    """Discard a report of progress."""
     del share
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
-    """Frames, the views that look at them, and what depth cameras measured in each of them, where that is known."""
+class Observations:
+    """Frames, the views of them, and the depth pictures that cameras took of each frame, if there are any."""
 
     frames: Sequence[Mesh] | Frames
     views: Sequence[PinholeCamera]
-    pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame, a camera each
-    tell: Tell = nobody  # who hears how far `find_places` is
+    pictures: Callable[[int], list[DepthPicture | None]] | None = None  # of a frame: one for each camera
+    report: Report = silent  # called with the progress of `find_places`
 
-    def look(self, number: int, lattice: Lattice) -> _Look:
-        """What is known of one frame."""
+    def observe(self, number: int, lattice: Lattice) -> _Observation:
+        """Read one frame and return what is observed in it."""
         points, _ = spread(mesh := self.frames[number], 1.5 * lattice.size)
-        return self.seen(number, mesh, distinct(lattice.keys(points)), lattice)
+        return self.of_mesh(number, mesh, distinct(lattice.keys(points)), lattice)
 
-    def seen(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Look:
-        """As `look`, of a frame that has been read and whose cells are known."""
+    def of_mesh(self, number: int, mesh: Mesh, cells: Int64[np.ndarray, " C"], lattice: Lattice) -> _Observation:
+        """Return what is observed in a frame whose mesh and occupied cells are known."""
         rays = Rays(mesh)
         depths = [_stored(rays, view, lattice.size / _FINENESS) for view in self.views]
-        return _Look(cells, depths, None if self.pictures is None else self.pictures(number))
+        return _Observation(cells, depths, None if self.pictures is None else self.pictures(number))
 
 
 @dataclass(frozen=True, slots=True)
 class Stay:
-    """The time from which on there is surface at each place without it being seen free any more, by frames looked at.
+    """For each place, the uninterrupted stay of surface at the end of the inspected frames; or, reversed, at the start.
 
-    Or, in reverse, until which.
+    A stay begins with the first frame that has surface after the place was last seen free.
     """
 
-    first: Int32[np.ndarray, " P"]  # that has surface; -1 where the place is never seen free, or has no surface then
-    count: Int32[np.ndarray, " P"]  # frames that have surface in that time
+    first: Int32[np.ndarray, " P"]  # index of that frame; -1 if the place is never seen free or has no surface after it
+    count: Int32[np.ndarray, " P"]  # frames with surface during the stay
 
 
 class Tally:
-    """What has happened at each of P places in the frames so far."""
+    """Counts, for each of P places, of the frames added so far in which it is occupied and in which it is seen free."""
 
     def __init__(self, places: int) -> None:
         self.frames = 0
@@ -104,7 +102,7 @@ class Tally:
         )
 
     def add(self, occupied: Bool[np.ndarray, " P"], free: Bool[np.ndarray, " P"]) -> None:
-        """Counts the next frame."""
+        """Count the next frame."""
         early = occupied & (self.free == 0)
         self._before.first[early] = self.frames
         self._before.count[early] += 1
@@ -118,116 +116,120 @@ class Tally:
 
     @property
     def after(self) -> Stay:
-        """Since each place was seen free for the last time."""
+        """Stays since each place was last seen free."""
         seen = self.free > 0
         return Stay(np.where(seen, self._after.first, -1).astype(np.int32), self._after.count)
 
     @property
     def before(self) -> Stay:
-        """Until each place was seen free for the first time; frames count from the last one, backwards."""
+        """Stays until each place was first seen free; frames are numbered backwards from the last one."""
         known = (self.free > 0) & (self._before.first >= 0)
         return Stay(np.where(known, self.frames - 1 - self._before.first, -1).astype(np.int32), self._before.count)
 
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    """A depth camera that stands still."""
+    """A depth camera that does not move, and the pixels in which it usually measures a depth."""
 
     camera: PinholeCamera
-    sees: Bool[np.ndarray, "H W"]  # where it measures something in half of the frames at least
+    sees: Bool[np.ndarray, "H W"]  # pixels with a depth in at least half of the frames
 
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Cells of a scene, and what happened there in the frames that were looked at."""
+    """Cells of a scene that have surface in some inspected frame, and the counts of what was observed there."""
 
     lattice: Lattice
     keys: Int64[np.ndarray, " P"]  # sorted
-    beside: Int32[np.ndarray, "P 26"]  # numbers of the cells around each; its own for none
-    normals: Float64[np.ndarray, "P 3"]  # mean of what was there, of unit length; 0 where they cancel
+    beside: Int32[np.ndarray, "P 26"]  # numbers of the neighbouring places; a place's own number where there is none
+    normals: Float64[np.ndarray, "P 3"]  # mean normal of the surface there, unit length; 0 where normals cancel
     tally: Tally
     eyes: dict[int, Eye] = field(default_factory=dict)  # by the number of the camera
 
     @property
     def free_share(self) -> Float64[np.ndarray, " P"]:
-        """The share of the frames that know a place in which it is seen free."""
+        """Share of frames in which a place is seen free, among those in which it is occupied or seen free."""
         return self.tally.free / np.maximum(self.tally.free + self.tally.occupied, 1)
 
     @property
     def middles(self) -> Float64[np.ndarray, "P 3"]:
-        """The middles of the cells."""
+        """Middles of the cells, in the scene's unit."""
         return self.lattice.centers(self.keys)
 
 
 @dataclass(frozen=True, slots=True)
-class _Look:
-    """What is known of one frame."""
+class _Observation:
+    """Observations of one frame: its occupied cells, the depths of the views, and the cameras' depth pictures."""
 
-    cells: Int64[np.ndarray, " C"]  # keys of those that it has surface in, sorted
-    depths: list[UInt16[np.ndarray, "H W"]]  # of each view, in units
-    measured: list[DepthPicture | None] | None  # by each camera; None where nothing is known of cameras
+    cells: Int64[np.ndarray, " C"]  # sorted keys of the cells with surface
+    depths: list[UInt16[np.ndarray, "H W"]]  # for each view, in units of a cell / _FINENESS
+    measured: list[DepthPicture | None] | None  # for each camera; None without cameras
 
 
-def find_places(watched: Watched, lattice: Lattice, options: PlacesOptions = PlacesOptions()) -> Places:
-    """The places of a scene; one frame in memory at a time. What comes after the first 32 frames is read twice.
+def find_places(observed: Observations, lattice: Lattice, options: PlacesOptions = PlacesOptions()) -> Places:
+    """Find the places of a scene and count what is observed there; frames after the first 32 are read twice.
 
-    About 1 s of CPU for a frame of 500,000 faces.
+    Meshes are in memory one at a time. Takes about 1 s of CPU for a frame of 500,000 faces.
     """
-    passes = len(watched.frames) + max(0, len(watched.frames) - _TOGETHER)
-    first, known, cameras = list[_Look](), _Known(), _Cameras()
-    for number in range(len(watched.frames)):
-        own, normals = _cells(mesh := watched.frames[number], lattice)
+    passes = len(observed.frames) + max(0, len(observed.frames) - _TOGETHER)
+    first, known, cameras = list[_Observation](), _Known(), _Cameras()
+    for number in range(len(observed.frames)):
+        own, normals = _cells(mesh := observed.frames[number], lattice)
         known.add(own, normals)
         if number < _TOGETHER:
-            first.append(watched.seen(number, mesh, own, lattice))
+            first.append(observed.of_mesh(number, mesh, own, lattice))
             cameras.add(first[-1].measured)
-        elif watched.pictures is not None:
-            cameras.add(watched.pictures(number))
-        watched.tell((number + 1) / passes)
+        elif observed.pictures is not None:
+            cameras.add(observed.pictures(number))
+        observed.report((number + 1) / passes)
     keys, normals = known.places()
     places = Places(lattice, keys, neighbours(keys), normals, Tally(len(keys)), cameras.eyes())
-    for occupied, free in _seen(first, places, watched.views, options):
+    for occupied, free in _states(first, places, observed.views, options):
         places.tally.add(occupied, free)
     first.clear()
-    for occupied, free in look(watched, range(_TOGETHER, len(watched.frames)), places, options):
+    for occupied, free in states(observed, range(_TOGETHER, len(observed.frames)), places, options):
         places.tally.add(occupied, free)
-        watched.tell((len(watched.frames) - _TOGETHER + places.tally.frames) / passes)
+        observed.report((len(observed.frames) - _TOGETHER + places.tally.frames) / passes)
     return places
 
 
-def look(
-    watched: Watched, numbers: range, places: Places, options: PlacesOptions = PlacesOptions()
+def states(
+    observed: Observations, numbers: range, places: Places, options: PlacesOptions = PlacesOptions()
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
-    """Where each of some frames has surface in or beside a place, and where not, and views see past it."""
+    """Yield for each frame in `numbers` which places are occupied, and which are not and are seen free."""
     for start in range(0, len(numbers), _TOGETHER):
-        together = (watched.look(number, places.lattice) for number in numbers[start : start + _TOGETHER])
-        yield from _seen(list(together), places, watched.views, options)
+        together = (observed.observe(number, places.lattice) for number in numbers[start : start + _TOGETHER])
+        yield from _states(list(together), places, observed.views, options)
 
 
-def _seen(
-    looks: Sequence[_Look], places: Places, views: Sequence[PinholeCamera], options: PlacesOptions
+def _states(
+    frames: Sequence[_Observation], places: Places, views: Sequence[PinholeCamera], options: PlacesOptions
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
-    """As `look`, of frames whose pictures are in memory."""
-    seen = np.zeros((len(looks), len(places.keys)), np.uint8)
+    """Yield the states of the places in frames whose observations are in memory; see `states`."""
+    seen = np.zeros((len(frames), len(places.keys)), np.uint8)
     middles, size = places.middles, places.lattice.size
     for number, view in enumerate(views):
         pixels, inside, depth = _projected(view, middles)
         limit = (depth + options.past * size) / (size / _FINENESS)
-        for row, one in zip(seen, looks, strict=True):
+        for row, one in zip(seen, frames, strict=True):
             row[inside[one.depths[number].reshape(-1)[pixels] > limit]] += 1
-    sensed = _sensed(looks, places, options.past * size)
-    for row, one, (doubtful, clear) in zip(seen, looks, sensed, strict=True):
+    sensed = _sensed(frames, places, options.past * size)
+    for row, one, (doubtful, clear) in zip(seen, frames, sensed, strict=True):
         occupied = _near(places.keys, places.beside, one.cells)
         yield occupied, ((row >= options.views) & ~doubtful | clear) & ~occupied
 
 
 def _sensed(
-    looks: Sequence[_Look], places: Places, reach: float
+    frames: Sequence[_Observation], places: Places, reach: float
 ) -> Iterator[tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, " P"]]]:
-    """Where each frame's cameras should have measured something past a place, m, and did not; where some surely did."""
+    """Yield for each frame which places are doubtful and which are clear, by the depths that cameras measured.
+
+    Doubtful: a camera that usually measures there measured nothing more than `reach` (m) past the place. Clear: a
+    camera measured more than that in all nine pixels around the place.
+    """
     middles = places.middles
     at = {number: _projected(eye.camera, middles) for number, eye in places.eyes.items()}
-    for one in looks:
+    for one in frames:
         expected, past, clear = np.zeros((3, len(middles)), bool)
         for number, eye in places.eyes.items():
             pixels, inside, depth = at[number]
@@ -242,21 +244,21 @@ def _sensed(
 
 
 def _least_around(depth: np.ndarray) -> np.ndarray:
-    """The least of each pixel and those around it; 0 where one of them measured nothing."""
+    """Return the smallest depth of each pixel and its eight neighbours; 0 where one of the nine measured nothing."""
     from scipy.ndimage import minimum_filter
 
     return np.asarray(minimum_filter(depth, 3))
 
 
 class _Cameras:
-    """The cameras of the frames so far, and in how many frames each of their pixels measures something."""
+    """Cameras of the frames added so far, with counts of the frames in which each pixel has a depth."""
 
     def __init__(self) -> None:
         self._frames = 0
         self._counts: dict[int, tuple[PinholeCamera, Int32[np.ndarray, "H W"]]] = {}
 
     def add(self, pictures: Sequence[DepthPicture | None] | None) -> None:
-        """Takes in a frame."""
+        """Count the depths in the pictures of the next frame."""
         self._frames += 1
         for number, picture in enumerate(pictures or ()):
             if picture is not None:
@@ -264,25 +266,25 @@ class _Cameras:
                 self._counts.setdefault(number, (picture.camera, none))[1][picture.depth > 0] += 1
 
     def eyes(self) -> dict[int, Eye]:
-        """Those that are known, by number."""
+        """Return the cameras that took at least one picture, by number."""
         return {number: Eye(camera, 2 * count >= self._frames) for number, (camera, count) in self._counts.items()}
 
 
 class _Known:
-    """The cells that any of the frames so far has surface in, and the sums of its normals there."""
+    """Cells with surface in any of the frames added so far, and the sums of the normals there."""
 
     def __init__(self) -> None:
         self._keys, self._sums = np.zeros(0, np.int64), np.zeros((0, 3), np.float32)
         self._new = list[tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]]()
 
     def add(self, cells: Int64[np.ndarray, " C"], normals: Float32[np.ndarray, "C 3"]) -> None:
-        """Takes in a frame."""
+        """Add the cells of a frame and the sums of its normals in them."""
         self._new.append((cells, normals))
-        if len(self._new) == _TOGETHER:  # sorting all keys anew for each frame would take longer
+        if len(self._new) == _TOGETHER:  # merging after every frame would sort all keys each time
             self._take()
 
     def places(self) -> tuple[Int64[np.ndarray, " P"], Float64[np.ndarray, "P 3"]]:
-        """The keys of the cells, sorted, and the mean normals there, of unit length; 0 where they cancel."""
+        """Return the sorted keys of the cells, and the mean normals there, of unit length; 0 where they cancel."""
         self._take()
         length = np.linalg.norm(self._sums, axis=1, keepdims=True)
         return self._keys, (self._sums / np.where(length > 0, length, 1)).astype(np.float64)
@@ -297,7 +299,7 @@ class _Known:
 
 
 def _cells(mesh: Mesh, lattice: Lattice) -> tuple[Int64[np.ndarray, " C"], Float32[np.ndarray, "C 3"]]:
-    """The cells that a mesh has surface in, sorted, and the sum of its normals there."""
+    """Return the sorted keys of the cells in which a mesh has surface, and the sums of its normals there."""
     points, faces = spread(mesh, 1.5 * lattice.size)
     keys, cell = np.unique(lattice.keys(points), return_inverse=True)
     normals = face_normals(mesh)[0][faces]
@@ -306,7 +308,7 @@ def _cells(mesh: Mesh, lattice: Lattice) -> tuple[Int64[np.ndarray, " C"], Float
 
 
 def _stored(rays: Rays, view: PinholeCamera, unit: float) -> UInt16[np.ndarray, "H W"]:
-    """Depth in units; 0 where nothing is met, or the back of something: what is there is not known."""
+    """Return a view's depths in multiples of `unit` (m); 0 where a ray hits nothing, or a face from behind."""
     seen = rays.look(view)
     depth = np.where(np.isfinite(seen.depth) & ~rays.backs(view, seen), seen.depth, 0.0)
     return np.clip(np.rint(depth / unit), 0, _DEEPEST).astype(np.uint16)
@@ -315,7 +317,7 @@ def _stored(rays: Rays, view: PinholeCamera, unit: float) -> UInt16[np.ndarray, 
 def _near(
     keys: Int64[np.ndarray, " P"], beside: Int32[np.ndarray, "P 26"], own: Int64[np.ndarray, " C"]
 ) -> Bool[np.ndarray, " P"]:
-    """The cells in or beside which a frame has surface."""
+    """Return True for each place that has surface of a frame (its cells are `own`) in it or in a neighbouring place."""
     there = np.zeros(len(keys), bool)
     there[np.searchsorted(keys, own)] = True
     near = there.copy()
@@ -326,7 +328,7 @@ def _near(
 def _projected(
     view: PinholeCamera, points: Float64[np.ndarray, "P 3"]
 ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
-    """Pixels that the points in the picture fall on, the numbers of these points, and their depths, m."""
+    """Project points into a view; return the pixels of those inside the picture, their numbers, and their depths, m."""
     local = points @ view.extrinsic[:3, :3].T + view.extrinsic[:3, 3]
     with np.errstate(invalid="ignore"):
         columns, rows = np.floor(view.project(local)).T

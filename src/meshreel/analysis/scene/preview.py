@@ -1,6 +1,6 @@
-"""Labels of faces to look at: colors of bodies, pictures of what the views see in them, and one sheet of many pictures.
+"""Pictures of a segmentation for inspection: moving faces in the colors of their bodies, and sheets of such pictures.
 
-In: what moves in some frames, and the views. Out: colors, and pictures as arrays.
+In: the moving faces of some frames, and the views. Out: colors, and pictures as arrays.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ _BODIES = (
     (23, 190, 207),
 )
 _LIGHT = np.array([0.36, 0.80, 0.48])
-_AMBIENT = 0.45  # what no light reaches has this much of its color
+_AMBIENT = 0.45  # share of the color that unlit surface keeps: a choice of looks
 _GAP, _LEFT, _TOP, _TEXT = 4, 64, 24, 14  # pixels: between pictures, left of them, above and below them, of text
-_LEGEND = "light gray: rests; a color: moves, a color a body (six in turn); dark gray: moves, of no body"
+_LEGEND = "light gray: still; colors: moving, one color per body (six in turn); dark gray: moving, part of no body"
 
 
 def label_colors(moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"]) -> UInt8[np.ndarray, "F 3"]:
-    """A color a face: light gray where it rests, one of six by the number of its body, dark gray for bits of none."""
+    """Return a color for each face: light gray if still, one of six by the body's number, dark gray if of no body."""
     own = np.array(_BODIES, np.uint8)[(bodies.astype(np.int64) - 1) % len(_BODIES)]
     known = np.where((bodies > 0)[:, None], own, np.array(_NO_BODY, np.uint8))
     return np.where(moving[:, None], known, np.array(_RESTS, np.uint8))
 
 
 def colored_picture(seen: Seen, view: PinholeCamera, colors: UInt8[np.ndarray, "F 3"]) -> UInt8[np.ndarray, "H W 3"]:
-    """What a view sees, in the faces' colors under one light; white where nothing is seen."""
+    """Render what a view sees in the faces' colors under one light; white where nothing is seen."""
     normals = normal_picture(seen, view).astype(np.float64) * (2 / 255) - 1
     light = _AMBIENT + (1 - _AMBIENT) * np.abs(normals @ _LIGHT)
     hit = seen.faces >= 0
@@ -51,7 +51,7 @@ def colored_picture(seen: Seen, view: PinholeCamera, colors: UInt8[np.ndarray, "
 def look_at_labels(
     mesh: Mesh, moving: Bool[np.ndarray, " F"], bodies: Integer[np.ndarray, " F"], views: Sequence[PinholeCamera]
 ) -> tuple[list[UInt8[np.ndarray, "H W 3"]], list[int]]:
-    """A picture a view, and how many faces that move it sees."""
+    """Return a picture for each view, and the number of moving faces that it sees."""
     rays, colors = Rays(mesh), label_colors(moving, bodies)
     looks = [rays.look(view) for view in views]
     pictures = [colored_picture(seen, view, colors) for seen, view in zip(looks, views, strict=True)]
@@ -60,14 +60,14 @@ def look_at_labels(
 
 @dataclass(frozen=True, slots=True)
 class FrameViews:
-    """What the views see of one frame."""
+    """Pictures of one frame, one for each view."""
 
     frame: int
     pictures: Sequence[UInt8[np.ndarray, "H W 3"]]
 
 
 def sheet(rows: Sequence[FrameViews], views: Sequence[int]) -> UInt8[np.ndarray, "Y X 3"]:
-    """Pictures of one size, a row a frame and a column a view, with the numbers of both and what the colors mean."""
+    """Draw pictures of one size on a sheet: a row per frame, a column per view, with their numbers and a legend."""
     from PIL import Image, ImageDraw, ImageFont
 
     height, width, _ = rows[0].pictures[0].shape

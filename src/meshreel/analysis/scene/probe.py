@@ -1,7 +1,7 @@
-"""Whether a sequence is a scene: most of what is seen in one frame is in the same place in the others, and it is open.
+"""Detect scenes: sequences of open surface most of which is in the same place in all frames.
 
-A body on its own moves, or is closed: where one stands as still as a room does, there is nothing to be won by taking it
-apart.
+In: a sequence. Out: whether to separate it into a background and bodies. A lone body moves or is closed; separating one
+that stands as still as a room would gain nothing.
 """
 
 from __future__ import annotations
@@ -14,18 +14,19 @@ from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Frames, Mesh, evenly
 from ..survey import check
 
-PROBES = 4  # frames, spread over the sequence
-SHARE = 0.6  # of a frame's surface that stands still in a scene
-CELLS = 200  # along a frame's diagonal: 4 cm in a room
-BORDER = 1.0  # diagonals: the length of the borders of what is open; of the holes of a captured body, less
-UNLIKE = 30.0  # of the sizes of two frames: no room is in both, and cells of one are no cells of the other
-COARSEST = 32  # edges along it: a mesh of fewer is no capture of a room
+# All of these are guesses, set between captured rooms and captured bodies.
+PROBES = 4  # frames inspected, spread over the sequence
+SHARE = 0.6  # smallest share of a frame's surface that stands still in a scene
+CELLS = 200  # cells along a frame's diagonal: 4 cm in a room
+BORDER = 1.0  # diagonals, smallest length of the borders of an open surface; the holes of a captured body have less
+UNLIKE = 30.0  # largest ratio of the sizes of two frames that can show one room
+COARSEST = 32  # smallest number of median edge lengths along the diagonal of a captured room
 
 
 def is_scene(frames: Frames) -> bool:
-    """True where there is a background worth the name; False for empty and single frames.
+    """Return whether a sequence has a background; False for empty sequences and single frames.
 
-    Raises InputError for frames that cannot be used, as far as they are looked at.
+    Raises InputError if one of the few inspected frames is invalid.
     """
     numbers = evenly(len(frames), PROBES)
     meshes = []
@@ -45,13 +46,13 @@ def is_scene(frames: Frames) -> bool:
 
 
 def _is_open(mesh: Mesh) -> bool:
-    """True where the borders are long; a few small holes do not open a body."""
+    """Return whether the borders of a mesh are long; a few small holes do not make a body open."""
     border = border_edges(mesh)
     length = np.linalg.norm(mesh.vertices[border[:, 0]] - mesh.vertices[border[:, 1]], axis=1).sum()
     return bool(length > BORDER * mesh.diagonal)
 
 
 def _shared(own: Int64[np.ndarray, " C"], other: Int64[np.ndarray, " D"]) -> float:
-    """The share of some cells that are among others; both are sorted."""
+    """Return the share of `own` cells that are among `other` cells; both are sorted."""
     at = np.minimum(np.searchsorted(other, own), len(other) - 1)
     return float((other[at] == own).mean())

@@ -1,10 +1,10 @@
-"""Masks by SAM3, in the paper's two stages (section 3.2): a view over time, then the views of each moment.
+"""Masks by SAM3 in the paper's two stages (section 3.2): one view over time, then all views of each frame.
 
-In: pictures of the views. Out: masks, and which object each pixel sees. Stage 1 follows what the prompts name through
-a reference view and keeps what moves; stage 2 follows the same prompts through the views of a frame, as if they were
-a video, and keeps what is one of those. The extra `sam3`; weights come from a folder that the user gives.
+In: pictures of the views. Out: masks, and the object that each pixel sees. Stage 1 tracks the prompted objects through
+a reference view and keeps those that move; stage 2 tracks them through the views of a frame, taken as a video, and
+keeps those found in stage 1. Needs the extra `sam3`; the user supplies a folder with the weights.
 
-Differs from the paper: it does not say what SAM3 is asked for; ours are words, and without any, `AUTOMATIC`.
+Differs from the paper: it does not state its prompts; ours are words, by default `AUTOMATIC`.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ from ...geometry.raycast import Seen
 from .hypotheses import Hypotheses, HypothesisOptions, Tracked, hypotheses, moving_in_views, reference_view, tour
 from .pictures import normal_picture
 
-AUTOMATIC = ("person", "animal", "vehicle", "object")  # what may move; what of it does, its masks over time say
-_WORDS = 32  # tokens of a prompt
+AUTOMATIC = ("person", "animal", "vehicle", "object")  # default prompts, whatever may move: a guess
+_WORDS = 32  # tokens of a prompt, fixed by the model
 _TOKENIZER = "tokenizer.json, or vocab.json with merges.txt"
 _NEEDED = f"config.json, model.safetensors (or its shards) and {_TOKENIZER}: the files of facebook/sam3"
 
 
 @dataclass(frozen=True, slots=True)
 class Sam3Options:
-    """How SAM3 is used."""
+    """Options of masks by SAM3."""
 
-    reference: int | None = None  # the view that is followed over time; None: that in which most changes
-    device: str = "cpu"  # as torch names it: cpu, cuda, cuda:1 ...
+    reference: int | None = None  # number of the view that is tracked over time; None: the one with most changes
+    device: str = "cpu"  # torch's name of a device: cpu, cuda, cuda:1 ...
     hypotheses: HypothesisOptions = field(default_factory=HypothesisOptions)
 
 
 class Sam3Masks:
-    """A Masker that must first have observed the reference view in every frame: two passes over the frames.
+    """A Masker that observes the reference view in every frame before it makes masks: two passes over the frames.
 
-    What it has observed and answered it keeps, a bit a pixel: who encodes again, for a target, pays once.
+    Masks are kept, one bit per pixel, so that further encodes of the same sequence do not run the model again.
     """
 
     def __init__(self, path: Path, prompts: Sequence[str] | None = None, options: Sam3Options = Sam3Options()) -> None:
-        """Loads the weights in the folder `path`. Raises InputError where they or the extra are not there."""
+        """Load the weights in the folder `path`. Raises InputError if they or the extra `sam3` are missing."""
         self._tracker = _Tracker(path, tuple(prompts or AUTOMATIC), options.device)
         self._options = options
         self._chosen = options.reference
@@ -56,16 +56,16 @@ class Sam3Masks:
 
     @property
     def reference(self) -> int:
-        """The number of the view that is followed over time."""
+        """Number of the view that is tracked over time."""
         return self._chosen or 0
 
     def foresee(self, moments: Sequence[Sequence[Seen]]) -> None:
-        """Chooses the reference view, once, by what all views see at a few moments; without it, it is the first."""
+        """Choose the reference view by what all views see at a few moments; without this call it is the first view."""
         if self._chosen is None:
             self._chosen = reference_view(moments)
 
     def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
-        """Takes note of a frame, once; frames come in order from 0 on, all before the first masks."""
+        """Keep the reference view's picture of a frame; frames must come in order from 0 on, before the first masks."""
         if self._moving is not None or frame < len(self._pictures):
             return
         assert frame == len(self._pictures), "frames are observed in order, before masks"
@@ -73,14 +73,14 @@ class Sam3Masks:
         self._pictures.append(normal_picture(seen[number], views[number]))
 
     def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Bool[np.ndarray, "X H W"]:
-        """The masks of a frame that was observed; True: dynamic."""
+        """Return the masks of an observed frame; True: moving."""
         shape = (len(views), views[0].height, views[0].width)
         if frame not in self._known:
             self._known[frame] = np.packbits(self.objects(frame, seen, views) > 0)
         return np.unpackbits(self._known[frame], count=math.prod(shape)).astype(bool).reshape(shape)
 
     def objects(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Int32[np.ndarray, "X H W"]:
-        """The moving object that each pixel sees, by one number in all frames; 0: none."""
+        """Return the number, the same in all frames, of the moving object that each pixel sees; 0: none."""
         moving = self._hypotheses()
         if not moving.objects.any():
             return np.zeros((len(views), views[0].height, views[0].width), np.int32)
@@ -90,7 +90,7 @@ class Sam3Masks:
         return found[np.argsort(order)]
 
     def _hypotheses(self) -> Hypotheses:
-        """Stage 1, once."""
+        """Run stage 1 at the first call and return its moving objects."""
         if self._moving is None:
             assert self._pictures, "observe the frames first"
             self._moving = hypotheses(self._tracker.over_time(self._pictures), self._options.hypotheses)
@@ -105,41 +105,41 @@ class Sam3Masks:
 
 
 class _Tracker:
-    """SAM3's video model: what some words name, found in every picture of a video and followed through it."""
+    """SAM3's video model: finds the prompted objects in every picture of a video and tracks them through it."""
 
     def __init__(self, path: Path, prompts: tuple[str, ...], device: str) -> None:
         _check_files(path)
         torch, transformers = _libraries()
         try:
             self._device = torch.device(device)
-            model, told = transformers.Sam3VideoModel.from_pretrained(
+            model, loaded = transformers.Sam3VideoModel.from_pretrained(
                 path, local_files_only=True, output_loading_info=True, dtype=torch.float32
             )
             self._model = model.to(self._device).eval()
             self._tokenizer = transformers.AutoTokenizer.from_pretrained(path, local_files_only=True)
-        except Exception as error:  # whatever the library makes of files that are not what they should be
+        except Exception as error:  # the library raises exceptions of many types for invalid files
             raise InputError(f"{path}: SAM3 cannot be loaded ({error}); the folder must hold {_NEEDED}") from error
-        if told["missing_keys"]:
-            some = sorted(told["missing_keys"])[0]
-            text = f"{path}: the weights lack {len(told['missing_keys'])} of SAM3's tensors, as {some}"
+        if loaded["missing_keys"]:
+            some = sorted(loaded["missing_keys"])[0]
+            text = f"{path}: the weights lack {len(loaded['missing_keys'])} of SAM3's tensors, as {some}"
             raise InputError(f"{text}; the folder must hold {_NEEDED}")
         self._torch, self._prompts = torch, prompts
         self._size = int(self._model.config.image_size)
 
     def over_time(self, pictures: list[UInt8[np.ndarray, "H W 3"]]) -> Tracked:
-        """The objects of a view's pictures at one moment after the other."""
+        """Track objects through the pictures of one view at consecutive moments."""
         return self._follow(pictures, self._model.config.hotstart_delay)
 
     def through_views(self, pictures: list[UInt8[np.ndarray, "H W 3"]]) -> Tracked:
-        """The objects of the pictures that all views have of one moment.
+        """Track objects through the pictures of all views at one moment.
 
-        Most views do not see an object, which in a video would say that it was none: no picture takes it back here.
+        Most views do not see a given object. In a video SAM3 would discard it as a false detection; not here.
         """
         return self._follow(pictures, 0)
 
-    def _follow(self, pictures: list[UInt8[np.ndarray, "H W 3"]], taken_back: int) -> Tracked:
-        """The objects of a video; within so many pictures one that is not found again counts as never found."""
-        self._model.hotstart_delay = taken_back
+    def _follow(self, pictures: list[UInt8[np.ndarray, "H W 3"]], confirmation: int) -> Tracked:
+        """Track objects through a video; one that is not found again within `confirmation` pictures is discarded."""
+        self._model.hotstart_delay = confirmation
         height, width, _ = pictures[0].shape
         session = self._session(pictures)
         objects = np.zeros((len(pictures), height, width), np.int32)
@@ -147,7 +147,7 @@ class _Tracker:
             hidden = set(output.suppressed_obj_ids or ()) | set(session.hotstart_removed_obj_ids)
             numbers = [number for number in sorted(output.obj_id_to_mask) if number not in hidden]
             scores = np.array([output.obj_id_to_tracker_score.get(number, 0.0) for number in numbers])
-            for place in np.argsort(scores, kind="stable"):  # the surest last: a pixel is of the one it takes
+            for place in np.argsort(scores, kind="stable"):  # the surest object comes last and keeps its pixels
                 mask = self._whole(output.obj_id_to_mask[numbers[place]], height, width)
                 objects[output.frame_idx][mask] = numbers[place] + 1
         found = np.unique(objects[objects > 0]).tolist()
@@ -176,14 +176,14 @@ class _Tracker:
         return session
 
     def _whole(self, logits: Any, height: int, width: int) -> Bool[np.ndarray, "H W"]:
-        """A mask of the picture's size from what the model gives for its own."""
+        """Resize the model's logits to the picture's size and return the mask where they are positive."""
         logits = logits.float().reshape(1, 1, *logits.shape[-2:])
         whole = self._torch.nn.functional.interpolate(logits, size=(height, width), mode="bilinear")
         return np.asarray((whole[0, 0] > 0).cpu())
 
 
 class _Video:
-    """Pictures as the model takes them, made when it asks: a whole video of them would be gigabytes."""
+    """Pictures in the model's input format, converted on access: a whole converted video would take gigabytes."""
 
     def __init__(self, pictures: list[UInt8[np.ndarray, "H W 3"]], size: int, torch: Any) -> None:
         self._pictures, self._size, self._torch = pictures, size, torch
@@ -192,7 +192,7 @@ class _Video:
         return len(self._pictures)
 
     def __getitem__(self, number: int) -> Any:
-        """3 x size x size, -1 to 1, as SAM3's own processor does; that needs torchvision, and this does not."""
+        """Return a picture as 3 x size x size, -1 to 1, like SAM3's own processor, which would need torchvision."""
         picture = self._torch.from_numpy(np.ascontiguousarray(self._pictures[number])).permute(2, 0, 1)[None].float()
         square = self._torch.nn.functional.interpolate(
             picture, size=(self._size, self._size), mode="bilinear", antialias=True

@@ -1,9 +1,9 @@
-"""Which faces of each frame move (paper, section 3.2): geometric change, or masks from elsewhere lifted by votes.
+"""Separate the moving faces of a scene from the still ones (paper, section 3.2), by geometric change or by masks.
 
-In: the frames of a scene. Out: a Segmentation, which says of each frame's faces whether they move, one frame at a time.
+In: the frames of a scene. Out: a Segmentation, which labels the faces of one frame at a time.
 
-Differs from the paper: without masks, what moves is found in space, not in pictures, over the whole sequence
-(docs/decisions/0018-places.md); and labels are cleaned on the surface.
+Differs from the paper: without masks, moving surface is found in space rather than in pictures, over the whole
+sequence (docs/decisions/0018-places.md); and labels are cleaned on the surface.
 """
 
 from __future__ import annotations
@@ -24,66 +24,67 @@ from ...types import Mesh, MeshSequence, evenly
 from .cut import CutOptions, moving_places
 from .labelling import ByMasks, ByPlace, looks
 from .masks import Masker
-from .places import PlacesOptions, Tell, Watched, find_places, nobody
+from .places import Observations, PlacesOptions, Report, find_places, silent
 from .settle import Rest, SettleOptions, find_rest
 from .views import ViewsOptions, place_views
 
-_PROBES = 3  # frames that the views are placed by
-_WIDTH = 4.75  # median distances between two frames that a cell is wide at least: noise moves no surface by two cells
-_WIDEST = 4.0  # edges that a cell is wide at most
-_THINNED = 7  # vertices of a frame of which one is measured
+_PROBES = 3  # frames used to place the views: a guess
+_WIDTH = 4.75  # smallest width of a cell, in median distances between two frames: decision 18
+_WIDEST = 4.0  # largest width of a cell, in edge lengths: decision 18
+_THINNED = 7  # one vertex in this many is measured when two frames are compared: a guess, for speed
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentOptions:
-    """How a scene is taken apart."""
+    """Options of the separation of a scene into moving and still faces."""
 
     views: ViewsOptions = field(default_factory=ViewsOptions)
     places: PlacesOptions = field(default_factory=PlacesOptions)
     cut: CutOptions = field(default_factory=CutOptions)
     settle: SettleOptions = field(default_factory=SettleOptions)
-    threshold: float = 0.3  # the paper's tau: a low one, and clean-up, miss less than a high one
-    island: float = 0.01  # m^2: connected faces with less area take the label of what is around them
-    cameras: tuple[PinholeCamera, ...] = ()  # what to look from, of one size; none: placed as `views` says
+    threshold: float = 0.3  # the paper's tau: a low one followed by clean-up misses less than a high one
+    island: float = 0.01  # m^2: connected faces with less area take the label of the faces around them
+    cameras: tuple[PinholeCamera, ...] = ()  # views of one picture size; none: they are placed by `views`
 
     def __post_init__(self) -> None:
         if not 0 < self.threshold <= 1 or not 0 <= self.island < np.inf:
-            raise InputError(f"threshold {self.threshold:g}, island {self.island:g} m^2: give (0, 1] and from 0 on")
+            raise InputError(f"threshold {self.threshold:g}, island {self.island:g} m^2: give (0, 1] and >= 0")
 
 
-def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), tell: Tell = nobody) -> ByPlace:
-    """What moves in a scene, by geometric change over the whole of it; `options` say which frames are looked at.
+def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), report: Report = silent) -> ByPlace:
+    """Segment a scene by geometric change over the whole sequence; `options.places` selects the inspected frames.
 
-    A scene whose faces turn their backs to it, in which nothing can be seen to move, is turned over.
+    If nothing is found to move and the faces show their backs to the inside of the scene, it is segmented again with
+    all faces reversed.
     """
     chosen = _with_surface(frames, options.places.chosen(len(frames), frames.frame_rate))
     if not chosen:
         nothing = np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0)
         return ByPlace(1.0, Lattice(np.zeros(3), 1.0), *nothing, options.island)
-    found = _by_place(frames, chosen, options, tell)
+    found = _by_place(frames, chosen, options, report)
     if not found.chosen.any() and _faces_away(frames[chosen[0]]):
-        turned = _by_place(TurnedOver(frames), chosen, options, nobody)
+        turned = _by_place(TurnedOver(frames), chosen, options, silent)
         found = turned if turned.chosen.any() else found
     return found
 
 
-def _by_place(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions, tell: Tell) -> ByPlace:
+def _by_place(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions, report: Report) -> ByPlace:
     cell, views = edge_length(frames, chosen), _views(frames, chosen, options)
     lattice = _lattice(frames, chosen, cell)
     pictures = _pictures_of(frames, chosen) if isinstance(frames, SeesDepth) else None
-    places = find_places(Watched(Chosen(frames, chosen), views, pictures, tell), lattice, options.places)
+    places = find_places(Observations(Chosen(frames, chosen), views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
     return ByPlace(cell, lattice, places.keys, moving, rest, options.island)
 
 
 def _pictures_of(frames: SeesDepth, chosen: Sequence[int]) -> Callable[[int], list[DepthPicture | None]]:
-    """What cameras measured in each of the chosen frames, by their number among these."""
+    """Return a function from an index into `chosen` to the depth pictures that the cameras took of that frame."""
     return lambda number: frames.pictures(chosen[number])
 
 
 def _faces_away(mesh: Mesh) -> bool:
-    """True where most of a surface has its front where the middle of all is not: a room's faces look into it."""
+    """Return whether most of the surface faces away from the middle of the mesh; the faces of a room look into it."""
     normals, areas = face_normals(mesh)
     middles = mesh.vertices[mesh.faces].mean(axis=1)
     away = middles - (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
@@ -91,9 +92,10 @@ def _faces_away(mesh: Mesh) -> bool:
 
 
 def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByMasks:
-    """What moves by somebody's masks.
+    """Segment a scene by the masks of `masker`.
 
-    Who must see all frames before the first mask has a method `observe`; who must see a few before that, `foresee`.
+    A masker that must see every frame before its first mask has a method `observe`; one that must see a few frames
+    before that, to choose a reference view, has a method `foresee`. Both are optional.
     """
     chosen = _to_see(frames)
     views = _looking(getattr(masker, "views", None), frames, chosen) or _views(frames, chosen, options)
@@ -106,22 +108,22 @@ def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = S
 
 
 def scene_views(frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> tuple[PinholeCamera, ...]:
-    """What a scene is looked at from. Raises InputError where no frame has a surface to place views by."""
+    """Return the views of a scene: given cameras, or placed ones. Raises InputError if no frame has a surface."""
     return _views(frames, _to_see(frames), options)
 
 
 def _to_see(frames: MeshSequence) -> list[int]:
-    """A few frames that have a surface; all that have where that is none of the few."""
+    """Return the numbers of a few frames that have a surface; of all such frames if none of the few has one."""
     return _with_surface(frames, evenly(len(frames), _PROBES)) or _with_surface(frames, range(len(frames)))
 
 
 def _with_surface(frames: MeshSequence, numbers: Sequence[int]) -> list[int]:
-    """Those of some frames that have a surface."""
+    """Return those of `numbers` whose frames have a surface."""
     return [number for number in numbers if not frames[number].is_empty]
 
 
 def _views(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> tuple[PinholeCamera, ...]:
-    """The cameras that are given, or placed ones that see some of the chosen frames well."""
+    """Return the cameras in the options, or views placed for a few of the chosen frames."""
     some = Chosen(frames, chosen[:: max(1, len(chosen) // _PROBES)])
     return _looking(options.cameras, frames, chosen) or place_views(some, options.views)
 
@@ -129,17 +131,17 @@ def _views(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions)
 def _looking(
     views: tuple[PinholeCamera, ...] | None, frames: MeshSequence, chosen: Sequence[int]
 ) -> tuple[PinholeCamera, ...] | None:
-    """The views that are given. Raises InputError where they see nothing of the chosen frames."""
+    """Return `views` unchanged. Raises InputError if they see no face of any chosen frame."""
     if views and chosen and not any((s.faces >= 0).any() for k in chosen for s in looks(frames[k], views)):
-        text = f"the {len(views)} cameras that are given see no face of {len(chosen)} frames, as {chosen[0]}"
+        text = f"the {len(views)} given cameras see no face in any of {len(chosen)} frames (the first is {chosen[0]})"
         raise InputError(f"{text}; give cameras of this scene, in its unit and axes")
     return views
 
 
 def _lattice(frames: MeshSequence, chosen: Sequence[int], cell: float) -> Lattice:
-    """Cells as large as the frames' edges are long, but no finer than noise lets a surface stay in its own.
+    """Return a lattice with cells as wide as the frames' edges (`cell`, m), wider where noise moves surface by more.
 
-    Noise by the median distance from a frame to another one: what stands still is more than half of a scene.
+    Noise is estimated by the median distance from one frame to another: more than half of a scene stands still.
     """
     first = frames[chosen[0]]
     apart = distances(first.vertices[::_THINNED], frames[chosen[len(chosen) // 2]])
@@ -147,9 +149,9 @@ def _lattice(frames: MeshSequence, chosen: Sequence[int], cell: float) -> Lattic
 
 
 def edge_length(frames: MeshSequence, chosen: Sequence[int]) -> float:
-    """How long the edges of a scene's frames usually are, m: about a voxel of what they were fused on.
+    """Return the median edge length of a scene's frames, m: about one voxel of the grid on which they were fused.
 
-    Of the first, the middle and the last frame that are chosen. Edges without length say nothing; 1 m where there are
+    Only the first, the middle and the last chosen frame are read. Edges of length zero are ignored; 1 m if there are
     no others.
     """
     edges = []

@@ -1,7 +1,7 @@
-"""Places where the room itself changes for good: a chair that was carried away, or has come to stand (section 3.2).
+"""Find lasting changes of the room, as a chair that is carried away or put down (paper, section 3.2; decision 18).
 
-In: what happens at each place over time, and which places move. Out: from which frame on, or until which frame, what
-is at a moving place belongs to the room after all.
+In: the counts of what was observed at each place, and the moving places. Out: the frames from which on, or until which,
+surface at a moving place belongs to the room.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from ...errors import InputError
 from .cut import connected
 from .places import Places, Stay
 
-NEVER = np.iinfo(np.int32).max
-_FEWEST = 3  # frames looked at that know a place in its time of rest
-_ALIKE = 1  # frames looked at between the changes of neighbours that change together
+NEVER = np.iinfo(np.int32).max  # frame number that means "at no time"
+_FEWEST = 3  # smallest number of inspected frames with surface in a time of rest: a guess
+_ALIKE = 1  # largest difference, in inspected frames, between neighbours that change together: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class SettleOptions:
-    """What counts as a change of the room."""
+    """Conditions for a change of the room (decision 18)."""
 
-    rest: float = 10.0  # s that it is as it is before, or after, without a break: people do not stand so still
-    share: float = 0.8  # of the frames that know a place in that time which have surface in it
-    least: float = 0.15  # m^2 that change together
+    rest: float = 10.0  # s of uninterrupted rest before or after the change: people do not stand still for as long
+    share: float = 0.8  # smallest share of the inspected frames in that time that have surface at the place
+    least: float = 0.15  # m^2, smallest area that changes together
 
     def __post_init__(self) -> None:
         if not self.rest > 0 or not 0 < self.share <= 1 or not self.least >= 0:
@@ -39,19 +39,19 @@ class SettleOptions:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """When what is at each place belongs to the room: before the frame `until`, and from the frame `since` on."""
+    """Frames in which surface at each place belongs to the room: those before `until`, and those from `since` on."""
 
-    until: Int32[np.ndarray, " P"]  # 0: never before
-    since: Int32[np.ndarray, " P"]  # NEVER: not later either
+    until: Int32[np.ndarray, " P"]  # 0: no frame at the beginning
+    since: Int32[np.ndarray, " P"]  # NEVER: no frame at the end
 
     @staticmethod
     def none(count: int) -> Rest:
-        """Of so many places whose state never changes."""
+        """Return the value for `count` places at which the room never changes."""
         return Rest(np.zeros(count, np.int32), np.full(count, NEVER, np.int32))
 
     @property
     def changes(self) -> list[int]:
-        """The frames with which the room is another, rising."""
+        """Numbers of the first frames after each change of the room, ascending."""
         return sorted(set(self.until[self.until > 0].tolist()) | set(self.since[self.since < NEVER].tolist()))
 
 
@@ -62,7 +62,7 @@ def find_rest(
     frame_rate: float,
     options: SettleOptions = SettleOptions(),
 ) -> Rest:
-    """The rest of moving places; `numbers` are the frames that were looked at."""
+    """Find when moving places rest; `numbers` are the numbers of the inspected frames."""
     rest = Rest.none(len(places.keys))
     frames = np.asarray(numbers, np.int32)
     late = _settled(places.tally.after, frames, frame_rate, options)
@@ -70,13 +70,13 @@ def find_rest(
     least = round(options.least / places.lattice.size**2)
     for at, order, out, sign in ((late, frames, rest.since, 1), (early, frames[::-1], rest.until, -1)):
         for group in _together(places, moving & (at >= 0), at, least):
-            last = int(at[group].max())  # of these places to come to rest
+            last = int(at[group].max())  # when the last of these places has come to rest
             out[group] = order[last] if sign > 0 else order[last] + 1
     return _with_unknown(places, moving, rest)
 
 
 def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) -> Rest:
-    """Moving places that are never seen free, as where a chair meets the floor, rest as the nearest that are."""
+    """Give moving places that are never seen free, as under a chair's legs, the rest of the nearest one that is."""
     from scipy.spatial import cKDTree
 
     free = places.tally.free > 0
@@ -92,10 +92,7 @@ def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) ->
 def _settled(
     stay: Stay, frames: Int32[np.ndarray, " T"], frame_rate: float, options: SettleOptions
 ) -> Int64[np.ndarray, " P"]:
-    """The first of the frames looked at from which each place has surface to the end; -1 where it has not.
-
-    Only places that are seen free before.
-    """
+    """Return the index of the first inspected frame of each place's rest; -1 if its stay is too short or too patchy."""
     share = stay.count / (len(frames) - stay.first)
     long = frames[-1] - frames[stay.first] >= options.rest * frame_rate
     full = (share >= options.share) & (stay.count >= _FEWEST)
@@ -105,7 +102,7 @@ def _settled(
 def _together(
     places: Places, chosen: Bool[np.ndarray, " P"], at: Int64[np.ndarray, " P"], least: int
 ) -> list[Int64[np.ndarray, " C"]]:
-    """Connected places that change at about one time, and are enough."""
+    """Return the sets of at least `least` connected places that change at about the same time."""
     own = np.flatnonzero(chosen)
     label = connected(places, own, lambda a, b: np.abs(at[own[a]] - at[own[b]]) <= _ALIKE)
     size = np.bincount(label, minlength=1)

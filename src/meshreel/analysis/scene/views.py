@@ -1,9 +1,9 @@
-"""Where to look from: views that all frames share and that together see nearly every face (paper, section 3.2).
+"""Placement of views that all frames share and that together see nearly every face (paper, section 3.2).
 
-In: a few frames of a scene. Out: cameras. Candidates stand on a grid in the scene's box and look several ways; of
-those, each next one is taken that is expected to see most of the surface that those before it do not.
+In: a few frames of a scene. Out: cameras. Candidates stand on a grid in the scene's box and look in 26 directions. They
+are taken greedily: next comes the candidate expected to see most of the surface that the earlier ones do not see.
 
-Differs from the paper: it does not say where its viewpoints are.
+Differs from the paper: it does not state its viewpoints, so this placement is ours (docs/decisions/0017-views.md).
 """
 
 from __future__ import annotations
@@ -23,25 +23,25 @@ from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
 from ...types import UP_AXES, Frames, Mesh, check_up
 
-_TOUCHES = 1e-3  # of a ray's length: what it meets so near its end is the sample itself
-_INSIDE = 0.5  # share of what a place sees from behind from which on it is taken to be inside of something
-_SURE = 0.9  # that a face which has a whole pixel is met: where all is seen, further views go where fewest see
+_TOUCHES = 1e-3  # of a ray's length: a hit this near its end is the sample itself; a guess
+_INSIDE = 0.5  # a place that sees more than this share of its samples from behind is inside an object; a guess
+_SURE = 0.9  # probability that a pixel meets a face of its size; below 1, so that a further view still gains: a guess
 _WAYS = np.array([w for w in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(w)])
 
 
 @dataclass(frozen=True, slots=True)
 class ViewsOptions:
-    """How many views, of what size, and how carefully their places are chosen."""
+    """Number and size of the views, and the effort spent on placing them; defaults from decision 17."""
 
     count: int = 14
     width: int = 320  # pixels
     height: int = 240  # pixels
     fov: float = 75.0  # degrees, horizontal
     up: str = "y"  # the axis that points up in the pictures: y, z, -y or -z
-    places: int = 6  # of candidates, along the longest side of the box
-    reach: float = 1.0  # of the box that views stand in, in the scene's own: 2 for a body that stands alone
-    frames: int = 4  # looked at, spread over what is given
-    samples: int = 2048  # points of the surface of each of them
+    places: int = 6  # candidate places along the longest side of the box
+    reach: float = 1.0  # size of the box in which views stand, in sizes of the scene's box: 2 for a lone body
+    frames: int = 4  # frames inspected, spread evenly over those given
+    samples: int = 2048  # points sampled on the surface of each inspected frame
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= 1000:
@@ -59,15 +59,15 @@ class ViewsOptions:
 
 
 def place_views(meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOptions()) -> tuple[PinholeCamera, ...]:
-    """Views that together see nearly all of the meshes; the same for the same meshes.
+    """Place views that together see nearly all of the meshes; the same meshes always give the same views.
 
-    Only `options.frames` of the meshes are read. Raises InputError where none of those has a surface. Some 4 s of
+    Only `options.frames` of the meshes are read. Raises InputError if none of those has a surface. Takes some 4 s of
     CPU for four frames of 500,000 faces.
     """
     chosen = sorted({int(k) for k in np.linspace(0, len(meshes) - 1, options.frames)}) if len(meshes) else []
     samples = [_Samples.of(mesh, options.samples) for mesh in (meshes[k] for k in chosen) if not mesh.is_empty]
     if not samples:
-        raise InputError(f"none of {len(chosen)} frames looked at has a surface; views need one")
+        raise InputError(f"none of the {len(chosen)} inspected frames has a surface; give a frame with faces")
     low = np.min([s.mesh.vertices[s.mesh.faces].min(axis=(0, 1)) for s in samples], axis=0)
     high = np.max([s.mesh.vertices[s.mesh.faces].max(axis=(0, 1)) for s in samples], axis=0)
     places = _outside(_grid(low, high, options), samples)
@@ -80,7 +80,7 @@ def place_views(meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOp
 
 @dataclass(frozen=True, slots=True)
 class _Samples:
-    """Points of a mesh, even by area, and the faces they are on."""
+    """Points spread over a mesh evenly by area, and the faces that they lie on."""
 
     mesh: Mesh
     rays: Rays
@@ -95,14 +95,14 @@ class _Samples:
         ends = np.cumsum(areas)
         steps = np.arange(count)
         faces = np.minimum(np.searchsorted(ends, (steps + 0.5) / count * ends[-1]), len(areas) - 1)
-        # A sequence that is even in the square, folded into the triangle; no chance in it.
+        # A deterministic low-discrepancy sequence in the unit square, folded into the triangle.
         u, v = (steps * 0.7548776662466927) % 1, (steps * 0.5698402909980532) % 1
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
         points = np.einsum("kn,nkd->nd", np.stack([1 - u - v, u, v]), mesh.vertices[mesh.faces[faces]])
         return _Samples(mesh, Rays(mesh), points, faces, normals[faces], areas[faces])
 
     def seen_from(self, eye: Float64[np.ndarray, " 3"]) -> tuple[np.ndarray, np.ndarray]:
-        """Of each sample, whether nothing stands before it; and whether the ray to it ends on a face's back."""
+        """Return for each sample whether it is visible from `eye`; and whether it is visible from behind."""
         ahead = self.points - eye
         hit = self.rays.cast(np.broadcast_to(eye, ahead.shape), ahead)
         free = (hit.faces == self.faces) | (hit.distances > 1 - _TOUCHES)
@@ -110,7 +110,7 @@ class _Samples:
 
 
 def _grid(low: np.ndarray, high: np.ndarray, options: ViewsOptions) -> list[Float64[np.ndarray, " 3"]]:
-    """Places in the middles of equal cells of the box."""
+    """Return the middles of equal cells of the box as candidate places."""
     more = (high - low) * (options.reach - 1) / 2
     low, high = low - more, high + more
     step = float((high - low).max()) / options.places or 1.0
@@ -122,9 +122,9 @@ def _grid(low: np.ndarray, high: np.ndarray, options: ViewsOptions) -> list[Floa
 def _outside(
     eyes: list[Float64[np.ndarray, " 3"]], samples: list[_Samples]
 ) -> list[tuple[Float64[np.ndarray, " 3"], list[np.ndarray]]]:
-    """The places that are not inside of something in any frame, and which samples are seen from each.
+    """Return the places that lie inside no object in any frame, with the visible samples of each frame.
 
-    All places where none is outside: the faces' order says nothing then.
+    Return all places if none is outside: the faces' orientation is then unreliable.
     """
     places, outside = [], []
     for eye in eyes:
@@ -137,7 +137,7 @@ def _outside(
 def _pixels(
     eye: np.ndarray, sees: list[np.ndarray], samples: list[_Samples], options: ViewsOptions
 ) -> Float32[np.ndarray, "W N"]:
-    """The share of a pixel that the face of each sample has in each way to look; all samples in a row, at most 1."""
+    """Return the size in pixels, at most 1, of each sample's face in each viewing direction; all frames in one row."""
     across = math.tan(math.radians(options.fov) / 2)
     high = across * options.height / options.width
     focal = options.width / 2 / across
@@ -156,8 +156,8 @@ def _pixels(
 def _greedy(
     candidates: list[PinholeCamera], pixels: Float32[np.ndarray, "C N"], count: int
 ) -> tuple[PinholeCamera, ...]:
-    """The views that, each after those before it, promise to see most of the samples."""
-    unseen = np.ones(pixels.shape[1], np.float32)  # probability that no pixel of the views so far meets the face
+    """Choose views one by one, each expected to see most of the samples that the earlier views do not see."""
+    unseen = np.ones(pixels.shape[1], np.float32)  # probability that no pixel of the chosen views meets the face
     chosen: list[PinholeCamera] = []
     for _ in range(min(count, len(candidates))):
         best = int(np.argmax(pixels @ unseen))
@@ -168,7 +168,7 @@ def _greedy(
 
 
 def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], options: ViewsOptions) -> PinholeCamera:
-    """A view from a place, turned so."""
+    """Return a camera at `eye` with the rotation `turn` from world to camera."""
     focal = options.width / 2 / math.tan(math.radians(options.fov) / 2)
     intrinsic = np.array([[focal, 0, options.width / 2], [0, focal, options.height / 2], [0, 0, 1.0]])
     extrinsic = np.eye(4)
@@ -178,7 +178,7 @@ def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], o
 
 @cache
 def _turns(options: ViewsOptions) -> Float64[np.ndarray, "W 3 3"]:
-    """World to camera for each way to look; upright where the way is not vertical."""
+    """Return the rotation from world to camera for each viewing direction; upright unless the direction is vertical."""
     up = np.array(UP_AXES[options.up])
     turns = []
     for way in _WAYS:

@@ -1,6 +1,6 @@
-"""Masks of views lifted to faces: each pixel that sees a face votes on it (paper, section 3.2, eqs. 1 to 4).
+"""Lift the masks of views to faces: each pixel votes on the face that it sees (paper, section 3.2, eqs. 1 to 4).
 
-In: the face that each pixel sees, and a mask of the pixels that move. Out: votes, visibility and score of each face.
+In: the face that each pixel sees, and a mask of the moving pixels. Out: votes, visibility and score of each face.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ...geometry.raycast import Rays
 
 @dataclass(frozen=True, slots=True)
 class Votes:
-    """How many pixels of all views see each face (U), and how many of them say that it moves (V)."""
+    """Numbers of pixels, over all views, that see each face (U) and that see it as moving (V)."""
 
     dynamic: Int64[np.ndarray, " F"]  # eq. 2; at most `seen`
     seen: Int64[np.ndarray, " F"]  # eq. 3; 0: no view sees the face
 
     @staticmethod
     def of(ids: Int32[np.ndarray, "X H W"], masks: Bool[np.ndarray, "X H W"], faces: int) -> Votes:
-        """The votes on so many faces; `ids` as `primitive_ids` gives them, masks True where a pixel moves."""
-        assert ids.shape == masks.shape, "a mask a view"
+        """Count the votes on `faces` faces; `ids` come from `primitive_ids`, masks are True where a pixel moves."""
+        assert ids.shape == masks.shape, "one mask per view"
         hit = ids >= 0
         return Votes(
             np.bincount(ids[hit & masks], minlength=faces),  # eq. 2
@@ -34,10 +34,10 @@ class Votes:
 
     @property
     def score(self) -> Float64[np.ndarray, " F"]:
-        """The share of the pixels seeing a face that say it moves, 0 to 1; 0 for a face that no view sees."""
+        """Share of the pixels seeing a face that call it moving, 0 to 1; 0 for a face that no view sees."""
         return self.dynamic / np.maximum(self.seen, 1)  # eq. 4
 
 
 def primitive_ids(rays: Rays, views: Sequence[PinholeCamera]) -> Int32[np.ndarray, "X H W"]:
-    """The face that each pixel of each view sees, -1 for none (eq. 1); all views have one size."""
+    """Return the face that each pixel of each view sees, -1 for none (eq. 1); all views have one size."""
     return np.stack([rays.look(view).faces for view in views])  # eq. 1
