@@ -1,7 +1,7 @@
-"""meshreel: time-varying meshes as one small .reel file.
+"""meshreel: compression of time-varying meshes into one small .reel file.
 
-`meshreel.open(path)` gives a Video of meshes; `meshreel.encode(sequence, path)` makes the file. Encoding needs the
-extra `encode`; opening does not.
+`meshreel.encode(sequence, path)` writes the file and needs the extra `encode`; `meshreel.open(path)` returns its frames
+as meshes and needs no extra.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from .decoder.video import Video, open
 from .errors import FormatError, InputError, MeshreelError
-from .types import Mesh, MeshList, MeshSequence
+from .types import Mesh, MeshList, MeshSequence, as_sequence
 
 if TYPE_CHECKING:
     from .encoder.options import EncoderOptions
     from .encoder.presets import preset_options
     from .encoder.sequence import encode
-    from .io.sequence import open_sequence
+    from .io.sequence import SequenceOptions, open_sequence
 
 __version__ = "0.1.0"
 
@@ -29,16 +29,19 @@ __all__ = [
     "MeshList",
     "MeshSequence",
     "MeshreelError",
+    "SequenceOptions",
     "Video",
+    "as_sequence",
     "encode",
     "open",
     "open_sequence",
     "preset_options",
 ]
 
-# Found on first use, so that a player never imports the encoder.
+# Imported on first use, so that decoding never imports the encoder.
 _LATER = {
     "EncoderOptions": ".encoder.options",
+    "SequenceOptions": ".io.sequence",
     "encode": ".encoder.sequence",
     "open_sequence": ".io.sequence",
     "preset_options": ".encoder.presets",
@@ -52,3 +55,8 @@ def __getattr__(name: str) -> Any:
         return getattr(import_module(_LATER[name], __name__), name)
     except ModuleNotFoundError as error:
         raise ImportError(f"meshreel.{name} needs the extra `encode`: pip install 'meshreel[encode]'") from error
+
+
+def __dir__() -> list[str]:
+    """List the promised names and no others: modules below may change without notice."""
+    return sorted(__all__)
