@@ -33,8 +33,8 @@ def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_tells_its_numbers(run, t
     assert said.code == 0, said.err
     row = said.row
     assert row["frames"] == 6 and row["d2_psnr_paper"] > 40
-    assert sum(row["parts"].values()) == row["bytes"] == (tmp_path / "demo" / "demo.reel").stat().st_size
-    assert row["parts"]["background"] > 0
+    assert sum(row["bytes_by_content"].values()) == row["bytes"] == (tmp_path / "demo" / "demo.reel").stat().st_size
+    assert row["bytes_by_content"]["background"] > 0
     truth = row["truth"]
     assert truth["frames"] == [0, 1, 3, 5]
     assert max(truth["decoded"][name] for name in ("people_median_m", "background_median_m")) < 0.02

@@ -58,9 +58,19 @@ def test_every_option_reaches_the_encoder(run, balls, tmp_path):
 
 
 @pytest.mark.usefixtures("quick_presets")
-def test_groups_are_predicted_between_the_frames_that_keyint_asks_for(run, balls, tmp_path):
+def test_groups_are_predicted_between_the_frames_that_the_key_interval_asks_for(run, balls, tmp_path):
     said = run(
-        "encode", balls, "-o", tmp_path / "a.reel", "--group-size", "1", "--fps", "10", "--keyint", "0.2", "--json"
+        "encode",
+        balls,
+        "-o",
+        tmp_path / "a.reel",
+        "--group-size",
+        "1",
+        "--fps",
+        "10",
+        "--key-interval",
+        "0.2",
+        "--json",
     )
     groups = run("info", tmp_path / "a.reel", "--json").row["groups"]
     assert [group["predicted"] for group in said.row["groups"]] == [group["predicted"] for group in groups]
@@ -170,8 +180,8 @@ def test_a_frame_that_cannot_be_used_is_told_with_file_and_number(run, tmp_path,
         (["-o", "a.reel", "--preset", "paper", "--basis-size", "-1"], ["-1"]),
         (["-o", "a.reel", "--basis-size", "4"], ["basis size 4", "preset `paper`"]),
         (["-o", "a.reel", "--centers", "300"], ["centers 300", "preset `paper`"]),
-        (["-o", "a.reel", "--keyint", "0"], ["key interval 0"]),
-        (["-o", "a.reel", "--keyint", "2", "--preset", "paper"], ["key interval 2"]),
+        (["-o", "a.reel", "--key-interval", "0"], ["key interval 0"]),
+        (["-o", "a.reel", "--key-interval", "2", "--preset", "paper"], ["key interval 2"]),
         (["-o", "a.reel", "--quality", "50", "--target-psnr", "60"], ["--quality 50", "one of both"]),
         (["-o", "a.reel", "--quality", "0", "--target-mbps", "1"], ["--quality 0", "one of both"]),
         (["-o", "a.reel", "--target-mbps", "1", "--target-psnr", "60"], ["60", "1", "one of them"]),

@@ -37,12 +37,12 @@ def quick_bodies(monkeypatch):
 def test_a_scene_is_told_by_its_parts_and_info_agrees(run, scan, tmp_path):
     out = tmp_path / "a.reel"
     row = run("encode", scan, "-o", out, *FRAMES, "--background-refresh", "0.2", "--json").row
-    parts = row["scene"]["parts_bytes"]
+    parts = row["scene"]["bytes_by_content"]
     assert sum(parts.values()) == row["bytes"] and list(parts) == ["background", "track 0", "track 1", "other"]
-    assert sum(row["scene"]["parts_mbps"].values()) == pytest.approx(row["mbps"])
+    assert sum(row["scene"]["mbps_by_content"].values()) == pytest.approx(row["mbps"])
     info = run("info", out, "--json").row
-    assert [state["spans"] for state in info["background"]] == [[[0, 1]], [[2, 3]]]  # two copies
-    assert parts["background"] == row["scene"]["background_bytes"] == info["parts"]["background"]
+    assert [state["ranges"] for state in info["background"]] == [[[0, 1]], [[2, 3]]]  # two copies
+    assert parts["background"] == row["scene"]["background_bytes"] == info["bytes_by_content"]["background"]
     assert [track["bytes"] for track in info["tracks"]] == [parts["track 0"], parts["track 1"]]
     assert info["metadata"]["noise_m"] == pytest.approx(row["scene"]["noise_m"], rel=1e-3)
     assert {group["track"] for group in row["groups"]} == {0, 1}

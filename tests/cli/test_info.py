@@ -1,4 +1,4 @@
-"""`meshreel info`: where the bytes of a file go."""
+"""`meshreel info`: the contents of a file and their bytes."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from tests.container.files import HEADER
 from tests.golden import GOLDEN
 
 
-def test_every_byte_is_in_some_part_and_in_some_group(run):
+def test_every_byte_counts_as_some_content_of_some_group(run):
     row = run("info", FILE, "--json").row
-    assert sum(row["parts"].values()) == row["bytes"] == FILE.stat().st_size
-    assert row["bytes"] == row["parts"]["header and index"] + sum(group["bytes"] for group in row["groups"])
-    assert abs(sum(row["parts_mbps"].values()) - row["mbps"]) < 1e-12
+    assert sum(row["bytes_by_content"].values()) == row["bytes"] == FILE.stat().st_size
+    assert row["bytes"] == row["bytes_by_content"]["header and index"] + sum(group["bytes"] for group in row["groups"])
+    assert abs(sum(row["mbps_by_content"].values()) - row["mbps"]) < 1e-12
     assert row["mbps"] == row["bytes"] * 8 * 25 / 10 / 1e6
-    assert {"reference", "basis", "displacements", "draco"} < set(row["parts"])
+    assert {"reference", "basis", "displacements", "draco"} < set(row["bytes_by_content"])
 
 
 def test_groups_have_their_frames_forms_and_layers(run):
@@ -32,7 +32,7 @@ def test_groups_have_their_frames_forms_and_layers(run):
     assert groups[1]["layers"] > 0
 
 
-def test_text_tells_frames_rate_forms_and_what_was_recorded(run):
+def test_the_text_has_frames_rate_forms_and_what_was_recorded(run):
     said = run("info", FILE)
     assert said.code == 0 and said.err == ""
     assert "10 frames at 25/s" in said.out and "recorded at encode: preset golden" in said.out
@@ -50,15 +50,15 @@ def test_a_damaged_group_is_reported_and_the_others_shown(run, tmp_path):
     assert "group 1: chunk 1 (frames 2 to 5)" in said.err
 
 
-def test_of_a_truncated_file_what_is_there_and_what_is_missing_is_told(run, tmp_path):
+def test_a_truncated_file_is_reported_with_its_existing_and_missing_bytes(run, tmp_path):
     data, groups = FILE.read_bytes(), meshreel.open(FILE).reader.groups
     cut = groups[2].offset + 10
     (tmp_path / "a.reel").write_bytes(data[:cut])
     row = run("info", tmp_path / "a.reel", "--json").row
     assert (row["bytes"], row["bytes_missing"]) == (len(data), len(data) - cut)
-    assert row["groups"][2]["parts"] == {"damaged": 10, "missing": groups[2].size - 10}
-    assert row["groups"][3]["parts"] == {"missing": groups[3].size}
-    assert sum(row["parts"].values()) == len(data) and row["parts"]["missing"] == len(data) - cut
+    assert row["groups"][2]["bytes_by_content"] == {"damaged": 10, "missing": groups[2].size - 10}
+    assert row["groups"][3]["bytes_by_content"] == {"missing": groups[3].size}
+    assert sum(row["bytes_by_content"].values()) == len(data) and row["bytes_by_content"]["missing"] == len(data) - cut
     said = run("info", tmp_path / "a.reel")
     assert (
         said.code == 0
@@ -68,45 +68,45 @@ def test_of_a_truncated_file_what_is_there_and_what_is_missing_is_told(run, tmp_
     assert "missing" not in run("info", FILE).out and run("info", FILE, "--json").row["bytes_missing"] == 0
 
 
-def test_of_a_scene_it_tells_when_each_body_is_there_and_what_it_is_made_of(run):
+def test_each_track_of_a_scene_has_the_frames_of_its_body_and_its_contents(run):
     row = run("info", SCENE, "--json").row
-    assert [track["spans"] for track in row["tracks"]] == [[[0, 13]], [[4, 8]]]
+    assert [track["ranges"] for track in row["tracks"]] == [[[0, 13]], [[4, 8]]]
     assert [track["groups"] for track in row["tracks"]] == [3, 4]
-    assert sum(row["parts"].values()) == row["bytes"] == SCENE.stat().st_size
+    assert sum(row["bytes_by_content"].values()) == row["bytes"] == SCENE.stat().st_size
     for number, track in enumerate(row["tracks"]):
         own = [group for group in row["groups"] if group["track"] == number]
-        assert track["bytes"] == sum(group["bytes"] for group in own) == sum(track["parts"].values())
-        assert track["parts"] == {
+        assert track["bytes"] == sum(group["bytes"] for group in own) == sum(track["bytes_by_content"].values())
+        assert track["bytes_by_content"] == {
             name.removeprefix(f"track {number}: "): size
-            for name, size in row["parts"].items()
+            for name, size in row["bytes_by_content"].items()
             if name.startswith(f"track {number}: ")
         }
-    assert row["parts"]["track 1: patches"] > 0 and "track 0: patches" not in row["parts"]
+    assert row["bytes_by_content"]["track 1: patches"] > 0 and "track 0: patches" not in row["bytes_by_content"]
     said = run("info", SCENE)
     assert (said.code, said.err) == (0, "")
-    assert all(words in said.out for words in ("is there in frames", "4-8", "track 1: base mesh", "background"))
+    assert all(words in said.out for words in ("appears in frames", "4-8", "track 1: base mesh", "background"))
 
 
-def test_of_a_scene_it_tells_the_states_of_the_background(run):
+def test_each_state_of_a_background_has_its_frames(run):
     row = run("info", SCENE, "--json").row
     states = row["background"]
-    assert [(s["chunk"], s["form"], s["changes"], s["spans"]) for s in states] == [
+    assert [(s["chunk"], s["form"], s["changes"], s["ranges"]) for s in states] == [
         (0, "draco", None, [[0, 3]]),
         (3, "patch", 0, [[4, 13]]),
     ]
-    assert row["parts"]["background"] == sum(state["bytes"] for state in states)
-    assert "is shown in frames" in run("info", SCENE).out and "is shown in frames" not in run("info", FILE).out
+    assert row["bytes_by_content"]["background"] == sum(state["bytes"] for state in states)
+    assert "shown in frames" in run("info", SCENE).out and "shown in frames" not in run("info", FILE).out
     assert run("info", FILE, "--json").row["background"] == []
 
 
-def test_a_body_that_comes_back_has_two_spans_and_one_that_never_comes_none(run, tmp_path):
+def test_a_body_that_returns_has_two_ranges_and_one_that_never_appears_has_none(run, tmp_path):
     payload = meshreel.open(FILE).reader.read_chunk(2)
     with ReelWriter(tmp_path / "a.reel", HEADER) as writer:
         for first in range(0, 12, 3):
             writer.add_group(first, 3, encode_empty() if first == 6 else payload)
             writer.add_group(first, 3, encode_empty(), track=1)
     row = run("info", tmp_path / "a.reel", "--json").row
-    assert [track["spans"] for track in row["tracks"]] == [[[0, 5], [9, 11]], []]
+    assert [track["ranges"] for track in row["tracks"]] == [[[0, 5], [9, 11]], []]
     assert "0-5, 9-11" in run("info", tmp_path / "a.reel").out and "none" in run("info", tmp_path / "a.reel").out
 
 
@@ -118,28 +118,28 @@ def test_damage_of_a_scene_is_reported_by_chunk_track_and_frames(run, tmp_path):
         (tmp_path / "a.reel").write_bytes(data)
         said = run("info", tmp_path / "a.reel", "--json")
         assert said.code == 0 and words in said.err and said.err.count("\n") == 1
-        assert said.row["parts"]["damaged"] == chunks[number].size
-        assert sum(said.row["parts"].values()) == len(data)
+        assert said.row["bytes_by_content"]["damaged"] == chunks[number].size
+        assert sum(said.row["bytes_by_content"].values()) == len(data)
 
 
-def test_of_a_truncated_scene_what_is_missing_is_told(run, tmp_path):
+def test_a_truncated_scene_is_reported_with_its_missing_bytes(run, tmp_path):
     data, chunks = SCENE.read_bytes(), meshreel.open(SCENE).reader.chunks
     cut = chunks[3].offset + 10
     (tmp_path / "a.reel").write_bytes(data[:cut])
     row = run("info", tmp_path / "a.reel", "--json").row
-    assert row["parts"]["missing"] == row["bytes_missing"] == len(data) - cut
-    assert row["background"][1]["parts"] == {"damaged": 10, "missing": chunks[3].size - 10}
-    assert sum(row["parts"].values()) == len(data)
+    assert row["bytes_by_content"]["missing"] == row["bytes_missing"] == len(data) - cut
+    assert row["background"][1]["bytes_by_content"] == {"damaged": 10, "missing": chunks[3].size - 10}
+    assert sum(row["bytes_by_content"].values()) == len(data)
 
 
-def test_other_files_are_told(run, tmp_path):
+def test_other_files_are_refused(run, tmp_path):
     (tmp_path / "a.reel").write_bytes(b"PK\x03\x04")
     assert failed(run("info", tmp_path / "a.reel"), "a.reel", "not a .reel")
     assert failed(run("info", tmp_path / "b.reel", "--json"), "b.reel")
     assert failed(run("info"), "FILE")
 
 
-def test_a_group_that_is_predicted_from_the_one_before_is_told(run):
+def test_a_predicted_group_is_marked(run):
     file = GOLDEN / "layers.reel"
     groups = run("info", file, "--json").row["groups"]
     assert [(group["form"], group["layers"], group["predicted"]) for group in groups] == [

@@ -88,7 +88,7 @@ def command(
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
     if reel:
         described = describe_file(Path(decoded))
-        row = {name: described[name] for name in ("bytes", "mbps", "parts", "parts_mbps")} | row
+        row = {name: described[name] for name in ("bytes", "mbps", "bytes_by_content", "mbps_by_content")} | row
     warnings = [*source.warnings, *(f"{decoded}: {w}" for w in getattr(other, "warnings", ()))]
     common.warn(warnings)
     texts: list[object] = [] if truth is None else [truth_table(row["truth"])]

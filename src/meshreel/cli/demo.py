@@ -73,7 +73,7 @@ def command(
             truth = _judged(output / "rig", capture, video, progress)
             write_sheet(capture, video, picture, SheetOptions(frames=_spread(frames, 3), height=360, unit="mm"))
     described = describe_file(file)
-    parts = {name: described[name] for name in ("parts", "parts_mbps")}
+    parts = {name: described[name] for name in ("bytes_by_content", "mbps_by_content")}
     row = summary_row(summary, capture.frame_rate) | parts | {"truth": truth}
     common.warn(summary.warnings)
     common.result(

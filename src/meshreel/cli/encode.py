@@ -1,4 +1,4 @@
-"""`meshreel encode`: a mesh sequence becomes one .reel file."""
+"""`meshreel encode`: encode a mesh sequence into one .reel file."""
 
 from __future__ import annotations
 
@@ -31,30 +31,30 @@ DEFAULT_QUALITY = preset_options().quality
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Coding:
-    """How meshes are coded: what `preset_options` takes."""
+    """Flags for the arguments of `preset_options`, and for targets."""
 
     preset: Literal["best", "paper"] = "best"
-    """How to code: `best` is what measures best, `paper` is section 3 of the TSMC paper."""
+    """`best` needs the fewest bits for its quality; `paper` is section 3 of the TSMC paper."""
     quality: float | None = None
-    """0 (small) to 100 (fine); 50 where neither it nor a target is given."""
+    """0 (small) to 100 (fine); 50 if neither it nor a target is given."""
     target_psnr: float | None = None
     """Instead of a quality: the D2-PSNR (one way, mean over the frames, as `compare` prints it) to meet within 0.3 dB.
-    Takes some encodes, 8 at most."""
+    Takes up to 8 encodes."""
     target_mbps: float | None = None
-    """Instead of a quality: the rate of the file to meet within 5 %, Mbit/s. Takes some encodes, 8 at most. No quality
-    changes the size of a scene's background."""
+    """Instead of a quality: the rate of the file to meet within 5 %, Mbit/s. Takes up to 8 encodes. The size of a
+    scene's background does not depend on the quality."""
     basis_size: int | None = None
-    """Exactly this many KLT components per group, and no per-frame Draco where that is cheaper; both by
-    rate-distortion where it is not given. Preset `paper` only."""
+    """Number of KLT components per group, which also excludes per-frame Draco; chosen by rate and distortion if not
+    given. Preset `paper` only."""
     centers: int | None = None
-    """Volume centers to track, the paper's K (2000). Preset `paper` only."""
+    """Number of volume centers to track, the paper's K (2000). Preset `paper` only."""
     group_size: int | None = None
-    """Most frames in a group, the paper's GoF (16; `paper`: 10)."""
-    keyint: float | None = None
-    """Seconds, at most, from one frame that decodes on its own to the next (4). Preset `best` only."""
+    """Largest number of frames in a group, the paper's GoF (16; `paper`: 10)."""
+    key_interval: float | None = None
+    """Longest time between frames that decode without earlier ones, s (4). Preset `best` only."""
 
     def goal(self) -> Goal | None:
-        """What is to be met; None: a quality. Raises InputError where both are given, or a target cannot be."""
+        """Return the target, None without one. Raises InputError for a target with a quality, or out of range."""
         if self.target_psnr is None and self.target_mbps is None:
             return None
         goal = Goal(self.target_psnr, self.target_mbps)
@@ -64,34 +64,34 @@ class Coding:
         return goal
 
     def options(self, quality: float) -> EncoderOptions:
-        """The encoder's options at a quality. Raises InputError where a value is out of range, or not of the preset."""
+        """Return the options at a quality. Raises InputError if a value is out of range or not of the preset."""
         return preset_options(
-            self.preset, quality, self.basis_size, self.group_size, self.centers, key_interval=self.keyint
+            self.preset, quality, self.basis_size, self.group_size, self.centers, key_interval=self.key_interval
         )
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Parting:
-    """What of a sequence is background."""
+    """Flags for the split of a scene into background and moving bodies."""
 
     dynamic_only: Annotated[bool, Parameter(negative="")] = False
-    """No background is looked for: all may move, and is coded in every frame."""
+    """Look for no background: everything may move and is coded in every frame."""
     background_refresh: float | None = None
-    """Seconds from one copy of a scene's background in the file to the next, for who joins late. One copy for all
-    frames where it is not given."""
+    """Seconds between copies of a scene's background in the file, for viewers who join late. One copy for all frames if
+    not given."""
 
     def __post_init__(self) -> None:
         if self.background_refresh is not None and not 0 < self.background_refresh < math.inf:
             raise InputError(f"--background-refresh {self.background_refresh:g}: give seconds above 0")
 
     def check(self, masking: Masking) -> None:
-        """Raises InputError where one flag excludes another."""
+        """Raise InputError if one flag excludes another."""
         if self.dynamic_only and (self.background_refresh is not None or masking.wanted):
             raise InputError("--dynamic-only looks for no background: leave out --background-refresh, masks and views")
 
     def options(self, options: EncoderOptions, segment: SegmentOptions) -> EncoderOptions:
-        """The same for a sequence that is taken apart so."""
+        """Return the options with these flags and the options of the segmentation."""
         background = replace(options.background, refresh=self.background_refresh)
         return replace(options, background=background, segment=segment, dynamic_only=self.dynamic_only)
 
@@ -114,14 +114,14 @@ def command(
     ----------
     inputs
         A directory, a glob, mesh files (OBJ, PLY, GLB, STL, OFF) or an .npz of vertices (T x V x 3) and faces (F x 3).
-        Vertices that repeat a position are welded. Or the folder of a rig, as `capture` takes it, with its defaults,
-        which gives a better background than the meshes that `capture` writes: it is fused from the depth itself. A
-        scene, of which most stands still, is taken apart: its background is in the file once, each moving body has its
-        own track.
+        Vertices that repeat a position are welded. Or the folder of a rig, as `capture` takes it, which is fused with
+        the defaults of `capture`; its background is better than that of the meshes that `capture` writes, because it is
+        fused from the depth itself. A sequence that mostly stands still is a scene: the file holds its background once,
+        and a track for each moving body.
     output
         The .reel file to write; it appears only when it is complete.
     jobs
-        Runs of frames that need no other to encode side by side (groups, or what `keyint` cuts); the file is the same.
+        Number of intervals to encode side by side; the file is the same.
     """
     if output.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
@@ -152,7 +152,7 @@ def command(
 
 
 def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
-    """Rate, quality and forms of an encode, ready for JSON."""
+    """Return rate, quality and groups of an encode, ready for JSON."""
     return {
         "bytes": summary.size,
         "frames": summary.frame_count,
@@ -176,19 +176,19 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
 
 
 def _scene_row(summary: Summary, scene: SceneSummary, frame_rate: float) -> dict[str, Any]:
-    """What a scene's parts take; `other` is header and index."""
-    parts = {"background": scene.background}
+    """Return the bytes of a scene by content; `other` is header and index."""
+    sizes = {"background": scene.background}
     for track in range(scene.tracks):
-        parts[f"track {track}"] = sum(group.size for group in summary.groups if group.track == track)
-    parts["other"] = summary.size - sum(parts.values())
+        sizes[f"track {track}"] = sum(group.size for group in summary.groups if group.track == track)
+    sizes["other"] = summary.size - sum(sizes.values())
     return {
         "tracks": scene.tracks,
         "background_bytes": scene.background,
         "background_faces": scene.faces,
         "noise_m": scene.noise,
         "measured_frames": list(scene.measured),
-        "parts_bytes": parts,
-        "parts_mbps": {name: _mbps(size, summary, frame_rate) for name, size in parts.items()},
+        "bytes_by_content": sizes,
+        "mbps_by_content": {name: _mbps(size, summary, frame_rate) for name, size in sizes.items()},
     }
 
 
@@ -197,15 +197,15 @@ def _mbps(size: int, summary: Summary, frame_rate: float) -> float:
 
 
 def _describe_scene(row: dict[str, Any]) -> str:
-    """What stands still and what moves, as a part of a line."""
-    rates = row["parts_mbps"]
+    """Describe background and tracks in a part of a line."""
+    rates = row["mbps_by_content"]
     moving = sum(rate for name, rate in rates.items() if name.startswith("track"))
     background = f"background {row['background_bytes']} bytes ({rates['background']:.3f} Mbps)"
     return f"{background}, {row['tracks']} tracks ({moving:.3f} Mbps), noise {1000 * row['noise_m']:.2g} mm, "
 
 
 def describe(row: dict[str, Any]) -> str:
-    """One line: frames, bytes, rate and forms."""
+    """Describe a row in one line: frames, bytes, rate and forms."""
     forms = [group["form"] for group in row["groups"]]
     counted = ", ".join(_count_groups(forms.count(form), form) for form in sorted(set(forms)))
     scene = "" if row["scene"] is None else _describe_scene(row["scene"])
@@ -226,13 +226,13 @@ def _reached(row: dict[str, Any]) -> str:
 
 @contextmanager
 def workers(jobs: int) -> Iterator[Executor | None]:
-    """Processes for `jobs` windows at a time, none for one; an interrupt ends them at once."""
+    """Start processes that encode `jobs` intervals at a time, none for one job; an interrupt ends them at once."""
     if jobs == 1:
         yield None
         return
     # Spawned, not forked: the progress display and Open3D have threads, which a fork would lose.
     context = multiprocessing.get_context("spawn")
-    executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_leave_interrupts)
+    executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_ignore_interrupts)
     try:
         yield executor
     except BaseException:
@@ -243,7 +243,7 @@ def workers(jobs: int) -> Iterator[Executor | None]:
     executor.shutdown()
 
 
-def _leave_interrupts() -> None:
-    """In a worker: Ctrl-C is the parent's affair, and SIGTERM ends the worker without a word."""
+def _ignore_interrupts() -> None:
+    """Let the parent process handle Ctrl-C, and SIGTERM end a worker without a message."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -1,4 +1,4 @@
-"""`meshreel info`: what is in a .reel file, and where its bytes go."""
+"""`meshreel info`: the contents of a .reel file and the bytes that each takes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .console import Common
 
 
 def command(file: Path, /, *, common: Common = Common()) -> None:
-    """Show rate by part, objects over time, groups, forms and the quality recorded when the file was encoded.
+    """Show the rate by content, the tracks over time, the groups and their forms, and what the encoder recorded.
 
     Parameters
     ----------
@@ -38,14 +38,14 @@ def command(file: Path, /, *, common: Common = Common()) -> None:
 
 
 def _printable(text: str) -> str:
-    """The text with what would steer a terminal as its code: a file may come from anyone."""
+    """Return the text with control characters escaped: a file from an untrusted source must not steer the terminal."""
     return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
 def describe_file(file: Path) -> dict[str, Any]:
-    """Everything `info` shows, ready for JSON. A damaged chunk is reported with its error; the others are read.
+    """Return everything that `info` shows, ready for JSON. A damaged chunk has an error; the others are read.
 
-    Sizes and rates are those of the whole file, also where its end is missing. Spans of frames are [first, last].
+    Sizes and rates are those of the whole file, even if its end is missing. Ranges of frames are [first, last].
     """
     with FileSource(file) as source:
         try:
@@ -58,18 +58,17 @@ def describe_file(file: Path) -> dict[str, Any]:
         static = [chunk for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC]
         states = [_describe_state(reader, chunk, there, shown.get(chunk.number, [])) for chunk in static]
     tracks = [_describe_track(reader, number, groups) for number in range(len(reader.tracks))]
-    parts = _sum([{"header and index": reader.head_size}, *(state["parts"] for state in states)])
     several = len(tracks) > 1
-    for track in tracks:
-        parts = _sum([parts, {_named(name, track, several): size for name, size in track["parts"].items()}])
+    of_tracks = [_renamed(track, several) for track in tracks]
+    sizes = _sum([{"header and index": reader.head_size}, *(state["bytes_by_content"] for state in states), *of_tracks])
     return {
         "frames": reader.frame_count,
         "frame_rate": reader.frame_rate,
         "bytes": reader.size,
         "bytes_missing": reader.size - there,
         "mbps": megabits(reader.size, reader),
-        "parts": parts,
-        "parts_mbps": {name: megabits(count, reader) for name, count in parts.items()},
+        "bytes_by_content": sizes,
+        "mbps_by_content": {name: megabits(size, reader) for name, size in sizes.items()},
         "tracks": tracks,
         "background": states,
         "groups": groups,
@@ -78,23 +77,23 @@ def describe_file(file: Path) -> dict[str, Any]:
 
 
 def megabits(size: int, reader: ReelReader) -> float:
-    """The rate of so many bytes spread over all frames, Mbit/s."""
+    """Return the rate of `size` bytes spread over all frames, Mbit/s."""
     return size * 8 * reader.frame_rate / reader.frame_count / 1e6
 
 
 def _describe_group(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, Any]:
-    """A group of a file of which so many bytes are there."""
+    """Describe a group of a file of which the first `there` bytes exist."""
     row: dict[str, Any] = {"chunk": chunk.number, "track": chunk.track}
     row |= {"first_frame": chunk.first_frame, "frames": chunk.frame_count}
     row |= {"form": chunk.form.name.lower(), "bytes": chunk.size, "layers": len(chunk.layers) - 1}
     row["predicted"] = reader.group_before(chunk) is not None
-    return row | _parts(reader, chunk, there, payload_parts)
+    return row | _contents(reader, chunk, there, payload_parts)
 
 
 def _shown(reader: ReelReader) -> dict[int, list[tuple[int, int]]]:
-    """The ranges of frames that each state of the background is shown in, by its chunk; it changes where groups do."""
+    """Return the ranges of frames (end excluded) that show each state of the background, by chunk number."""
     ranges: dict[int, list[tuple[int, int]]] = {}
-    starts = sorted({group.first_frame for group in reader.groups})
+    starts = sorted({group.first_frame for group in reader.groups})  # the background changes only with a group
     for start, end in pairwise([*starts, reader.frame_count]):
         if (chunk := reader.static_of_frame(start)) is not None:
             ranges.setdefault(chunk.number, []).append((start, end))
@@ -102,90 +101,98 @@ def _shown(reader: ReelReader) -> dict[int, list[tuple[int, int]]]:
 
 
 def _describe_state(reader: ReelReader, chunk: Chunk, there: int, shown: Iterable[tuple[int, int]]) -> dict[str, Any]:
-    """A state of the background: the one it changes, if any, and the frames that are shown with it."""
+    """Describe a state of the background: the state that it changes, if any, and the frames that show it."""
     row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form.name.lower(), "bytes": chunk.size}
     row["changes"] = chunk.depends_on[0] if chunk.depends_on else None
-    row["spans"] = _spans(shown)
-    return row | _parts(reader, chunk, there, lambda payload: {"background": len(payload)})
+    row["ranges"] = _merged(shown)
+    return row | _contents(reader, chunk, there, lambda payload: {"background": len(payload)})
 
 
 def _describe_track(reader: ReelReader, number: int, groups: list[dict[str, Any]]) -> dict[str, Any]:
-    """When a moving body is there, and what it is made of."""
+    """Describe a track: the frames in which its body appears, and the bytes of its contents."""
     own = [group for group in groups if group["track"] == number]
     there = [(g.first_frame, g.first_frame + g.frame_count) for g in reader.tracks[number] if g.form != Form.EMPTY]
     size = sum(group["bytes"] for group in own)
-    row: dict[str, Any] = {"track": number, "spans": _spans(there), "groups": len(own), "bytes": size}
-    return row | {"mbps": megabits(size, reader), "parts": _sum([group["parts"] for group in own])}
+    row: dict[str, Any] = {"track": number, "ranges": _merged(there), "groups": len(own), "bytes": size}
+    return row | {
+        "mbps": megabits(size, reader),
+        "bytes_by_content": _sum([group["bytes_by_content"] for group in own]),
+    }
 
 
-def _parts(reader: ReelReader, chunk: Chunk, there: int, parts_of: Callable[[bytes], dict[str, int]]) -> dict[str, Any]:
-    """The bytes of a chunk by what they are for, or its error, and how many of its bytes are there."""
+def _contents(
+    reader: ReelReader, chunk: Chunk, there: int, sizes_of: Callable[[bytes], dict[str, int]]
+) -> dict[str, Any]:
+    """Return the bytes of a chunk by content; for a damaged chunk its error, and which of its bytes are missing."""
     try:
-        return {"parts": parts_of(reader.read_chunk(chunk.number))}
+        return {"bytes_by_content": sizes_of(reader.read_chunk(chunk.number))}
     except FormatError as error:
         missing = min(max(chunk.end - there, 0), chunk.size)
-        parts = {"damaged": chunk.size - missing, "missing": missing}
-        return {"parts": {name: size for name, size in parts.items() if size}, "error": str(error)}
+        sizes = {"damaged": chunk.size - missing, "missing": missing}
+        return {"bytes_by_content": {name: size for name, size in sizes.items() if size}, "error": str(error)}
 
 
-def _sum(parts: Iterable[dict[str, int]]) -> dict[str, int]:
+def _sum(rows: Iterable[dict[str, int]]) -> dict[str, int]:
     total: dict[str, int] = {}
-    for row in parts:
+    for row in rows:
         for name, size in row.items():
             total[name] = total.get(name, 0) + size
     return total
 
 
-def _named(name: str, track: dict[str, Any], several: bool) -> str:
-    """What a part of a track is called among those of a file; what is lost is lost in all alike."""
-    return f"track {track['track']}: {name}" if several and name not in ("damaged", "missing") else name
+def _renamed(track: dict[str, Any], several: bool) -> dict[str, int]:
+    """Return the bytes of a track by content; names include the track if there are several, save for lost bytes."""
+    whole = ("damaged", "missing")
+    prefix = f"track {track['track']}: " if several else ""
+    return {name if name in whole else prefix + name: size for name, size in track["bytes_by_content"].items()}
 
 
-def _spans(ranges: Iterable[tuple[int, int]]) -> list[list[int]]:
-    """First and last frame of what ranges (end excluded) that are in order cover without a gap."""
-    spans: list[list[int]] = []
+def _merged(ranges: Iterable[tuple[int, int]]) -> list[list[int]]:
+    """Return first and last frames of ranges (end excluded, in order), adjacent ones merged."""
+    merged: list[list[int]] = []
     for start, end in ranges:
-        if spans and spans[-1][1] == start - 1:
-            spans[-1][1] = end - 1
+        if merged and merged[-1][1] == start - 1:
+            merged[-1][1] = end - 1
         else:
-            spans.append([start, end - 1])
-    return spans
+            merged.append([start, end - 1])
+    return merged
 
 
 def rate_table(row: dict[str, Any]) -> Table:
-    table = Table("part", "bytes", "Mbps", "share")
-    for name, size in ((name, size) for name, size in row["parts"].items() if size):
-        table.add_row(name, str(size), f"{row['parts_mbps'][name]:.4f}", f"{100 * size / row['bytes']:.1f} %")
+    """Return a table of bytes and rate by content."""
+    table = Table("content", "bytes", "Mbps", "share")
+    for name, size in ((name, size) for name, size in row["bytes_by_content"].items() if size):
+        table.add_row(name, str(size), f"{row['mbps_by_content'][name]:.4f}", f"{100 * size / row['bytes']:.1f} %")
     return table
 
 
 def _tracks(row: dict[str, Any]) -> Table:
-    table = Table("track", "is there in frames", "groups", "bytes", "Mbps")
+    table = Table("track", "appears in frames", "groups", "bytes", "Mbps")
     for track in row["tracks"]:
         size = (str(track["groups"]), str(track["bytes"]), f"{track['mbps']:.4f}")
-        table.add_row(str(track["track"]), _told(track["spans"]), *size)
+        table.add_row(str(track["track"]), _listed(track["ranges"]), *size)
     return table
 
 
 def _states(row: dict[str, Any]) -> Table:
-    table = Table("background", "form", "changes", "is shown in frames", "bytes")
+    table = Table("background", "form", "changes", "shown in frames", "bytes")
     for state in row["background"]:
         changes = "" if state["changes"] is None else f"chunk {state['changes']}"
-        table.add_row(f"chunk {state['chunk']}", state["form"], changes, _told(state["spans"]), str(state["bytes"]))
+        table.add_row(f"chunk {state['chunk']}", state["form"], changes, _listed(state["ranges"]), str(state["bytes"]))
     return table
 
 
 def _groups(row: dict[str, Any]) -> Table:
     several = len(row["tracks"]) > 1
-    table = Table("group", *(["track"] if several else []), "frames", "form", "layers", "bytes", "parts")
+    table = Table("group", *(["track"] if several else []), "frames", "form", "layers", "bytes", "by content")
     for number, group in enumerate(row["groups"]):
-        parts = ", ".join(f"{name} {size}" for name, size in group["parts"].items())
-        frames = _told([[group["first_frame"], group["first_frame"] + group["frames"] - 1]])
+        sizes = ", ".join(f"{name} {size}" for name, size in group["bytes_by_content"].items())
+        frames = _listed([[group["first_frame"], group["first_frame"] + group["frames"] - 1]])
         form = group["form"] + (", predicted" if group["predicted"] else "")
         cells = [str(number), *([str(group["track"])] if several else []), frames, form]
-        table.add_row(*cells, str(group["layers"]), str(group["bytes"]), parts)
+        table.add_row(*cells, str(group["layers"]), str(group["bytes"]), sizes)
     return table
 
 
-def _told(spans: list[list[int]]) -> str:
-    return ", ".join(f"{first}-{last}" for first, last in spans) or "none"
+def _listed(ranges: list[list[int]]) -> str:
+    return ", ".join(f"{first}-{last}" for first, last in ranges) or "none"
