@@ -71,7 +71,7 @@ def test_frames_that_one_camera_lacks_are_told_and_fused_without(folder):
     (folder / "side" / "depth" / "depth_00001.png").unlink()
     rig = read_rig(folder)
     assert [len(rig.depths(frame)) for frame in rig.frames] == [2, 1, 2]
-    assert rig.missing() == ["camera side lacks 1 of 3 frames, as 1: fused without"]
+    assert rig.missing() == ["camera side lacks 1 of 3 frames, for example 1; they are fused without it"]
 
 
 def changed(folder, change):
@@ -130,7 +130,7 @@ def test_keys_that_mean_nothing_are_told_with_what_may_be_meant(folder):
     changed(folder, lambda rig: rig["cameras"][1].update(depth_unit=0.01, serial="x"))
     _, warnings = open_recording(folder)
     assert warnings == [
-        f"{folder}: cameras are described by keys that mean nothing here: depth_unit (is depth_unit_m meant?), serial"
+        f"{folder}: unknown keys describe cameras and are ignored: depth_unit (is depth_unit_m meant?), serial"
     ]
 
 
@@ -144,7 +144,9 @@ def test_frames_that_no_camera_has_are_told_where_the_row_is_uneven(folder):
     for name in ("front", "side"):
         for number in (3, 4, 6):
             write_depth(measured(camera()), folder / name / "depth" / f"depth_{number:05}.png")
-    assert read_rig(folder).missing() == ["no camera has 1 of the frames 0 to 6, as 5: later ones come earlier"]
+    assert read_rig(folder).missing() == [
+        "no camera has 1 of the frames 0 to 6, for example 5; the frames after a gap are shown earlier"
+    ]
     for name in ("front", "side"):
         for number in (1, 3):
             (folder / name / "depth" / f"depth_{number:05}.png").unlink()

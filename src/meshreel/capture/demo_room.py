@@ -1,7 +1,7 @@
-"""A furnished room from nothing, in which two people move: the scene of the demo, for a simulated rig.
+"""The demo's scene: a procedural furnished room in which two people move, for a simulated rig.
 
-In: options. Out: the clean mesh of each moment with the faces that move, made when asked for, and where the cameras
-stand. y is up, metres; the floor is at height 0 and its front and right sides are open.
+Options -> the clean mesh of each frame with the faces that move, made when it is read, and the cameras. y is up, in
+metres; the floor is at height 0, and the front and right sides of the room are open.
 """
 
 from __future__ import annotations
@@ -25,17 +25,18 @@ from .procedural import grid_of_frame
 from .rig import DepthCamera
 from .simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
 
+# All sizes and speeds are chosen for a demo of a minute or two (guess).
 WIDTH = 256  # pixels of a depth picture
-NOISE = 0.3  # of a sensor, as `SensorOptions` has it
-VOXEL = 0.03  # m, of the volume that such pictures are fused in
-SIZE = (3.0, 1.7, 2.6)  # m, of the room; it stands on the middle of its floor
-_FACE = 0.1  # m, about the length of a side of the room's faces
-_LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)  # m, box of the cameras: before the walls, and outside where none is
+NOISE = 0.3  # of the sensor, see `SensorOptions.noise`
+VOXEL = 0.03  # m, for the fusion of such pictures
+SIZE = (3.0, 1.7, 2.6)  # m, of the room; its origin is the middle of the floor
+_FACE = 0.1  # m, about the side length of the room's faces
+_LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)  # m, box of the cameras: inside the walls, outside the open sides
 _CIRCLE, _SPEED = 0.8, 0.8  # m and m/s, of the walk around the middle
 _CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step
-_SOLE = 0.01  # m, by which feet would sink into the floor
-_TURN = 0.6  # rad/s of the child
-_TOUCH = 0.01  # m; each person is made alone
+_SOLE = 0.01  # m by which feet would sink into the floor
+_TURN = 0.6  # rad/s, of the child
+_TOUCH = 0.01  # m; each person is meshed alone
 
 Vector = Float64[np.ndarray, " 3"] | tuple[float, float, float]
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lowest and highest corner, m
@@ -53,7 +54,7 @@ FURNITURE: tuple[Box, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class RoomOptions:
-    """How long and how fine."""
+    """Length and resolution of the demo's scene."""
 
     frames: int = 20
     frame_rate: float = 30.0  # 1/s
@@ -61,7 +62,7 @@ class RoomOptions:
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
-        """Refuses what cannot be made."""
+        """Raise InputError for options that cannot be met."""
         if self.frames < 1:
             raise InputError(f"frames {self.frames} is below 1; ask for at least one")
         if not 0.008 <= self.spacing <= 0.1:
@@ -72,7 +73,7 @@ class RoomOptions:
 
 @dataclass(frozen=True, slots=True)
 class Room(Sequence[SceneFrame]):
-    """The clean frames of `furnished_room`."""
+    """Clean frames of `furnished_room`."""
 
     options: RoomOptions
     still: Mesh  # room and furniture
@@ -91,7 +92,7 @@ class Room(Sequence[SceneFrame]):
         return SceneFrame.of([self.still], self.people(number))
 
     def people(self, number: int) -> list[Mesh]:
-        """Who moves in a frame: one who walks around the middle, and a child who jumps and turns there. Both closed."""
+        """Return the closed meshes of a frame's people: one walks around the middle, a child jumps there."""
         spacing = self.options.spacing
         grid = grid_of_frame(number, spacing, self.options.seed)
         poses = (_walker(number / self.options.frame_rate), _child(number / self.options.frame_rate))
@@ -99,7 +100,7 @@ class Room(Sequence[SceneFrame]):
 
 
 def furnished_room(options: RoomOptions | None = None) -> Room:
-    """The room and its people, for as long as asked; the same options give the same frames."""
+    """Return the frames of the room and its people; the same options give the same frames."""
     x, y, z = SIZE[0] / 2, SIZE[1], SIZE[2] / 2
     panels = [
         _panel((-x, 0, z), (2 * x, 0, 0), (0, 0, -2 * z)),  # the floor
@@ -113,20 +114,20 @@ def record_room(
     folder: Path,
     options: RoomOptions,
     width: int = WIDTH,
-    tell: Callable[[int], None] = lambda _done: None,
+    progress: Callable[[int], None] = lambda _done: None,
 ) -> None:
-    """Writes what four depth cameras measure of the room, and the truth; `tell` hears how many frames are done."""
+    """Write what four depth cameras measure, and the truth; `progress` gets the number of finished frames."""
     sensor, cameras = SensorOptions(noise=NOISE, seed=options.seed), room_cameras(width)
-    simulate_rig(folder, furnished_room(options), cameras, options.frame_rate, sensor, tell)
+    simulate_rig(folder, furnished_room(options), cameras, options.frame_rate, sensor, progress)
 
 
 def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:
-    """Depth cameras at the corners that look down to the middle; pictures of `width` x 0.9 `width` pixels."""
+    """Return depth cameras in the corners that look down at the middle; pictures of `width` x 0.9 `width` pixels."""
     return tuple(_resized(camera, width) for camera in corner_cameras(np.array(_LOW), np.array(_HIGH), count))
 
 
 def _walker(seconds: float) -> Pose:
-    """Walks in a circle around the middle, arms swinging."""
+    """Pose of the walker, who circles the middle with swinging arms."""
     walked = _SPEED * seconds
     angle = walked / _CIRCLE + 2.4  # begins at the left
     place = np.array([_CIRCLE * math.cos(angle), _SOLE, -_CIRCLE * math.sin(angle)])
@@ -136,7 +137,7 @@ def _walker(seconds: float) -> Pose:
 
 
 def _child(seconds: float) -> Pose:
-    """Jumps on the spot, turns, and waves with both arms."""
+    """Pose of the child, who jumps on the spot, turns, and waves with both arms."""
     place = np.array([0.0, _SOLE + 0.14 * max(math.sin(2 * math.pi * seconds), 0.0), 0.0])
     heading, sway = _TURN * seconds, 0.05 * math.sin(4 * math.pi * seconds)
     out = np.array([math.cos(heading), 0.0, -math.sin(heading)])  # to its left
@@ -145,7 +146,7 @@ def _child(seconds: float) -> Pose:
 
 
 def _resized(camera: DepthCamera, width: int) -> DepthCamera:
-    """The camera with larger or smaller pixels; the middle of pixel i is at i."""
+    """Return the camera with pictures of another width; the middle of pixel i is at i."""
     height = round(width * camera.height / camera.width)
     ratios = (width / camera.width, height / camera.height)
     focal = (camera.focal[0] * ratios[0], camera.focal[1] * ratios[1])
@@ -154,7 +155,7 @@ def _resized(camera: DepthCamera, width: int) -> DepthCamera:
 
 
 def _box(box: Box) -> Mesh:
-    """A closed box that looks outwards."""
+    """Return a closed box whose faces point outward."""
     low, high = (np.array(corner) for corner in box)
     a, b, c = np.diag(high - low)
     lower = [_panel(low, b, a), _panel(low, c, b), _panel(low, a, c)]
@@ -163,13 +164,13 @@ def _box(box: Box) -> Mesh:
 
 
 def _joined(panels: list[Mesh]) -> Mesh:
-    """Panels as one mesh; where two meet, they share vertices."""
+    """Join panels into one mesh; where two meet, they share vertices."""
     mesh = concatenate(panels)
-    return weld(Mesh.of(mesh.vertices.round(9), mesh.faces))  # the two come to a vertex by different sums
+    return weld(Mesh.of(mesh.vertices.round(9), mesh.faces))  # both panels compute a shared vertex by different sums
 
 
 def _panel(corner: Vector, right: Vector, up: Vector) -> Mesh:
-    """A rectangle of small faces that looks along right x up."""
+    """Return a rectangle of small faces whose normal is right x up."""
     counts = [max(1, round(float(np.linalg.norm(side)) / _FACE)) for side in (right, up)]
     i, j = np.meshgrid(*(np.arange(count + 1) for count in counts), indexing="ij")
     shares = (i.reshape(-1, 1) / counts[0], j.reshape(-1, 1) / counts[1])

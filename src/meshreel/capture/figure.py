@@ -1,6 +1,6 @@
-"""A person made of soft parts: a pose in, a body of capsules out.
+"""A procedural person of soft parts: pose -> body of capsules.
 
-The person stands at its own origin, faces +z, y up; x is its left. Sizes are those of an adult of 1.75 m.
+The person stands at its own origin and faces +z, with y up and x to its left. Sizes are those of an adult of 1.75 m.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ from .implicit import Body, Chain
 Row = tuple[tuple[float, ...], tuple[float, ...], float, float]  # start, end, their radii; m
 Vector = Float64[np.ndarray, "3"]
 
-_THIGH, _SHIN, _UPPER_ARM, _FOREARM = 0.43, 0.415, 0.28, 0.25  # m
-_STANCE = 0.6  # of a step cycle a foot is on the ground
+_THIGH, _SHIN, _UPPER_ARM, _FOREARM = 0.43, 0.415, 0.28, 0.25  # m, lengths of an adult's bones (guess)
+_STANCE = 0.6  # share of a step cycle that a foot is on the ground, as in human gait
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """What a person does at one moment."""
+    """Position, gait and gestures of a person at one moment."""
 
     place: Vector  # m, the ground between the feet
     heading: float  # rad about y; 0 faces +z
     step: float = 0.0  # step cycles walked so far
     stride: float = 0.0  # m, length of a step at this moment
-    wrists: tuple[Vector | None, Vector | None] = (None, None)  # left, right: world targets; None hangs and swings
+    wrists: tuple[Vector | None, Vector | None] = (None, None)  # left, right: world targets; None: the arm swings
     reach: tuple[float, float] = (0.0, 0.0)  # how far each wrist is on its way to its target, 0 to 1
-    softness: float = 0.0  # -1 to 1: the wobble of belly and chest
-    size: float = 1.0  # of an adult
-    girth: float = 1.0  # of an average adult's radii
+    softness: float = 0.0  # -1 to 1: deflection of belly and chest
+    size: float = 1.0  # relative to an adult
+    girth: float = 1.0  # relative to an average adult's radii
 
 
 def figure(pose: Pose, thinnest: float) -> Body:
-    """The person's parts in the world; none is thinner than `thinnest` (m), so that a grid can see it."""
+    """Return the person's parts in world coordinates, none thinner than `thinnest` (m), so that a grid resolves it."""
     bob = -pose.stride * (0.035 + 0.02 * np.cos(4 * np.pi * pose.step))  # lowest when both feet are far apart
     lift = np.array([0.0, bob, 0.0])
     chains = [_torso(lift, pose), _head(lift)]
@@ -55,7 +55,7 @@ def figure(pose: Pose, thinnest: float) -> Body:
 
 
 def turn_about_y(angle: float) -> Float64[np.ndarray, "3 3"]:
-    """The rotation that takes +z to the heading `angle`, rad."""
+    """Return the rotation that takes +z to the heading `angle`, rad."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
@@ -116,7 +116,7 @@ def _leg(lift: Vector, side: float, phase: float, stride: float) -> Chain:
 
 
 def _foot_track(phase: float) -> tuple[float, float, float]:
-    """How far ahead of the hip, how high and how much toe-down a foot is, in strides, strides and rad."""
+    """Return how far a foot is ahead of the hip and above the ground, in strides, and its downward pitch, rad."""
     u = phase % 1.0
     if u < _STANCE:
         return 0.5 - u / _STANCE, 0.0, 0.0
@@ -143,7 +143,7 @@ def _arm(lift: Vector, side: float, pose: Pose) -> list[Chain]:
 
 
 def _hand(wrist: Vector, along: Vector, side: float) -> list[Row]:
-    """Palm, fingers and thumb: the palm's flat side looks to the middle of the body."""
+    """Return palm, fingers and thumb; the flat side of the palm faces the middle of the body."""
     along = along / np.linalg.norm(along)
     flat = np.array([side, 0.0, 0.3])
     flat = flat - along * (flat @ along)
@@ -164,7 +164,7 @@ def _hand(wrist: Vector, along: Vector, side: float) -> list[Row]:
 
 
 def _bent(root: Vector, end: Vector, lengths: tuple[float, float], pole: Vector) -> tuple[Vector, Vector]:
-    """Where the middle joint and the end of a two-bone limb are; the joint bends to the pole."""
+    """Return the middle joint and the end of a two-bone limb; the joint bends towards the pole."""
     first, second = lengths
     span = end - root
     distance = float(np.clip(np.linalg.norm(span), abs(first - second) + 0.02, 0.995 * (first + second)))

@@ -1,7 +1,7 @@
-"""Depth pictures of one moment become one mesh: TSDF, marching cubes, fragments dropped (paper, section 4.1).
+"""Fusion of the depth pictures of one moment into a mesh: TSDF, marching cubes, fragments dropped (paper, section 4.1).
 
-In: what each camera of a rig measured. Out: a mesh in world coordinates, on one voxel grid for all frames, so that what
-stands still has the same grid around it always. The same pictures give the same mesh, whatever the number of threads.
+The cameras' depths -> a mesh in world coordinates. All frames use one voxel grid, so that surface which stands still is
+sampled alike in every frame. The same pictures give the same mesh, whatever the number of threads.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from .rig import DepthCamera
 
 @dataclass(frozen=True, slots=True)
 class FusionOptions:
-    """How depth becomes surface."""
+    """Resolution of the fused surface and removal of fragments."""
 
     voxel: float = 0.02  # m, side of a voxel
-    truncation: float = TRUNCATION  # voxels that a depth says something about before and behind it
-    fragment: float = 0.01  # m^2: connected pieces with less area are dropped
+    truncation: float = TRUNCATION  # voxels before and behind a depth that it constrains
+    fragment: float = 0.01  # m^2: connected components with less area are dropped
 
     def __post_init__(self) -> None:
         if not 1e-4 <= self.voxel <= 1:
@@ -39,9 +39,9 @@ class FusionOptions:
 def fuse_depths(
     depths: Sequence[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]], options: FusionOptions = FusionOptions()
 ) -> Mesh:
-    """The surface that these cameras see; empty where none has measured anything in its range.
+    """Fuse the cameras' depths into a mesh, which is empty where no camera measured anything in its range.
 
-    Raises InputError where what they see takes more blocks of voxels than there is memory for.
+    Raises InputError where the surface takes more blocks of voxels than `tsdf.MOST_BLOCKS`.
     """
     pictures = [camera.picture(inside) for camera, depth in depths if (inside := camera.in_range(depth)).any()]
     if not pictures:

@@ -1,6 +1,6 @@
 """Soft shapes as the zero set of smoothly joined tapered capsules, and their meshes.
 
-In: bodies (chains of parts). Out: the field at points, or a closed mesh whose vertices lie on the zero set.
+Bodies, which are chains of parts -> the field at points, or a closed mesh whose vertices lie on the zero set.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from ..types import Mesh
 Points = Float64[np.ndarray, "N 3"]
 Distances = Float64[np.ndarray, " N"]
 
-_STEP = 1e-4  # m, of the difference quotient
-_NEWTON_STEPS = 3
+_STEP = 1e-4  # m, of the difference quotient (guess)
+_NEWTON_STEPS = 3  # rounds of smoothing and projection (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """Parts that melt into each other: tapered capsules from `starts` to `ends`."""
+    """Parts that blend into each other: tapered capsules from `starts` to `ends`."""
 
     starts: Float64[np.ndarray, "P 3"]  # m
     ends: Float64[np.ndarray, "P 3"]  # m
@@ -37,7 +37,7 @@ Body = tuple[Chain, ...]
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A turned and shifted lattice: lattice point (i, j, k) lies at origin + spacing * turn @ (i, j, k)."""
+    """Rotated and shifted lattice: lattice point (i, j, k) lies at spacing * turn @ ((i, j, k) + shift)."""
 
     turn: Float64[np.ndarray, "3 3"]
     shift: Float64[np.ndarray, "3"]  # in cells
@@ -45,7 +45,7 @@ class Grid:
 
 
 def field(bodies: tuple[Body, ...], touch: float, points: Points) -> Distances:
-    """Roughly the signed distance of points to the surface, negative inside, m; bodies join over `touch`."""
+    """Return the approximate signed distance of points to the surface, m, negative inside; bodies blend by `touch`."""
     total = None
     for body in bodies:
         whole = None
@@ -63,7 +63,7 @@ def field(bodies: tuple[Body, ...], touch: float, points: Points) -> Distances:
 
 
 def polygonize(bodies: tuple[Body, ...], touch: float, grid: Grid) -> Mesh:
-    """A closed mesh of the zero set: marching cubes on the grid, evened out, every vertex back on the zero set."""
+    """Mesh the zero set: marching cubes on the grid, then smoothing that keeps every vertex on the zero set."""
     from skimage.measure import marching_cubes
 
     margin = 2.5 * grid.spacing + max(touch, *(max(c.blend, c.join) for body in bodies for c in body))
@@ -81,7 +81,7 @@ def polygonize(bodies: tuple[Body, ...], touch: float, grid: Grid) -> Mesh:
 
 
 def capsule(points: np.ndarray, start: np.ndarray, end: np.ndarray, radii: np.ndarray) -> np.ndarray:
-    """Signed distance to a tapered capsule, radius taken where the point projects to; points ... x 3."""
+    """Return the signed distance of points (... x 3) to a tapered capsule, whose radius is taken at the projection."""
     axis = end - start
     offset = points - start
     along = np.clip(offset @ axis / max(float(axis @ axis), 1e-12), 0.0, 1.0)
@@ -90,20 +90,20 @@ def capsule(points: np.ndarray, start: np.ndarray, end: np.ndarray, radii: np.nd
 
 
 def smooth_min(a: np.ndarray, b: np.ndarray, width: float) -> np.ndarray:
-    """The smaller of two distances, rounded off where they differ by less than `width` (quadratic polynomial)."""
+    """Return the smaller of two distances, blended quadratically where they differ by less than `width`."""
     near = np.maximum(width - np.abs(a - b), 0)
     return np.minimum(a, b) - near * near / (4 * width)
 
 
 def _on_lattice(chain: Chain, grid: Grid) -> Chain:
-    """The chain in lattice directions, in metres."""
+    """Return the chain in the lattice's axes, m."""
     shift = grid.shift * grid.spacing
     starts, ends = chain.starts @ grid.turn - shift, chain.ends @ grid.turn - shift
     return Chain(starts, ends, chain.radii, chain.blend, chain.join)
 
 
 def _bounds(chains: list[Chain], margin: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
-    """The box of chains, in cells."""
+    """Return the bounding box of chains, widened by `margin`, in cells."""
     reach = np.concatenate([c.radii.max(axis=1) for c in chains])[:, None] + margin
     starts, ends = np.concatenate([c.starts for c in chains]), np.concatenate([c.ends for c in chains])
     low = (np.minimum(starts, ends) - reach).min(axis=0)
@@ -112,14 +112,14 @@ def _bounds(chains: list[Chain], margin: float, spacing: float) -> tuple[np.ndar
 
 
 def _box(chains: list[Chain], margin: float, spacing: float, low: np.ndarray) -> tuple[tuple[slice, ...], np.ndarray]:
-    """Where chains lie in an array whose first cell is `low`, and the cell that this part begins with."""
+    """Return the slices that chains occupy in an array whose first cell is `low`, and the first cell of the slices."""
     begin, end = _bounds(chains, margin, spacing)
     first, last = np.floor(begin).astype(int), np.ceil(end).astype(int) + 1
     return tuple(slice(a, b) for a, b in zip(first - low, last - low, strict=True)), first
 
 
 def _sampled_body(body: Body, margin: float, spacing: float, low: np.ndarray) -> tuple[tuple[slice, ...], np.ndarray]:
-    """The field of one body near its surface, `margin` elsewhere; each part is sampled in its own box only."""
+    """Sample the field of one body near its surface, `margin` elsewhere; each part is sampled in its own box only."""
     box, first = _box(list(body), margin, spacing, low)
     values = np.full([s.stop - s.start for s in box], margin, dtype=np.float32)
     for chain in body:
@@ -142,7 +142,7 @@ def _centers(box: tuple[slice, ...], first: np.ndarray, spacing: float) -> np.nd
 
 
 def _evened(mesh: Mesh, distance: Callable[[Points], Distances]) -> Mesh:
-    """The mesh with vertices drawn to the middle of their neighbours and back onto the zero set: no slivers."""
+    """Remove slivers: move vertices towards the middle of their neighbours and back onto the zero set."""
     edges, _ = unique_edges(mesh.faces)
     count = len(mesh.vertices)
     degree = np.maximum(np.bincount(edges.reshape(-1), minlength=count), 1)[:, None]
@@ -157,7 +157,7 @@ def _evened(mesh: Mesh, distance: Callable[[Points], Distances]) -> Mesh:
 
 
 def _landed(points: Points, distance: Callable[[Points], Distances]) -> Points:
-    """One Newton step to the zero set."""
+    """Move points by one Newton step towards the zero set."""
     here = distance(points)
     slope = np.stack([(distance(points + _STEP * axis) - here) / _STEP for axis in np.eye(3)], axis=1)
     return points - here[:, None] * slope / np.maximum(np.einsum("nd,nd->n", slope, slope), 0.25)[:, None]

@@ -1,6 +1,6 @@
-"""Moving people from nothing: the demo's data, and small shapes whose motion is known exactly.
+"""Procedural sequences: moving people for the demo, and small shapes whose motion is known exactly.
 
-In: options. Out: a MeshSequence whose connectivity changes every frame, each made when asked for.
+Options -> a MeshSequence. The people's connectivity changes every frame, and each frame is made when it is read.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from ..types import Mesh, MeshList, MeshSequence
 from .figure import Pose, figure
 from .implicit import Body, Grid, polygonize
 
-_TOUCH = 0.02  # m, over which two people's surfaces melt where they meet
-_FAR, _NEAR = 1.9, 0.66  # m between the two who meet
-_CYCLE = 0.9  # m walked in a step cycle
+_TOUCH = 0.02  # m over which two people's surfaces blend where they meet (guess)
+_FAR, _NEAR = 1.9, 0.66  # m between the two people, at most and at least (guess)
+_CYCLE = 0.9  # m walked in a step cycle (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class SoftBodiesOptions:
-    """How long, how fine and how many."""
+    """Length, resolution and number of the people."""
 
     frames: int = 90
     frame_rate: float = 30.0  # 1/s
     spacing: float = 0.022  # m between grid points: 0.022 gives about 10k vertices for two people
     people: int = 2  # 1 to 3
-    story: float = 3.0  # s to walk up, shake hands, part and wave; then it begins again
+    story: float = 3.0  # s to walk up, shake hands, part and wave; then the story repeats
     begin: float = 0.0  # s into the story; 0.95 with 30 frames: apart, in touch, apart
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
-        """Refuses what cannot be made."""
+        """Raise InputError for options that cannot be met."""
         if self.frames < 1:
             raise InputError(f"frames {self.frames} is below 1; ask for at least one")
         if not 1 <= self.people <= 3:
@@ -51,7 +51,7 @@ class SoftBodiesOptions:
 
 @dataclass(frozen=True, slots=True)
 class SoftBodies(MeshSequence):
-    """The frames of `soft_bodies`: a MeshSequence."""
+    """MeshSequence of the frames of `soft_bodies`."""
 
     options: SoftBodiesOptions
 
@@ -72,7 +72,7 @@ class SoftBodies(MeshSequence):
 
 
 def soft_bodies(options: SoftBodiesOptions | None = None) -> SoftBodies:
-    """People who walk up to each other, shake hands, part and wave; y up, metres, a new grid for each frame.
+    """Return people who walk up to each other, shake hands, part and wave; y up, metres, a new grid for each frame.
 
     About 10k vertices and under 1.5 s a frame at the default spacing; the same options give the same frames.
     """
@@ -80,27 +80,27 @@ def soft_bodies(options: SoftBodiesOptions | None = None) -> SoftBodies:
 
 
 def deforming_sphere(frames: int, levels: int = 3) -> MeshList:
-    """A unit sphere that stretches along y by 1 + 0.3 sin: 8 x 4^levels faces, fixed connectivity."""
+    """Return a unit sphere that stretches along y by 1 + 0.3 sin: 8 x 4^levels faces, fixed connectivity."""
     ball = _sphere(levels)
     stretch = 1 + 0.3 * np.sin(2 * np.pi * np.arange(frames) / max(frames, 1))
     return MeshList(tuple(Mesh.of(ball.vertices * [1.0, s, 1.0], ball.faces) for s in stretch))
 
 
 def sliding_sphere(frames: int, step: float = 0.05, levels: int = 3) -> MeshList:
-    """A unit sphere that moves along x by `step` (m) a frame: the rigid motion with a known answer."""
+    """Return a unit sphere that moves along x by `step` (m) per frame: a rigid motion with a known answer."""
     ball = _sphere(levels)
     return MeshList(tuple(Mesh.of(ball.vertices + [t * step, 0.0, 0.0], ball.faces) for t in range(frames)))
 
 
 def cast(moment: float, options: SoftBodiesOptions) -> tuple[Body, ...]:
-    """The bodies at a moment (0 to 1) of the story."""
+    """Return the bodies at a moment (0 to 1) of the story."""
     thinnest = 0.7 * options.spacing
     poses = (_host(moment), _guest(moment), _child(moment))
     return tuple(figure(pose, thinnest) for pose in poses[: options.people])
 
 
 def grid_of_frame(number: int, spacing: float, seed: int) -> Grid:
-    """A lattice of its own for each frame, so that no two frames share connectivity."""
+    """Return a differently rotated lattice for each frame, so that no two frames share connectivity."""
     random = np.random.default_rng((seed, number))
     a, b, c = random.uniform(-0.15, 0.15, 3)
     skew = np.array([[0.0, -c, b], [c, 0.0, -a], [-b, a, 0.0]])
@@ -109,7 +109,7 @@ def grid_of_frame(number: int, spacing: float, seed: int) -> Grid:
 
 
 def _host(moment: float) -> Pose:
-    """Walks to +x, waves before the meeting, pats the guest's arm during it."""
+    """Pose of the host, who walks to +x, waves before the meeting and pats the guest's arm during it."""
     gap, step, stride = _walk(moment)
     place = np.array([-gap / 2, 0.0, -0.12])
     shake = _shake(moment)
@@ -122,7 +122,7 @@ def _host(moment: float) -> Pose:
 
 
 def _guest(moment: float) -> Pose:
-    """Walks to -x, waves good-bye."""
+    """Pose of the guest, who walks to -x and waves goodbye."""
     gap, step, stride = _walk(moment)
     place = np.array([gap / 2, 0.0, 0.12])
     bye = _during(moment, 0.72, 0.80, 0.90, 0.98)
@@ -133,7 +133,7 @@ def _guest(moment: float) -> Pose:
 
 
 def _child(moment: float) -> Pose:
-    """Jumps and waves with both arms behind the two."""
+    """Pose of the child, who jumps behind the two and waves with both arms."""
     jump = 0.16 * max(np.sin(2 * np.pi * 3 * moment), 0.0)
     place = np.array([0.1, jump, -0.95])
     sway = 0.08 * np.sin(2 * np.pi * 6 * moment)
@@ -142,7 +142,7 @@ def _child(moment: float) -> Pose:
 
 
 def _walk(moment: float) -> tuple[float, float, float]:
-    """Distance of the two, step cycles walked and stride: up to each other, a stay, and backwards apart."""
+    """Return the distance of the two, the step cycles walked and the stride: they approach, stay, and back away."""
     near = _during(moment, 0.0, 0.36, 0.62, 1.0)
     speed = abs(_during(moment + 0.01, 0.0, 0.36, 0.62, 1.0) - near) / 0.01
     walked = near * (_FAR - _NEAR) / 2
@@ -162,14 +162,14 @@ def _wobble(step: float, stride: float) -> float:
 
 
 def _during(moment: float, rise: float, full: float, fade: float, end: float) -> float:
-    """0 outside rise to end, 1 from full to fade, smooth between."""
+    """Return 0 outside `rise` to `end`, 1 from `full` to `fade`, and a smooth transition between."""
     up = np.clip((moment - rise) / (full - rise), 0, 1)
     down = np.clip((end - moment) / (end - fade), 0, 1)
     return float(up * up * (3 - 2 * up) * down * down * (3 - 2 * down))
 
 
 def _mixed(*targets: tuple[np.ndarray, float]) -> tuple[np.ndarray, float]:
-    """The target that counts most and how much."""
+    """Return the target with the largest weight, and that weight."""
     return max(targets, key=lambda target: target[1])
 
 

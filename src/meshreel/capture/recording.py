@@ -1,7 +1,7 @@
-"""A recording of a rig as a sequence of meshes: each frame fused when it is asked for.
+"""A rig's recording as a sequence of meshes, each frame fused when it is read.
 
-In: a rig's folder. Out: a MeshSequence, and what a user must know of the recording. A camera that moves is found by
-its own data: the pixels of one that stands still mostly see what they always see.
+A rig's folder -> a MeshSequence and warnings for the user. A camera that moved is detected in its own data: the pixels
+of a camera that stands still measure mostly the same depths in all frames.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from ..types import Mesh, MeshSequence
 from .fusion import FusionOptions, fuse_depths
 from .rig import Rig, read_rig
 
-LOOKED_AT = 12  # frames, spread over the recording
-APART = (0.06, 0.02)  # m, and of the depth: measurements farther apart are of something else
-MOVED = 0.5  # share of the pixels that see something else than usual, in the usual frame, of a camera that moves
-LEAST = 0.3  # share of the pixels with a measurement below which nothing is said: there may be no background in view
+LOOKED_AT = 12  # frames examined for movement, spread over the recording (guess)
+APART = (0.06, 0.02)  # m, and share of the depth: measurements farther apart are of different surfaces (guess)
+MOVED = 0.5  # share of pixels that differ from their usual depth, in the median frame, of a camera that moves (guess)
+LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored: it may show no background (guess)
 
 
 class Recording(MeshSequence):
     """The frames of a rig as a MeshSequence, in world coordinates.
 
-    A frame is fused when it is first asked for, and kept in a folder for temporary files as long as this object lives
-    and there is room (10 MB for half a million faces): who encodes a scene asks for it several times. Who reads each
-    frame once says `keep=False`.
+    A frame is fused when it is first read, and kept in a temporary folder as long as this object lives and the disk has
+    room (10 MB for half a million faces), since encoding a scene reads it several times. Pass `keep=False` to read each
+    frame once.
     """
 
     def __init__(
@@ -64,14 +64,14 @@ class Recording(MeshSequence):
         return mesh
 
     def pictures(self, index: int) -> list[DepthPicture | None]:
-        """What each camera measured in a frame; None where it lacks it (`SeesDepth`)."""
+        """Return each camera's depth picture of a frame, None for a camera that lacks the frame (`SeesDepth`)."""
         frame, files = self.numbers[index], self.rig.files
         cameras = enumerate(self.rig.cameras)
         return [camera.picture(self.rig.depth(k, frame)) if frame in files[k] else None for k, camera in cameras]
 
 
 class Kept:
-    """Meshes by number, in a folder of its own that goes when it does."""
+    """Meshes by number in a temporary folder, which is deleted with this object."""
 
     def __init__(self) -> None:
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -79,14 +79,14 @@ class Kept:
         self._full = False
 
     def get(self, number: int) -> Mesh | None:
-        """The mesh as it was put; None where it is not there."""
+        """Return a kept mesh, or None."""
         if number not in self._files:
             return None
         with np.load(self._files[number], allow_pickle=False) as arrays:
             return Mesh(arrays["vertices"], arrays["faces"])
 
     def put(self, number: int, mesh: Mesh) -> None:
-        """Keeps a mesh; from when there is no room for one on, none."""
+        """Keep a mesh, unless the disk has no room; then none is kept from now on."""
         if self._full:
             return
         try:
@@ -94,17 +94,17 @@ class Kept:
             path = Path(self._folder.name) / f"{number}.npz"
             np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
             self._files[number] = path
-        except OSError:  # what is asked for again is then made again
+        except OSError:  # frames that are read again are then fused again
             self._full = True
 
 
 def open_recording(
     folder: Path, options: FusionOptions = FusionOptions(), frames: str = ":", keep: bool = True
 ) -> tuple[Recording, list[str]]:
-    """The recording in a rig's folder, and a line for each thing that a user must know of it.
+    """Open the recording in a rig's folder; also return a warning for each problem that a user must know.
 
-    `frames` is a range of them, as A:B with B excluded; `keep` is that of the recording. Raises InputError where the
-    rig is wrong or one of its cameras moves.
+    `frames` is a range A:B, with B excluded; `keep` is that of `Recording`. Raises InputError where the rig is wrong or
+    one of its cameras moves.
     """
     rig = read_rig(folder)
     warnings = [*rig.remarks, *rig.missing()]
@@ -122,9 +122,10 @@ def open_recording(
 
 
 def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
-    """The share of the pixels that see something else than they usually do, in the median frame; depths in m.
+    """Return the share of pixels whose depth (m) differs from their usual depth, in the median frame.
 
-    Usual is the median over the frames; pixels without a measurement say nothing. 0 where there is too little to say.
+    The usual depth is the median over frames; pixels without a measurement are ignored. Fewer than three usable frames
+    give 0.
     """
     seen = [depth for depth in depths if (depth > 0).mean() >= LEAST]
     if len(seen) < 3:
@@ -138,7 +139,7 @@ def moved_share(depths: list[Float64[np.ndarray, "H W"]]) -> float:
 
 
 def _looked_at(rig: Rig, number: int) -> list[Float64[np.ndarray, "H W"]]:
-    """Some depths of a camera, m, evenly spread over its frames; 0 where nothing counts."""
+    """Return depths of a camera, m, from frames spread evenly over its recording; 0 is no measurement."""
     frames = sorted(rig.files[number])
     chosen = sorted({frames[int(k)] for k in np.linspace(0, len(frames) - 1, LOOKED_AT)})
     return [rig.depth(number, frame) * rig.cameras[number].depth_unit for frame in chosen]

@@ -1,7 +1,7 @@
-"""A rig: depth cameras that stand still around a scene, and what each has recorded.
+"""A rig: depth cameras that stand still around a scene, and the depth pictures that they recorded.
 
-In -> out: a folder with `rig.json` <-> cameras and, frame by frame, their depths. A folder with one `camera.json` and
-`depth/` is a rig of one camera. Frames of different cameras belong together by the number in their file names.
+A folder with `rig.json` <-> cameras and their depths, frame by frame. A folder with `camera.json` and `depth/` is a rig
+of one camera. Pictures of different cameras belong to one frame if their file names have the same number.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from ..io.write import make_folder, replacing
 from ..types import UP_AXES, UPS, Up
 
 RIG, SINGLE = "rig.json", "camera.json"
-MOST_PIXELS = 16_384  # of a picture's side
-RIGID = 1e-3  # that an entry of R R^T may be off
+MOST_PIXELS = 16_384  # of a picture's side (guess)
+RIGID = 1e-3  # largest error of an entry of R R^T (guess)
 FARTHEST = 1e4  # m from the world's origin: fusion has 32-bit coordinates, which are 1 mm apart there
-FOCAL = (0.05, 100.0)  # of a picture's side, outside of which no focal length is in pixels
-AWAY = 10.0  # sides that the optical axis may be beside the picture, of one that was cut out
-RATES = (1e-9, 1e9)  # 1/s, as a sequence of meshes may have
+FOCAL = (0.05, 100.0)  # in sides of the picture; a focal length outside is not in pixels (guess)
+AWAY = 10.0  # sides by which a cropped picture may lie beside its optical axis (guess)
+RATES = (1e-9, 1e9)  # 1/s, the range of a sequence of meshes
 _TEXTS = ("name", "depth", "color")
 _NUMBERS = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m", "depth_min_m", "depth_max_m")
-_UPRIGHT = 0.5  # of the cosine between an axis and what is up in pictures
+_UPRIGHT = 0.5  # least cosine between an axis and the pictures' mean upward direction (guess)
 _SEE = "see `meshreel capture --help`"
 
 
@@ -84,22 +84,22 @@ class DepthCamera:
 
     @property
     def view(self) -> PinholeCamera:
-        """What the camera looks through; there the middle of a pixel is half a pixel from its number."""
+        """The camera as a PinholeCamera, in which the middle of pixel i is at i + 1/2."""
         shifted = self.intrinsic + np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
         return PinholeCamera(self.width, self.height, shifted, self.extrinsic)
 
     def in_range(self, depth: UInt16[np.ndarray, "H W"]) -> UInt16[np.ndarray, "H W"]:
-        """Depths that count, as they are; the others are 0, no measurement."""
+        """Return depths with those outside the camera's range set to 0, no measurement."""
         near, far = self.depth_range
         metres = depth * self.depth_unit
         return np.where((metres >= near) & (metres <= far), depth, 0).astype(np.uint16)
 
     def picture(self, depth: UInt16[np.ndarray, "H W"]) -> DepthPicture:
-        """What it measured, with what it takes to see where that is; depths out of its range are 0 already."""
+        """Return depths, already limited by `in_range`, as a DepthPicture of this camera."""
         return DepthPicture(self.view, depth, self.depth_unit, float(self.depth_range[1]))
 
     def record(self) -> dict[str, Any]:
-        """The camera as `rig.json` has it."""
+        """Return the camera as a record of `rig.json`."""
         (fx, fy), (cx, cy), (near, far) = self.focal, self.center, self.depth_range
         record = {"name": self.name, "width": self.width, "height": self.height, "fx": fx, "fy": fy, "cx": cx, "cy": cy}
         record |= {"depth_unit_m": self.depth_unit, "depth_min_m": near, "depth_max_m": far}
@@ -108,17 +108,17 @@ class DepthCamera:
 
 @dataclass(frozen=True, slots=True)
 class Rig:
-    """Cameras, and the depth pictures of each by frame number."""
+    """Cameras of a rig, with the depth pictures of each by frame number."""
 
     folder: Path
     cameras: tuple[DepthCamera, ...]
     files: tuple[dict[int, Path], ...]  # of each camera
     frame_rate: float  # 1/s
-    remarks: tuple[str, ...] = ()  # what a user must know of the description
+    remarks: tuple[str, ...] = ()  # warnings about the description, for the user
 
     @property
     def up(self) -> Up:
-        """The axis that is nearest to up in the cameras' pictures: y, z, -y or -z; y where none is near."""
+        """The axis nearest to upward in the cameras' pictures: y, z, -y or -z; y where none is near."""
         mean = np.mean([-camera.camera_to_world[:3, 1] for camera in self.cameras], axis=0)
         along = {axis: float(mean @ UP_AXES[axis]) for axis in UPS}
         best = max(along, key=along.__getitem__)
@@ -126,16 +126,16 @@ class Rig:
 
     @property
     def frames(self) -> list[int]:
-        """The numbers of the frames that any camera has, in order."""
+        """Sorted numbers of the frames that at least one camera has."""
         return sorted(set().union(*self.files))
 
     def depths(self, frame: int) -> list[tuple[DepthCamera, UInt16[np.ndarray, "H W"]]]:
-        """What the cameras measured that have this frame. Raises InputError where a picture is of another size."""
+        """Read a frame's depths of all cameras that have it. Raises InputError where a picture has another size."""
         there = [number for number, files in enumerate(self.files) if frame in files]
         return [(self.cameras[number], self.depth(number, frame)) for number in there]
 
     def depth(self, number: int, frame: int) -> UInt16[np.ndarray, "H W"]:
-        """What one camera, by its number, measured in a frame that it has; what is out of its range is 0."""
+        """Read the depths of one camera, by its number, in a frame that it has; depths out of its range are 0."""
         camera, path = self.cameras[number], self.files[number][frame]
         depth = read_depth(path)
         if depth.shape != (camera.height, camera.width):
@@ -144,19 +144,18 @@ class Rig:
         return camera.in_range(depth)
 
     def missing(self) -> list[str]:
-        """For each camera that lacks some frames, a line that says so; and one for frames that none has."""
-        frames, told = set(self.frames), []
+        """Return a warning for each camera that lacks frames, and one for frames that no camera has."""
+        frames, warnings = set(self.frames), []
         for camera, files in zip(self.cameras, self.files, strict=True):
             lost = sorted(frames - set(files))
             if lost:
-                told.append(
-                    f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, as {lost[0]}: fused without"
-                )
-        return told + _gaps(self.frames)
+                text = f"camera {camera.name} lacks {len(lost)} of {len(frames)} frames, for example {lost[0]}"
+                warnings.append(f"{text}; they are fused without it")
+        return warnings + _gaps(self.frames)
 
 
 def read_rig(folder: Path) -> Rig:
-    """The rig in a folder. Raises InputError where its description or a camera's pictures are missing or wrong."""
+    """Read the rig in a folder. Raises InputError where its description or a camera's pictures are missing or wrong."""
     entries, cameras, rate = _described(folder)
     folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
     files = tuple(_pictures(place, camera) for place, camera in zip(folders, cameras, strict=True))
@@ -167,13 +166,13 @@ def read_rig(folder: Path) -> Rig:
 
 
 def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:
-    """The cameras that a folder describes, and their frame rate, 1/s; no pictures need to be there."""
+    """Read the cameras that a folder describes, and their frame rate, 1/s; their pictures may be missing."""
     _, cameras, rate = _described(folder)
     return cameras, rate
 
 
 def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float]:
-    """The description's entries, a camera each, these cameras, and their frame rate, 1/s."""
+    """Read a folder's description: its entry per camera, the cameras, and their frame rate, 1/s."""
     path, single = folder / RIG, folder / SINGLE
     if path.exists():
         record = _json(path)
@@ -198,7 +197,7 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float]
 
 
 def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:
-    """Makes a folder for each camera's depth pictures, where `rig.json` will name it."""
+    """Make a folder for each camera's depth pictures, where `rig.json` will name it."""
     folders = [folder / camera.name / "depth" for camera in cameras]
     for place in folders:
         make_folder(place)
@@ -206,7 +205,7 @@ def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:
 
 
 def write_rig(folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float) -> None:
-    """Writes `rig.json`."""
+    """Write `rig.json`."""
     entries = [camera.record() | {"depth": f"{camera.name}/depth"} for camera in cameras]
     with replacing(folder / RIG) as file:
         file.write((json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n").encode())
@@ -244,7 +243,7 @@ def _number(entry: dict[str, Any], key: str) -> float:
 
 
 def _pose(entry: dict[str, Any]) -> Float64[np.ndarray, "4 4"]:
-    """The matrix, whatever is wrong with its numbers."""
+    """Return the matrix of an entry; its shape is checked here, its numbers by DepthCamera."""
     if "camera_to_world" not in entry:
         raise InputError("it has no camera_to_world")
     try:
@@ -258,29 +257,29 @@ def _pose(entry: dict[str, Any]) -> Float64[np.ndarray, "4 4"]:
 
 
 def _unknown(folder: Path, entries: list[Any]) -> Iterator[str]:
-    """A line about keys of cameras that mean nothing: a misspelt one would leave a default in place, unseen."""
+    """Yield a warning about unknown keys of cameras: a misspelt key would silently leave a default in place."""
     known = {*_TEXTS, *_NUMBERS, "camera_to_world", "frames_per_second"}
     found = dict.fromkeys(key for entry in entries for key in entry if key not in known)
     near = [(key, difflib.get_close_matches(key, known, 1)) for key in found]
     if near:
-        told = ", ".join(key + (f" (is {other[0]} meant?)" if other else "") for key, other in near)
-        yield f"{folder}: cameras are described by keys that mean nothing here: {told}"
+        keys = ", ".join(key + (f" (is {other[0]} meant?)" if other else "") for key, other in near)
+        yield f"{folder}: unknown keys describe cameras and are ignored: {keys}"
 
 
 def _gaps(frames: list[int]) -> list[str]:
-    """A line where numbers of frames are left out in an otherwise even row."""
+    """Return a warning if frame numbers are missing in an otherwise even row."""
     pairs = list(pairwise(frames))
     step = min((after - before for before, after in pairs), default=1)
     lost = [(before + step, (after - before - 1) // step) for before, after in pairs if after - before > step]
     if not lost:
         return []
     count = sum(many for _, many in lost)
-    told = f"no camera has {count} of the frames {frames[0]} to {frames[-1]}, as {lost[0][0]}"
-    return [f"{told}: later ones come earlier"]
+    text = f"no camera has {count} of the frames {frames[0]} to {frames[-1]}, for example {lost[0][0]}"
+    return [f"{text}; the frames after a gap are shown earlier"]
 
 
 def _broken(pose: Float64[np.ndarray, "4 4"]) -> str:
-    """What is wrong with a pose; empty where nothing is."""
+    """Return what is wrong with a pose, or an empty string."""
     if not np.isfinite(pose).all():
         return "has a number that is not finite"
     if not np.allclose(pose[3], (0, 0, 0, 1)):
@@ -294,7 +293,7 @@ def _broken(pose: Float64[np.ndarray, "4 4"]) -> str:
 
 
 def _pictures(folder: Path, camera: DepthCamera) -> dict[int, Path]:
-    """The depth pictures in a folder by the last number in their names."""
+    """Return the depth pictures in a folder by the last number in their names."""
     try:
         paths = sorted(p for p in folder.iterdir() if p.suffix.lower() == ".png" and not p.name.startswith("."))
     except OSError as error:
@@ -314,7 +313,7 @@ def _pictures(folder: Path, camera: DepthCamera) -> dict[int, Path]:
 
 
 def _check_color(folder: Path, camera: DepthCamera) -> None:
-    """Colour is not fused; pictures of another size mean that depth was not aligned with them."""
+    """Check that color pictures, which are not fused, have the size of the depth pictures aligned with them."""
     first = next((p for p in sorted(folder.glob("*")) if p.suffix.lower() in (".png", ".jpg", ".jpeg")), None)
     if first is not None and (size := picture_size(first)) != (camera.width, camera.height):
         text = f"{first}: {size[0]} x {size[1]} pixels where depth has {camera.width} x {camera.height}"

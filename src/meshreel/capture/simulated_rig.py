@@ -1,6 +1,6 @@
-"""A simulated rig: what depth cameras would measure of known meshes, with a sensor's errors (paper, section 4.1).
+"""Simulation of a rig: depths that cameras would measure of known meshes, with sensor errors (paper, section 4.1).
 
-In: meshes of a scene frame by frame, cameras. Out: a rig's folder as `rig.py` reads it, and beside it the truth: the
+Meshes of a scene frame by frame, and cameras -> a rig's folder, which `rig.py` reads, and beside it the truth: the
 clean mesh of each frame and which of its faces move. Everything follows from the seed.
 """
 
@@ -25,21 +25,21 @@ from ..types import Mesh
 from .rig import RIG, DepthCamera, make_folders, write_rig
 
 TRUTH = "truth"  # folder of the clean meshes
-LABELS = "dynamic.npz"  # there: by frame, a bit for each face of its mesh
-DEEPEST = 65_535  # units that a depth picture holds
+LABELS = "dynamic.npz"  # file in that folder: for each frame, a bit per face of its mesh
+DEEPEST = 65_535  # units, largest value of a 16-bit depth picture
 
 
 @dataclass(frozen=True, slots=True)
 class SensorOptions:
-    """What is wrong with a depth camera."""
+    """Errors of a depth camera."""
 
-    noise: float = 0.4  # in units of 15, 20 and 25 mm of standard deviation at 2, 3 and 4 m
-    correlation: float = 0.0  # pixels over which the noise is alike (standard deviation of a Gaussian); 0: none
+    noise: float = 0.4  # times a standard deviation of 15, 20 and 25 mm at 2, 3 and 4 m
+    correlation: float = 0.0  # pixels over which the noise is correlated (standard deviation of a Gaussian); 0: none
     grazing: float = 80.0  # degrees between ray and normal above which nothing is measured
     holes: float = 0.002  # share of the pixels that measure nothing
-    flying: float = 0.3  # share of the pixels beside a jump that measure between both sides
-    jump: float = 0.05  # m between neighbours, that is one
-    pose_error: tuple[float, float] = (0.0, 0.0)  # m, degrees: standard deviation of what the rig's file is wrong by
+    flying: float = 0.3  # share of the pixels beside a jump that measure a depth between both sides
+    jump: float = 0.05  # m between neighbours above which there is a jump
+    pose_error: tuple[float, float] = (0.0, 0.0)  # m, degrees: standard deviations of the errors in the rig's file
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -54,20 +54,20 @@ class SensorOptions:
 
 @dataclass(frozen=True, slots=True)
 class SceneFrame:
-    """The clean mesh of a moment, and what of it moves."""
+    """Clean mesh of one moment, with the faces that move."""
 
     mesh: Mesh
     dynamic: Bool[np.ndarray, " F"]
 
     @staticmethod
     def of(still: Sequence[Mesh], moving: Sequence[Mesh]) -> SceneFrame:
-        """All parts in one mesh."""
+        """Join still and moving parts into one mesh."""
         parts = [*still, *moving]
         faces = [len(part.faces) for part in parts]
         return SceneFrame(concatenate(parts), np.repeat(np.arange(len(parts)) >= len(still), faces))
 
     def labels_for(self, fused: Mesh) -> Bool[np.ndarray, " F"]:
-        """Which faces of a fused mesh move: as the clean face nearest to the middle of each."""
+        """Label the faces of a fused mesh that move: each takes the label of the clean face nearest to its middle."""
         if self.mesh.is_empty:
             return np.zeros(len(fused.faces), bool)
         return carried_labels(Surface(self.mesh), self.dynamic, fused)
@@ -76,10 +76,10 @@ class SceneFrame:
 def corner_cameras(
     low: Float64[np.ndarray, " 3"], high: Float64[np.ndarray, " 3"], count: int = 4, up: int = 1
 ) -> tuple[DepthCamera, ...]:
-    """Cameras of the paper's size (640 x 576, 75 x 65 degrees) around a box, high up, that look down at its middle.
+    """Return cameras of the paper's size (640 x 576, 75 x 65 degrees) high up around a box, looking down at its middle.
 
-    `low` and `high` are the box's corners, m; they stand on an ellipse through its vertical edges, the first at 45
-    degrees. `up` is the number of the axis that points up.
+    `low` and `high` are the box's corners, m; the cameras stand on an ellipse through its vertical edges, the first at
+    45 degrees. `up` is the number of the axis that points up.
     """
     if count < 1:
         raise InputError(f"{count} cameras: give one at least")
@@ -111,11 +111,11 @@ def simulate_rig(
     cameras: tuple[DepthCamera, ...],
     frame_rate: float,
     sensor: SensorOptions = SensorOptions(),
-    tell: Callable[[int], None] = lambda _done: None,
+    progress: Callable[[int], None] = lambda _done: None,
 ) -> int:
-    """Writes what the cameras measure of each frame, and the truth; the number of frames.
+    """Write what the cameras measure of each frame, and the truth; return the number of frames.
 
-    `rig.json` comes last: a folder without it is not complete. `tell` hears how many frames are done.
+    `rig.json` is written last: a folder without it is incomplete. `progress` gets the number of finished frames.
     """
     places = make_folders(folder, cameras)
     make_folder(folder / TRUTH)
@@ -128,7 +128,7 @@ def simulate_rig(
         write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
         labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
         count = number + 1
-        tell(count)
+        progress(count)
     with replacing(folder / TRUTH / LABELS) as file:
         np.savez_compressed(file, allow_pickle=False, **labels)
     with replacing(folder / TRUTH / RIG) as file:
@@ -144,11 +144,11 @@ class _Rays:
 
     def __init__(self, mesh: Mesh) -> None:
         self._normals = face_normals(mesh)[0]
-        # About the world's origin, as every simulated scene was: another would round depths differently.
+        # About the world's origin, as in all earlier simulations: another origin would round depths differently.
         self._rays = Rays(mesh, origin=np.zeros(3))
 
     def cast(self, camera: DepthCamera) -> tuple[Float64[np.ndarray, "H W"], Float64[np.ndarray, "H W"]]:
-        """Depth along the optical axis, m, infinite for a miss; and the cosine between ray and normal."""
+        """Return the depth along the optical axis, m, infinite for a miss, and the cosine between ray and normal."""
         rows, columns = np.mgrid[: camera.height, : camera.width]
         (fx, fy), (cx, cy) = camera.focal, camera.center
         ahead = np.stack([(columns - cx) / fx, (rows - cy) / fy, np.ones(rows.shape)], axis=-1)
@@ -180,7 +180,7 @@ def _measured(
 def _flown(
     depth: Float64[np.ndarray, "H W"], sensor: SensorOptions, random: np.random.Generator
 ) -> Float64[np.ndarray, "H W"]:
-    """Some pixels beside a jump of depth measure a mixture of both sides."""
+    """Mix the depths of both sides at some pixels beside a jump (flying pixels)."""
     found = depth.copy()
     for axis in (0, 1):
         beside = np.roll(depth, 1, axis=axis)
@@ -194,7 +194,7 @@ def _flown(
 
 
 def _noise(shape: tuple[int, ...], correlation: float, random: np.random.Generator) -> Float64[np.ndarray, "H W"]:
-    """Normal noise of unit deviation, alike over so many pixels."""
+    """Draw normal noise of unit deviation, correlated over `correlation` pixels."""
     from scipy.ndimage import gaussian_filter
 
     white = random.standard_normal(shape)
@@ -205,7 +205,7 @@ def _noise(shape: tuple[int, ...], correlation: float, random: np.random.Generat
 
 
 def _mistaken(camera: DepthCamera, sensor: SensorOptions, random: np.random.Generator) -> DepthCamera:
-    """The camera as its calibration has it."""
+    """Return the camera with the errors of its calibration."""
     from scipy.spatial.transform import Rotation
 
     apart, degrees = sensor.pose_error

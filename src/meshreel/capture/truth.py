@@ -1,6 +1,6 @@
 """The truth beside a simulated rig: clean meshes, which of their faces move, true cameras (see `simulated_rig.py`).
 
-In: the folder `truth` of a rig. Out: a SceneFrame a frame, read when it is asked for.
+The folder `truth` of a rig -> one SceneFrame per frame, read on demand.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ _DAMAGED = (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotIm
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What a simulated rig has really seen, by frame."""
+    """Clean frames of a simulated rig, with its true cameras."""
 
     paths: tuple[Path, ...]  # of the clean meshes
-    packed: tuple[np.ndarray, ...]  # for each face a bit: it moves; from outside, checked frame by frame
-    cameras: tuple[DepthCamera, ...]  # where they really stood
+    packed: tuple[np.ndarray, ...]  # a bit per face, set if it moves; untrusted, checked frame by frame
+    cameras: tuple[DepthCamera, ...]  # with their true poses
     frame_rate: float  # 1/s
 
     def __len__(self) -> int:
@@ -44,7 +44,7 @@ class Truth:
 
 
 def read_truth(folder: Path) -> Truth:
-    """The truth in a folder. Raises InputError where a part of it is missing, is damaged or does not fit another."""
+    """Read the truth in a folder. Raises InputError where a part of it is missing, damaged or inconsistent."""
     cameras, rate = read_cameras(folder)
     paths = {path.stem: path for path in sorted(folder.glob("frame_*.ply"))}
     if not paths:
@@ -57,7 +57,7 @@ def read_truth(folder: Path) -> Truth:
 
 
 def _labels(path: Path) -> dict[str, np.ndarray]:
-    """Packed labels by the frame's name."""
+    """Return packed labels by frame name."""
     try:
         with np.load(path, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
