@@ -1,6 +1,6 @@
-"""Reading a .reel file: the head once, then any chunk by its byte range. In: a Source. Out: payloads, checked by CRC.
+"""Reader of a .reel file: the head once, then any chunk by its byte range. A Source -> payloads checked by CRC.
 
-A damaged head makes the file unreadable (FormatError at once); damage behind it costs only the chunks it lies in.
+A damaged head makes the file unreadable (FormatError at once); damage behind it costs only the damaged chunks.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from ..format.records import least_size, unpack, unpack_all
 from ..types import Up, known_up
 from .sources import Source
 
-FIRST_REQUEST = 16384  # bytes; the head of some minutes of video
+FIRST_REQUEST = 16384  # bytes; the head of some minutes of video (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """Where a chunk lies and what it holds."""
+    """Position and contents of a chunk."""
 
     number: int
     kind: ChunkKind
@@ -37,12 +37,12 @@ class Chunk:
 
     @property
     def size(self) -> int:
-        """Bytes of the whole chunk."""
+        """Size of the whole chunk, bytes."""
         return sum(layer.size for layer in self.layers)
 
     @property
     def end(self) -> int:
-        """Offset of the byte behind it."""
+        """Offset of the byte behind the chunk."""
         return self.offset + self.size
 
     def __str__(self) -> str:
@@ -53,7 +53,7 @@ class Chunk:
 
 
 class ReelReader:
-    """The head of a file, checked, and its chunks on demand. Does not close the source."""
+    """Checked head of a file, and access to its chunks; does not close the source."""
 
     def __init__(self, source: Source) -> None:
         self._source = source
@@ -65,7 +65,7 @@ class ReelReader:
         self.frame_count = self.tracks[0][-1].first_frame + self.tracks[0][-1].frame_count
         check_header(self.header, self.frame_count)
         self.metadata = parse_metadata(self.header.metadata)
-        self.size = self.chunks[-1].end  # bytes of the whole file, whether they are there or not
+        self.size = self.chunks[-1].end  # bytes of the whole file, even if it is truncated
         if source.size > self.size:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
         self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]
@@ -93,7 +93,7 @@ class ReelReader:
 
     @property
     def has_background(self) -> bool:
-        """Whether some frame is shown with one."""
+        """Whether some frame has a background."""
         return any(self._is_static(number) for group in self.groups for number in group.depends_on)
 
     @property
@@ -102,36 +102,36 @@ class ReelReader:
         return any(group.form != Form.EMPTY for group in self.groups)
 
     def timestamp(self, frame: int) -> float:
-        """The time of a frame, s. IndexError as chunk_of_frame."""
+        """Return the time of a frame, s. Raises IndexError as chunk_of_frame does."""
         self.chunk_of_frame(frame)
         if self.header.intervals:
             return self._times[frame] / 1e6
         return self.header.first_time / 1e6 + frame / self.header.frame_rate
 
     def chunk_of_frame(self, frame: int, track: int = 0) -> Chunk:
-        """The GROUP chunk of a track that holds a frame. IndexError outside 0 .. frame_count - 1."""
+        """Return the GROUP chunk of a track that holds a frame. Raises IndexError outside 0 .. frame_count - 1."""
         if not 0 <= frame < self.frame_count:
             raise IndexError(f"frame {frame}: the file has frames 0 to {self.frame_count - 1}")
         return self.tracks[track][bisect_right(self._first_frames[track], frame) - 1]
 
     def chunks_of_frame(self, frame: int) -> tuple[Chunk, ...]:
-        """The GROUP chunks that hold a frame, in the order of their tracks. IndexError as chunk_of_frame."""
+        """Return the GROUP chunks that hold a frame, by track. Raises IndexError as chunk_of_frame does."""
         return tuple(self.chunk_of_frame(frame, track) for track in range(len(self.tracks)))
 
     def static_of_frame(self, frame: int) -> Chunk | None:
-        """The STATIC chunk that a frame is shown with: the newest that a group of it names. IndexError as above."""
+        """Return the STATIC chunk that a frame is shown with: the newest one that a group of the frame depends on."""
         named = [n for chunk in self.chunks_of_frame(frame) for n in chunk.depends_on if self._is_static(n)]
         return self.chunks[max(named)] if named else None
 
     def group_before(self, chunk: Chunk) -> Chunk | None:
-        """The GROUP chunk that one is predicted from."""
+        """Return the GROUP chunk that a chunk is predicted from, or None."""
         return next((self.chunks[n] for n in chunk.depends_on if not self._is_static(n)), None)
 
     def _is_static(self, number: int) -> bool:
         return self.chunks[number].kind == ChunkKind.STATIC
 
     def read_chunk(self, number: int, layers: int | None = None) -> bytes:
-        """The payload of a chunk, or its first `layers` (at least one). FormatError names chunk and frames."""
+        """Read the payload of a chunk, or its first `layers` (at least one). A FormatError names chunk and frames."""
         chunk = self.chunks[number]
         wanted = chunk.layers if layers is None else chunk.layers[: max(layers, 1)]
         size = sum(layer.size for layer in wanted)
@@ -145,7 +145,7 @@ class ReelReader:
 
 
 def _read_head(source: Source) -> tuple[Header, Index, int]:
-    """Header, index and size of the head, in one request where it is short; never more than the source has."""
+    """Return header, index and size of the head; a short head takes one request, within the size of the source."""
     data = source.get_bytes(0, min(FIRST_REQUEST, source.size))
     if data[: len(MAGIC)] != MAGIC:
         raise FormatError("not a .reel file: the signature is missing")

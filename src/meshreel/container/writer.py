@@ -1,4 +1,4 @@
-"""Writing a .reel file, chunk by chunk, whole or not at all. In: a header and payloads. Out: a file, or its bytes.
+"""Writer of a .reel file, which appears whole or not at all. A header and payloads -> a file, or its bytes.
 
 The head names every chunk and comes first, so chunks wait in an unnamed temporary file beside the target: memory stays
 flat, and a process that is killed leaves nothing under the final name.
@@ -26,7 +26,7 @@ from ..format.records import least_size, pack
 
 @runtime_checkable
 class Sink(Protocol):
-    """What bytes can be written to: io.BytesIO, an open binary file."""
+    """Destination of bytes: io.BytesIO, an open binary file."""
 
     def write(self, data: bytes, /) -> Any: ...
 
@@ -34,29 +34,29 @@ class Sink(Protocol):
 
 
 class ReelWriter:
-    """A context manager: chunks go in by `add_*`, and the file appears when the block ends without an exception.
+    """Context manager that writes a file: chunks are added by `add_*`, and the file appears when the block succeeds.
 
-    The target is a path, or a Sink such as io.BytesIO that is given the bytes. InputError where it cannot
-    be written (no such folder, disk full), where no frame was added, or where a value cannot be stored.
+    The target is a path, or a Sink such as io.BytesIO. Raises InputError where the target cannot be written (no such
+    folder, disk full), where no frame was added, or where a value cannot be stored.
     """
 
     def __init__(self, target: str | Path | Sink, header: Header) -> None:
         self._target = Path(target) if isinstance(target, str | Path) else target
-        self.header = header  # may be replaced until the block ends: what was measured goes into its metadata
+        self.header = header  # may be replaced until the block ends, to store measured values as metadata
         self._entries: list[IndexEntry] = []
         self._checks = IndexChecks()
 
     @property
     def frame_count(self) -> int:
-        """Frames so far, of the first track."""
+        """Number of frames added to the first track."""
         return self.frames_of(0)
 
     def frames_of(self, track: int) -> int:
-        """Frames of a track so far; where its next group begins."""
+        """Return the number of frames added to a track, which is where its next group begins."""
         return self._checks.frames[track] if track < len(self._checks.frames) else 0
 
     def last_of(self, track: int) -> int | None:
-        """Number of a track's newest chunk, which its next may be predicted from; None where there is none."""
+        """Return the number of a track's newest chunk, from which its next may be predicted, or None."""
         return self._checks.groups[track] if track < len(self._checks.groups) else None
 
     def __enter__(self) -> ReelWriter:
@@ -77,9 +77,9 @@ class ReelWriter:
                 self._spool.close()
 
     def add_static(self, payload: bytes, layers: Sequence[int] = (), depends_on: Sequence[int] = ()) -> int:
-        """The number of a new chunk that is a state of the background; `layers` as for a group.
+        """Add a state of the background and return the number of its chunk; `layers` are those of `add_group`.
 
-        Of form DRACO, or of form PATCH: then `depends_on` is the number of the state that it changes.
+        The payload has form DRACO or PATCH; for PATCH, `depends_on` is the number of the state that it changes.
         """
         form = _form(payload)
         entry = IndexEntry(ChunkKind.STATIC, form, 0, 0, tuple(depends_on), _layers(payload, layers))
@@ -94,11 +94,11 @@ class ReelWriter:
         depends_on: Sequence[int] = (),
         track: int = 0,
     ) -> int:
-        """The number of a new chunk of frames; the first comes right behind those of the group before in its track.
+        """Add a group of frames, which follow those of the track's previous group, and return the number of its chunk.
 
-        Groups of all tracks come in order of their first frame, then of their track. `layers` are the ends of the
-        payload's layers, bytes, rising to its length; none: it is one layer. `depends_on` are numbers: of the static
-        chunk that the frames are shown with, and, where it is predicted from it, of the group before it in its track.
+        Add groups in the order of their first frame, then of their track. `layers` are the ends of the payload's
+        layers, bytes, ascending to its length; without any it is one layer. `depends_on` are the numbers of the static
+        chunk that the frames are shown with and, for a predicted group, of the previous group of its track.
         """
         if track < 0 or first_frame != self.frames_of(track):
             raise InputError(
@@ -132,7 +132,7 @@ class ReelWriter:
         if not isinstance(self._target, Path):
             _copy(head, self._spool, self._target)
             return
-        partial = self._target.with_name(f".{uuid.uuid4().hex}.tmp")  # short: any name that may be final has room
+        partial = self._target.with_name(f".{uuid.uuid4().hex}.tmp")  # short enough wherever the final name is
         try:
             with partial.open("xb") as file:
                 _copy(head, self._spool, file)
@@ -143,13 +143,13 @@ class ReelWriter:
 
 
 def check_target(path: Path) -> None:
-    """Raises InputError where no file can be written at a path: before minutes are spent on what goes into it."""
+    """Raise InputError where no file can be written at a path, before minutes are spent on encoding."""
     with _as_input_error(path):
         _open_spool(path).close()
 
 
 def pack_head(header: Header, index: Index) -> bytes:
-    """Everything before the chunks."""
+    """Pack the head, which is everything before the chunks."""
     body = pack(header) + pack(index)
     size = least_size(Preamble) + len(body) + least_size(Checksum)
     data = pack(Preamble(MAGIC, VERSION, 0, size)) + body
@@ -188,7 +188,7 @@ def _layers(payload: bytes, ends: Sequence[int]) -> tuple[Layer, ...]:
 
 @contextmanager
 def _as_input_error(target: Path | Sink) -> Iterator[None]:
-    """What goes wrong inside is the caller's to mend: an InputError that names the target."""
+    """Turn errors inside the block, which the caller can mend, into an InputError that names the target."""
     name = target if isinstance(target, Path) else "the output"
     try:
         yield

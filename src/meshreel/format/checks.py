@@ -1,4 +1,4 @@
-"""What the records of a head must satisfy beyond their bytes; FormatError where they do not."""
+"""Laws that the records of a head obey beyond their layout; breaking one raises FormatError."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from typing import Any, NoReturn
 from ..errors import FormatError
 from .layout import ChunkKind, Form, Header, Index, IndexEntry
 
-LARGEST = 1e15  # of every number in a header: keeps all that is computed from them finite
-SMALLEST = 1e-15
-MOST_TRACKS = 256  # a frame needs a group of each
-MOST_CHANGES = 255  # of a background, one upon the other: random access decodes all of them
+# Limits of the format, stated in FORMAT.md; the values are guesses with room to spare.
+LARGEST = 1e15  # of the numbers in a header: keeps everything computed from them finite
+SMALLEST = 1e-15  # of a rate or scale
+MOST_TRACKS = 256  # a frame needs a group of each track
+MOST_CHANGES = 255  # patches on one background: random access decodes all of them
 
 
 def check_header(header: Header, frame_count: int) -> None:
-    """Positive rate and scale, corners in order, an interval of time between each two frames or none."""
+    """Check that rate and scale are positive, corners ordered, and intervals absent or one between each two frames."""
     for name in ("frame_rate", "scale"):
         value = getattr(header, name)
         if not SMALLEST <= value <= LARGEST:
@@ -33,7 +34,7 @@ def check_header(header: Header, frame_count: int) -> None:
 
 
 class IndexChecks:
-    """The laws of an index, entry by entry, so that who writes one and who reads one have the same."""
+    """Laws of an index, checked entry by entry, so that the writer and the reader share them."""
 
     def __init__(self) -> None:
         self.frames: list[int] = []  # of each track so far
@@ -43,7 +44,7 @@ class IndexChecks:
         self._count = 0
 
     def add(self, entry: IndexEntry) -> int:
-        """The number of the next entry. FormatError, and nothing changed, where it breaks a law."""
+        """Add the next entry and return its number. Raises FormatError, and changes nothing, where it breaks a law."""
         number = self._count
         if (entry.kind == ChunkKind.STATIC) != (entry.frames == 0):
             raise FormatError(f"chunk {number}: {entry.kind.name} of {entry.frames} frames")
@@ -59,7 +60,7 @@ class IndexChecks:
         return number
 
     def finish(self) -> None:
-        """FormatError where there are no frames, or a track has others than the first."""
+        """Raise FormatError if there are no frames, or if a track has another number of frames than the first."""
         if not self.frames:
             raise FormatError("no frames: the index names no group")
         for track, frames in enumerate(self.frames):
@@ -67,7 +68,7 @@ class IndexChecks:
                 raise FormatError(f"track {track} has {frames} frames, track 0 has {self.frames[0]}")
 
     def _changes_of(self, entry: IndexEntry) -> int:
-        """How many patches lead to a STATIC chunk: none to a mesh, one more than to what it changes to a patch."""
+        """Return how many patches lead to a STATIC chunk: 0 for a mesh, 1 + those of its base for a patch."""
         number = self._count
         if entry.form not in (Form.DRACO, Form.PATCH) or entry.track:
             raise FormatError(f"chunk {number}: a static chunk of form {entry.form.name} and track {entry.track}")
@@ -111,7 +112,7 @@ class IndexChecks:
 
 
 def check_index(index: Index) -> None:
-    """FormatError, naming the chunk, where an entry breaks a law; see IndexChecks."""
+    """Check a whole index; a FormatError names the chunk whose entry breaks a law of IndexChecks."""
     checks = IndexChecks()
     for entry in index.chunks:
         checks.add(entry)
@@ -119,7 +120,7 @@ def check_index(index: Index) -> None:
 
 
 def parse_metadata(text: str) -> dict[str, Any]:
-    """The JSON object of Header.metadata."""
+    """Parse Header.metadata, which must be a JSON object."""
     try:
         metadata = json.loads(text, parse_constant=_refuse)
         json.dumps(

@@ -1,6 +1,6 @@
-"""FORMAT.md's tables, made from the declarations of the records. In: a text with markers. Out: it, tables filled in.
+"""Tables of FORMAT.md, generated from the declarations of the records: text with markers -> text with tables.
 
-A marker is the pair `<!-- table NAME -->` and `<!-- end -->`; what stands between is replaced.
+A marker is the pair `<!-- table NAME -->` and `<!-- end -->`; the text between them is replaced.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ MARKED = re.compile(r"(<!-- table (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
 def fill_tables(text: str, records: Sequence[type]) -> str:
-    """The text with every marked table made anew. InputError where a table or a record lacks its counterpart."""
+    """Regenerate every marked table of a text. Raises InputError where a table or a record lacks its counterpart."""
     by_name = {record.__name__: record for record in records}
     marked = [name for _, name, _ in MARKED.findall(text)]
     if sorted(marked) != sorted(by_name):
@@ -26,7 +26,7 @@ def fill_tables(text: str, records: Sequence[type]) -> str:
 
 
 def table(record_type: type) -> str:
-    """A markdown table of one record: offset (as long as it is fixed), field, kind, meaning."""
+    """Return the Markdown table of a record: offset (while it is fixed), field, kind, meaning."""
     lines = ["| offset | field | kind | meaning |", "| ---: | --- | --- | --- |"]
     offset: int | None = 0
     for field in record_fields(record_type):

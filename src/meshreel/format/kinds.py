@@ -1,7 +1,7 @@
-"""Kinds of fields: how one value lies in bytes. In: a value, or bytes and an offset. Out: bytes, or value and offset.
+"""Kinds of fields: value <-> bytes at an offset.
 
-The only place that packs numbers. Little-endian throughout. Packing raises ValueError or TypeError for what does not
-fit, unpacking FormatError; counts are checked against the bytes that are left before anything is allocated.
+The only module that packs numbers, little-endian throughout. Packing raises ValueError or TypeError for values that do
+not fit, unpacking raises FormatError; counts are checked against the remaining bytes before anything is allocated.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from ..errors import FormatError
 
 @runtime_checkable
 class Kind(Protocol):
-    """How one field lies in bytes."""
+    """Layout of one field in bytes."""
 
     @property
     def label(self) -> str:
-        """The name of the kind in FORMAT.md."""
+        """Name of the kind in FORMAT.md."""
         ...
 
     @property
     def least(self) -> int:
-        """The fewest bytes a value can take; at least 1 for what may stand in a List."""
+        """The fewest bytes that a value can take; at least 1 for an item of a List."""
         ...
 
     def pack(self, value: Any) -> bytes: ...
@@ -37,7 +37,7 @@ class Kind(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number of fixed size. Floats are finite."""
+    """A number of fixed size; floats are finite."""
 
     label: str
     code: str  # as in the struct module
@@ -85,7 +85,7 @@ F64 = Number("f64", "d")
 
 @dataclass(frozen=True, slots=True)
 class Varint:
-    """An unsigned number below 2^64, 7 bits a byte, low bits first, in as few bytes as it fits (LEB128)."""
+    """An unsigned number below 2^64 in the fewest bytes: 7 bits per byte, low bits first (LEB128)."""
 
     label: str = "varint"
     least: int = 1
@@ -115,7 +115,7 @@ class Varint:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of the values of an enumeration."""
+    """A value of an enumeration."""
 
     number: Number
     values: type[IntEnum]
@@ -164,7 +164,7 @@ class Bytes:
 
 @dataclass(frozen=True, slots=True)
 class Blob:
-    """A length, then so many bytes."""
+    """A length, then that number of bytes."""
 
     length: Kind
 
@@ -186,7 +186,7 @@ class Blob:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A length in bytes, then UTF-8."""
+    """A length in bytes, then UTF-8 text."""
 
     length: Kind
 
@@ -211,7 +211,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """All bytes to the end; the last field of a record, if at all."""
+    """All bytes to the end; only the last field of a record may be of this kind."""
 
     label: str = "bytes to the end"
     least: int = 0
@@ -249,7 +249,7 @@ class Array:
 
 @dataclass(frozen=True, slots=True)
 class List:
-    """A count, then so many values of one kind, as a tuple."""
+    """A count, then that number of values of one kind, as a tuple."""
 
     length: Kind
     item: Kind

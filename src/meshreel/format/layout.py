@@ -1,8 +1,8 @@
-"""The one definition of the bytes of a .reel file and of the payloads in it.
+"""The one definition of the bytes of a .reel file and of its payloads.
 
-A file is `Preamble | Header | Index | Checksum | chunks`; everything before the chunks is the head. Chunks lie one
-behind the other in the order of the index, so their offsets, like the numbers of their frames, follow from sums and
-cannot contradict each other. FORMAT.md's tables are made from this module by scripts/generate.
+A file is `Preamble | Header | Index | Checksum | chunks`; everything before the chunks is the head. Chunks follow one
+another in the order of the index, so their offsets and frame numbers are sums and cannot contradict each other
+(decision 3). scripts/generate makes FORMAT.md's tables and the player's layout.gen.ts from this module.
 """
 
 from __future__ import annotations
@@ -14,37 +14,37 @@ from typing import Annotated
 from .kinds import F32, F64, I64, U8, U16, U32, Array, Blob, Bytes, Choice, List, Rest, Text, Varint
 from .records import Nested
 
-MAGIC = b"REEL\r\n\x1a\n"  # the line ends betray a transfer in text mode
+MAGIC = b"REEL\r\n\x1a\n"  # the line ends reveal a transfer in text mode
 VERSION = 1
 
 
 class ChunkKind(IntEnum):
-    """What a chunk is for."""
+    """Purpose of a chunk."""
 
     STATIC = 1  # a state of the background; groups refer to it
     GROUP = 2  # a group of consecutive frames of one track
 
 
 class Form(IntEnum):
-    """How a chunk is coded; its first byte."""
+    """Coding of a chunk, stored in its first byte."""
 
     LAPLACIAN = 1  # reference mesh and displacements
-    LAYERS = 2  # coarse mesh and its motion, then one scalar a vertex and level of subdivision
-    DRACO = 3  # one Draco mesh a frame
+    LAYERS = 2  # coarse mesh and its motion, then one scalar per vertex for each level of subdivision
+    DRACO = 3  # one Draco mesh per frame
     EMPTY = 4  # frames without a surface
-    PATCH = 5  # a background: another one without some of its faces, and with a Draco mesh
+    PATCH = 5  # a background: another background without some faces, plus a Draco mesh
 
 
 class AnchorRule(IntEnum):
-    """How the anchors of the Laplacian coordinates are chosen on both sides."""
+    """Rule by which encoder and decoder choose the anchors of the Laplacian coordinates."""
 
-    SPREAD = 1  # every k-th vertex, and the first of each component that would have none
+    SPREAD = 1  # every k-th vertex, and the first vertex of each component that has none of these
     FARTHEST = 2  # farthest points by edge hops, starting from the first vertex of each component
 
 
 @dataclass(frozen=True, slots=True)
 class Preamble:
-    """The first bytes of a file: what it is, and how much of it to read before anything else."""
+    """The first bytes of a file: its signature, and the size of the head."""
 
     magic: Annotated[bytes, Bytes(8), "`52 45 45 4c 0d 0a 1a 0a`"]
     version: Annotated[int, U8, "version of the format, 1; a reader refuses any other"]
@@ -54,30 +54,30 @@ class Preamble:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What holds for all frames. Coordinates y in chunks are normalised: x = origin + scale * y is in metres."""
+    """Values for all frames. Coordinates y in chunks are normalised: x = origin + scale * y is in metres."""
 
     frame_rate: Annotated[float, F64, "1/s, above 0"]
     origin: Annotated[tuple[float, ...], Array(3, F64), "m"]
     scale: Annotated[float, F64, "m, above 0"]
     minimum: Annotated[tuple[float, ...], Array(3, F32), "lower corner of the sequence's bounding box, normalised"]
-    maximum: Annotated[tuple[float, ...], Array(3, F32), "upper corner of it"]
+    maximum: Annotated[tuple[float, ...], Array(3, F32), "upper corner of this box"]
     metadata: Annotated[
         str,
         Text(U16),
-        "a JSON object, not needed to decode: `up` (axis; y if not there), preset ...",
+        "a JSON object, not needed for decoding: `up` (axis; y if absent), preset ...",
     ]
     first_time: Annotated[int, I64, "time of frame 0, microseconds"] = 0
     intervals: Annotated[
         tuple[int, ...],
         List(Varint(), Varint()),
-        "microseconds from each frame but the last to the next, each above 0; "
-        "none: frame i is at first_time + 10^6 * i / frame_rate",
+        "microseconds from each frame to the next, each above 0; "
+        "if empty, frame i is at first_time + 10^6 * i / frame_rate",
     ] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """A range of a chunk: its first k layers are its first bytes. Which k are enough to decode depends on the form."""
+    """Byte range of a chunk, whose first k layers are its first bytes; the form decides which k can be decoded."""
 
     size: Annotated[int, Varint(), "bytes, above 0"]
     crc: Annotated[int, U32, "CRC-32 (ISO-HDLC, as in zlib) of these bytes"]
@@ -85,18 +85,18 @@ class Layer:
 
 @dataclass(frozen=True, slots=True)
 class IndexEntry:
-    """One chunk."""
+    """Index entry of a chunk."""
 
-    kind: Annotated[ChunkKind, Choice(U8, ChunkKind), "what it is for"]
-    form: Annotated[Form, Choice(U8, Form), "how it is coded; equal to its first byte"]
+    kind: Annotated[ChunkKind, Choice(U8, ChunkKind), "purpose"]
+    form: Annotated[Form, Choice(U8, Form), "coding; equal to the first byte of the chunk"]
     frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC"]
-    track: Annotated[int, Varint(), "which moving body's frames these are, from 0; 0 if STATIC"]
+    track: Annotated[int, Varint(), "number of the moving body, from 0; 0 if STATIC"]
     depends_on: Annotated[
         tuple[int, ...],
         List(U8, Varint()),
-        "numbers of the chunks before it that it needs: "
-        "of a GROUP, the STATIC one it is shown with and the GROUP right before it in its track; "
-        "of a STATIC of form PATCH, the STATIC one that it changes",
+        "numbers of the earlier chunks that it needs: "
+        "for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; "
+        "for a STATIC of form PATCH, the STATIC chunk that it changes",
     ]
     layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]
 
@@ -110,7 +110,7 @@ class Index:
 
 @dataclass(frozen=True, slots=True)
 class Checksum:
-    """The end of the head."""
+    """Last record of the head: its checksum."""
 
     crc: Annotated[int, U32, "CRC-32 of the head up to here"]
 
@@ -130,7 +130,7 @@ class LaplacianGroup:
 
 @dataclass(frozen=True, slots=True)
 class Component:
-    """One direction of the basis and the streams of its weights."""
+    """Direction of the basis, and sizes of the streams of its weights."""
 
     basis_bits: Annotated[int, U8, "b, at most 30: the direction's numbers are integers times 2^-b"]
     step_level: Annotated[int, U8, "k: the quantiser's step is 2^(-k/8)"]
@@ -140,11 +140,11 @@ class Component:
 
 @dataclass(frozen=True, slots=True)
 class DisplacementHead:
-    """The start of coded displacements. Behind it, for each component in turn, its anchors' and its deltas' stream."""
+    """Head of coded displacements; for each component in turn, the streams of its anchors and its deltas follow."""
 
     frames: Annotated[int, U16, "T, above 0"]
     anchor_rule: Annotated[AnchorRule, Choice(U8, AnchorRule), "how anchors are chosen"]
-    anchor_count: Annotated[int, Varint(), "number of anchors asked for; each connected component has at least one"]
+    anchor_count: Annotated[int, Varint(), "number of requested anchors; each connected component has at least one"]
     anchor_weight: Annotated[int, U8, "factor of the anchors' rows, above 0"]
     mean_bits: Annotated[int, U8, "b, at most 30: the mean's numbers are integers times 2^-b"]
     components: Annotated[tuple[Component, ...], List(U16, Nested(Component)), "strongest first, at most 3 T"]
@@ -152,22 +152,22 @@ class DisplacementHead:
 
 
 class Presence(IntEnum):
-    """Whether something is there."""
+    """Whether an optional part is present."""
 
     ABSENT = 0
     PRESENT = 1
 
 
 class Origin(IntEnum):
-    """What a coded field is counted from."""
+    """Prediction of a coded field."""
 
-    ALONE = 0  # from nothing outside of its group
-    PREVIOUS = 1  # from the last frame of the group before
+    ALONE = 0  # nothing outside its group
+    PREVIOUS = 1  # the last frame of the previous group
 
 
 @dataclass(frozen=True, slots=True)
 class CodedField:
-    """Trajectories in a basis: quantised weights of a causal graph's vertices."""
+    """Trajectories in a basis: quantised weights at the vertices of a causal graph."""
 
     columns: Annotated[int, Varint(), "M, number of basis vectors"]
     step_level: Annotated[int, U8, "k: the quantiser's step is 2^(-k/8)"]
@@ -177,10 +177,10 @@ class CodedField:
 
 @dataclass(frozen=True, slots=True)
 class LayersGroup:
-    """The start of a group of form LAYERS: its first layer. A LayersLevel for each level is behind it."""
+    """First layer of a group of form LAYERS; a LayersLevel for each level follows."""
 
     form: Annotated[Form, Choice(U8, Form), "LAYERS"]
-    origin: Annotated[Origin, Choice(U8, Origin), "where the base mesh is from"]
+    origin: Annotated[Origin, Choice(U8, Origin), "source of the base mesh"]
     frames: Annotated[int, U8, "T, above 0"]
     levels: Annotated[int, U8, "L, midpoint subdivisions of the base mesh"]
     step: Annotated[float, F64, "spacing of the base's lattice, above 0: decoded vertices are rounded to multiples"]
@@ -191,23 +191,23 @@ class LayersGroup:
 
 @dataclass(frozen=True, slots=True)
 class LayersLevel:
-    """One level of a group of form LAYERS."""
+    """Layer of a group of form LAYERS that refines it by one level of subdivision."""
 
-    origin: Annotated[Origin, Choice(U8, Origin), "what its scalars are counted from"]
-    curvature: Annotated[int, U8, "share of the bend of its edges by which midpoints are lifted, 64ths"]
-    sibling_weight: Annotated[int, U8, "of the siblings' mean in a prediction, 64ths"]
+    origin: Annotated[Origin, Choice(U8, Origin), "prediction of the scalars"]
+    curvature: Annotated[int, U8, "share of an edge's sagitta by which its midpoint is lifted, 64ths"]
+    sibling_weight: Annotated[int, U8, "weight of the siblings' mean in a prediction, 64ths"]
     scalars: Annotated[CodedField, Nested(CodedField), "the offsets of its new vertices"]
 
 
 @dataclass(frozen=True, slots=True)
 class LayersPatches:
-    """The last layer of a group of form LAYERS, which it may be without: what does not follow the base mesh."""
+    """Optional last layer of a group of form LAYERS: corrections where frames do not follow the base mesh."""
 
     runs: Annotated[int, Varint(), "number of integers in `dropped`"]
-    dropped: Annotated[bytes, Blob(Varint()), "integers: lengths of runs, of faces that frames are shown without"]
+    dropped: Annotated[bytes, Blob(Varint()), "integers: lengths of runs; they mark the faces that each frame lacks"]
     step_level: Annotated[int, U8, "k: the spacing of the mesh's lattice is 2^(-k/8)"]
-    width: Annotated[int, Varint(), "cells of the lattice that each frame has along x"]
-    mesh: Annotated[bytes, Blob(Varint()), "what frames are shown with besides, Draco; no bytes: nothing"]
+    width: Annotated[int, Varint(), "cells along x that each frame has in the lattice"]
+    mesh: Annotated[bytes, Blob(Varint()), "additional faces of all frames, Draco; no bytes: nothing"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,18 +217,18 @@ class DracoGroup:
     form: Annotated[Form, Choice(U8, Form), "DRACO"]
     levels: Annotated[int, U8, "midpoint subdivisions of every decoded mesh"]
     step: Annotated[float, F64, "spacing of the frames' lattice, above 0: decoded vertices are rounded to multiples"]
-    meshes: Annotated[tuple[bytes, ...], List(U16, Blob(U32)), "one Draco mesh a frame; no bytes: an empty frame"]
+    meshes: Annotated[tuple[bytes, ...], List(U16, Blob(U32)), "one Draco mesh per frame; no bytes: an empty frame"]
 
 
 @dataclass(frozen=True, slots=True)
 class StaticPatch:
-    """The payload of a STATIC chunk of form PATCH: what it changes of the background that it depends on."""
+    """The payload of a STATIC chunk of form PATCH: changes of the background that it depends on."""
 
     form: Annotated[Form, Choice(U8, Form), "PATCH"]
     step: Annotated[float, F64, "spacing of the mesh's lattice, above 0: decoded vertices are rounded to multiples"]
     runs: Annotated[int, Varint(), "number of integers in `dropped`"]
     dropped: Annotated[bytes, Blob(Varint()), "integers: lengths of runs of faces, kept and dropped in turn"]
-    mesh: Annotated[bytes, Blob(Varint()), "what is added, Draco; no bytes: nothing"]
+    mesh: Annotated[bytes, Blob(Varint()), "additional faces, Draco; no bytes: nothing"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,6 @@
-"""Records: dataclasses whose fields say how they lie in bytes. In: a record, or bytes. Out: bytes, or a record.
+"""Records: dataclasses whose fields declare their layout; record <-> bytes.
 
-A field is declared `name: Annotated[type, KIND, "what it means"]`; pack, unpack and the tables of FORMAT.md all follow
-from that.
+A field is declared as `name: Annotated[type, KIND, "meaning"]`; pack, unpack and FORMAT.md's tables follow from it.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ R = TypeVar("R")
 
 
 def pack(record: object) -> bytes:
-    """The bytes of a record. InputError where a value does not fit its field."""
+    """Pack a record into bytes. Raises InputError where a value does not fit its field."""
     parts = []
     for field in record_fields(type(record)):
         value = getattr(record, field.name)
@@ -31,7 +30,7 @@ def pack(record: object) -> bytes:
 
 
 def unpack(record_type: type[R], data: bytes, offset: int = 0) -> tuple[R, int]:
-    """The record that starts at `offset`, and the offset behind it. FormatError where the bytes are no such record."""
+    """Unpack the record at `offset`; also return the offset behind it. Raises FormatError for other bytes."""
     values = {}
     for field in record_fields(record_type):
         try:
@@ -42,7 +41,7 @@ def unpack(record_type: type[R], data: bytes, offset: int = 0) -> tuple[R, int]:
 
 
 def unpack_all(record_type: type[R], data: bytes) -> R:
-    """The record that fills `data` exactly. FormatError where bytes are left over."""
+    """Unpack the record that fills `data` exactly. Raises FormatError where bytes are left over."""
     record, end = unpack(record_type, data)
     if end != len(data):
         raise FormatError(f"{record_type.__name__}: {len(data) - end} bytes too many")
@@ -50,13 +49,13 @@ def unpack_all(record_type: type[R], data: bytes) -> R:
 
 
 def least_size(record_type: type) -> int:
-    """The fewest bytes a record can take; its size where all fields have a fixed one."""
+    """Return the fewest bytes that a record can take, which is its size if all fields are of fixed size."""
     return sum(field.kind.least for field in record_fields(record_type))
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field of a record, as its declaration says."""
+    """Declaration of one field of a record."""
 
     name: str
     kind: Kind
@@ -64,7 +63,7 @@ class Field:
 
 
 def record_fields(record_type: type) -> tuple[Field, ...]:
-    """The fields of a record in the order of their bytes."""
+    """Return the fields of a record in the order of their bytes."""
     return _declared(record_type)
 
 
@@ -80,7 +79,7 @@ def _declared(record_type: type) -> tuple[Field, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Nested:
-    """Another record."""
+    """A record as a field of another record."""
 
     record: type
 

@@ -1,4 +1,4 @@
-"""The records as the player reads them: layout.gen.ts, made from their declarations. In: records. Out: TypeScript."""
+"""Generator of the player's layout.gen.ts from the declarations of the records: records -> TypeScript."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import type { Kind } from "./records.ts";
 
 
 def typescript(records: Sequence[type]) -> str:
-    """A module with every enumeration and every record, each record behind those that it has for fields."""
+    """Return a module with every enumeration and every record; a record follows the records that are its fields."""
     enumerations: dict[str, type[IntEnum]] = {}
     done: dict[str, str] = {}
     for record in records:
@@ -32,7 +32,7 @@ def typescript(records: Sequence[type]) -> str:
 
 
 def _declare(record: type, enumerations: dict[str, type[IntEnum]], done: dict[str, str]) -> None:
-    """The record behind those that it is made of."""
+    """Declare a record after the records that are its fields."""
     if record.__name__ in done:
         return
     lines, kinds = [], []
@@ -52,7 +52,7 @@ def _declare(record: type, enumerations: dict[str, type[IntEnum]], done: dict[st
 
 
 def _parts(kind: Kind) -> list[Kind]:
-    """A kind and those that it is made of."""
+    """Return a kind and the kinds that it is made of."""
     if isinstance(kind, Array):
         return [kind, *_parts(kind.item)]
     if isinstance(kind, List):
@@ -79,7 +79,7 @@ def _type(kind: Kind) -> str:
 
 
 def _reader(kind: Kind) -> str:
-    """The expression that makes the reader of a kind."""
+    """Return the TypeScript expression that makes the reader of a kind."""
     if isinstance(kind, Number):
         return kind.label
     if isinstance(kind, Choice):

@@ -36,7 +36,7 @@ export const Presence = {
   PRESENT: 1,
 } as const;
 
-/** The first bytes of a file: what it is, and how much of it to read before anything else. */
+/** The first bytes of a file: its signature, and the size of the head. */
 export interface Preamble {
   readonly magic: Uint8Array; // `52 45 45 4c 0d 0a 1a 0a`
   readonly version: number; // version of the format, 1; a reader refuses any other
@@ -50,16 +50,16 @@ export const Preamble: Kind<Preamble> = record("Preamble", {
   headSize: u32,
 });
 
-/** What holds for all frames. Coordinates y in chunks are normalised: x = origin + scale * y is in metres. */
+/** Values for all frames. Coordinates y in chunks are normalised: x = origin + scale * y is in metres. */
 export interface Header {
   readonly frameRate: number; // 1/s, above 0
   readonly origin: readonly number[]; // m
   readonly scale: number; // m, above 0
   readonly minimum: readonly number[]; // lower corner of the sequence's bounding box, normalised
-  readonly maximum: readonly number[]; // upper corner of it
-  readonly metadata: string; // a JSON object, not needed to decode: `up` (axis; y if not there), preset ...
+  readonly maximum: readonly number[]; // upper corner of this box
+  readonly metadata: string; // a JSON object, not needed for decoding: `up` (axis; y if absent), preset ...
   readonly firstTime: number; // time of frame 0, microseconds
-  readonly intervals: readonly number[]; // microseconds from each frame but the last to the next, each above 0; none: frame i is at first_time + 10^6 * i / frame_rate
+  readonly intervals: readonly number[]; // microseconds from each frame to the next, each above 0; if empty, frame i is at first_time + 10^6 * i / frame_rate
 }
 export const Header: Kind<Header> = record("Header", {
   frameRate: f64,
@@ -72,7 +72,7 @@ export const Header: Kind<Header> = record("Header", {
   intervals: list(varint, varint),
 });
 
-/** A range of a chunk: its first k layers are its first bytes. Which k are enough to decode depends on the form. */
+/** Byte range of a chunk, whose first k layers are its first bytes; the form decides which k can be decoded. */
 export interface Layer {
   readonly size: number; // bytes, above 0
   readonly crc: number; // CRC-32 (ISO-HDLC, as in zlib) of these bytes
@@ -82,13 +82,13 @@ export const Layer: Kind<Layer> = record("Layer", {
   crc: u32,
 });
 
-/** One chunk. */
+/** Index entry of a chunk. */
 export interface IndexEntry {
-  readonly kind: number; // what it is for
-  readonly form: number; // how it is coded; equal to its first byte
+  readonly kind: number; // purpose
+  readonly form: number; // coding; equal to the first byte of the chunk
   readonly frames: number; // number of frames; 0 if and only if STATIC
-  readonly track: number; // which moving body's frames these are, from 0; 0 if STATIC
-  readonly dependsOn: readonly number[]; // numbers of the chunks before it that it needs: of a GROUP, the STATIC one it is shown with and the GROUP right before it in its track; of a STATIC of form PATCH, the STATIC one that it changes
+  readonly track: number; // number of the moving body, from 0; 0 if STATIC
+  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes
   readonly layers: readonly Layer[]; // at least one
 }
 export const IndexEntry: Kind<IndexEntry> = record("IndexEntry", {
@@ -108,7 +108,7 @@ export const Index: Kind<Index> = record("Index", {
   chunks: list(u32, nested(() => IndexEntry)),
 });
 
-/** The end of the head. */
+/** Last record of the head: its checksum. */
 export interface Checksum {
   readonly crc: number; // CRC-32 of the head up to here
 }
@@ -132,7 +132,7 @@ export const LaplacianGroup: Kind<LaplacianGroup> = record("LaplacianGroup", {
   displacements: rest,
 });
 
-/** One direction of the basis and the streams of its weights. */
+/** Direction of the basis, and sizes of the streams of its weights. */
 export interface Component {
   readonly basisBits: number; // b, at most 30: the direction's numbers are integers times 2^-b
   readonly stepLevel: number; // k: the quantiser's step is 2^(-k/8)
@@ -146,11 +146,11 @@ export const Component: Kind<Component> = record("Component", {
   deltasSize: varint,
 });
 
-/** The start of coded displacements. Behind it, for each component in turn, its anchors' and its deltas' stream. */
+/** Head of coded displacements; for each component in turn, the streams of its anchors and its deltas follow. */
 export interface DisplacementHead {
   readonly frames: number; // T, above 0
   readonly anchorRule: number; // how anchors are chosen
-  readonly anchorCount: number; // number of anchors asked for; each connected component has at least one
+  readonly anchorCount: number; // number of requested anchors; each connected component has at least one
   readonly anchorWeight: number; // factor of the anchors' rows, above 0
   readonly meanBits: number; // b, at most 30: the mean's numbers are integers times 2^-b
   readonly components: readonly Component[]; // strongest first, at most 3 T
@@ -166,7 +166,7 @@ export const DisplacementHead: Kind<DisplacementHead> = record("DisplacementHead
   basis: blob(varint),
 });
 
-/** Trajectories in a basis: quantised weights of a causal graph's vertices. */
+/** Trajectories in a basis: quantised weights at the vertices of a causal graph. */
 export interface CodedField {
   readonly columns: number; // M, number of basis vectors
   readonly stepLevel: number; // k: the quantiser's step is 2^(-k/8)
@@ -180,10 +180,10 @@ export const CodedField: Kind<CodedField> = record("CodedField", {
   symbols: blob(varint),
 });
 
-/** The start of a group of form LAYERS: its first layer. A LayersLevel for each level is behind it. */
+/** First layer of a group of form LAYERS; a LayersLevel for each level follows. */
 export interface LayersGroup {
   readonly form: number; // LAYERS
-  readonly origin: number; // where the base mesh is from
+  readonly origin: number; // source of the base mesh
   readonly frames: number; // T, above 0
   readonly levels: number; // L, midpoint subdivisions of the base mesh
   readonly step: number; // spacing of the base's lattice, above 0: decoded vertices are rounded to multiples
@@ -202,11 +202,11 @@ export const LayersGroup: Kind<LayersGroup> = record("LayersGroup", {
   motion: nested(() => CodedField),
 });
 
-/** One level of a group of form LAYERS. */
+/** Layer of a group of form LAYERS that refines it by one level of subdivision. */
 export interface LayersLevel {
-  readonly origin: number; // what its scalars are counted from
-  readonly curvature: number; // share of the bend of its edges by which midpoints are lifted, 64ths
-  readonly siblingWeight: number; // of the siblings' mean in a prediction, 64ths
+  readonly origin: number; // prediction of the scalars
+  readonly curvature: number; // share of an edge's sagitta by which its midpoint is lifted, 64ths
+  readonly siblingWeight: number; // weight of the siblings' mean in a prediction, 64ths
   readonly scalars: CodedField; // the offsets of its new vertices
 }
 export const LayersLevel: Kind<LayersLevel> = record("LayersLevel", {
@@ -216,13 +216,13 @@ export const LayersLevel: Kind<LayersLevel> = record("LayersLevel", {
   scalars: nested(() => CodedField),
 });
 
-/** The last layer of a group of form LAYERS, which it may be without: what does not follow the base mesh. */
+/** Optional last layer of a group of form LAYERS: corrections where frames do not follow the base mesh. */
 export interface LayersPatches {
   readonly runs: number; // number of integers in `dropped`
-  readonly dropped: Uint8Array; // integers: lengths of runs, of faces that frames are shown without
+  readonly dropped: Uint8Array; // integers: lengths of runs; they mark the faces that each frame lacks
   readonly stepLevel: number; // k: the spacing of the mesh's lattice is 2^(-k/8)
-  readonly width: number; // cells of the lattice that each frame has along x
-  readonly mesh: Uint8Array; // what frames are shown with besides, Draco; no bytes: nothing
+  readonly width: number; // cells along x that each frame has in the lattice
+  readonly mesh: Uint8Array; // additional faces of all frames, Draco; no bytes: nothing
 }
 export const LayersPatches: Kind<LayersPatches> = record("LayersPatches", {
   runs: varint,
@@ -237,7 +237,7 @@ export interface DracoGroup {
   readonly form: number; // DRACO
   readonly levels: number; // midpoint subdivisions of every decoded mesh
   readonly step: number; // spacing of the frames' lattice, above 0: decoded vertices are rounded to multiples
-  readonly meshes: readonly Uint8Array[]; // one Draco mesh a frame; no bytes: an empty frame
+  readonly meshes: readonly Uint8Array[]; // one Draco mesh per frame; no bytes: an empty frame
 }
 export const DracoGroup: Kind<DracoGroup> = record("DracoGroup", {
   form: choice(u8, Form),
@@ -254,13 +254,13 @@ export const EmptyGroup: Kind<EmptyGroup> = record("EmptyGroup", {
   form: choice(u8, Form),
 });
 
-/** The payload of a STATIC chunk of form PATCH: what it changes of the background that it depends on. */
+/** The payload of a STATIC chunk of form PATCH: changes of the background that it depends on. */
 export interface StaticPatch {
   readonly form: number; // PATCH
   readonly step: number; // spacing of the mesh's lattice, above 0: decoded vertices are rounded to multiples
   readonly runs: number; // number of integers in `dropped`
   readonly dropped: Uint8Array; // integers: lengths of runs of faces, kept and dropped in turn
-  readonly mesh: Uint8Array; // what is added, Draco; no bytes: nothing
+  readonly mesh: Uint8Array; // additional faces, Draco; no bytes: nothing
 }
 export const StaticPatch: Kind<StaticPatch> = record("StaticPatch", {
   form: choice(u8, Form),
