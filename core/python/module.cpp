@@ -1,17 +1,19 @@
 // The Python face of core/: one bind_* function for each part, each in its own file.
 #include <nanobind/nanobind.h>
 
-namespace nb = nanobind;
+namespace meshreel {
 
-void bind_entropy(nb::module_&);
-void bind_laplacian(nb::module_&);
-void bind_layers(nb::module_&);
-void bind_tracking(nb::module_&);
+void bind_entropy(nanobind::module_&);
+void bind_laplacian(nanobind::module_&);
+void bind_layers(nanobind::module_&);
+void bind_tracking(nanobind::module_&);
+
+}  // namespace meshreel
 
 NB_MODULE(_core, m) {
-    m.doc() = "The arithmetic that must be fast, and bit-equal in every build.";
-    bind_entropy(m);
-    bind_laplacian(m);
-    bind_layers(m);
-    bind_tracking(m);
+    m.doc() = "The arithmetic that must be fast, and equal to the bit in every build.";
+    meshreel::bind_entropy(m);
+    meshreel::bind_laplacian(m);
+    meshreel::bind_layers(m);
+    meshreel::bind_tracking(m);
 }

@@ -5,6 +5,7 @@
 #include "guarded.h"
 #include "meshreel/laplacian.h"
 
+namespace meshreel {
 namespace {
 
 struct Graph {
@@ -44,13 +45,16 @@ void add_source(const Graph& g, int32_t source, std::vector<int32_t>& hops, std:
 }
 
 }  // namespace
+}  // namespace meshreel
+
+using namespace meshreel;
 
 int64_t mr_farthest_anchors(const int32_t* faces, int64_t face_count, int64_t vertices, int64_t count, int32_t* out) {
     if (vertices < 0 || vertices > INT_MAX || face_count < 0 || count < 0) return -1;
     for (int64_t k = 0; k < 3 * face_count; ++k)
         if (faces[k] < 0 || faces[k] >= vertices) return -1;
     int64_t found = 0;
-    const int status = meshreel::guarded(MR_LAPLACIAN_NO_MEMORY, [&] {
+    const int status = guarded(MR_NO_MEMORY, [&] {
         const Graph g = graph_of(faces, face_count, vertices);
         std::vector<int32_t> hops(static_cast<size_t>(vertices), INT_MAX), queue;
         for (int32_t v = 0; v < vertices; ++v) {  // one a component
@@ -68,7 +72,7 @@ int64_t mr_farthest_anchors(const int32_t* faces, int64_t face_count, int64_t ve
             out[found++] = v;
         }
         std::sort(out, out + found);
-        return MR_LAPLACIAN_OK;
+        return MR_OK;
     });
-    return status == MR_LAPLACIAN_OK ? found : -1;
+    return status == MR_OK ? found : -1;
 }

@@ -3,14 +3,13 @@
 #include <cstring>
 #include <vector>
 
-#include "causal.h"
-#include "copy_out.h"
+#include "arrays.h"
+#include "escape.h"
 #include "guarded.h"
-#include "meshreel/escape.h"
-#include "meshreel/range_coder.h"
-#include "meshreel/weight_contexts.h"
+#include "range_coder.h"
+#include "weight_contexts.h"
 
-namespace meshreel::entropy {
+namespace meshreel {
 namespace {
 
 struct WeightModels {
@@ -59,7 +58,8 @@ int64_t code_integer(Coder& coder, IntegerModels& models, int64_t value) {
     int bits = 0;
     while (size >> bits) ++bits;
     uint32_t node = 1;
-    for (int k = 5; k >= 0; --k) node = node << 1 | static_cast<uint32_t>(coder.bit(models.length[node], bits >> k & 1));
+    for (int k = 5; k >= 0; --k)
+        node = node << 1 | static_cast<uint32_t>(coder.bit(models.length[node], bits >> k & 1));
     const int length = static_cast<int>(node & 63);
     if (length == 0) return 0;
     if (length > 32) return INT64_MAX;  // no such integer
@@ -74,14 +74,13 @@ int64_t code_integer(Coder& coder, IntegerModels& models, int64_t value) {
 }
 
 }  // namespace
-}  // namespace meshreel::entropy
+}  // namespace meshreel
 
-using namespace meshreel::entropy;
-using meshreel::guarded, meshreel::is_causal;
+using namespace meshreel;
 
-int meshreel_encode_weights(const meshreel_weights* weights, uint8_t* out, size_t capacity, size_t* sizes) {
-    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&] {
+int mr_encode_weights(const mr_weights* weights, uint8_t* out, size_t capacity, size_t* sizes) {
+    if (!is_causal(*weights)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&] {
         std::vector<uint8_t> bytes;
         Surroundings around(*weights);
         for (size_t c = 0; c < weights->columns; ++c) {
@@ -94,30 +93,30 @@ int meshreel_encode_weights(const meshreel_weights* weights, uint8_t* out, size_
     });
 }
 
-int meshreel_decode_weights(const meshreel_weights* weights, const uint8_t* data, const size_t* sizes, size_t* column) {
-    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&]() -> int {
+int mr_decode_weights(const mr_weights* weights, const uint8_t* data, const size_t* sizes, size_t* column) {
+    if (!is_causal(*weights)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&]() -> int {
         Surroundings around(*weights);
         for (size_t c = 0; c < weights->columns; data += sizes[c], ++c) {
             *column = c;
             if (weights->count == 0) {
-                if (sizes[c] != 0) return MESHREEL_ENTROPY_BAD_STREAM;
+                if (sizes[c] != 0) return MR_BAD_STREAM;
                 continue;
             }
             RangeDecoder coder(data, sizes[c]);
             int32_t* symbols = weights->symbols + c * weights->count;
             std::memset(symbols, 0, weights->count * sizeof(int32_t));
             if (!is_plausible(weights->count, sizes[c]) || !code_column(coder, around, symbols, weights->count)) {
-                return MESHREEL_ENTROPY_BAD_STREAM;
+                return MR_BAD_STREAM;
             }
         }
-        return MESHREEL_ENTROPY_OK;
+        return MR_OK;
     });
 }
 
-int meshreel_weight_contexts(const meshreel_weights* weights, uint8_t* classes, uint8_t* signs) {
-    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&] {
+int mr_weight_contexts(const mr_weights* weights, uint8_t* classes, uint8_t* signs) {
+    if (!is_causal(*weights)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&] {
         Surroundings around(*weights);
         for (size_t c = 0; c < weights->columns; ++c) {
             for (size_t v = 0; v < weights->count; ++v) {
@@ -130,12 +129,12 @@ int meshreel_weight_contexts(const meshreel_weights* weights, uint8_t* classes, 
             }
             around.next_column();
         }
-        return static_cast<int>(MESHREEL_ENTROPY_OK);
+        return static_cast<int>(MR_OK);
     });
 }
 
-int meshreel_encode_integers(const int32_t* values, size_t count, uint8_t* out, size_t capacity, size_t* size) {
-    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&] {
+int mr_encode_integers(const int32_t* values, size_t count, uint8_t* out, size_t capacity, size_t* size) {
+    return guarded(MR_NO_MEMORY, [&] {
         std::vector<uint8_t> bytes;
         RangeEncoder coder(bytes);
         IntegerModels models;
@@ -146,15 +145,15 @@ int meshreel_encode_integers(const int32_t* values, size_t count, uint8_t* out, 
     });
 }
 
-int meshreel_decode_integers(const uint8_t* data, size_t size, size_t count, int32_t* values) {
-    if (count == 0) return size == 0 ? MESHREEL_ENTROPY_OK : MESHREEL_ENTROPY_BAD_STREAM;
-    if (!is_plausible(count, size)) return MESHREEL_ENTROPY_BAD_STREAM;
+int mr_decode_integers(const uint8_t* data, size_t size, size_t count, int32_t* values) {
+    if (count == 0) return size == 0 ? MR_OK : MR_BAD_STREAM;
+    if (!is_plausible(count, size)) return MR_BAD_STREAM;
     RangeDecoder coder(data, size);
     IntegerModels models;
     for (size_t k = 0; k < count; ++k) {
         const int64_t value = code_integer(coder, models, 0);
-        if (coder.failed() || !fits(value)) return MESHREEL_ENTROPY_BAD_STREAM;
+        if (coder.failed() || !fits(value)) return MR_BAD_STREAM;
         values[k] = static_cast<int32_t>(value);
     }
-    return coder.finish() ? MESHREEL_ENTROPY_OK : MESHREEL_ENTROPY_BAD_STREAM;
+    return coder.finish() ? MR_OK : MR_BAD_STREAM;
 }

@@ -4,6 +4,8 @@
 
 #include <Eigen/SparseCholesky>
 
+namespace meshreel {
+
 bool Factor::compute(const Eigen::SparseMatrix<double>& lower) {
     Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::AMDOrdering<int>> ldlt;
     ldlt.compute(lower);
@@ -44,3 +46,5 @@ void Factor::solve(const double* right, int64_t columns, double* out) const {
         std::copy_n(to, columns, out + order[k] * columns);
     }
 }
+
+}  // namespace meshreel

@@ -1,17 +1,15 @@
-#include "meshreel/field_coder.h"
+#include "field_coder.h"
 
 #include <algorithm>
-#include <cstring>
 #include <vector>
 
-#include "causal.h"
-#include "copy_out.h"
+#include "arrays.h"
+#include "escape.h"
 #include "guarded.h"
-#include "meshreel/escape.h"
-#include "meshreel/magnitude_classes.h"
-#include "meshreel/range_coder.h"
+#include "magnitude_classes.h"
+#include "range_coder.h"
 
-namespace meshreel::entropy {
+namespace meshreel {
 namespace {
 
 constexpr size_t kBlock = 64;  // places after which the ratio is learned anew
@@ -21,8 +19,14 @@ constexpr ClassTable<5> kClassOf;  // of five times the expected magnitude: it i
 // What has been coded, as the context of what comes next: in this column at earlier places, in earlier columns here.
 class Magnitudes {
 public:
-    explicit Magnitudes(const meshreel_weights& weights)
-        : count_(weights.count), sums_(count_), shares_(count_), past_(count_), bases_(count_), now_(count_), classes_(count_),
+    explicit Magnitudes(const mr_weights& weights)
+        : count_(weights.count),
+          sums_(count_),
+          shares_(count_),
+          past_(count_),
+          bases_(count_),
+          now_(count_),
+          classes_(count_),
           starts_(count_ + 1) {
         const auto each_link = [&](auto&& visit) {  // a place that none predicts looks at the one before it
             for (size_t v = 0; v < count_; ++v) {
@@ -85,7 +89,8 @@ public:
 
 private:
     uint8_t class_of(size_t v) const {
-        const uint32_t around = static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
+        const uint32_t around =
+            static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
         const uint32_t expected = around * trust_ + bases_[v];
         return kClassOf[expected];
     }
@@ -124,7 +129,7 @@ int64_t code_nonzero(Coder& coder, FieldModels& models, int context, int64_t val
 
 // All columns through a coder, either way; false where the bytes are bad.
 template <class Coder>
-bool code_field(Coder coder, const meshreel_weights& weights, size_t* ends) {
+bool code_field(Coder coder, const mr_weights& weights, size_t* ends) {
     Magnitudes magnitudes(weights);
     FieldModels models;
     for (size_t c = 0; c < weights.columns; ++c) {
@@ -152,30 +157,23 @@ bool code_field(Coder coder, const meshreel_weights& weights, size_t* ends) {
 }
 
 }  // namespace
-}  // namespace meshreel::entropy
 
-using namespace meshreel::entropy;
-using meshreel::guarded, meshreel::is_causal;
+bool decode_symbols(const mr_weights& weights, const mr_bytes& stream) {
+    if (weights.count == 0 || weights.columns == 0) return stream.size == 0;
+    return code_field(RangeDecoder(stream.data, stream.size), weights, nullptr);
+}
 
-int meshreel_encode_field(const meshreel_weights* weights, uint8_t* out, size_t capacity, size_t* size, size_t* ends) {
-    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&]() -> int {
+}  // namespace meshreel
+
+using namespace meshreel;
+
+int mr_encode_field(const mr_weights* weights, uint8_t* out, size_t capacity, size_t* size, size_t* ends) {
+    if (!is_causal(*weights)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&]() -> int {
         std::vector<uint8_t> bytes;
         RangeEncoder coder(bytes);
         if (weights->count * weights->columns > 0) code_field(coder, *weights, ends);
         *size = bytes.size();
         return copy_out(bytes, out, capacity);
-    });
-}
-
-int meshreel_decode_field(const meshreel_weights* weights, const uint8_t* data, size_t size) {
-    if (!is_causal(*weights)) return MESHREEL_ENTROPY_BAD_INPUT;
-    const size_t count = weights->count * weights->columns;
-    if (count == 0) return size == 0 ? MESHREEL_ENTROPY_OK : MESHREEL_ENTROPY_BAD_STREAM;
-    if (!is_plausible(count, size)) return MESHREEL_ENTROPY_BAD_STREAM;
-    return guarded(MESHREEL_ENTROPY_NO_MEMORY, [&]() -> int {
-        RangeDecoder coder(data, size);
-        std::memset(weights->symbols, 0, count * sizeof(int32_t));
-        return code_field(coder, *weights, nullptr) ? MESHREEL_ENTROPY_OK : MESHREEL_ENTROPY_BAD_STREAM;
     });
 }

@@ -5,6 +5,7 @@
 
 #include "grounded_solver.h"
 
+namespace meshreel {
 namespace {
 
 // The order in which little fills in, by the pattern alone.
@@ -125,3 +126,5 @@ void GroundedFactor::solve(std::vector<double>& x, int64_t columns) const {
     for (int32_t k = n; k-- > 0;) gather(k, &Entry::upper), divide(k);     // U
     for (int32_t k = 0; k < n; ++k) std::copy_n(row(k), columns, x.data() + order_[k] * columns);
 }
+
+}  // namespace meshreel

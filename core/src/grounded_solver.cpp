@@ -4,6 +4,7 @@
 
 #include <Eigen/SparseCore>
 
+namespace meshreel {
 namespace {
 
 constexpr int64_t kMostAnchors = 32;  // of a component: each costs as much as a column more
@@ -28,7 +29,8 @@ GroundedSolver::Outcome GroundedSolver::compute(const SparseRows& rows, const st
     if (!factor_.compute(rows, grounds)) return Outcome::kSingular;
     responses_.assign(component_of_.size() * static_cast<size_t>(most_anchors_), 0.0);
     for (const Component& component : components_)
-        for (size_t k = 0; k < component.anchors.size(); ++k) responses_[component.anchors[k] * most_anchors_ + k] = 1.0;
+        for (size_t k = 0; k < component.anchors.size(); ++k)
+            responses_[component.anchors[k] * most_anchors_ + k] = 1.0;
     factor_.solve(responses_, most_anchors_);
     for (Component& component : components_)
         if (!factor_capacitance(component)) return Outcome::kSingular;
@@ -113,3 +115,5 @@ void GroundedSolver::solve(std::vector<double>& x, int64_t columns) const {
         for (int64_t c = 0; c < columns; ++c) to[c] -= amount[count * columns + c];
     }
 }
+
+}  // namespace meshreel

@@ -5,8 +5,7 @@
 // M-matrix: B = M U exists without pivoting. The normal equations are those of B and a few terms more,
 //     (L*)^T L* = B^T B + F C F^T,   F = [e_a, B^T g],   a over the anchors,
 // whose inverse follows from that of B^T B by Woodbury's identity, component by component.
-#ifndef MESHREEL_GROUNDED_SOLVER_H
-#define MESHREEL_GROUNDED_SOLVER_H
+#pragma once
 
 #include <cstdint>
 #include <vector>
@@ -14,16 +13,18 @@
 #include "factor.h"
 #include "sparse_rows.h"
 
+namespace meshreel {
+
 // B = M U in an order of little fill, both by the pattern of a symmetric elimination.
 class GroundedFactor {
-  public:
+public:
     // `grounds`: ascending vertices, one in each component that has edges. False where a pivot vanishes.
     bool compute(const SparseRows& rows, const std::vector<int32_t>& grounds);
 
     // In place: x <- (B^T B)^-1 x, all columns side by side; x is in the order of vertices.
     void solve(std::vector<double>& x, int64_t columns) const;
 
-  private:
+private:
     struct Entry {  // at (row, k) of M and (k, row) of U, row > k
         double lower, upper;
     };
@@ -35,13 +36,13 @@ class GroundedFactor {
     std::vector<int32_t> position_;  // the inverse
     std::vector<int32_t> parent_;    // elimination tree; -1: a root
     std::vector<int64_t> starts_;
-    std::vector<int32_t> rows_;      // ascending in each column
+    std::vector<int32_t> rows_;  // ascending in each column
     std::vector<Entry> entries_;
-    std::vector<double> pivots_;     // diagonal of U
+    std::vector<double> pivots_;  // diagonal of U
 };
 
 class GroundedSolver {
-  public:
+public:
     enum class Outcome { kReady, kSingular, kTooManyAnchors };
 
     // Fails where a component has no anchor, or more than pay: then a factor of the square is cheaper.
@@ -50,7 +51,7 @@ class GroundedSolver {
     // x <- ((L*)^T L*)^-1 x in place, all columns side by side.
     void solve(std::vector<double>& x, int64_t columns) const;
 
-  private:
+private:
     struct Component {
         int32_t ground = -1;  // -1: a vertex without edges
         std::vector<int32_t> anchors;
@@ -66,8 +67,9 @@ class GroundedSolver {
     GroundedFactor factor_;
     std::vector<int32_t> component_of_;
     std::vector<Component> components_;
-    int64_t most_anchors_ = 0;       // of a component
-    std::vector<double> responses_;  // V x most_anchors_: (B^T B)^-1 e_a, the k-th anchors of all components in column k
+    int64_t most_anchors_ = 0;  // of a component
+    std::vector<double>
+        responses_;  // V x most_anchors_: (B^T B)^-1 e_a, the k-th anchors of all components in column k
 };
 
-#endif
+}  // namespace meshreel

@@ -3,8 +3,8 @@
 #include <memory>
 #include <vector>
 
+#include "arrays.h"
 #include "guarded.h"
-#include "indices.h"
 #include "meshreel/layers.h"
 
 struct mr_hierarchy {
@@ -14,12 +14,13 @@ struct mr_hierarchy {
     std::vector<double> weights;
 };
 
+namespace meshreel {
 namespace {
 
-constexpr int64_t kMostNear = 24;  // a vertex with more neighbours stays: what is left costs no more than linear time
+constexpr int64_t kMostNear = 24;   // a vertex with more neighbours stays: what is left costs no more than linear time
 constexpr size_t kLeastShare = 16;  // a round that removes less than this part of the linked vertices is the last
-constexpr double kSlope = 0.2;     // how far slopes are drawn to zero
-constexpr double kBlunt = 0.1;    // of the mean squared distance: bounds the pull of a near vertex
+constexpr double kSlope = 0.2;      // how far slopes are drawn to zero
+constexpr double kBlunt = 0.1;      // of the mean squared distance: bounds the pull of a near vertex
 
 struct Removal {
     int32_t vertex;
@@ -38,7 +39,7 @@ struct Adjacency {
     // Sorts links that are in any order: by counting, so that no mesh takes more than linear time.
     void sort(size_t vertices) {
         spare_.resize(links.size());
-        const auto place = [&](const std::vector<Link>& in, std::vector<Link>& out, int32_t Link::*key) {
+        const auto place = [&](const std::vector<Link>& in, std::vector<Link>& out, int32_t Link::* key) {
             starts.assign(vertices + 1, 0);
             for (const Link& link : in) ++starts[static_cast<size_t>(link.*key)];
             size_t sum = 0;
@@ -89,7 +90,8 @@ void regression(const double* positions, int32_t v, const int32_t* ring, size_t 
         total += g;
         energy += g * far;
         s[0] += g * x, s[1] += g * y, s[2] += g * z;
-        m[0] += g * x * x, m[1] += g * x * y, m[2] += g * x * z, m[3] += g * y * y, m[4] += g * y * z, m[5] += g * z * z;
+        m[0] += g * x * x, m[1] += g * x * y, m[2] += g * x * z, m[3] += g * y * y, m[4] += g * y * z,
+            m[5] += g * z * z;
     }
     const double draw = kSlope * energy;
     const double d0 = m[0] + draw, l10 = m[1] / d0, l20 = m[2] / d0;  // L D L^T
@@ -121,7 +123,8 @@ void remove_vertices(const double* positions, size_t vertices, Adjacency& mesh, 
             ++linked;
             if (end - begin > kMostNear) continue;
             bool stays = false;
-            for (size_t k = begin; k < end && !stays; ++k) stays = heir[static_cast<size_t>(mesh.links[k].to)] != mesh.links[k].to;
+            for (size_t k = begin; k < end && !stays; ++k)
+                stays = heir[static_cast<size_t>(mesh.links[k].to)] != mesh.links[k].to;
             if (stays) continue;
             removals.push_back({static_cast<int32_t>(v), rings.size(), rings.size() + (end - begin)});
             double least = 0.0;
@@ -150,7 +153,8 @@ void build(const double* positions, size_t vertices, const int32_t* faces, size_
     mesh.links.reserve(6 * face_count);
     for (size_t f = 0; f < face_count; ++f)
         for (int c = 0; c < 3; ++c) {
-            const int32_t a = faces[3 * f + static_cast<size_t>(c)], b = faces[3 * f + static_cast<size_t>((c + 1) % 3)];
+            const int32_t a = faces[3 * f + static_cast<size_t>(c)],
+                          b = faces[3 * f + static_cast<size_t>((c + 1) % 3)];
             if (a != b) mesh.links.push_back({a, b}), mesh.links.push_back({b, a});
         }
     mesh.sort(vertices);
@@ -182,15 +186,18 @@ void build(const double* positions, size_t vertices, const int32_t* faces, size_
 }
 
 }  // namespace
+}  // namespace meshreel
 
-int mr_hierarchy_create(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, mr_hierarchy** out) {
-    if (vertices > INT32_MAX) return MR_LAYERS_BAD_INPUT;
-    if (!meshreel::in_range(faces, 3 * face_count, vertices)) return MR_LAYERS_BAD_INPUT;
-    return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&] {
+using namespace meshreel;
+
+int mr_hierarchy_create(const mr_mesh* mesh, mr_hierarchy** out) {
+    if (mesh->vertices > INT32_MAX) return MR_BAD_INPUT;
+    if (!in_range(mesh->faces, 3 * mesh->face_count, mesh->vertices)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&] {
         auto made = std::make_unique<mr_hierarchy>();
-        build(positions, vertices, faces, face_count, *made);
+        build(mesh->positions, mesh->vertices, mesh->faces, mesh->face_count, *made);
         *out = made.release();
-        return int{MR_LAYERS_OK};
+        return int{MR_OK};
     });
 }
 

@@ -7,22 +7,17 @@
 
 #include "guarded.h"
 #include "laplacian_system.h"
+#include "rigid3.h"
 
+namespace meshreel {
 namespace {
-
-struct Vec {
-    double x, y, z;
-};
-
-Vec minus(const Vec& a, const Vec& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-double dot(const Vec& a, const Vec& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 
 // Bounds that keep a degenerate corner from owning its row: tan(a/2) of 2.3 and 170 degrees, edges of a twentieth of
 // the mean at their vertex, weights of a fiftieth of the largest in their row.
 constexpr double kLeastTangent = 0.02, kMostTangent = 11.0, kLeastEdge = 0.05, kLeastWeight = 0.02;
 
-double half_tangent(const Vec& u, const Vec& w) {
-    const Vec c{u.y * w.z - u.z * w.y, u.z * w.x - u.x * w.z, u.x * w.y - u.y * w.x};
+double half_tangent(Vec u, Vec w) {
+    const Vec c = cross(u, w);
     const double below = std::sqrt(dot(u, u)) * std::sqrt(dot(w, w)) + dot(u, w);
     const double above = std::sqrt(dot(c, c));
     if (!(below > 0.0)) return above > 0.0 ? kMostTangent : kLeastTangent;
@@ -49,8 +44,8 @@ void collect_corners(const double* positions, int64_t vertices, const int32_t* f
         if (!usable(faces + 3 * f)) continue;
         for (int c = 0; c < 3; ++c) {
             const int32_t i = faces[3 * f + c], j = faces[3 * f + (c + 1) % 3], k = faces[3 * f + (c + 2) % 3];
-            const auto at = [&](int32_t v) { return Vec{positions[3 * v], positions[3 * v + 1], positions[3 * v + 2]}; };
-            const double tangent = half_tangent(minus(at(j), at(i)), minus(at(k), at(i)));
+            const auto at = [&](int32_t v) { return load(positions + 3 * int64_t{v}); };
+            const double tangent = half_tangent(at(j) - at(i), at(k) - at(i));
             corners[next[i]++] = {j, tangent};
             corners[next[i]++] = {k, tangent};
         }
@@ -70,9 +65,7 @@ void finish_row(const double* positions, int64_t i, Corner* first, Corner* last,
     std::vector<double> lengths(count);
     double mean = 0.0;
     for (size_t k = 0; k < count; ++k) {
-        const double* a = positions + 3 * i;
-        const double* b = positions + 3 * static_cast<int64_t>(rows.columns[begin + k]);
-        const Vec edge{b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+        const Vec edge = load(positions + 3 * int64_t{rows.columns[begin + k]}) - load(positions + 3 * i);
         lengths[k] = std::sqrt(dot(edge, edge));
         mean += lengths[k];
     }
@@ -134,13 +127,17 @@ void refine(const mr_laplacian& system, const std::vector<double>& right, int64_
 }
 
 }  // namespace
+}  // namespace meshreel
 
-using meshreel::guarded;
+using namespace meshreel;
 
-int mr_laplacian_create(const double* positions, int64_t vertices, const int32_t* faces, int64_t face_count,
-                        const int32_t* anchors, int64_t anchor_count, double anchor_weight, mr_laplacian** out) {
-    return guarded(MR_LAPLACIAN_NO_MEMORY, MR_LAPLACIAN_BAD_INPUT, [&] {
-        if (!good_input(positions, vertices, faces, face_count, anchors, anchor_count)) return int(MR_LAPLACIAN_BAD_INPUT);
+int mr_laplacian_create(const mr_mesh* mesh, const int32_t* anchors, int64_t anchor_count, double anchor_weight,
+                        mr_laplacian** out) {
+    const double* positions = mesh->positions;
+    const int32_t* faces = mesh->faces;
+    const int64_t vertices = static_cast<int64_t>(mesh->vertices), face_count = static_cast<int64_t>(mesh->face_count);
+    return guarded(MR_NO_MEMORY, MR_BAD_INPUT, [&] {
+        if (!good_input(positions, vertices, faces, face_count, anchors, anchor_count)) return int(MR_BAD_INPUT);
         auto system = std::make_unique<mr_laplacian>();
         std::vector<int64_t> starts;
         std::vector<Corner> corners;
@@ -155,7 +152,7 @@ int mr_laplacian_create(const double* positions, int64_t vertices, const int32_t
             rows.starts.push_back(static_cast<int64_t>(rows.columns.size()));
         }
         *out = system.release();
-        return int(MR_LAPLACIAN_OK);
+        return int(MR_OK);
     });
 }
 
@@ -186,28 +183,38 @@ int mr_laplacian_forward(const mr_laplacian* system, const double* weights, int6
     }
     for (size_t a = 0; a < system->anchors.size(); ++a)
         for (int64_t k = 0; k < columns; ++k)
-            deltas[(n + static_cast<int64_t>(a)) * columns + k] = system->anchor_weight * weights[system->anchors[a] * columns + k];
-    return MR_LAPLACIAN_OK;
+            deltas[(n + static_cast<int64_t>(a)) * columns + k] =
+                system->anchor_weight * weights[system->anchors[a] * columns + k];
+    return MR_OK;
 }
 
 int mr_laplacian_inverse(mr_laplacian* system, const double* deltas, int64_t columns, double* weights) {
-    return guarded(MR_LAPLACIAN_NO_MEMORY, MR_LAPLACIAN_BAD_INPUT, [&] {
-        if (!factor_normal(*system)) return int(MR_LAPLACIAN_SINGULAR);
+    return guarded(MR_NO_MEMORY, MR_BAD_INPUT, [&] {
+        if (!factor_normal(*system)) return int(MR_SINGULAR);
         const std::vector<double> right = transposed(*system, deltas, columns);
         std::vector<double> found = right;
         solve_normal(*system, found, columns);
         std::copy(found.begin(), found.end(), weights);
         if (system->solver) refine(*system, right, columns, weights);  // four digits, which the ground costs
-        return int(MR_LAPLACIAN_OK);
+        return int(MR_OK);
     });
+}
+
+int mr_laplacian_solve(const mr_mesh* mesh, const int32_t* anchors, int64_t anchor_count, double anchor_weight,
+                       const double* deltas, int64_t columns, double* weights) {
+    mr_laplacian* system = nullptr;
+    int status = mr_laplacian_create(mesh, anchors, anchor_count, anchor_weight, &system);
+    if (status == MR_OK) status = mr_laplacian_inverse(system, deltas, columns, weights);
+    mr_laplacian_destroy(system);
+    return status;
 }
 
 int mr_laplacian_quantize(mr_laplacian* system, const double* deltas, int64_t columns, const double* steps,
                           const double* prices, int32_t* symbols) {
-    return guarded(MR_LAPLACIAN_NO_MEMORY, MR_LAPLACIAN_BAD_INPUT, [&] {
-        if (!factor_shaping(*system)) return int(MR_LAPLACIAN_SINGULAR);
+    return guarded(MR_NO_MEMORY, MR_BAD_INPUT, [&] {
+        if (!factor_shaping(*system)) return int(MR_SINGULAR);
         shape(*system->shaping, deltas, columns, steps, prices, symbols);
-        return int(MR_LAPLACIAN_OK);
+        return int(MR_OK);
     });
 }
 

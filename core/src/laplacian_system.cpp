@@ -7,6 +7,8 @@
 
 #include "meshreel/laplacian.h"
 
+namespace meshreel {
+
 using Sparse = Eigen::SparseMatrix<double>;  // by columns, 32-bit indices
 
 namespace {
@@ -73,9 +75,7 @@ void shape(const Factor& factor, const double* deltas, int64_t columns, const do
         const double pivot = factor.pivots[k];
         for (int64_t c = 0; c < columns; ++c) {
             const double wanted = deltas[i * columns + c] / steps[c] + debt[k * columns + c];
-            const auto cost = [&](double q) {
-                return (q - wanted) * (q - wanted) + pivot * prices[c] * std::fabs(q);
-            };
+            const auto cost = [&](double q) { return (q - wanted) * (q - wanted) + pivot * prices[c] * std::fabs(q); };
             double q = std::floor(wanted + 0.5);
             const double smaller = q > 0.0 ? q - 1.0 : q + 1.0;
             if (q != 0.0 && cost(smaller) < cost(q)) q = smaller;
@@ -89,3 +89,5 @@ void shape(const Factor& factor, const double* deltas, int64_t columns, const do
         }
     }
 }
+
+}  // namespace meshreel

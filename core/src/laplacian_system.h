@@ -1,6 +1,5 @@
 // What a Laplacian system holds, and the two sparse factors it may need.
-#ifndef MESHREEL_LAPLACIAN_SYSTEM_H
-#define MESHREEL_LAPLACIAN_SYSTEM_H
+#pragma once
 
 #include <cstdint>
 #include <memory>
@@ -12,13 +11,15 @@
 
 struct mr_laplacian {
     int64_t vertices = 0;
-    SparseRows rows;  // -L off the diagonal; the diagonal is 1
+    meshreel::SparseRows rows;  // -L off the diagonal; the diagonal is 1
     std::vector<int32_t> anchors;
     double anchor_weight = 1.0;
-    std::unique_ptr<GroundedSolver> solver;  // of (L*)^T L*
-    std::unique_ptr<Factor> normal;          // the same, where components have many anchors
-    std::unique_ptr<Factor> shaping;         // L* (L*)^T, regularised
+    std::unique_ptr<meshreel::GroundedSolver> solver;  // of (L*)^T L*
+    std::unique_ptr<meshreel::Factor> normal;          // the same, where components have many anchors
+    std::unique_ptr<meshreel::Factor> shaping;         // L* (L*)^T, regularised
 };
+
+namespace meshreel {
 
 // For `solve_normal`, once; false where a component has no anchor.
 bool factor_normal(mr_laplacian& system);
@@ -28,4 +29,4 @@ bool factor_shaping(mr_laplacian& system);
 void shape(const Factor& factor, const double* deltas, int64_t columns, const double* steps, const double* prices,
            int32_t* symbols);
 
-#endif
+}  // namespace meshreel

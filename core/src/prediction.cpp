@@ -4,12 +4,13 @@
 #include "meshreel/layers.h"
 #include "prediction.h"
 
+namespace meshreel {
 namespace {
 
-using meshreel::is_causal, meshreel::lowered, meshreel::magnitude_around, meshreel::predicted, meshreel::slope;
-
-// One column; `mean` is what magnitudes are expected to be, and becomes what they are. False where a symbol has no room.
-bool forward(const mr_graph& graph, const double* values, double step, double price, double& mean, int32_t* symbols, double* decoded) {
+// One column; `mean` is what magnitudes are expected to be, and becomes what they are. False where a symbol has no
+// room.
+bool forward(const mr_graph& graph, const double* values, double step, double price, double& mean, int32_t* symbols,
+             double* decoded) {
     double total = 0.0;
     for (size_t v = 0; v < graph.count; ++v) {
         const double guess = predicted(graph, v, decoded);
@@ -26,15 +27,18 @@ bool forward(const mr_graph& graph, const double* values, double step, double pr
 }
 
 }  // namespace
+}  // namespace meshreel
 
-int mr_predict_forward(const mr_graph* graph, const double* values, size_t columns, double step, double price, int32_t* symbols,
-                       double* decoded) {
-    if (!is_causal(*graph)) return MR_LAYERS_BAD_INPUT;
+using namespace meshreel;
+
+int mr_predict_forward(const mr_graph* graph, const double* values, size_t columns, double step, double price,
+                       int32_t* symbols, double* decoded) {
+    if (!is_causal(*graph)) return MR_BAD_INPUT;
     for (size_t c = 0; c < columns; ++c, values += graph->count, symbols += graph->count, decoded += graph->count) {
         double mean = 1.0;
-        if (!forward(*graph, values, step, 0.0, mean, symbols, decoded)) return MR_LAYERS_OVERFLOW;
+        if (!forward(*graph, values, step, 0.0, mean, symbols, decoded)) return MR_OVERFLOW;
         for (int pass = 0; pass < 2 && price > 0.0; ++pass)
-            if (!forward(*graph, values, step, price, mean, symbols, decoded)) return MR_LAYERS_OVERFLOW;
+            if (!forward(*graph, values, step, price, mean, symbols, decoded)) return MR_OVERFLOW;
     }
-    return MR_LAYERS_OK;
+    return MR_OK;
 }

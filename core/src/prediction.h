@@ -1,10 +1,11 @@
-// What both closed-loop quantisers share: prediction in a causal graph, and what a magnitude costs (an encoder's estimate).
+// What both closed-loop quantisers share: prediction in a causal graph, and what a magnitude costs (an encoder's
+// estimate).
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
-#include "causal.h"
+#include "arrays.h"
 #include "meshreel/layers.h"
 
 namespace meshreel {
@@ -18,7 +19,8 @@ inline double predicted(const mr_graph& graph, size_t v, const double* values) {
 // The magnitude to expect at v: that of the symbols which predict it, and the mean of its column, twice.
 inline double magnitude_around(const mr_graph& graph, size_t v, const int32_t* symbols, double mean) {
     double around = 2.0 * mean, weight = 2.0;
-    for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k, weight += 1.0) around += std::fabs(static_cast<double>(symbols[graph.near[k]]));
+    for (int64_t k = graph.starts[v]; k < graph.starts[v + 1]; ++k, weight += 1.0)
+        around += std::fabs(static_cast<double>(symbols[graph.near[k]]));
     return std::max(around / weight, 1e-3);
 }
 

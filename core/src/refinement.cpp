@@ -2,18 +2,16 @@
 #include <cmath>
 #include <vector>
 
-#include "causal.h"
-#include "field_rows.h"
+#include "arrays.h"
+#include "field_record.h"
 #include "guarded.h"
-#include "indices.h"
 #include "meshreel/layers.h"
 #include "wide.h"
 
+namespace meshreel {
 namespace {
 
-using meshreel::FieldRows, meshreel::guarded, meshreel::kRowBlock, meshreel::wide;
-
-constexpr double kMostBend = 0.15;  // of an edge's length
+constexpr double kMostBend = 0.15;  // of an edge's length (guess): noisy normals lift no midpoint farther
 
 // Rows of places or normals: all frames' x of a vertex, then their y, then their z. A loop over frames is one over
 // neighbours in memory, and each frame's numbers come about as if it were alone.
@@ -88,8 +86,10 @@ struct Refinement {
     std::vector<double> normals;
     double share;
 
-    Refinement(const mr_level& level, const double* rows)
-        : places{rows, level.frames}, normals(normals_of(places, level.vertices, level.faces, level.face_count)), share(level.curvature / 64.0) {}
+    Refinement(const mr_level& level, int curvature, const double* rows)
+        : places{rows, level.frames},
+          normals(normals_of(places, level.vertices, level.faces, level.face_count)),
+          share(curvature / 64.0) {}
 
     void place(const int32_t* edges, size_t edge_count, const double* scalars, double* out) const {
         const size_t frames = places.frames;
@@ -97,7 +97,9 @@ struct Refinement {
             double* __restrict place = out;
             const double* __restrict scalar = scalars;
             edge_frame(places, {normals.data(), frames}, edges + 2 * e, share,
-                       [=](size_t t, size_t k, double middle, double direction) { place[k] = middle + scalar[t] * direction; });
+                       [=](size_t t, size_t k, double middle, double direction) {
+                           place[k] = middle + scalar[t] * direction;
+                       });
         }
     }
 };
@@ -142,10 +144,11 @@ private:
     // Where a vertex goes in each frame: memory that is far away by then, and on its way while others are placed.
     void fetch(size_t vertex) const {
         if (vertex >= vertices_) return;
-        for (size_t t = 0; t < count_; ++t) meshreel::will_write(out_.positions + 3 * (t * vertices_ + vertex));
+        for (size_t t = 0; t < count_; ++t) will_write(out_.positions + 3 * (t * vertices_ + vertex));
     }
     void turn(const double* __restrict in, size_t count, double* __restrict out) const {
-        for (size_t v = 0; v < count; ++v, in += 3 * count_, out += 3) out[0] = in[0], out[1] = in[count_], out[2] = in[2 * count_];
+        for (size_t v = 0; v < count; ++v, in += 3 * count_, out += 3)
+            out[0] = in[0], out[1] = in[count_], out[2] = in[2 * count_];
     }
 
     mr_frames out_;
@@ -160,89 +163,144 @@ void each_block(const mr_level& level, const double* scalars, Visit visit) {
         visit(e, std::min(kRowBlock, level.edge_count - e), scalars + e * level.frames);
 }
 
-// The same of scalars that come about on the way, so that they need not go through memory; `last` gets those of the last frame.
-template <class Visit>
-void each_block(const mr_level& level, const mr_field& field, double* last, Visit visit) {
-    FieldRows values(field);
-    std::vector<double> scalars(kRowBlock * level.frames);
-    for (size_t e = 0; e < level.edge_count; e += kRowBlock) {
-        const size_t count = std::min(kRowBlock, level.edge_count - e);
-        values.next(count, scalars.data());
-        for (size_t k = 0; k < count; ++k) last[e + k] = scalars[(k + 1) * level.frames - 1];
-        visit(e, count, scalars.data());
+// The scalars of a LayersLevel record, decoded block after block so that they need not go through memory.
+class LevelScalars {
+public:
+    // A status; the other calls are for MR_OK.
+    int decode(const LayersLevel& record, const mr_level& level) {
+        weights_.resize(static_cast<size_t>(level.starts[level.edge_count]));
+        for (size_t e = 0; e < level.edge_count; ++e) {
+            const int64_t begin = level.starts[e], end = level.starts[e + 1];
+            const double weight = record.sibling_weight / (64.0 * static_cast<double>(end - begin));
+            std::fill(weights_.begin() + begin, weights_.begin() + end, weight);
+        }
+        const mr_graph graph{level.edge_count, level.starts, level.near, weights_.data()};
+        const int status = decode_streams(record.scalars, graph, level.frames, false, streams_);
+        field_ = streams_.over(graph);
+        field_.before = record.follows ? level.previous : nullptr;
+        return status == MR_OK && record.follows && !level.previous ? int{MR_NO_PREVIOUS} : status;
     }
-}
+
+    // Calls visit(first edge, count, rows of scalars); `last` gets the scalars of the last frame.
+    template <class Visit>
+    void each_block(double* last, Visit visit) const {
+        FieldRows values(field_);
+        const size_t frames = field_.width, edge_count = field_.graph.count;
+        std::vector<double> scalars(kRowBlock * frames);
+        for (size_t e = 0; e < edge_count; e += kRowBlock) {
+            const size_t count = std::min(kRowBlock, edge_count - e);
+            values.next(count, scalars.data());
+            for (size_t k = 0; k < count; ++k) last[e + k] = scalars[(k + 1) * frames - 1];
+            visit(e, count, scalars.data());
+        }
+    }
+
+private:
+    std::vector<double> weights_;
+    FieldStreams streams_;
+    Field field_{};
+};
 
 bool is_good(const mr_level& level) {
-    return meshreel::in_range(level.faces, 3 * level.face_count, level.vertices) &&
-           meshreel::in_range(level.edges, 2 * level.edge_count, level.vertices);
+    return in_range(level.faces, 3 * level.face_count, level.vertices) &&
+           in_range(level.edges, 2 * level.edge_count, level.vertices);
 }
 
-bool is_good(const mr_level& level, const mr_field& field) {
-    return is_good(level) && level.frames > 0 && field.graph.count == level.edge_count && field.basis.width == level.frames && meshreel::is_causal(field.graph);
+// The arrays of a level and a record of it; MR_OK where both can be used.
+int open_level(const mr_bytes& bytes, const mr_level& level, LayersLevel& record) {
+    const int64_t links = level.starts[level.edge_count];
+    if (!is_good(level) || level.frames == 0 || !is_causal(level.edge_count, level.starts, level.near, links)) {
+        return MR_BAD_INPUT;
+    }
+    return parse(bytes, record) ? MR_OK : MR_BAD_RECORD;
 }
 
 // All of a finer level as frames; `each(visit)` visits its blocks of scalars.
 template <class Each>
-int refine_to_frames(const mr_level& level, const double* rows, mr_frames* frames, Each each) {
-    const Refinement refinement(level, rows);
+int refine_to_frames(const mr_level& level, const Refinement& refinement, const mr_frames& frames, Each each) {
     std::vector<double> some(kRowBlock * 3 * level.frames);
-    Frames out(*frames, level.frames, level.vertices + level.edge_count);
-    out.set(0, rows, level.vertices);
+    Frames out(frames, level.frames, level.vertices + level.edge_count);
+    out.set(0, refinement.places.data, level.vertices);
     each([&](size_t e, size_t count, const double* scalars) {
         refinement.place(level.edges + 2 * e, count, scalars, some.data());
         out.set(level.vertices + e, some.data(), count);
     });
-    frames->finite = out.are_finite();
-    return MR_LAYERS_OK;
+    return out.are_finite() ? MR_OK : MR_NOT_FINITE;
 }
 
 }  // namespace
+}  // namespace meshreel
 
-int mr_edge_frames(const mr_level* level, const double* positions, double* midpoints, double* directions) {
-    if (!is_good(*level) || level->frames != 1) return MR_LAYERS_BAD_INPUT;
-    return guarded(MR_LAYERS_NO_MEMORY, [&] { return wide([&] {
-        const Refinement refinement(*level, positions);
-        for (size_t e = 0; e < level->edge_count; ++e)
-            edge_frame(refinement.places, {refinement.normals.data(), 1}, level->edges + 2 * e, refinement.share,
-                       [=](size_t, size_t k, double middle, double direction) {
-                           midpoints[3 * e + k] = middle;
-                           directions[3 * e + k] = direction;
-                       });
-        return int{MR_LAYERS_OK};
-    }); });
-}
+using namespace meshreel;
 
-int mr_refine(const mr_level* level, const double* rows, const double* scalars, mr_frames* frames) {
-    if (!is_good(*level)) return MR_LAYERS_BAD_INPUT;
-    return guarded(MR_LAYERS_NO_MEMORY, [&] { return wide([&] {
-        return refine_to_frames(*level, rows, frames, [&](auto visit) { each_block(*level, scalars, visit); });
-    }); });
-}
-
-int mr_refine_field(const mr_level* level, const mr_field* field, double* rows, double* last) {
-    if (!is_good(*level, *field)) return MR_LAYERS_BAD_INPUT;
-    return guarded(MR_LAYERS_NO_MEMORY, [&] { return wide([&] {
-        const Refinement refinement(*level, rows);
-        each_block(*level, *field, last, [&](size_t e, size_t count, const double* scalars) {
-            refinement.place(level->edges + 2 * e, count, scalars, rows + 3 * level->frames * (level->vertices + e));
+int mr_edge_frames(const mr_level* level, const double* positions, int curvature, double* midpoints,
+                   double* directions) {
+    if (!is_good(*level) || level->frames != 1) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&] {
+        return wide([&] {
+            const Refinement refinement(*level, curvature, positions);
+            for (size_t e = 0; e < level->edge_count; ++e)
+                edge_frame(refinement.places, {refinement.normals.data(), 1}, level->edges + 2 * e, refinement.share,
+                           [=](size_t, size_t k, double middle, double direction) {
+                               midpoints[3 * e + k] = middle;
+                               directions[3 * e + k] = direction;
+                           });
+            return int{MR_OK};
         });
-        return int{MR_LAYERS_OK};
-    }); });
+    });
 }
 
-int mr_refine_field_frames(const mr_level* level, const mr_field* field, const double* rows, double* last, mr_frames* frames) {
-    if (!is_good(*level, *field)) return MR_LAYERS_BAD_INPUT;
-    return guarded(MR_LAYERS_NO_MEMORY, [&] { return wide([&] {
-        return refine_to_frames(*level, rows, frames, [&](auto visit) { each_block(*level, *field, last, visit); });
-    }); });
+int mr_refine(const mr_level* level, const double* rows, int curvature, const double* scalars,
+              const mr_frames* frames) {
+    if (!is_good(*level)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&] {
+        return wide([&] {
+            const Refinement refinement(*level, curvature, rows);
+            return refine_to_frames(*level, refinement, *frames,
+                                    [&](auto visit) { each_block(*level, scalars, visit); });
+        });
+    });
 }
 
-int mr_frames_of_rows(const double* rows, size_t count, size_t vertices, mr_frames* frames) {
-    return guarded(MR_LAYERS_NO_MEMORY, [&] {
+int mr_decode_level(const mr_bytes* bytes, const mr_level* level, double* rows, double* last) {
+    LayersLevel record;
+    int status = open_level(*bytes, *level, record);
+    if (status != MR_OK) return status;
+    return guarded(MR_NO_MEMORY, [&]() -> int {
+        LevelScalars scalars;
+        status = scalars.decode(record, *level);
+        if (status != MR_OK) return status;
+        return wide([&] {
+            const Refinement refinement(*level, record.curvature, rows);
+            double* finer = rows + 3 * level->frames * level->vertices;
+            scalars.each_block(last, [&](size_t e, size_t count, const double* block) {
+                refinement.place(level->edges + 2 * e, count, block, finer + 3 * level->frames * e);
+            });
+            return int{MR_OK};
+        });
+    });
+}
+
+int mr_decode_last_level(const mr_bytes* bytes, const mr_level* level, const double* rows, double* last,
+                         const mr_frames* frames) {
+    LayersLevel record;
+    int status = open_level(*bytes, *level, record);
+    if (status != MR_OK) return status;
+    return guarded(MR_NO_MEMORY, [&]() -> int {
+        LevelScalars scalars;
+        status = scalars.decode(record, *level);
+        if (status != MR_OK) return status;
+        return wide([&] {
+            const Refinement refinement(*level, record.curvature, rows);
+            return refine_to_frames(*level, refinement, *frames, [&](auto visit) { scalars.each_block(last, visit); });
+        });
+    });
+}
+
+int mr_frames_of_rows(const double* rows, size_t count, size_t vertices, const mr_frames* frames) {
+    return guarded(MR_NO_MEMORY, [&] {
         Frames out(*frames, count, vertices);
         out.set(0, rows, vertices);
-        frames->finite = out.are_finite();
-        return int{MR_LAYERS_OK};
+        return out.are_finite() ? int{MR_OK} : int{MR_NOT_FINITE};
     });
 }

@@ -1,6 +1,5 @@
 // Three-vectors, 3 x 3 matrices and the rotation nearest to a matrix, for the hot loops of tracking.
-#ifndef MESHREEL_RIGID3_H
-#define MESHREEL_RIGID3_H
+#pragma once
 
 #include <cmath>
 
@@ -47,13 +46,12 @@ inline Matrix turn(Vec w) {
 
 inline Matrix product(const Matrix& a, const Matrix& b) {
     Matrix m;
-    for (int r = 0; r < 3; ++r)
-        m.row[r] = a.row[r].x * b.row[0] + a.row[r].y * b.row[1] + a.row[r].z * b.row[2];
+    for (int r = 0; r < 3; ++r) m.row[r] = a.row[r].x * b.row[0] + a.row[r].y * b.row[1] + a.row[r].z * b.row[2];
     return m;
 }
 
-// Turns `r` towards the rotation nearest to `s` (maximal trace of r^T s). Directions in which s says nothing keep r: so a
-// degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice.
+// Turns `r` towards the rotation nearest to `s` (maximal trace of r^T s). Directions in which s says nothing keep r: so
+// a degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice.
 inline void follow(Matrix& r, const Matrix& s, int steps) {
     for (int step = 0; step < steps; ++step) {
         Vec torque{0, 0, 0};
@@ -71,5 +69,3 @@ inline void follow(Matrix& r, const Matrix& s, int steps) {
 }
 
 }  // namespace meshreel
-
-#endif

@@ -1,5 +1,7 @@
 #include "sparse_rows.h"
 
+namespace meshreel {
+
 void append_transposed(const SparseRows& rows, Eigen::SparseMatrix<double>& matrix) {
     const Eigen::Index n = static_cast<Eigen::Index>(rows.starts.size()) - 1;
     for (Eigen::Index i = 0; i < n; ++i) {
@@ -12,3 +14,5 @@ void append_transposed(const SparseRows& rows, Eigen::SparseMatrix<double>& matr
         if (!placed) matrix.insertBack(i, i) = 1.0;
     }
 }
+
+}  // namespace meshreel

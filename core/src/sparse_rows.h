@@ -1,10 +1,11 @@
-#ifndef MESHREEL_SPARSE_ROWS_H
-#define MESHREEL_SPARSE_ROWS_H
+#pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include <Eigen/SparseCore>
+
+namespace meshreel {
 
 struct SparseRows {  // compressed rows, columns ascending
     std::vector<int64_t> starts;
@@ -15,4 +16,4 @@ struct SparseRows {  // compressed rows, columns ascending
 // Appends the rows of 1 - R to those columns of a matrix that come first: (1 - R)^T, 32-bit indices.
 void append_transposed(const SparseRows& rows, Eigen::SparseMatrix<double>& matrix);
 
-#endif
+}  // namespace meshreel

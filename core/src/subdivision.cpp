@@ -5,10 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "arrays.h"
 #include "guarded.h"
-#include "indices.h"
 #include "meshreel/layers.h"
 
+namespace meshreel {
 namespace {
 
 // Sorts by insertion what is as short as nearly always.
@@ -45,7 +46,8 @@ size_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, in
     }
     size_t count = 0;
     for (size_t v = 0; v < vertices; ++v) {
-        const auto begin = halves.begin() + static_cast<int64_t>(starts[v]), end = halves.begin() + static_cast<int64_t>(starts[v + 1]);
+        const auto begin = halves.begin() + static_cast<int64_t>(starts[v]),
+                   end = halves.begin() + static_cast<int64_t>(starts[v + 1]);
         sort_few(begin, end, [](const HalfEdge& a, const HalfEdge& b) { return a.high < b.high; });
         for (auto half = begin; half != end; ++half) {
             if (half == begin || half->high != (half - 1)->high) {
@@ -60,11 +62,15 @@ size_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, in
 }
 
 }  // namespace
+}  // namespace meshreel
 
-int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer, size_t* edge_count) {
-    if (vertices > INT32_MAX || vertices + 3 * face_count > INT32_MAX) return MR_LAYERS_BAD_INPUT;
-    if (!meshreel::in_range(faces, 3 * face_count, vertices)) return MR_LAYERS_BAD_INPUT;
-    return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&] {
+using namespace meshreel;
+
+int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer,
+                 size_t* edge_count) {
+    if (vertices > INT32_MAX || vertices + 3 * face_count > INT32_MAX) return MR_BAD_INPUT;
+    if (!in_range(faces, 3 * face_count, vertices)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&] {
         std::vector<int32_t> numbers(3 * face_count);
         *edge_count = number_edges(faces, face_count, vertices, edges, numbers.data());
         const int32_t first = static_cast<int32_t>(vertices);
@@ -74,18 +80,19 @@ int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32
             const int32_t cut[12] = {a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca};
             std::copy(cut, cut + 12, finer);
         }
-        return int{MR_LAYERS_OK};
+        return int{MR_OK};
     });
 }
 
-int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts, int32_t* near) {
-    if (vertices > INT32_MAX || edge_count > INT32_MAX) return MR_LAYERS_BAD_INPUT;
+int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t edge_count, int64_t* starts,
+                int32_t* near) {
+    if (vertices > INT32_MAX || edge_count > INT32_MAX) return MR_BAD_INPUT;
     const int64_t first = static_cast<int64_t>(vertices);
     const auto in_face = [&](size_t f, int k) { return finer[12 * f + 9 + static_cast<size_t>(k)] - first; };
     for (size_t f = 0; f < face_count; ++f)
         for (int k = 0; k < 3; ++k)
-            if (in_face(f, k) < 0 || in_face(f, k) >= static_cast<int64_t>(edge_count)) return MR_LAYERS_BAD_INPUT;
-    return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&] {
+            if (in_face(f, k) < 0 || in_face(f, k) >= static_cast<int64_t>(edge_count)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&] {
         std::vector<int64_t> bounds(edge_count + 1, 0);
         const auto each_pair = [&](auto&& visit) {
             for (size_t f = 0; f < face_count; ++f)
@@ -97,7 +104,9 @@ int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t
         for (size_t e = 0; e < edge_count; ++e) bounds[e + 1] += bounds[e];
         std::vector<int32_t> all(static_cast<size_t>(bounds[edge_count]));
         std::vector<int64_t> next(bounds.begin(), bounds.end() - 1);
-        each_pair([&](int64_t late, int64_t early) { all[static_cast<size_t>(next[static_cast<size_t>(late)]++)] = static_cast<int32_t>(early); });
+        each_pair([&](int64_t late, int64_t early) {
+            all[static_cast<size_t>(next[static_cast<size_t>(late)]++)] = static_cast<int32_t>(early);
+        });
         starts[0] = 0;
         for (size_t e = 0; e < edge_count; ++e) {
             const auto begin = all.begin() + bounds[e], end = all.begin() + bounds[e + 1];
@@ -106,7 +115,7 @@ int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t
             std::copy(begin, last, near + starts[e]);
             starts[e + 1] = starts[e] + (last - begin);
         }
-        return int{MR_LAYERS_OK};
+        return int{MR_OK};
     });
 }
 

@@ -7,6 +7,7 @@
 #include "meshreel/layers.h"
 #include "prediction.h"
 
+namespace meshreel {
 namespace {
 
 constexpr int kSweeps = 3;  // over the columns of a vertex; more change nothing
@@ -20,19 +21,29 @@ double dot(const double* a, const double* b, size_t count) {
 class SurfaceQuantizer {
 public:
     SurfaceQuantizer(const mr_graph& graph, const mr_surface& surface, double step, double price)
-        : graph_(graph), surface_(surface), step_(step), price_(price), width_(surface.width), seen_(surface.columns * width_),
-          error_(width_), guesses_(surface.columns), slopes_(surface.columns), wanted_(surface.columns), sizes_(surface.columns) {}
+        : graph_(graph),
+          surface_(surface),
+          step_(step),
+          price_(price),
+          width_(surface.width),
+          seen_(surface.columns * width_),
+          error_(width_),
+          guesses_(surface.columns),
+          slopes_(surface.columns),
+          wanted_(surface.columns),
+          sizes_(surface.columns) {}
 
     // Symbols, with those that were there as the expected magnitudes.
     bool run(const double* values, int32_t* symbols, double* decoded) {
         const size_t count = graph_.count, columns = surface_.columns;
         std::vector<double> means(columns, 0.0);
         for (size_t k = 0; k < columns; ++k)
-            for (size_t v = 0; v < count; ++v) means[k] += std::fabs(static_cast<double>(symbols[k * count + v])) / static_cast<double>(count);
+            for (size_t v = 0; v < count; ++v)
+                means[k] += std::fabs(static_cast<double>(symbols[k * count + v])) / static_cast<double>(count);
         for (size_t v = 0; v < count; ++v) {
             for (size_t k = 0; k < columns; ++k) {
-                guesses_[k] = meshreel::predicted(graph_, v, decoded + k * count);
-                slopes_[k] = meshreel::slope(meshreel::magnitude_around(graph_, v, symbols + k * count, means[k]));
+                guesses_[k] = predicted(graph_, v, decoded + k * count);
+                slopes_[k] = slope(magnitude_around(graph_, v, symbols + k * count, means[k]));
                 wanted_[k] = (values[k * count + v] - guesses_[k]) / step_;
                 if (!(std::fabs(wanted_[k]) < 2147483000.0)) return false;
             }
@@ -71,7 +82,7 @@ private:
                 const double weight = dot(seen, surface_.vectors + k * width_, width_);
                 if (!(weight > 0.0)) continue;
                 const double best = sizes_[k] - dot(seen, error_.data(), width_) / weight;
-                const double size = meshreel::lowered(std::fabs(best), price_ * slopes_[k] / weight);
+                const double size = lowered(std::fabs(best), price_ * slopes_[k] / weight);
                 const double symbol = std::fabs(best) < 2147483000.0 ? std::copysign(size, best) : sizes_[k];
                 move(k, sizes_[k] - wanted_[k], symbol);
                 sizes_[k] = symbol;
@@ -93,13 +104,16 @@ private:
 };
 
 }  // namespace
+}  // namespace meshreel
 
-int mr_predict_surface(const mr_graph* graph, const mr_surface* surface, const double* values, double step, double price, int32_t* symbols,
-                       double* decoded) {
+using namespace meshreel;
+
+int mr_predict_surface(const mr_graph* graph, const mr_surface* surface, const double* values, double step,
+                       double price, int32_t* symbols, double* decoded) {
     const int status = mr_predict_forward(graph, values, surface->columns, step, price, symbols, decoded);
-    if (status != MR_LAYERS_OK) return status;
-    return meshreel::guarded(MR_LAYERS_NO_MEMORY, [&] {
+    if (status != MR_OK) return status;
+    return guarded(MR_NO_MEMORY, [&] {
         SurfaceQuantizer quantizer(*graph, *surface, step, price);
-        return quantizer.run(values, symbols, decoded) ? int{MR_LAYERS_OK} : int{MR_LAYERS_OVERFLOW};
+        return quantizer.run(values, symbols, decoded) ? int{MR_OK} : int{MR_OVERFLOW};
     });
 }

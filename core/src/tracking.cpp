@@ -12,9 +12,8 @@
 #include "guarded.h"
 #include "rigid3.h"
 
+namespace meshreel {
 namespace {
-
-using namespace meshreel;
 
 // Centers in a uniform grid: the nearest one within a ball, exactly.
 class Grid {
@@ -36,8 +35,9 @@ public:
         start_.assign(static_cast<size_t>(n_[0]) * n_[1] * n_[2] + 1, 0);
         std::vector<size_t> where(points.size());
         for (size_t i = 0; i < points.size(); ++i) {
-            where[i] = (static_cast<size_t>(at(points[i].x - low_.x, 0)) * n_[1] + at(points[i].y - low_.y, 1)) * n_[2] +
-                       at(points[i].z - low_.z, 2);
+            where[i] =
+                (static_cast<size_t>(at(points[i].x - low_.x, 0)) * n_[1] + at(points[i].y - low_.y, 1)) * n_[2] +
+                at(points[i].z - low_.z, 2);
             ++start_[where[i] + 1];
         }
         for (size_t c = 1; c < start_.size(); ++c) start_[c] += start_[c - 1];
@@ -96,11 +96,16 @@ private:
     std::vector<Vec> sorted_;
 };
 
-// Who owns which sample, kept up to date while centers move: a sample is searched again only when its owner could have lost it.
+// Who owns which sample, kept up to date while centers move: a sample is searched again only when its owner could have
+// lost it.
 class Ownership {
 public:
     Ownership(const double* samples, int64_t count, size_t centers)
-        : samples_(samples), count_(static_cast<size_t>(count)), owner_(count_, -1), slack_(count_, -1), sums_(centers, Vec{0, 0, 0}),
+        : samples_(samples),
+          count_(static_cast<size_t>(count)),
+          owner_(count_, -1),
+          slack_(count_, -1),
+          sums_(centers, Vec{0, 0, 0}),
           sizes_(centers, 0) {
         for (size_t s = 0; s < count_; ++s) squares_ += dot(load(samples + 3 * s), load(samples + 3 * s));
     }
@@ -120,7 +125,8 @@ public:
             const Vec x = load(samples_ + 3 * s);
             Grid::Found found{-1, 0, 0};
             double reach = old >= 0 ? length(centers[old] - x) : scale;
-            while ((found = grid_.nearest(x, reach, 0.3 * scale)).id < 0 || found.best > reach + 0.3 * scale) reach *= 2;
+            while ((found = grid_.nearest(x, reach, 0.3 * scale)).id < 0 || found.best > reach + 0.3 * scale)
+                reach *= 2;
             slack_[s] = found.second - found.best;
             if (found.id != old) give(s, x, old, found.id);
         }
@@ -130,7 +136,8 @@ public:
     // Sum over the samples of the squared distance to their owner.
     double energy(const std::vector<Vec>& centers) const {
         double e = squares_;
-        for (size_t i = 0; i < centers.size(); ++i) e += sizes_[i] * dot(centers[i], centers[i]) - 2 * dot(centers[i], sums_[i]);
+        for (size_t i = 0; i < centers.size(); ++i)
+            e += sizes_[i] * dot(centers[i], centers[i]) - 2 * dot(centers[i], sums_[i]);
         return std::max(e, 0.0);
     }
 
@@ -150,6 +157,7 @@ public:
     const std::vector<int32_t>& owners() const { return owner_; }
     Vec sum(size_t i) const { return sums_[i]; }
     double size(size_t i) const { return sizes_[i]; }
+
 private:
     static double length(Vec a) { return std::sqrt(dot(a, a)); }
 
@@ -182,7 +190,7 @@ private:
 // The rigid term: a rigid motion for each neighbourhood, and where the motions around a center would put it.
 class Rigidity {
 public:
-    explicit Rigidity(const meshreel_relaxation& p) : neighbours_(p.neighbours), count_(static_cast<size_t>(p.center_count)) {
+    explicit Rigidity(const mr_relaxation& p) : neighbours_(p.neighbours), count_(static_cast<size_t>(p.center_count)) {
         const size_t pairs = static_cast<size_t>(neighbours_.offsets[count_]);
         previous_.resize(count_);
         rotations_.assign(count_, identity());
@@ -240,7 +248,7 @@ private:
         return weight * dot(where - centers[j], where - centers[j]);
     }
 
-    meshreel_neighbours neighbours_;
+    mr_neighbours neighbours_;
     size_t count_;
     std::vector<Vec> previous_, target_;
     std::vector<Matrix> rotations_;
@@ -248,14 +256,15 @@ private:
 };
 
 bool in_range(double x) { return std::fabs(x) <= 1e100; }  // so are squares: among infinite distances no search ends
-bool sound(const meshreel_relaxation& p, const meshreel_relaxed& r) {
+bool sound(const mr_relaxation& p, const mr_relaxed& r) {
     if (!p.samples || !r.centers || !r.owners || p.sample_count < 1 || p.center_count < 1) return false;
     if (!(p.spread > 0) || !(p.rigidity >= 0) || p.max_rounds < 1) return false;
-    for (int64_t s = 0; s < 3 * p.sample_count; ++s) if (!in_range(p.samples[s])) return false;
+    for (int64_t s = 0; s < 3 * p.sample_count; ++s)
+        if (!in_range(p.samples[s])) return false;
     for (int64_t i = 0; i < 3 * p.center_count; ++i)
         if (!in_range(r.centers[i]) || (p.previous && !in_range(p.previous[i]))) return false;
     if (!p.previous) return true;
-    const meshreel_neighbours& n = p.neighbours;
+    const mr_neighbours& n = p.neighbours;
     if (!r.rotations || !n.offsets || n.offsets[0] != 0) return false;
     for (int64_t i = 0; i < p.center_count; ++i)
         if (n.offsets[i + 1] < n.offsets[i]) return false;
@@ -265,8 +274,8 @@ bool sound(const meshreel_relaxation& p, const meshreel_relaxed& r) {
 }
 
 // One block step from `y` (owners, motions, centers). Returns the energy at y; `gain` is what the step is sure to win.
-double block_step(const meshreel_relaxation& p, const std::vector<Vec>& y, Ownership& owned, Rigidity* rigid, std::vector<Vec>& x,
-                  double& gain) {
+double block_step(const mr_relaxation& p, const std::vector<Vec>& y, Ownership& owned, Rigidity* rigid,
+                  std::vector<Vec>& x, double& gain) {
     owned.update(y);
     const double share = p.spread * static_cast<double>(p.center_count) / static_cast<double>(p.sample_count);
     double energy = share * owned.energy(y);
@@ -282,7 +291,7 @@ double block_step(const meshreel_relaxation& p, const std::vector<Vec>& y, Owner
     return energy;
 }
 
-void relax(const meshreel_relaxation& p, meshreel_relaxed& out) {
+void relax(const mr_relaxation& p, mr_relaxed& out) {
     const size_t count = static_cast<size_t>(p.center_count);
     std::vector<Vec> x(count), y(count), next(count);
     for (size_t i = 0; i < count; ++i) x[i] = y[i] = load(out.centers + 3 * i);
@@ -316,24 +325,28 @@ void relax(const meshreel_relaxation& p, meshreel_relaxed& out) {
 }
 
 }  // namespace
+}  // namespace meshreel
 
-extern "C" int meshreel_relax_centers(const meshreel_relaxation* problem, meshreel_relaxed* result) {
-    if (!problem || !result || !sound(*problem, *result)) return MESHREEL_TRACKING_BAD_INPUT;
-    return meshreel::guarded(MESHREEL_TRACKING_NO_MEMORY, [&] {
+using namespace meshreel;
+
+extern "C" int mr_relax_centers(const mr_relaxation* problem, mr_relaxed* result) {
+    if (!problem || !result || !sound(*problem, *result)) return MR_BAD_INPUT;
+    return guarded(MR_NO_MEMORY, [&] {
         relax(*problem, *result);
-        return int{MESHREEL_TRACKING_OK};
+        return int{MR_OK};
     });
 }
 
-extern "C" int meshreel_motion_differences(int64_t center_count, const meshreel_neighbours* neighbours, const double* rotations,
-                                           const double* shifts, const double* means, const double* covariances, double* out) {
-    if (center_count < 1 || !neighbours || !rotations || !shifts || !means || !covariances || !out) return MESHREEL_TRACKING_BAD_INPUT;
+extern "C" int mr_motion_differences(int64_t center_count, const mr_neighbours* neighbours, const double* rotations,
+                                     const double* shifts, const double* means, const double* covariances,
+                                     double* out) {
+    if (center_count < 1 || !neighbours || !rotations || !shifts || !means || !covariances || !out) return MR_BAD_INPUT;
     for (int64_t i = 0; i < center_count; ++i) {
         const Vec mean = load(means + 3 * i);
         const Matrix cov{{load(covariances + 9 * i), load(covariances + 9 * i + 3), load(covariances + 9 * i + 6)}};
         for (int32_t k = neighbours->offsets[i]; k < neighbours->offsets[i + 1]; ++k) {
             const int64_t j = neighbours->indices[k];
-            if (j < 0 || j >= center_count) return MESHREEL_TRACKING_BAD_INPUT;
+            if (j < 0 || j >= center_count) return MR_BAD_INPUT;
             Vec at = load(shifts + 3 * i) - load(shifts + 3 * j);
             double spread = 0;
             for (int r = 0; r < 3; ++r) {
@@ -344,5 +357,5 @@ extern "C" int meshreel_motion_differences(int64_t center_count, const meshreel_
             out[k] = dot(at, at) + spread;
         }
     }
-    return MESHREEL_TRACKING_OK;
+    return MR_OK;
 }

@@ -19,8 +19,9 @@ __attribute__((target("avx2"), flatten)) auto in_wide_registers(Body& body) {
     return body();
 }
 
-// What `body` gives, in registers as wide as the machine has: the compiler makes it twice. Each number comes about by the
-// same operations in the same order, only more of them side by side, and none is fused: no bit depends on the machine.
+// What `body` gives, in registers as wide as the machine has: the compiler makes it twice. Each number comes about by
+// the same operations in the same order, only more of them side by side, and none is fused: no bit depends on the
+// machine.
 template <class Body>
 auto wide(Body body) {
     return __builtin_cpu_supports("avx2") ? in_wide_registers(body) : body();

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
+#include "../src/arrays.h"
+
+namespace meshreel {
 namespace {
 
 constexpr double kMostPlace = 65535.0, kHalfNormal = 127.5;
@@ -28,7 +32,25 @@ uint16_t octahedral(const double* n) {
     return static_cast<uint16_t>(byte_of(u) | byte_of(v) << 8);
 }
 
+// The area-weighted sum of the normals of the faces at each vertex, not of unit length.
+std::vector<double> normal_sums(const mr_mesh& mesh) {
+    std::vector<double> sums(3 * mesh.vertices, 0.0);
+    for (size_t f = 0; f < mesh.face_count; ++f) {
+        const int32_t* face = mesh.faces + 3 * f;
+        const double *a = mesh.positions + 3 * face[0], *b = mesh.positions + 3 * face[1],
+                     *c = mesh.positions + 3 * face[2];
+        const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+        const double n[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
+        for (size_t corner = 0; corner < 3; ++corner)
+            for (size_t k = 0; k < 3; ++k) sums[3 * face[corner] + k] += n[k];
+    }
+    return sums;
+}
+
 }  // namespace
+}  // namespace meshreel
+
+using namespace meshreel;
 
 void mr_grow_box(const double* positions, size_t vertices, double box[6]) {
     for (size_t v = 0; v < vertices; ++v)
@@ -38,24 +60,12 @@ void mr_grow_box(const double* positions, size_t vertices, double box[6]) {
         }
 }
 
-int mr_normal_sums(const double* positions, size_t vertices, const int32_t* faces, size_t face_count, double* sums) {
-    for (size_t k = 0; k < 3 * face_count; ++k)
-        if (faces[k] < 0 || static_cast<size_t>(faces[k]) >= vertices) return 1;
-    std::fill(sums, sums + 3 * vertices, 0.0);
-    for (size_t f = 0; f < face_count; ++f) {
-        const int32_t* face = faces + 3 * f;
-        const double *a = positions + 3 * face[0], *b = positions + 3 * face[1], *c = positions + 3 * face[2];
-        const double u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]}, w[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
-        const double n[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
-        for (size_t corner = 0; corner < 3; ++corner)
-            for (size_t k = 0; k < 3; ++k) sums[3 * face[corner] + k] += n[k];
+int mr_pack_vertices(const mr_mesh* mesh, const double box[6], uint16_t* texels) {
+    if (!in_range(mesh->faces, 3 * mesh->face_count, mesh->vertices)) return MR_BAD_INPUT;
+    const std::vector<double> sums = normal_sums(*mesh);
+    for (size_t v = 0; v < mesh->vertices; ++v) {
+        for (size_t k = 0; k < 3; ++k) texels[4 * v + k] = place_of(mesh->positions[3 * v + k], box[k], box[3 + k]);
+        texels[4 * v + 3] = octahedral(sums.data() + 3 * v);
     }
-    return 0;
-}
-
-void mr_pack_vertices(const double* positions, const double* sums, size_t vertices, const double box[6], uint16_t* texels) {
-    for (size_t v = 0; v < vertices; ++v) {
-        for (size_t k = 0; k < 3; ++k) texels[4 * v + k] = place_of(positions[3 * v + k], box[k], box[3 + k]);
-        texels[4 * v + 3] = octahedral(sums + 3 * v);
-    }
+    return MR_OK;
 }

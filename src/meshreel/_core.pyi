@@ -89,43 +89,45 @@ def motion_differences(
 
 # bind_layers.cpp
 
-_Graph: TypeAlias = tuple[Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]
-_Field: TypeAlias = tuple[  # symbols, graph, step, vectors, means, what the values are counted from
-    Int32[np.ndarray, "M V"],
-    _Graph,
-    float,
-    Float64[np.ndarray, "M C"],
-    Float64[np.ndarray, " C"],
-    Float64[np.ndarray, " V"] | None,
-]
 _Place: TypeAlias = tuple[float, tuple[float, ...]]  # scale and origin, three numbers
+
+class Graph:
+    def __init__(
+        self,
+        starts: Int64[np.ndarray, " V+1"],
+        near: Int32[np.ndarray, " N"],
+        weights: Float64[np.ndarray, " N"],
+    ) -> None: ...
+
+class Surface:
+    def __init__(
+        self, vectors: Float64[np.ndarray, "M C"], normals: Float64[np.ndarray, "V C"], tangential: float
+    ) -> None: ...
+
+class Level:
+    def __init__(
+        self,
+        faces: Int32[np.ndarray, "F 3"],
+        edges: Int32[np.ndarray, "E 2"],
+        starts: Int64[np.ndarray, " E+1"],
+        near: Int32[np.ndarray, " N"],
+    ) -> None: ...
 
 def hierarchy(
     positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
 ) -> tuple[Int32[np.ndarray, " V"], Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]]: ...
 def predict_forward(
-    values: Float64[np.ndarray, "M V"],
-    starts: Int64[np.ndarray, " V+1"],
-    near: Int32[np.ndarray, " N"],
-    weights: Float64[np.ndarray, " N"],
-    step: float,
-    price: float,
+    values: Float64[np.ndarray, "M V"], graph: Graph, step: float, price: float
 ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]: ...
 def predict_surface(
-    values: Float64[np.ndarray, "M V"],
-    graph: tuple[Int64[np.ndarray, " V+1"], Int32[np.ndarray, " N"], Float64[np.ndarray, " N"]],
-    vectors: Float64[np.ndarray, "M C"],
-    normals: Float64[np.ndarray, "V C"],
-    tangential: float,
-    step: float,
-    price: float,
+    values: Float64[np.ndarray, "M V"], graph: Graph, surface: Surface, step: float, price: float
 ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]: ...
-def field_inverse(field: _Field) -> Float64[np.ndarray, "V C"]: ...
+def encode_field(symbols: Int32[np.ndarray, "M V"], graph: Graph) -> tuple[bytes, Int64[np.ndarray, " M"]]: ...
+def decode_field(record: bytes, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "V C"]: ...
+def decode_motion(
+    record: bytes, positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], frames: int
+) -> Float64[np.ndarray, "V 3 T"]: ...
 def orthonormal_inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64[np.ndarray, "M C"]: ...
-def place_rows(
-    moved: Float64[np.ndarray, "V C"], order: Int32[np.ndarray, " V"], base: Float64[np.ndarray, "V 3"]
-) -> tuple[Float64[np.ndarray, "V 3 T"], bool]: ...
-def sibling_weights(starts: Int64[np.ndarray, " E+1"], weight: int) -> Float64[np.ndarray, " N"]: ...
 def subdivide(
     faces: Int32[np.ndarray, "F 3"], vertices: int
 ) -> tuple[Int32[np.ndarray, "E 2"], Int32[np.ndarray, "4F 3"]]: ...
@@ -144,32 +146,22 @@ def refine(
     edges: Int32[np.ndarray, "E 2"],
     scalars: Float64[np.ndarray, "E T"],
     curvature: int,
-) -> tuple[Float64[np.ndarray, "T W 3"], bool]: ...
-def refine_field(
+) -> Float64[np.ndarray, "T W 3"]: ...
+def decode_level(
+    record: bytes,
+    level: Level,
     rows: Float64[np.ndarray, "V 3 T"],
-    faces: Int32[np.ndarray, "F 3"],
-    edges: Int32[np.ndarray, "E 2"],
-    field: _Field,
-    curvature: int,
+    previous: Float64[np.ndarray, " E"] | None,
 ) -> tuple[Float64[np.ndarray, "W 3 T"], Float64[np.ndarray, " E"]]: ...
-def refine_field_frames(
+def decode_last_level(
+    record: bytes,
+    level: Level,
     rows: Float64[np.ndarray, "V 3 T"],
-    faces: Int32[np.ndarray, "F 3"],
-    edges: Int32[np.ndarray, "E 2"],
-    field: _Field,
-    curvature: int,
+    previous: Float64[np.ndarray, " E"] | None,
     place: _Place | None,
     positions: Float64[np.ndarray, "T W 3"],
-) -> tuple[bool, Float64[np.ndarray, " E"]]: ...
-def frames_of_rows(
-    rows: Float64[np.ndarray, "V 3 T"], place: _Place | None
-) -> tuple[Float64[np.ndarray, "T V 3"], bool]: ...
+) -> Float64[np.ndarray, " E"]: ...
+def frames_of_rows(rows: Float64[np.ndarray, "V 3 T"], place: _Place | None) -> Float64[np.ndarray, "T V 3"]: ...
 def keep_faces(
     faces: Int32[np.ndarray, "F 3"], dropped: UInt8[np.ndarray, " F"], room: Int32[np.ndarray, "N 3"]
 ) -> int: ...
-def encode_field(
-    columns: Int32[np.ndarray, "M V"], starts: Int64[np.ndarray, " V+1"], near: Int32[np.ndarray, " N"]
-) -> tuple[bytes, Int64[np.ndarray, " M"]]: ...
-def decode_field(
-    data: bytes, columns: Int32[np.ndarray, "M V"], starts: Int64[np.ndarray, " V+1"], near: Int32[np.ndarray, " N"]
-) -> bool: ...

@@ -1,11 +1,13 @@
 // Laplacian coordinates on a triangle mesh (paper, section 3.3.3, eqs. 11-13): the extended operator L*, its forward
-// product, its least-squares inverse by a sparse factor, and the encoder's quantizer that shapes the noise for that inverse.
+// product, its least-squares inverse by a sparse factor, and the encoder's quantizer that shapes the noise for that
+// inverse.
 //
 // Strict arithmetic: IEEE + - * / sqrt in a fixed order, one thread, no trigonometry; every build gives the same bits.
-#ifndef MESHREEL_LAPLACIAN_H
-#define MESHREEL_LAPLACIAN_H
+#pragma once
 
 #include <stdint.h>
+
+#include "meshreel/status.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -13,17 +15,9 @@ extern "C" {
 
 typedef struct mr_laplacian mr_laplacian;
 
-enum {
-    MR_LAPLACIAN_OK = 0,
-    MR_LAPLACIAN_BAD_INPUT = 1,  // an index out of range, anchors that do not ascend, a negative size, a coordinate not finite
-    MR_LAPLACIAN_SINGULAR = 2,   // a connected component has no anchor
-    MR_LAPLACIAN_NO_MEMORY = 3,
-};
-
 // L* of a mesh: `vertices` rows of mean-value weights (eq. 11), then a row of `anchor_weight` times a unit
 // vector for each anchor; anchors ascend.
-int mr_laplacian_create(const double* positions, int64_t vertices, const int32_t* faces, int64_t face_count,
-                        const int32_t* anchors, int64_t anchor_count, double anchor_weight,
+int mr_laplacian_create(const struct mr_mesh* mesh, const int32_t* anchors, int64_t anchor_count, double anchor_weight,
                         mr_laplacian** out);
 void mr_laplacian_destroy(mr_laplacian* system);
 
@@ -35,6 +29,10 @@ int mr_laplacian_forward(const mr_laplacian* system, const double* weights, int6
 
 // Weights V x columns that fit the deltas best (eq. 13). The first call factorises, later ones reuse the factor.
 int mr_laplacian_inverse(mr_laplacian* system, const double* deltas, int64_t columns, double* weights);
+
+// The same in one call, for a system that is used once.
+int mr_laplacian_solve(const struct mr_mesh* mesh, const int32_t* anchors, int64_t anchor_count, double anchor_weight,
+                       const double* deltas, int64_t columns, double* weights);
 
 // Symbols whose inverse is close to the weights: each rounding takes into account the error that those before it leave
 // in the *weights*. `prices` are, for each column, the squared error in squared steps that one unit less of a symbol's
@@ -52,6 +50,4 @@ void mr_klt_inverse(const double* weights, int64_t rows, int64_t columns, const 
 
 #ifdef __cplusplus
 }
-#endif
-
 #endif

@@ -88,16 +88,9 @@ def refine(
     that these normals imply away from the middle of the edge.
     """
     rows = np.ascontiguousarray(known.transpose(1, 2, 0))
-    return checked(*_core.refine(rows, level.coarse, level.edges, np.ascontiguousarray(scalars.T), curvature))
+    return _core.refine(rows, level.coarse, level.edges, np.ascontiguousarray(scalars.T), curvature)
 
 
 def frames_of(rows: Float64[np.ndarray, "V 3 T"], place: Placement | None = None) -> Float64[np.ndarray, "T V 3"]:
     """Transpose rows, which hold all frames of a number, to frames. Raises FormatError if a number is not finite."""
-    return checked(*_core.frames_of_rows(rows, None if place is None else place.numbers))
-
-
-def checked(frames: Float64[np.ndarray, "T V 3"], finite: bool) -> Float64[np.ndarray, "T V 3"]:
-    """Return frames that the core found finite; raise FormatError otherwise."""
-    if not finite:
-        raise FormatError("vertices that are not finite")
-    return frames
+    return _core.frames_of_rows(rows, None if place is None else place.numbers)

@@ -8,11 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from meshreel import _core
+from meshreel.coding.entropy import encode_integers
 from meshreel.coding.layers import fields, orthonormal
 from meshreel.coding.layers.fields import Rate, SurfaceWeight, decode_field, encode_field
 from meshreel.coding.layers.graph import hierarchy, siblings
 from meshreel.coding.steps import LEVELS
 from meshreel.errors import FormatError, InputError
+from meshreel.format.layout import CodedField
+from meshreel.format.records import pack, unpack
 from meshreel.geometry.subdivision import subdivide
 from meshreel.geometry.topology import vertex_normals
 
@@ -96,17 +99,19 @@ def test_any_symbols_come_back_from_one_stream(seed: int, columns: int, size: fl
     sizes = np.exp2(generator.uniform(0, size, (columns, len(level.edges)))) - 1
     symbols = np.rint(generator.choice([-1, 1], sizes.shape) * sizes * (generator.random(sizes.shape) < 0.5))
     symbols = symbols.astype(np.int32)
-    stream, shares = _core.encode_field(symbols, near.starts, near.near)
+    graph = near.graph(0)  # no value is predicted from others
+    stream, shares = _core.encode_field(symbols, graph.core)
     assert abs(int(shares.sum()) - len(stream)) < 6
-    found = np.empty_like(symbols)
-    assert _core.decode_field(stream, found, near.starts, near.near)
-    np.testing.assert_array_equal(found, symbols)
+    basis = encode_integers(orthonormal.forward(np.eye(columns), np.ones(columns)))
+    whole = CodedField(columns, 0, basis, stream)  # in steps of 1, along the axes: rows are symbols
+    np.testing.assert_array_equal(decode_field(whole, graph, columns, False).T, symbols)
     for damaged in (stream[:-1], stream + b"\0"):
-        assert not _core.decode_field(damaged, found, near.starts, near.near)
+        with pytest.raises(FormatError, match="symbols"):
+            decode_field(dataclasses.replace(whole, symbols=damaged), graph, columns, False)
 
 
 def test_zeros_cost_next_to_nothing() -> None:
-    stream, _ = _core.encode_field(np.zeros((4, COUNT), np.int32), GRAPH.starts, GRAPH.near)
+    stream, _ = _core.encode_field(np.zeros((4, COUNT), np.int32), GRAPH.core)
     assert len(stream) < 6
 
 
@@ -122,3 +127,19 @@ def test_absurd_records_are_refused(change: dict[str, object]) -> None:
 def test_trajectories_too_long_for_the_step_are_refused() -> None:
     with pytest.raises(InputError, match="too long"):
         encode_field(1e4 * trajectories(), GRAPH, Rate(LEVELS - 1, 0.1))
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_damaged_records_decode_to_rows_or_to_an_error_of_the_format(data: st.DataObject) -> None:
+    coded = encode_field(trajectories(), GRAPH, Rate(72, 0.1), ROUND)
+    record = bytearray(pack(coded.record))
+    for _ in range(data.draw(st.integers(0, 2))):
+        record[data.draw(st.integers(0, len(record) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+    damaged = bytes(record[: data.draw(st.integers(0, len(record)))]) + data.draw(st.binary(max_size=2))
+    try:
+        rows = _core.decode_field(damaged, GRAPH.core, 12, coded.has_mean)
+    except FormatError:
+        return
+    assert rows.shape == (COUNT, 12)
+    assert unpack(CodedField, damaged)[1] == len(damaged)

@@ -7,7 +7,7 @@ of layers decodes to a coarser mesh. T = 1 is the intra form. A group may be pre
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 import numpy as np
 from jaxtyping import Float64, Int32
@@ -132,18 +132,17 @@ class LayersRecords:
     """The records of a payload, or those of its first levels."""
 
     head: LayersGroup
-    levels: tuple[LayersLevel, ...]
+    layers: tuple[bytes, ...]  # the packed LayersGroup, then a packed LayersLevel for each level
     end: int  # offset behind them
 
 
 def read_layers(data: bytes, levels: int | None = None) -> LayersRecords:
     """The records of a payload, or only the first so many levels. Raises FormatError on damaged bytes."""
     head, offset = unpack(LayersGroup, data)
-    records = []
+    ends = [0, offset]
     for _ in range(head.levels if levels is None else min(levels, head.levels)):
-        record, offset = unpack(LayersLevel, data, offset)
-        records.append(record)
-    return LayersRecords(head, tuple(records), offset)
+        ends.append(unpack(LayersLevel, data, ends[-1])[1])
+    return LayersRecords(head, tuple(data[start:end] for start, end in pairwise(ends)), ends[-1])
 
 
 def decode_layers(
@@ -181,17 +180,17 @@ def place_layers(
     head = records.head
     previous = previous if head.origin == Origin.PREVIOUS else None
     base = _base(head, previous)
-    known = decode_trajectories(head.motion, base, head.frames, head.has_mean == Presence.PRESENT)
+    known = decode_trajectories(records.layers[0], base, head.frames)
     last = np.ascontiguousarray(known[:, :, -1])
     faces, room = base.faces, _Room.of(head.frames, 0, 0)
     scalars: list[Float64[np.ndarray, " _"]] = []
     finer: list[Connectivity] = []
-    for number, record in enumerate(records.levels, 1):
+    for number, record in enumerate(records.layers[1:], 1):
         near = _connectivity(previous, number) or connectivity(faces, len(known))
         if 3 * head.frames * near.level.count > MOST_NUMBERS:
             raise FormatError(f"{head.frames} frames of {len(near.level.faces)} faces exceed {MOST_NUMBERS} numbers")
         before = _before(previous, number)
-        if number < len(records.levels):
+        if number < len(records.layers) - 1:
             known, offsets = decode_level(record, near, known, before)
         else:
             room = _Room.of(head.frames, near.level.count, len(near.level.faces) * spare)
@@ -199,7 +198,7 @@ def place_layers(
         faces = near.level.faces
         finer.append(near)
         scalars.append(offsets)
-    positions = room.positions if records.levels else frames_of(known, place)
+    positions = room.positions if finer else frames_of(known, place)
     return DecodedLayers(faces, positions, LayersState(base.faces, last, tuple(scalars), tuple(finer)), room.faces)
 
 

@@ -6,18 +6,17 @@ decoded, from which both sides place them; the decoder as they come about.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
 
 from ... import _core
-from ...errors import FormatError
 from ...format.layout import LayersLevel, Origin
-from ...geometry.subdivision import Level, checked
+from ...geometry.subdivision import Level
 from ...types import Placement
-from .fields import EncodedField, FieldValues, Rate, encode_field, read_field
-from .graph import Connectivity, Siblings, siblings
+from .fields import EncodedField, Rate, encode_field
+from .graph import Connectivity, siblings
 
 SIBLING_WEIGHTS = (36, 16)  # tried, 64ths
 
@@ -57,44 +56,28 @@ def encode_level(
 
 
 def decode_level(
-    record: LayersLevel,
+    record: bytes,
     near: Connectivity,
     known: Float64[np.ndarray, "V 3 T"],
     previous: Float64[np.ndarray, " E"] | None,
 ) -> tuple[Float64[np.ndarray, "W 3 T"], Float64[np.ndarray, " E"]]:
     """Rows of the level's vertices from those of the coarser one's, and the last frame's scalars.
 
-    Raises FormatError on damaged records, or where they need a group that is not there.
+    `record` is a packed LayersLevel. Raises FormatError where it is damaged, or needs a group that is not there.
     """
-    scalars = _scalars(record, near.siblings, known.shape[2], previous)
-    return _core.refine_field(known, near.level.coarse, near.level.edges, scalars.arrays, record.curvature)
+    return _core.decode_level(record, near.core, known, previous)
 
 
 def decode_last(
-    record: LayersLevel,
+    record: bytes,
     near: Connectivity,
     known: Float64[np.ndarray, "V 3 T"],
     previous: Float64[np.ndarray, " E"] | None,
     shown: Shown,
 ) -> Float64[np.ndarray, " E"]:
     """As `decode_level`, of a last level, whose vertices it places. FormatError where they are not finite, too."""
-    scalars = _scalars(record, near.siblings, known.shape[2], previous)
     place = None if shown.place is None else shown.place.numbers
-    arrays = (known, near.level.coarse, near.level.edges, scalars.arrays)
-    finite, last = _core.refine_field_frames(*arrays, record.curvature, place, shown.positions)
-    checked(shown.positions, finite)
-    return last
-
-
-def _scalars(
-    record: LayersLevel, near: Siblings, frames: int, previous: Float64[np.ndarray, " E"] | None
-) -> FieldValues:
-    scalars = read_field(record.scalars, near.graph(record.sibling_weight), frames, False)
-    if record.origin == Origin.ALONE:
-        return scalars
-    if previous is None or len(previous) != len(near.starts) - 1:
-        raise FormatError("a level that is counted from a group which is not at hand, or not to this level")
-    return replace(scalars, before=previous)
+    return _core.decode_last_level(record, near.core, known, previous, place, shown.positions)
 
 
 def _cost(field: EncodedField, offsets: Float64[np.ndarray, "E T"], rate: Rate) -> float:

@@ -7,18 +7,18 @@ The basis as decoded is orthonormal, so all columns share one step. A column is 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from ... import _core
-from ...errors import FormatError, InputError
+from ...errors import InputError
 from ...format.layout import CodedField
+from ...format.records import pack
 from .. import entropy, klt
-from ..steps import LEVELS, step_of
+from ..steps import step_of
 from . import orthonormal
-from .graph import Graph, GraphArrays
+from .graph import Graph
 
 MOST_BITS = 30  # of a mean's fraction: one that is a diagonal long still fits 32 bits
 FINENESS = 20.0  # a basis vector's rounding turns its column's typical weight away by about 1 / FINENESS of a step
@@ -60,37 +60,6 @@ class EncodedField:
     symbol_bits: int
 
 
-FieldArrays: TypeAlias = tuple[
-    Int32[np.ndarray, "M V"],
-    GraphArrays,
-    float,
-    Float64[np.ndarray, "M C"],
-    Float64[np.ndarray, " C"],
-    Float64[np.ndarray, " V"] | None,
-]
-
-
-@dataclass(frozen=True, slots=True)
-class FieldValues:
-    """The trajectories of a field, as coded: what makes their numbers can do so on its way to what they are for."""
-
-    symbols: Int32[np.ndarray, "M V"]
-    graph: Graph
-    step: float
-    vectors: Float64[np.ndarray, "M C"]
-    mean: Float64[np.ndarray, " C"]
-    before: Float64[np.ndarray, " V"] | None = None  # what each trajectory is counted from, if not from 0
-
-    @property
-    def arrays(self) -> FieldArrays:
-        """As the core takes them."""
-        return (self.symbols, self.graph.arrays, self.step, self.vectors, self.mean, self.before)
-
-    def rows(self) -> Float64[np.ndarray, "V C"]:
-        """Their numbers."""
-        return _core.field_inverse(self.arrays)
-
-
 def encode_field(
     trajectories: Float64[np.ndarray, "V C"], graph: Graph, rate: Rate, surface: SurfaceWeight | None = None
 ) -> EncodedField:
@@ -111,26 +80,13 @@ def encode_field(
         coded = _Columns(centered, _only(basis, kept), graph, rate, surface)
     packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
     record = CodedField(len(kept), rate.step_level, packed, coded.stream)
-    values = FieldValues(coded.symbols, graph, rate.step, coded.vectors, np.ldexp(mean, -bits) * has_mean)
-    return EncodedField(record, has_mean, values.rows(), 8 * len(packed), 8 * len(coded.stream))
+    decoded = decode_field(record, graph, width, has_mean)
+    return EncodedField(record, has_mean, decoded, 8 * len(packed), 8 * len(coded.stream))
 
 
 def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "V C"]:
     """The trajectories of a record. Raises FormatError where it holds none of this width."""
-    return read_field(record, graph, width, has_mean).rows()
-
-
-def read_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> FieldValues:
-    """The same as coded."""
-    count = len(graph.starts) - 1
-    if record.columns > width or record.step_level >= LEVELS:
-        raise FormatError(f"{record.columns} columns of {width} numbers at step level {record.step_level}")
-    mean, vectors = _read_basis(record, width, has_mean)
-    entropy.check_plausible(count * record.columns, len(record.symbols), "symbols")
-    symbols = np.empty((record.columns, count), np.int32)
-    if not _core.decode_field(record.symbols, symbols, graph.starts, graph.near):
-        raise FormatError(f"{len(record.symbols)} bytes of symbols are truncated or damaged")
-    return FieldValues(symbols, graph, step_of(record.step_level), vectors, mean)
+    return _core.decode_field(pack(record), graph.core, width, has_mean)
 
 
 class _Columns:
@@ -154,16 +110,16 @@ class _Columns:
         if np.abs(self.weights).max(initial=0) > MOST_WEIGHT * rate.step:
             raise InputError(f"a trajectory {np.abs(self.weights).max():g} long is too long for step {rate.step:g}")
         self.symbols, self.decoded = self._quantized(graph, surface)
-        self.stream, self.sizes = _core.encode_field(self.symbols, graph.starts, graph.near)
+        self.stream, self.sizes = _core.encode_field(self.symbols, graph.core)
 
     def _quantized(
         self, graph: Graph, surface: SurfaceWeight | None
     ) -> tuple[Int32[np.ndarray, "M V"], Float64[np.ndarray, "M V"]]:
         step, price = self.rate.step, self.rate.price
         if surface is None:
-            return _core.predict_forward(self.weights, graph.starts, graph.near, graph.weights, step, price)
-        normals, tangential = surface.normals, surface.tangential
-        return _core.predict_surface(self.weights, graph.arrays, self.vectors, normals, tangential, step, price)
+            return _core.predict_forward(self.weights, graph.core, step, price)
+        metric = _core.Surface(self.vectors, surface.normals, surface.tangential)
+        return _core.predict_surface(self.weights, graph.core, metric, step, price)
 
     def pays(self) -> Bool[np.ndarray, " M"]:
         """True for the columns whose absence would cost more than they do."""
@@ -182,18 +138,3 @@ def _only(basis: klt.Basis, kept: Int64[np.ndarray, " M"]) -> klt.Basis:
 def _mean_bits(step: float) -> int:
     """Fraction bits, at most 30, at which the mean's rounding is a sixteenth of a step."""
     return int(np.clip(np.ceil(np.log2(8.0 / step)), 0, MOST_BITS))
-
-
-def _read_basis(
-    record: CodedField, width: int, has_mean: bool
-) -> tuple[Float64[np.ndarray, " C"], Float64[np.ndarray, "M C"]]:
-    """Mean and vectors."""
-    head = (1 + width) * has_mean
-    count = orthonormal.symbol_count(record.columns, width)
-    values = entropy.decode_integers(record.basis, head + count)
-    mean = np.zeros(width)
-    if has_mean:
-        if not 0 <= values[0] <= MOST_BITS:
-            raise FormatError(f"a mean of {values[0]} bits")
-        mean = np.ldexp(values[1:head].astype(np.float64), -int(values[0]))
-    return mean, orthonormal.inverse(np.ascontiguousarray(values[head:]), record.columns, width)

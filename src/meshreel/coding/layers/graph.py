@@ -7,7 +7,6 @@ that of the next, with each new vertex's siblings.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
@@ -16,8 +15,6 @@ from ... import _core
 from ...errors import FormatError
 from ...geometry.subdivision import Level, subdivide
 from ...types import Mesh
-
-GraphArrays: TypeAlias = tuple[Int64[np.ndarray, " S"], Int32[np.ndarray, " E"], Float64[np.ndarray, " E"]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +26,9 @@ class Graph:
     weights: Float64[np.ndarray, " E"]
 
     @property
-    def arrays(self) -> GraphArrays:
-        """As the core takes them."""
-        return self.starts, self.near, self.weights
+    def core(self) -> _core.Graph:
+        """The graph for calls of the core, which looks at these arrays."""
+        return _core.Graph(self.starts, self.near, self.weights)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +48,8 @@ class Siblings:
 
     def graph(self, weight: int) -> Graph:
         """Each new vertex's scalar is predicted by weight / 64 of the mean of its siblings'."""
-        return Graph(self.starts, self.near, _core.sibling_weights(self.starts, weight))
+        counts = np.diff(self.starts)
+        return Graph(self.starts, self.near, np.repeat(weight / (64.0 * np.maximum(counts, 1)), counts))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +58,11 @@ class Connectivity:
 
     level: Level
     siblings: Siblings
+
+    @property
+    def core(self) -> _core.Level:
+        """The level for calls of the core, which looks at these arrays."""
+        return _core.Level(self.level.coarse, self.level.edges, self.siblings.starts, self.siblings.near)
 
     @property
     def nbytes(self) -> int:

@@ -10,13 +10,10 @@ import numpy as np
 from jaxtyping import Float64
 
 from ... import _core
-from ...errors import FormatError
-from ...format.layout import CodedField
-from ...geometry.subdivision import frames_of
 from ...geometry.topology import vertex_normals
 from ...types import Mesh
-from .fields import EncodedField, Rate, SurfaceWeight, decode_field, encode_field
-from .graph import Hierarchy, hierarchy
+from .fields import EncodedField, Rate, SurfaceWeight, encode_field
+from .graph import hierarchy
 
 
 def encode_trajectories(
@@ -32,17 +29,14 @@ def encode_trajectories(
     normals = np.stack(frames, axis=1)[places.order].reshape(len(base.vertices), -1)
     surface = SurfaceWeight(np.ascontiguousarray(normals), tangential)
     field = encode_field(offsets.reshape(len(base.vertices), -1), places.graph, rate, surface)
-    return field, frames_of(_placed(field.decoded, base, places))
+    known = np.empty_like(positions)
+    known[:, places.order] = np.moveaxis(field.decoded.reshape(offsets.shape), 0, 1) + base.vertices[places.order]
+    return field, known
 
 
-def decode_trajectories(record: CodedField, base: Mesh, frames: int, has_mean: bool) -> Float64[np.ndarray, "V 3 T"]:
-    """Where the base's vertices are in every frame, as rows. Raises FormatError on damaged records."""
-    places = hierarchy(base)
-    return _placed(decode_field(record, places.graph, 3 * frames, has_mean), base, places)
+def decode_trajectories(record: bytes, base: Mesh, frames: int) -> Float64[np.ndarray, "V 3 T"]:
+    """Where the base's vertices are in every frame, as rows.
 
-
-def _placed(moved: Float64[np.ndarray, "V C"], base: Mesh, places: Hierarchy) -> Float64[np.ndarray, "V 3 T"]:
-    rows, finite = _core.place_rows(moved, places.order, base.vertices)
-    if not finite:
-        raise FormatError("a motion that is not finite")
-    return rows
+    `record` is a packed LayersGroup of so many frames. Raises FormatError where it is damaged.
+    """
+    return _core.decode_motion(record, base.vertices, base.faces, frames)

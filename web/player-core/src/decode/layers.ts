@@ -4,24 +4,16 @@
 import type { DecoderModule } from "draco3d";
 
 import { FormatError } from "../errors.ts";
-import { LayersGroup, LayersLevel, Origin, Presence } from "../format/layout.gen.ts";
+import { LayersGroup, LayersLevel, Origin } from "../format/layout.gen.ts";
+import { unpack } from "../format/records.ts";
 import { vertexCount } from "../mesh.ts";
 import type { Mesh, Placement } from "../mesh.ts";
-import { unpack } from "../format/records.ts";
-import type { Neighbours } from "../wasm/entropy.ts";
-import { fieldInverse, framesOfRows, hierarchy, placeRows, refineField, refineFieldFrames, siblingWeights, siblings, subdivide } from "../wasm/layers.ts";
-import type { FieldValues, Level } from "../wasm/layers.ts";
+import { connectivity, decodeLastLevel, decodeLevel, decodeMotion, framesOfRows } from "../wasm/layers.ts";
+import type { Connectivity } from "../wasm/layers.ts";
 import type { Core } from "../wasm/memory.ts";
-import { readField } from "./fields.ts";
 import { checkGrowth, checkStep, decodeMesh } from "./mesh.ts";
 
-const MOST_NUMBERS = 2 ** 29; // of decoded places
-
-/** What follows from the coarser level's faces alone, so that groups which share them share it. */
-interface Connectivity {
-  readonly level: Level;
-  readonly siblings: Neighbours;
-}
+const MOST_NUMBERS = 2 ** 29; // of decoded places: 4 GiB, as in Python
 
 /** What the next group may be predicted from. */
 export interface LayersState {
@@ -34,7 +26,7 @@ export interface LayersState {
 /** The records of a payload, or those of its first levels. */
 export interface LayersRecords {
   readonly head: LayersGroup;
-  readonly levels: readonly LayersLevel[];
+  readonly layers: readonly Uint8Array[]; // the LayersGroup, then a LayersLevel for each level, as bytes
   readonly end: number; // offset behind them
 }
 
@@ -45,43 +37,38 @@ export interface DecodedLayers {
 }
 
 export function readLayers(data: Uint8Array, levels: number | null): LayersRecords {
-  let [head, offset] = unpack(LayersGroup, data);
-  const records: LayersLevel[] = [];
+  let [head, end] = unpack(LayersGroup, data);
+  const layers = [data.subarray(0, end)];
   for (let count = Math.min(levels ?? head.levels, head.levels); count > 0; count--) {
-    const [record, end] = unpack(LayersLevel, data, offset);
-    records.push(record);
-    offset = end;
+    const start = end;
+    [, end] = unpack(LayersLevel, data, start);
+    layers.push(data.subarray(start, end));
   }
-  return { head, levels: records, end: offset };
+  return { head, layers, end };
 }
 
 /** What records decode to, placed; the state never is. FormatError on damaged records, or where `previous` lacks. */
 export function placeLayers(core: Core, draco: DecoderModule, records: LayersRecords, previous: LayersState | null, place: Placement): DecodedLayers {
-  const { head } = records;
+  const { head, layers } = records;
   if (head.origin !== Origin.PREVIOUS) previous = null;
   const base = baseOf(draco, head, previous);
   const frames = head.frames;
-  let rows = trajectories(core, head, base);
+  let rows = decodeMotion(core, layers[0], base, frames);
   const last = lastOf(rows, vertexCount(base), frames);
   const scalars: Float64Array[] = [];
   const finer: Connectivity[] = [];
   let [faces, vertices] = [base.faces, vertexCount(base)];
   let positions: Float64Array | null = null;
-  records.levels.forEach((record, k) => {
+  layers.slice(1).forEach((record, k) => {
     const near = previous?.finer[k] ?? connectivity(core, faces, vertices);
     const count = vertices + near.level.edges.length / 2;
     if (3 * frames * count > MOST_NUMBERS) throw new FormatError(`${frames} frames of ${near.level.faces.length / 3} faces exceed ${MOST_NUMBERS} numbers`);
-    const field = scalarsOf(core, record, near.siblings, frames, previous?.scalars[k] ?? null);
-    const refinement = { level: near.level, field, curvature: record.curvature };
-    if (k + 1 < records.levels.length) {
-      const [refined, offsets] = refineField(core, rows, refinement);
-      rows = refined;
-      scalars.push(offsets);
-    } else {
-      const shown = refineFieldFrames(core, rows, refinement, place);
-      positions = shown.positions;
-      scalars.push(shown.last);
-    }
+    const coarser = { frames, near, rows, previous: previous?.scalars[k] ?? null };
+    const isLast = k + 2 === layers.length;
+    const [refined, ofLast] = isLast ? decodeLastLevel(core, record, coarser, place) : decodeLevel(core, record, coarser);
+    if (isLast) positions = refined;
+    else rows = refined;
+    scalars.push(ofLast);
     [faces, vertices] = [near.level.faces, count];
     finer.push(near);
   });
@@ -101,28 +88,7 @@ function baseOf(draco: DecoderModule, head: LayersGroup, previous: LayersState |
   return base;
 }
 
-/** Where the base's vertices are in every frame, as rows. */
-function trajectories(core: Core, head: LayersGroup, base: Mesh): Float64Array {
-  const { order, graph } = hierarchy(core, base);
-  const field = readField(core, head.motion, graph, 3 * head.frames, head.hasMean === Presence.PRESENT);
-  return placeRows(core, fieldInverse(core, field), order, base.vertices);
-}
-
 /** The last frame of rows, vertex after vertex. */
 function lastOf(rows: Float64Array, vertices: number, frames: number): Float64Array {
   return Float64Array.from({ length: 3 * vertices }, (_, k) => rows[k * frames + frames - 1]);
-}
-
-function connectivity(core: Core, faces: Int32Array, vertices: number): Connectivity {
-  const level = subdivide(core, faces, vertices);
-  return { level, siblings: siblings(core, level) };
-}
-
-function scalarsOf(core: Core, record: LayersLevel, near: Neighbours, frames: number, before: Float64Array | null): FieldValues {
-  const field = readField(core, record.scalars, siblingWeights(core, near, record.siblingWeight), frames, false);
-  if (record.origin === Origin.ALONE) return field;
-  if (before === null || before.length !== near.starts.length - 1) {
-    throw new FormatError("a level that is counted from a group which is not at hand, or not to this level");
-  }
-  return { ...field, before };
 }

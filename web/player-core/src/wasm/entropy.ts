@@ -1,4 +1,4 @@
-// Entropy decoding, as core/include/meshreel/{entropy,field_coder}.h have it. False or null: the stream is damaged.
+// Entropy decoding, declared in core/include/meshreel/entropy.h. A damaged stream is null, or the number of its column.
 
 import { joined } from "../bytes.ts";
 import type { Arena, Core } from "./memory.ts";
@@ -12,7 +12,7 @@ export interface Neighbours {
 export function decodeIntegers(core: Core, data: Uint8Array, count: number): Int32Array | null {
   return core.run((arena) => {
     const values = arena.room(4 * count);
-    const status = core.call("meshreel_decode_integers", arena.put(data), data.length, count, values);
+    const status = core.call("mr_decode_integers", arena.put(data), data.length, count, values);
     return status === 0 ? arena.i32(values, count) : null;
   });
 }
@@ -23,22 +23,12 @@ export function decodeWeights(core: Core, streams: readonly Uint8Array[], count:
     const sizes = arena.put(Int32Array.from(streams, (stream) => stream.length));
     const [symbols, weights] = weightsOf(arena, streams.length, count, neighbours);
     const failed = arena.struct(["u32", 0]);
-    const status = core.call("meshreel_decode_weights", weights, arena.put(joined(streams)), sizes, failed);
+    const status = core.call("mr_decode_weights", weights, arena.put(joined(streams)), sizes, failed);
     return status === 0 ? arena.i32(symbols, count * streams.length) : arena.u32(failed);
   });
 }
 
-/** The symbols of so many columns out of one stream. */
-export function decodeField(core: Core, data: Uint8Array, columns: number, neighbours: Neighbours): Int32Array | null {
-  const count = neighbours.starts.length - 1;
-  return core.run((arena) => {
-    const [symbols, weights] = weightsOf(arena, columns, count, neighbours);
-    const status = core.call("meshreel_decode_field", weights, arena.put(data), data.length);
-    return status === 0 ? arena.i32(symbols, count * columns) : null;
-  });
-}
-
-/** Room for symbols, and a struct meshreel_weights around it. */
+/** Room for symbols, and a struct mr_weights around it. */
 function weightsOf(arena: Arena, columns: number, count: number, neighbours: Neighbours): [number, number] {
   const symbols = arena.room(4 * columns * count);
   const [starts, near] = [arena.put(neighbours.starts), arena.put(neighbours.near)];

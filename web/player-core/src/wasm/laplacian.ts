@@ -1,10 +1,8 @@
-// Laplacian coordinates, as core/include/meshreel/laplacian.h has them.
+// Laplacian coordinates, declared in core/include/meshreel/laplacian.h.
 
 import { FormatError } from "../errors.ts";
 import type { Mesh } from "../mesh.ts";
 import type { Core } from "./memory.ts";
-
-const SINGULAR = 2;
 
 /** Ascending anchors, far from each other, at least one for each component that has faces. */
 export function farthestAnchors(core: Core, faces: Int32Array, vertices: number, count: number): Int32Array {
@@ -17,7 +15,7 @@ export function farthestAnchors(core: Core, faces: Int32Array, vertices: number,
   });
 }
 
-/** What the least squares are set up from. */
+/** The mesh and the anchors that define the least squares. */
 export interface LaplacianSystem {
   readonly base: Mesh;
   readonly anchors: Int32Array; // vertices, ascending
@@ -28,24 +26,12 @@ export interface LaplacianSystem {
 export function laplacianInverse(core: Core, { base, anchors, anchorWeight }: LaplacianSystem, deltas: Float64Array, columns: number): Float64Array {
   const vertices = base.vertices.length / 3;
   return core.run((arena) => {
-    const made = arena.struct(["u32", 0]);
-    const mesh = [arena.put(base.vertices), BigInt(vertices), arena.put(base.faces), BigInt(base.faces.length / 3)] as const;
-    check(core.call("mr_laplacian_create", ...mesh, arena.put(anchors), BigInt(anchors.length), anchorWeight, made));
-    const system = arena.u32(made);
-    try {
-      const out = arena.room(8 * vertices * columns);
-      check(core.call("mr_laplacian_inverse", system, arena.put(deltas), BigInt(columns), out));
-      return arena.f64(out, vertices * columns);
-    } finally {
-      core.call("mr_laplacian_destroy", system);
-    }
+    const out = arena.room(8 * vertices * columns);
+    const system = [arena.mesh(base), arena.put(anchors), BigInt(anchors.length), anchorWeight] as const;
+    const status = core.call("mr_laplacian_solve", ...system, arena.put(deltas), BigInt(columns), out);
+    core.check(status, "displacements: the base's least squares have no solution: ");
+    return arena.f64(out, vertices * columns);
   });
-}
-
-function check(status: number): void {
-  if (status === 0) return;
-  const why = status === SINGULAR ? "a connected component has no anchor" : "an index is out of range or a coordinate is not finite";
-  throw new FormatError(`displacements: the base's least squares have no solution: ${why}`);
 }
 
 /** Rows of `width` numbers: the mean plus the sum of weights times vectors, in their order (eq. 9). */

@@ -1,31 +1,8 @@
-// The form LAYERS, as core/include/meshreel/layers.h has it.
+// The form LAYERS, declared in core/include/meshreel/layers.h.
 
-import { FormatError } from "../errors.ts";
 import type { Mesh, Placement } from "../mesh.ts";
 import type { Neighbours } from "./entropy.ts";
 import type { Arena, Core } from "./memory.ts";
-
-/** A causal graph: each value is predicted by the weighted sum of those near it, which come before it. */
-export interface Graph extends Neighbours {
-  readonly weights: Float64Array;
-}
-
-/** An order of a mesh's vertices, coarse to fine, and the graph of their places in it. */
-export interface Hierarchy {
-  readonly order: Int32Array;
-  readonly graph: Graph;
-}
-
-/** A field as coded: symbols column after column, of `columns` orthonormal vectors of `width` numbers. */
-export interface FieldValues {
-  readonly symbols: Int32Array;
-  readonly graph: Graph;
-  readonly step: number;
-  readonly columns: number;
-  readonly vectors: Float64Array;
-  readonly means: Float64Array; // `width` numbers
-  readonly before: Float64Array | null; // one number a value, added to its row
-}
 
 /** One midpoint subdivision: what it does to the connectivity. */
 export interface Level {
@@ -35,183 +12,112 @@ export interface Level {
   readonly vertices: number; // of the coarser mesh
 }
 
-export function hierarchy(core: Core, base: Mesh): Hierarchy {
-  const vertices = base.vertices.length / 3;
-  return core.run((arena) => {
-    const made = arena.struct(["u32", 0]);
-    check(core.call("mr_hierarchy_create", arena.put(base.vertices), vertices, arena.put(base.faces), base.faces.length / 3, made));
-    const owner = arena.u32(made);
-    try {
-      const order = arena.i32(core.call("mr_hierarchy_order", owner), vertices);
-      const graph = arena.struct(["u32", 0], ["u32", 0], ["u32", 0], ["u32", 0]);
-      core.call("mr_hierarchy_graph", graph, owner); // a struct is given back through its place
-      const starts = arena.i64(arena.u32(graph + 4), vertices + 1);
-      const links = Number(starts[vertices]);
-      return { order, graph: { starts, near: arena.i32(arena.u32(graph + 8), links), weights: arena.f64(arena.u32(graph + 12), links) } };
-    } finally {
-      core.call("mr_hierarchy_destroy", owner);
-    }
-  });
-}
-
-/** `count` orthonormal vectors of `width` numbers. */
-export function orthonormalInverse(core: Core, symbols: Int32Array, count: number, width: number): Float64Array {
-  return core.run((arena) => {
-    const out = arena.room(8 * count * width);
-    if (core.call("mr_orthonormal_inverse", arena.put(symbols), count, width, out) !== 0) throw new FormatError("a basis vector without a direction");
-    return arena.f64(out, count * width);
-  });
-}
-
-/** A row of numbers for each value. */
-export function fieldInverse(core: Core, field: FieldValues): Float64Array {
-  const count = (field.graph.starts.length - 1) * field.means.length;
-  return core.run((arena) => {
-    const rows = arena.room(8 * count);
-    check(core.call("mr_field_inverse", fieldOf(arena, field), rows));
-    return arena.f64(rows, count);
-  });
-}
-
-/** Where vertices are in all frames: rows of all frames' x, then their y, then their z. FormatError where not finite. */
-export function placeRows(core: Core, moved: Float64Array, order: Int32Array, base: Float64Array): Float64Array {
-  const vertices = order.length;
-  const frames = vertices > 0 ? moved.length / vertices / 3 : 0;
-  return core.run((arena) => {
-    const rows = arena.room(8 * moved.length);
-    const finite = core.call("mr_place_rows", arena.put(moved), arena.put(order), arena.put(base), vertices, frames, rows);
-    if (!finite) throw new FormatError("a motion that is not finite");
-    return arena.f64(rows, moved.length);
-  });
+/** Connectivity of a level. It follows from the coarser level's faces alone, so groups that share them share it. */
+export interface Connectivity {
+  readonly level: Level;
+  readonly siblings: Neighbours; // for each new vertex the earlier ones that share a face of the coarser level with it
 }
 
 export function subdivide(core: Core, faces: Int32Array, vertices: number): Level {
   const faceCount = faces.length / 3;
   return core.run((arena) => {
     const [edges, finer, found] = [arena.room(24 * faceCount), arena.room(48 * faceCount), arena.struct(["u32", 0])];
-    check(core.call("mr_subdivide", arena.put(faces), faceCount, vertices, edges, finer, found));
+    core.check(core.call("mr_subdivide", arena.put(faces), faceCount, vertices, edges, finer, found));
     return { coarse: faces, edges: arena.i32(edges, 2 * arena.u32(found)), faces: arena.i32(finer, 12 * faceCount), vertices };
   });
 }
 
-/** For each new vertex of a level those before it that share a face of the coarser level with it. */
-export function siblings(core: Core, level: Level): Neighbours {
-  const [faceCount, edgeCount] = [level.coarse.length / 3, level.edges.length / 2];
+export function connectivity(core: Core, faces: Int32Array, vertices: number): Connectivity {
+  const level = subdivide(core, faces, vertices);
+  const [faceCount, edgeCount] = [faces.length / 3, level.edges.length / 2];
   return core.run((arena) => {
     const [starts, near] = [arena.room(8 * (edgeCount + 1)), arena.room(12 * faceCount)];
-    check(core.call("mr_siblings", arena.put(level.faces), faceCount, level.vertices, edgeCount, starts, near));
+    core.check(core.call("mr_siblings", arena.put(level.faces), faceCount, vertices, edgeCount, starts, near));
     const found = arena.i64(starts, edgeCount + 1);
-    return { starts: found, near: arena.i32(near, Number(found[edgeCount])) };
+    return { level, siblings: { starts: found, near: arena.i32(near, Number(found[edgeCount])) } };
   });
 }
 
-/** Weights that predict each by weight / 64 of the mean of those near it. */
-export function siblingWeights(core: Core, near: Neighbours, weight: number): Graph {
+/** Rows of the base mesh's vertices out of a LayersGroup record: for each vertex the x of all frames, then their y, then their z. */
+export function decodeMotion(core: Core, record: Uint8Array, base: Mesh, frames: number): Float64Array {
+  const size = frames * base.vertices.length;
   return core.run((arena) => {
-    const weights = arena.room(8 * near.near.length);
-    core.call("mr_sibling_weights", arena.put(near.starts), near.starts.length - 1, weight, weights);
-    return { ...near, weights: arena.f64(weights, near.near.length) };
+    const rows = arena.room(8 * size);
+    core.check(core.call("mr_decode_motion", arena.record(record), arena.mesh(base), frames, rows));
+    return arena.f64(rows, size);
   });
 }
 
-/** What makes a level's new vertices: how it is subdivided, and how far along its normals they lie. */
-export interface Refinement {
-  readonly level: Level;
-  readonly field: FieldValues;
-  readonly curvature: number; // 64ths of the bend of its edges by which midpoints are lifted
+/** What a LayersLevel record refines. */
+export interface Coarser {
+  readonly frames: number;
+  readonly near: Connectivity;
+  readonly rows: Float64Array; // of the coarser level's vertices
+  readonly previous: Float64Array | null; // scalars of the level in the last frame of the group before
 }
 
-/** Rows of the finer level's vertices from the coarser one's, and the last frame's scalars. */
-export function refineField(core: Core, rows: Float64Array, { level, field, curvature }: Refinement): [Float64Array, Float64Array] {
-  const frames = field.means.length;
-  const edgeCount = level.edges.length / 2;
-  const size = 3 * frames * (level.vertices + edgeCount);
+/** Rows of the finer level's vertices, and the last frame's scalars. FormatError where the record is damaged. */
+export function decodeLevel(core: Core, record: Uint8Array, coarser: Coarser): [Float64Array, Float64Array] {
+  const { rows } = coarser;
+  const { edgeCount, size } = sizesOf(coarser);
   return core.run((arena) => {
     const [finer, last] = [arena.room(8 * size), arena.room(8 * edgeCount)];
     new Float64Array(core.buffer, finer, rows.length).set(rows);
-    check(core.call("mr_refine_field", levelOf(arena, level, frames, curvature), fieldOf(arena, field), finer, last));
+    core.check(core.call("mr_decode_level", arena.record(record), levelOf(arena, coarser), finer, last));
     return [arena.f64(finer, size), arena.f64(last, edgeCount)];
   });
 }
 
-/** How the last level's vertices are shown. */
-export interface Refined {
-  readonly positions: Float64Array; // frames x vertices x 3
-  readonly last: Float64Array;
-}
-
-/** The same of a last level, as frames. FormatError where they are not finite. */
-export function refineFieldFrames(core: Core, rows: Float64Array, { level, field, curvature }: Refinement, place: Placement): Refined {
-  const frames = field.means.length;
-  const edgeCount = level.edges.length / 2;
-  const size = 3 * frames * (level.vertices + edgeCount);
+/** Positions of a last level, frames x vertices x 3, and the last frame's scalars. */
+export function decodeLastLevel(core: Core, record: Uint8Array, coarser: Coarser, place: Placement): [Float64Array, Float64Array] {
+  const { edgeCount, size } = sizesOf(coarser);
   return core.run((arena) => {
     const [positions, last] = [arena.room(8 * size), arena.room(8 * edgeCount)];
-    const out = framesOf(arena, positions, place);
-    const arrays = [levelOf(arena, level, frames, curvature), fieldOf(arena, field), arena.put(rows), last] as const;
-    check(core.call("mr_refine_field_frames", ...arrays, out));
-    checkFinite(arena, out);
-    return { positions: arena.f64(positions, size), last: arena.f64(last, edgeCount) };
+    const arrays = [arena.record(record), levelOf(arena, coarser), arena.put(coarser.rows), last] as const;
+    core.check(core.call("mr_decode_last_level", ...arrays, framesOf(arena, positions, place)));
+    return [arena.f64(positions, size), arena.f64(last, edgeCount)];
   });
 }
 
-/** Frames of rows. FormatError where they are not finite. */
+/** Rows as frames. FormatError where they are not finite. */
 export function framesOfRows(core: Core, rows: Float64Array, vertices: number, place: Placement): Float64Array {
   return core.run((arena) => {
     const positions = arena.room(8 * rows.length);
-    const out = framesOf(arena, positions, place);
-    check(core.call("mr_frames_of_rows", arena.put(rows), vertices > 0 ? rows.length / vertices / 3 : 0, vertices, out));
-    checkFinite(arena, out);
+    const frames = vertices > 0 ? rows.length / vertices / 3 : 0;
+    core.check(core.call("mr_frames_of_rows", arena.put(rows), frames, vertices, framesOf(arena, positions, place)));
     return arena.f64(positions, rows.length);
   });
 }
 
-const FINITE = 8; // offset of mr_frames.finite
+/** How many edges the coarser level has, and numbers the finer one. */
+function sizesOf({ frames, near }: Coarser): { edgeCount: number; size: number } {
+  const { edges, vertices } = near.level;
+  const edgeCount = edges.length / 2;
+  return { edgeCount, size: 3 * frames * (vertices + edgeCount) };
+}
 
+/** A struct mr_frames. */
 function framesOf(arena: Arena, positions: number, place: Placement): number {
   const [x, y, z] = place.origin;
-  const placement = arena.struct(["f64", place.scale], ["f64", x], ["f64", y], ["f64", z]);
-  return arena.struct(["u32", positions], ["u32", placement], ["i32", 0]);
+  return arena.struct(["u32", positions], ["u32", arena.struct(["f64", place.scale], ["f64", x], ["f64", y], ["f64", z])]);
 }
 
-function checkFinite(arena: Arena, frames: number): void {
-  if (arena.u32(frames + FINITE) === 0) throw new FormatError("vertices that are not finite");
-}
-
-function levelOf(arena: Arena, level: Level, frames: number, curvature: number): number {
+/** A struct mr_level. */
+function levelOf(arena: Arena, coarser: Coarser): number {
+  const { level, siblings } = coarser.near;
+  const { edgeCount } = sizesOf(coarser);
   const [faces, edges] = [arena.put(level.coarse), arena.put(level.edges)];
+  const [starts, near] = [arena.put(siblings.starts), arena.put(siblings.near)];
+  const previous = coarser.previous?.length === edgeCount ? arena.put(coarser.previous) : 0;
   return arena.struct(
-    ["u32", frames],
+    ["u32", coarser.frames],
     ["u32", level.vertices],
     ["u32", faces],
     ["u32", level.coarse.length / 3],
     ["u32", edges],
-    ["u32", level.edges.length / 2],
-    ["i32", curvature],
-  );
-}
-
-/** A struct mr_field: its graph, its basis, then symbols, step and what values are counted from. */
-function fieldOf(arena: Arena, field: FieldValues): number {
-  const { graph } = field;
-  const [starts, near, weights] = [arena.put(graph.starts), arena.put(graph.near), arena.put(graph.weights)];
-  const [vectors, means, symbols] = [arena.put(field.vectors), arena.put(field.means), arena.put(field.symbols)];
-  const before = field.before === null ? 0 : arena.put(field.before);
-  return arena.struct(
-    ["u32", graph.starts.length - 1],
+    ["u32", edgeCount],
     ["u32", starts],
     ["u32", near],
-    ["u32", weights],
-    ["u32", field.columns],
-    ["u32", field.means.length],
-    ["u32", vectors],
-    ["u32", means],
-    ["u32", symbols],
-    ["f64", field.step],
-    ["u32", before],
+    ["u32", previous],
   );
-}
-
-function check(status: number): void {
-  if (status !== 0) throw new FormatError("an index is out of range, or a graph is not causal");
 }

@@ -1,12 +1,17 @@
 // The core's wasm instance and its memory. Arrays are copied in, results out: what JavaScript holds outlives the instance.
 
+import { FormatError } from "../errors.ts";
+import type { Mesh } from "../mesh.ts";
+
 type Call = (...values: (number | bigint)[]) => number | bigint | undefined;
+
+const NO_MEMORY = 3; // mr_status, core/include/meshreel/status.h
 
 /** What C++ takes for one argument or one field of a struct. */
 type Scalar = readonly ["u32" | "i32" | "f64", number];
 export type Bytes = Uint8Array | Int32Array | Float64Array | BigInt64Array;
 
-/** A core that ran out of memory or met what it should not have: its instance cannot be used again. */
+/** The core ran out of memory or trapped: its instance cannot be used again. */
 export class CoreStopped extends Error {
   override name = "CoreStopped";
 }
@@ -22,14 +27,14 @@ export class Core {
   }
 
   static async create(module: WebAssembly.Module): Promise<Core> {
-    // The standard library would write why it stops; there is nowhere to, and the trap tells that it did.
+    // The standard library would write why it stops, but there is nowhere to write to; the trap reports that it stopped.
     const wasi = { fd_close: () => 0, fd_seek: () => 0, fd_write: () => 0 };
     const core = new Core(await WebAssembly.instantiate(module, { wasi_snapshot_preview1: wasi }));
     core.calls["_initialize"]?.();
     return core;
   }
 
-  /** Calls an exported function; what it gives, 0 for nothing. Throws CoreStopped where it traps. */
+  /** Calls an exported function and returns its result, 0 for none. Throws CoreStopped where it traps. */
   call(name: string, ...values: (number | bigint)[]): number {
     try {
       return Number(this.calls[name](...values) ?? 0);
@@ -38,7 +43,15 @@ export class Core {
     }
   }
 
-  /** What `body` gives; the memory that it took is free again behind it. */
+  /** Throws FormatError with `what` and the core's message where a call's status is not 0; CoreStopped where memory ran out. */
+  check(status: number, what = ""): void {
+    if (status === 0) return;
+    const text = new Uint8Array(this.buffer, this.call("mr_message", status));
+    const message = what + new TextDecoder().decode(text.slice(0, text.indexOf(0)));
+    throw status === NO_MEMORY ? new CoreStopped(message) : new FormatError(message);
+  }
+
+  /** Returns what `body` returns; the memory that `body` took is free again afterwards. */
   run<T>(body: (arena: Arena) => T): T {
     const arena = new Arena(this);
     try {
@@ -48,7 +61,7 @@ export class Core {
     }
   }
 
-  /** The memory as it is now: it moves when it grows, so nobody keeps this. */
+  /** The memory as it is now. It moves when it grows: do not keep this. */
   get buffer(): ArrayBuffer {
     return this.memory.buffer;
   }
@@ -60,7 +73,7 @@ export class Arena {
 
   constructor(readonly core: Core) {}
 
-  /** Room for so many bytes, aligned for everything. Throws CoreStopped where there is none. */
+  /** Room for `size` bytes, aligned for every type. Throws CoreStopped where there is none. */
   room(size: number): number {
     const place = this.core.call("mr_allocate", Math.max(size, 1));
     if (place === 0) throw new CoreStopped(`no memory for ${size} bytes`);
@@ -89,6 +102,17 @@ export class Arena {
       offset += sizeOf(kind);
     }
     return place;
+  }
+
+  /** A struct mr_bytes around a copy of bytes. */
+  record(bytes: Uint8Array): number {
+    return this.struct(["u32", this.put(bytes)], ["u32", bytes.length]);
+  }
+
+  /** A struct mr_mesh around copies of a mesh's arrays. */
+  mesh({ vertices, faces }: Mesh): number {
+    const [positions, corners] = [this.put(vertices), this.put(faces)];
+    return this.struct(["u32", positions], ["u32", vertices.length / 3], ["u32", corners], ["u32", faces.length / 3]);
   }
 
   /** Copies of what lies at a place. */

@@ -1,6 +1,5 @@
-// Vertices as the GPU takes them, as core/wasm/packing.h has it.
+// Vertices as the GPU takes them, declared in core/wasm/packing.h.
 
-import { FormatError } from "../errors.ts";
 import type { Mesh } from "../mesh.ts";
 import type { Core } from "./memory.ts";
 
@@ -24,12 +23,8 @@ export function growBox(core: Core, positions: Float64Array, bounds: Bounds): Bo
 export function packVertices(core: Core, mesh: Mesh, bounds: Bounds): Uint16Array {
   const count = mesh.vertices.length / 3;
   return core.run((arena) => {
-    const positions = arena.put(mesh.vertices);
-    const sums = arena.room(24 * count);
-    const status = core.call("mr_normal_sums", positions, count, arena.put(mesh.faces), mesh.faces.length / 3, sums);
-    if (status !== 0) throw new FormatError(`a face that names none of ${count} vertices`);
     const texels = arena.room(8 * count);
-    core.call("mr_pack_vertices", positions, sums, count, arena.put(bounds), texels);
+    core.check(core.call("mr_pack_vertices", arena.mesh(mesh), arena.put(bounds), texels));
     return arena.u16(texels, 4 * count);
   });
 }

@@ -1,4 +1,5 @@
-// What surrounds a weight on the mesh and in earlier columns, as contexts for its magnitude and a prediction of its sign.
+// What surrounds a weight on the mesh and in earlier columns, as contexts for its magnitude and a prediction of its
+// sign.
 //
 // Integers only, in a fixed order: encoder and decoder, on every platform, see the same contexts.
 #pragma once
@@ -8,14 +9,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "magnitude_classes.h"
 #include "meshreel/entropy.h"
-#include "meshreel/magnitude_classes.h"
 
-namespace meshreel::entropy {
+namespace meshreel {
 
-constexpr int kSigns = 48;  // predicted sign x how strongly predicted x magnitude (1, 2, more)
+constexpr int kSigns = 48;       // predicted sign x how strongly predicted x magnitude (1, 2, more)
 constexpr size_t kNearest = 32;  // neighbours looked at, the last in order
-constexpr size_t kHistory = 6;  // earlier columns that predict
+constexpr size_t kHistory = 6;   // earlier columns that predict
 constexpr size_t kTaps = kHistory + 2;
 
 constexpr ClassTable<1> kClassOf;
@@ -64,7 +65,7 @@ public:
     }
 
 private:
-    static constexpr int64_t kCaution = 2560;  // 256 / 2560: a tenth of the error is learned at once
+    static constexpr int64_t kCaution = 2560;   // 256 / 2560: a tenth of the error is learned at once
     static constexpr int64_t kLimit = 1 << 18;  // 4, in units of 2^-16
 
     std::array<int64_t, kTaps> weights_{};
@@ -75,7 +76,7 @@ private:
 // the current one at smaller indices.
 class Surroundings {
 public:
-    explicit Surroundings(const meshreel_weights& weights)
+    explicit Surroundings(const mr_weights& weights)
         : weights_(weights),
           current_(weights.count),
           past_(weights.count),
@@ -170,7 +171,7 @@ private:
         expected_ -= expected_ / 6;
     }
 
-    const meshreel_weights& weights_;
+    const mr_weights& weights_;
     std::vector<int16_t> current_;
     std::vector<uint32_t> past_;
     std::vector<int16_t> history_;  // kHistory values a vertex, the column before first
@@ -187,4 +188,4 @@ private:
     uint32_t age_ = 0;
 };
 
-}  // namespace meshreel::entropy
+}  // namespace meshreel

@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace meshreel::entropy {
+namespace meshreel {
 
 constexpr int kClasses = 15;
-constexpr int kClamp = 255;  // larger magnitudes say no more about the scale
+constexpr int kClamp = 255;                 // larger magnitudes say no more about the scale
 constexpr uint64_t kFirstRatio = 1u << 11;  // a column about as large as the one before
 
 // Where a class begins, in sixteenths of a step.
@@ -35,4 +35,4 @@ private:
     std::array<uint8_t, kLast + 1> classes_{};
 };
 
-}  // namespace meshreel::entropy
+}  // namespace meshreel

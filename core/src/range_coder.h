@@ -1,7 +1,7 @@
 // The binary adaptive range coder: 32-bit range with carry, probabilities that learn at two speeds.
 //
-// RangeEncoder and RangeDecoder have the same face, so one template codes a value both ways: bit(model, b) takes the true
-// bit when encoding, ignores it when decoding, and returns the bit.
+// RangeEncoder and RangeDecoder have the same face, so one template codes a value both ways: bit(model, b) takes the
+// true bit when encoding, ignores it when decoding, and returns the bit.
 #pragma once
 
 #include <array>
@@ -9,15 +9,17 @@
 #include <cstdint>
 #include <vector>
 
-namespace meshreel::entropy {
+namespace meshreel {
 
-constexpr uint32_t kTop = 1u << 24;  // the range never stays below
+constexpr uint32_t kTop = 1u << 24;    // the range never stays below
 constexpr uint32_t kSlowMemory = 300;  // symbols: weights are not stationary over a mesh, so a model forgets,
-constexpr uint32_t kFastMemory = 18;   // and averages a patient and a hasty estimate (1 to 3 % less than the patient one)
+constexpr uint32_t kFastMemory =
+    18;  // and averages a patient and a hasty estimate (1 to 3 % less than the patient one)
 
 constexpr std::array<uint32_t, kSlowMemory + 1> learning_rates() {
     std::array<uint32_t, kSlowMemory + 1> rates{};
-    for (uint32_t n = 0; n <= kSlowMemory; ++n) rates[n] = 65536 / (n + 2);  // Krichevsky-Trofimov, until the memory is full
+    for (uint32_t n = 0; n <= kSlowMemory; ++n)
+        rates[n] = 65536 / (n + 2);  // Krichevsky-Trofimov, until the memory is full
     return rates;
 }
 inline constexpr auto kRates = learning_rates();
@@ -30,10 +32,14 @@ struct Model {  // slow and fast apart: a compiler that makes one vector of them
 
     void update(bool bit) { bit ? update_one() : update_zero(); }
     void update_one() {
-        learn([](uint32_t one, uint32_t rate) { return one + static_cast<uint32_t>((static_cast<uint64_t>(~one) * rate) >> 16); });
+        learn([](uint32_t one, uint32_t rate) {
+            return one + static_cast<uint32_t>((static_cast<uint64_t>(~one) * rate) >> 16);
+        });
     }
     void update_zero() {
-        learn([](uint32_t one, uint32_t rate) { return one - static_cast<uint32_t>((static_cast<uint64_t>(one) * rate) >> 16); });
+        learn([](uint32_t one, uint32_t rate) {
+            return one - static_cast<uint32_t>((static_cast<uint64_t>(one) * rate) >> 16);
+        });
     }
 
 private:
@@ -111,7 +117,8 @@ private:
         return value;
     }
     void carry() {
-        for (size_t k = out_->size(); k > begin_ && ++(*out_)[k - 1] == 0; --k) {}
+        for (size_t k = out_->size(); k > begin_ && ++(*out_)[k - 1] == 0; --k) {
+        }
     }
 
     std::vector<uint8_t>* out_;
@@ -151,7 +158,8 @@ public:
     size_t position() const { return position_; }
     bool failed() const { return position_ > size_ + 3; }  // a whole stream is read at most 3 bytes past its end
 
-    // True where the stream is exactly what the encoder writes for the symbols decoded: no byte missing, none left over.
+    // True where the stream is exactly what the encoder writes for the symbols decoded: no byte missing, none left
+    // over.
     bool finish() const {
         uint32_t window = 0;
         for (size_t k = position_ - 4; k < position_; ++k) window = window << 8 | (k < size_ ? data_[k] : 0u);
@@ -179,4 +187,4 @@ private:
     uint32_t range_ = 0xFFFFFFFFu;
 };
 
-}  // namespace meshreel::entropy
+}  // namespace meshreel

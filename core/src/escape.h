@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "meshreel/range_coder.h"
+#include "range_coder.h"
 
-namespace meshreel::entropy {
+namespace meshreel {
 
 constexpr int kUnary = 20;  // magnitudes below have a model a step; above, an Exp-Golomb escape
 
@@ -19,7 +19,8 @@ struct EscapeModels {
 template <class Coder>
 uint64_t code_escape(Coder& coder, EscapeModels& models, uint64_t value) {
     int length = 0;
-    while (length < 32 && coder.bit(models.exponent[length < 31 ? length : 31], (value + 1) >> (length + 1) != 0)) ++length;
+    while (length < 32 && coder.bit(models.exponent[length < 31 ? length : 31], (value + 1) >> (length + 1) != 0))
+        ++length;
     uint64_t read = 1;
     for (int k = length - 1; k >= 0; --k) {
         const bool bit = (value + 1) >> k & 1;
@@ -34,6 +35,6 @@ uint64_t code_escape(Coder& coder, EscapeModels& models, uint64_t value) {
 inline bool fits(int64_t value) { return value >= INT32_MIN && value <= INT32_MAX; }
 
 // A coded bit costs at least -log2(65520 / 65536) = 1 / 2840 bit: a stream can say no more than this many symbols.
-inline bool is_plausible(size_t count, size_t size) { return count / 22800 <= size + 3; }
+inline bool is_plausible(uint64_t count, size_t size) { return count / 22800 <= size + 3; }
 
-}  // namespace meshreel::entropy
+}  // namespace meshreel

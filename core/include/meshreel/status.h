@@ -1,0 +1,47 @@
+// What calls of the C ABI return, and the arguments that several of them take.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum mr_status {
+    MR_OK = 0,
+    MR_BAD_INPUT,  // an index out of range or out of order, or a number that is not allowed
+    MR_SINGULAR,   // a connected component has no anchor
+    MR_NO_MEMORY,
+    MR_OVERFLOW,       // a symbol beyond 32 bits
+    MR_OUT_TOO_SMALL,  // sizes are set: call again with that much room
+    // Bytes of a file that no encoder wrote:
+    MR_BAD_STREAM,    // truncated, damaged, or longer than what it holds
+    MR_BAD_RECORD,    // the fields of a record do not fit its bytes
+    MR_BAD_COLUMNS,   // more columns than numbers in a row, or a step that the ladder does not have
+    MR_BAD_BASIS,     // the integers of a basis: see MR_BAD_STREAM
+    MR_BAD_MEAN,      // more bits than a mean may have
+    MR_NO_DIRECTION,  // a basis vector of zeros
+    MR_BAD_SYMBOLS,   // the symbols of a field: see MR_BAD_STREAM
+    MR_NO_PREVIOUS,   // a level is counted from another group, which the caller does not have
+    MR_NOT_FINITE,    // decoded vertices
+};
+
+// A status in words, without a full stop.
+const char* mr_message(int status);
+
+struct mr_bytes {
+    const uint8_t* data;
+    size_t size;
+};
+
+struct mr_mesh {
+    const double* positions;  // vertices x 3
+    size_t vertices;
+    const int32_t* faces;  // face_count x 3
+    size_t face_count;
+};
+
+#ifdef __cplusplus
+}
+#endif

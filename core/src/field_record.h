@@ -1,0 +1,49 @@
+// The records of the form LAYERS as they lie in a file (FORMAT.md): parsed, and their streams decoded.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "field_rows.h"
+#include "meshreel/layers.h"
+
+namespace meshreel {
+
+struct CodedField {
+    uint64_t columns;
+    uint8_t step_level;
+    mr_bytes basis, symbols;
+};
+
+struct LayersGroup {
+    uint8_t frames;
+    bool has_mean;
+    CodedField motion;
+};
+
+struct LayersLevel {
+    bool follows;  // its scalars are counted from the last frame of the group before
+    int curvature, sibling_weight;
+    CodedField scalars;
+};
+
+// False where the bytes are not exactly one such record.
+bool parse(const mr_bytes& bytes, CodedField& record);
+bool parse(const mr_bytes& bytes, LayersGroup& record);
+bool parse(const mr_bytes& bytes, LayersLevel& record);
+
+// What the streams of a CodedField hold.
+struct FieldStreams {
+    std::vector<double> vectors, means;
+    std::vector<int32_t> symbols;
+    size_t columns;
+    double step;
+
+    Field over(const mr_graph& graph) const;
+};
+
+// Returns a status. The graph must be causal. May throw std::bad_alloc.
+int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, bool has_mean, FieldStreams& out);
+
+}  // namespace meshreel

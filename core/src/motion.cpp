@@ -1,0 +1,69 @@
+// Decoding of a field, and of the motion of a group's base mesh.
+#include <algorithm>
+#include <memory>
+#include <vector>
+
+#include "arrays.h"
+#include "field_record.h"
+#include "guarded.h"
+#include "meshreel/layers.h"
+
+namespace meshreel {
+namespace {
+
+// Writes the rows of vertices order[0], order[1] ...: their displacements, frame after frame x, y and z, from their
+// places in `base`. Returns false where a number is not finite.
+bool place_rows(FieldRows& field, const int32_t* order, const mr_mesh& base, size_t frames, double* rows) {
+    std::vector<double> block(kRowBlock * 3 * frames);
+    double waste = 0.0;  // of numbers that are not finite: any other number times 0 is 0
+    for (size_t first = 0; first < base.vertices; first += kRowBlock) {
+        const size_t count = std::min(kRowBlock, base.vertices - first);
+        field.next(count, block.data());
+        for (size_t p = 0; p < count; ++p) {
+            const double* moved = block.data() + 3 * frames * p;
+            const size_t v = static_cast<size_t>(order[first + p]);
+            for (size_t k = 0; k < 3; ++k) {
+                double* out = rows + (3 * v + k) * frames;
+                const double from = base.positions[3 * v + k];
+                for (size_t t = 0; t < frames; ++t) out[t] = moved[3 * t + k] + from, waste += out[t] * 0.0;
+            }
+        }
+    }
+    return waste == 0.0;
+}
+
+int decode_motion(const LayersGroup& record, const mr_mesh& base, double* rows) {
+    mr_hierarchy* made = nullptr;
+    int status = mr_hierarchy_create(&base, &made);
+    if (status != MR_OK) return status;
+    const std::unique_ptr<mr_hierarchy, void (*)(mr_hierarchy*)> owner(made, mr_hierarchy_destroy);
+    const mr_graph graph = mr_hierarchy_graph(made);
+    FieldStreams streams;
+    status = decode_streams(record.motion, graph, size_t{3} * record.frames, record.has_mean, streams);
+    if (status != MR_OK) return status;
+    FieldRows field(streams.over(graph));
+    return place_rows(field, mr_hierarchy_order(made), base, record.frames, rows) ? MR_OK : MR_NOT_FINITE;
+}
+
+}  // namespace
+}  // namespace meshreel
+
+using namespace meshreel;
+
+int mr_decode_field(const mr_bytes* record, const mr_graph* graph, size_t width, int has_mean, double* rows) {
+    if (!is_causal(*graph)) return MR_BAD_INPUT;
+    CodedField coded;
+    if (!parse(*record, coded)) return MR_BAD_RECORD;
+    return guarded(MR_NO_MEMORY, [&]() -> int {
+        FieldStreams streams;
+        const int status = decode_streams(coded, *graph, width, has_mean != 0, streams);
+        if (status == MR_OK) FieldRows(streams.over(*graph)).next(graph->count, rows);
+        return status;
+    });
+}
+
+int mr_decode_motion(const mr_bytes* record, const mr_mesh* base, size_t frames, double* rows) {
+    LayersGroup group;
+    if (!parse(*record, group) || group.frames != frames) return MR_BAD_RECORD;
+    return guarded(MR_NO_MEMORY, [&] { return decode_motion(group, *base, rows); });
+}

@@ -1,0 +1,23 @@
+#include "meshreel/status.h"
+
+const char* mr_message(int status) {
+    switch (status) {
+        case MR_OK: return "no error";
+        case MR_BAD_INPUT: return "an index is out of range or out of order, or a number is not finite";
+        case MR_SINGULAR: return "a connected component has no anchor";
+        case MR_NO_MEMORY: return "not enough memory";
+        case MR_OVERFLOW: return "a symbol beyond 32 bits";
+        case MR_OUT_TOO_SMALL: return "the output has too little room";
+        case MR_BAD_STREAM: return "a stream of symbols is truncated or damaged";
+        case MR_BAD_RECORD: return "a record is truncated or damaged";
+        case MR_BAD_COLUMNS:
+            return "a field has more columns than its rows have numbers, or a step that does not exist";
+        case MR_BAD_BASIS: return "the integers of a basis are truncated or damaged";
+        case MR_BAD_MEAN: return "the mean of a basis has more bits than a mean may have";
+        case MR_NO_DIRECTION: return "a basis vector without a direction";
+        case MR_BAD_SYMBOLS: return "the symbols of a field are truncated or damaged";
+        case MR_NO_PREVIOUS: return "a level that is counted from a group which is not at hand, or not to this level";
+        case MR_NOT_FINITE: return "vertices that are not finite";
+        default: return "an unknown status";
+    }
+}
