@@ -10,7 +10,7 @@ import { Session } from "./session.ts";
 import type { Limits } from "./session.ts";
 import type { Source } from "./net/source.ts";
 import { PLAYBACK_RATES } from "./types.ts";
-import type { Info, Playback, PlaybackEvents, Quality, Shown, Stats } from "./types.ts";
+import type { Info, Layers, Playback, PlaybackEvents, Shown, Stats } from "./types.ts";
 
 export interface PlayerOptions extends Partial<Limits> {
   readonly source: Source; // the player's own from here on: `dispose` closes it
@@ -39,8 +39,8 @@ export class Player extends PlaybackTarget implements Playback {
   #start = 0; // s, where to begin once the head is there
   #loop = false;
   #rate = 1;
-  #quality: Quality = "auto";
-  #level = NaN; // quality that was told last
+  #layers: Layers = "auto";
+  #level = NaN; // layers beyond the first, as last reported by `layerschange`
   interpolate = true;
 
   #paused = true;
@@ -126,14 +126,14 @@ export class Player extends PlaybackTarget implements Playback {
     this.#wake();
   }
 
-  get quality(): Quality {
-    return this.#quality;
+  get layers(): Layers {
+    return this.#layers;
   }
 
-  set quality(quality: Quality) {
-    if (quality !== "auto" && !(quality >= 0)) throw new TypeError(`a quality of ${quality}: give "auto" or a number of layers`);
-    if (quality === this.#quality) return;
-    this.#quality = quality === "auto" ? quality : Math.floor(quality);
+  set layers(layers: Layers) {
+    if (layers !== "auto" && !(layers >= 0)) throw new TypeError(`layers ${layers}: give "auto" or a number from 0`);
+    if (layers === this.#layers) return;
+    this.#layers = layers === "auto" ? layers : Math.floor(layers);
     this.#session?.decoding.forgive(); // what is damaged may have whole layers before the damage
     this.#wake();
   }
@@ -141,17 +141,17 @@ export class Player extends PlaybackTarget implements Playback {
   get stats(): Stats {
     const session = this.#session;
     const shown = session?.picture.shown;
-    const quality = Math.max(0, ...(shown?.groups ?? []).map((group) => group?.quality ?? 0));
+    const layers = Math.max(0, ...(shown?.groups ?? []).map((group) => group?.layers ?? 0));
     const ahead = session?.readyAhead(this.currentTime, this.#loop, MOST_BUFFERED) ?? 0;
     return {
-      mbps: session ? session.rateAt(quality) / 1e6 : 0,
+      mbps: session ? session.rateAt(layers) / 1e6 : 0,
       bandwidthMbps: this.#source.bandwidth / 1e6,
       decodeMs: session?.decoding.lastMs ?? 0,
       decodeLoad: session?.load ?? 0,
       bufferedSeconds: Math.min(ahead, this.#loop ? this.duration : this.duration - this.currentTime),
       fetchedBytes: this.#bytes,
-      quality,
-      wholeQuality: session?.picture.wholeQuality ?? 0,
+      layers,
+      wholeLayers: session?.picture.wholeLayers ?? 0,
       stalls: this.#stalls,
       skippedGroups: session?.decoding.failedGroups ?? 0,
     };
@@ -268,12 +268,12 @@ export class Player extends PlaybackTarget implements Playback {
     this.#wakesIn = Infinity;
     const [session, clock] = [this.#session, this.#clock];
     if (session === null || clock === null || this.#error !== null) return;
-    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, quality: this.#quality, isWaiting: this.#hasStalled && !clock.isRunning });
+    session.pump({ time: clock.time, speed: this.#rate, loop: this.#loop, layers: this.#layers, isWaiting: this.#hasStalled && !clock.isRunning });
     this.#tellProgress(session);
-    const level = this.#quality === "auto" ? session.level : this.#quality;
+    const level = this.#layers === "auto" ? session.level : this.#layers;
     if (level !== this.#level) {
       this.#level = level;
-      this.#tell("qualitychange");
+      this.#tell("layerschange");
     }
     if (this.#isStallNew) {
       this.#isStallNew = false;

@@ -17,8 +17,8 @@ export interface DecodeJob {
   firstFrame: number;
   frameCount: number;
   payload: Uint8Array; // its buffer is transferred
-  layers: { size: number; crc: number }[]; // of the bytes given
-  quality: number | null; // layers beyond the first; null: all
+  ranges: { size: number; crc: number }[]; // of the layers in `payload`
+  layers: number | null; // layers beyond the first; null: all
   previous: number | null; // chunk whose state it needs, decoded earlier in this worker; or the static chunk that a patch changes
   scale: number;
   stateOnly: boolean; // decode for the chain's sake, pack nothing

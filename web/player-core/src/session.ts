@@ -14,7 +14,7 @@ import type { Chunk, Head } from "./format/reader.ts";
 import { plan } from "./time/scheduler.ts";
 import type { Plan, Step } from "./time/scheduler.ts";
 import type { Source } from "./net/source.ts";
-import type { Quality } from "./types.ts";
+import type { Layers } from "./types.ts";
 
 export interface Limits {
   readonly bufferSeconds: number; // of bytes fetched ahead, at normal speed
@@ -27,7 +27,7 @@ export interface Aim {
   readonly time: number; // s
   readonly speed: number; // content seconds a second
   readonly loop: boolean;
-  readonly quality: Quality;
+  readonly layers: Layers;
   readonly isWaiting: boolean; // it should play and cannot
 }
 
@@ -53,7 +53,7 @@ export class Session {
   readonly #events: SessionEvents;
   readonly #adaptive: Adaptive;
   readonly #movingTracks: number; // that have something to decode
-  readonly #rates = new Map<number, number>(); // bits/s by quality
+  readonly #rates = new Map<number, number>(); // bits/s by layers beyond the first
   #plan: Plan = { steps: [], keep: new Set(), chainCount: 0 };
   #size: number | null = null; // of the file, as the source had it last
   #speed = 1;
@@ -92,8 +92,8 @@ export class Session {
       decodeSeconds: decodedSeconds * aim.speed,
       behindSeconds: BEHIND,
       memory,
-      quality: aim.quality === "auto" ? this.#adaptive.level : aim.quality,
-      exact: aim.quality !== "auto",
+      layers: aim.layers === "auto" ? this.#adaptive.level : aim.layers,
+      exact: aim.layers !== "auto",
     };
     const made = plan(this.head, this.#links, this.timeline, outlook, this.decoding);
     const keep = new Set(made.keep);
@@ -102,8 +102,8 @@ export class Session {
     this.decoding.run(this.#plan);
     this.decoding.release(STATICS * memory);
     const later = LATER * outlook.fetchSeconds;
-    this.fetcher.want(made.steps.map(({ chunk, quality, ahead }) => ({ chunk, layers: quality + 1, when: ahead <= 0 ? "now" : ahead < later ? "soon" : "later" })));
-    if (aim.quality === "auto") this.#adapt(aim);
+    this.fetcher.want(made.steps.map(({ chunk, layers, ahead }) => ({ chunk, count: layers + 1, when: ahead <= 0 ? "now" : ahead < later ? "soon" : "later" })));
+    if (aim.layers === "auto") this.#adapt(aim);
   }
 
   /** Seconds of content from a time on that can be shown; Infinity if that is all. It looks for `most` of them, or some more. */
@@ -134,13 +134,13 @@ export class Session {
   }
 
   /** Bits a second of content of the whole stream, with so many layers beyond the first. */
-  rateAt(quality: number): number {
-    let rate = this.#rates.get(quality);
+  rateAt(layers: number): number {
+    let rate = this.#rates.get(layers);
     if (rate === undefined) {
-      const layersOf = (chunk: Chunk): number => (chunk.kind === "static" ? chunk.layers.length : quality + 1);
+      const layersOf = (chunk: Chunk): number => (chunk.kind === "static" ? chunk.layers.length : layers + 1);
       const size = this.head.chunks.reduce((sum, chunk) => sum + sizeOfLayers(chunk, layersOf(chunk)), 0);
       rate = (8 * size) / this.timeline.duration;
-      this.#rates.set(quality, rate);
+      this.#rates.set(layers, rate);
     }
     return rate;
   }
@@ -163,7 +163,7 @@ export class Session {
       time: aim.time,
       speed: aim.speed,
       bandwidth: this.#bandwidth,
-      fetched: this.#firstAhead(({ chunk, quality }) => this.fetcher.layersOf(chunk) <= quality) / aim.speed,
+      fetched: this.#firstAhead(({ chunk, layers }) => this.fetcher.layersOf(chunk) <= layers) / aim.speed,
       decoded: this.#firstAhead(({ decode, chunk }) => decode && !this.decoding.isSettled(chunk)) / aim.speed,
       load: this.load,
       isWaiting: aim.isWaiting,

@@ -37,7 +37,7 @@ export interface PackedGroup extends PackedVertices {
   /** Corners of those that single frames show besides: frame t has extra[extraStarts[t]] up to extra[extraStarts[t + 1]]. */
   readonly extra: Uint32Array;
   readonly extraStarts: Uint32Array; // T + 1 numbers
-  readonly quality: number; // layers beyond the first that it was decoded from
+  readonly layers: number; // layers beyond the first that it was decoded from
   readonly bytes: number; // that it was decoded from
   readonly decodeMs: number;
 }
@@ -78,27 +78,27 @@ export interface Info {
   readonly origin: readonly [number, number, number]; // m, where the scene's own space has its zero
   readonly box: Box; // around all frames
   readonly trackCount: number;
-  readonly mostQuality: number; // layers beyond the first that the richest group has
+  readonly mostLayers: number; // layers beyond the first that the richest group has
   readonly size: number; // bytes
   readonly metadata: Readonly<Record<string, unknown>>;
 }
 
 /** Layers beyond the first that are played; "auto": as many as network and workers bear. */
-export type Quality = number | "auto";
+export type Layers = number | "auto";
 
 /** What `Playback.playbackRate` may be. */
 export const PLAYBACK_RATES = { least: 0.1, most: 4 } as const;
 
 /** Numbers for the overlay. */
 export interface Stats {
-  readonly mbps: number; // of the stream at the quality that plays, over its own time
+  readonly mbps: number; // of the stream with the layers that play, over its own time
   readonly bandwidthMbps: number; // as measured while fetching; 0 before the first chunk
   readonly decodeMs: number; // of the last group
   readonly decodeLoad: number; // decoding time over playing time of the last groups; above 1 is too slow
   readonly bufferedSeconds: number; // decoded ahead of the current time
   readonly fetchedBytes: number;
-  readonly quality: number; // layers beyond the first of the groups shown
-  readonly wholeQuality: number; // those that these groups have in the file, where it may have fewer than `Info.mostQuality`
+  readonly layers: number; // layers beyond the first of the groups shown
+  readonly wholeLayers: number; // those that these groups have in the file, where it may have fewer than `Info.mostLayers`
   readonly stalls: number;
   readonly skippedGroups: number; // damaged ones
 }
@@ -117,7 +117,7 @@ export interface PlaybackEvents {
   progress: Event; // bytes have come
   ended: Event;
   ratechange: Event;
-  qualitychange: Event;
+  layerschange: Event;
   ready: CustomEvent<Packed>; // decoded: upload it ahead of time
   release: CustomEvent<Packed>; // will not be shown again soon: free what was made of it
   warning: CustomEvent<Error>; // playback goes on: a damaged group is skipped, the network is tried again
@@ -137,7 +137,7 @@ export interface Playback extends EventTarget {
   loop: boolean;
   playbackRate: number; // within PLAYBACK_RATES
   interpolate: boolean; // blend between frames of a group
-  quality: Quality;
+  layers: Layers;
   play(): Promise<void>;
   pause(): void;
   /** Pauses and shows the frame so many further; negative goes back. */

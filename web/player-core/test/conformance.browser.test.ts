@@ -24,9 +24,9 @@ describeInBrowser("golden files in Chromium", () => {
     const golden = JSON.parse(readFileSync(`${FOLDER}/${name}.json`, "utf8"));
     const file = [...readFileSync(`${FOLDER}/${name}.reel`)];
     const wasm = [[...new Uint8Array(coreWasm())], [...new Uint8Array(dracoWasm())]];
-    for (const [quality, key] of [[null, "frames"], [1, "frames_with_one_component"]] as const) {
+    for (const [layers, key] of [[null, "frames"], [1, "frames_with_one_component"]] as const) {
       if (golden[key] === undefined) continue;
-      const call = `decodeAll(${[...wasm, file, quality].map((value) => JSON.stringify(value)).join(", ")})`;
+      const call = `decodeAll(${[...wasm, file, layers].map((value) => JSON.stringify(value)).join(", ")})`;
       const wanted = golden[key].map(({ first_vertices: _, ...record }: Record<string, unknown>) => record);
       expect(await opened.page.evaluate(call)).toEqual(wanted);
     }

@@ -16,9 +16,9 @@ async function recordOf(mesh: Mesh): Promise<object> {
 }
 
 /** The records of all frames of a file. */
-async function decodeAll(core: number[], draco: number[], file: number[], quality: number | null): Promise<object[]> {
+async function decodeAll(core: number[], draco: number[], file: number[], layers: number | null): Promise<object[]> {
   const tools = await makeTools(await WebAssembly.compile(Uint8Array.from(core)), Uint8Array.from(draco).buffer);
-  const video = new Video(tools, Uint8Array.from(file), quality);
+  const video = new Video(tools, Uint8Array.from(file), layers);
   return Promise.all(Array.from({ length: video.head.frameCount }, (_, frame) => recordOf(video.frame(frame))));
 }
 

@@ -75,14 +75,14 @@ describe("a damaged group", () => {
     expect(rig.workers.chunks.filter((chunk) => chunk === 3)).toHaveLength(1);
   });
 
-  test("that is damaged in a fine layer is shown at a quality without it", async () => {
+  test("that is damaged in a fine layer is shown without that layer", async () => {
     rig.begin(damaged(stream(2, FULL), 0), FAST);
     void rig.player.load();
     await pass(0.3);
     expect(rig.viewer.shown?.groups[0]).toBeNull();
-    rig.player.quality = 1;
+    rig.player.layers = 1;
     await pass(0.2);
-    expect(rig.viewer.shown?.groups[0]).toMatchObject({ chunk: 0, quality: 1 });
+    expect(rig.viewer.shown?.groups[0]).toMatchObject({ chunk: 0, layers: 1 });
     expect(rig.player.stats.skippedGroups).toBe(0);
   });
 
@@ -192,7 +192,7 @@ describe("a truncated file", () => {
     ]);
     expect([...held]).toEqual(frames(120, 200).map((frame) => [frame, 119]));
     expect(rig.source.reads.every((read) => read.offset + read.length <= offset || read.offset === 0)).toBe(true);
-    rig.player.quality = 0;
+    rig.player.layers = 0;
     await pass(1);
     expect(rig.viewer.warnings).toHaveLength(1);
     expect(rig.player.stats.skippedGroups).toBe(8);
@@ -343,7 +343,7 @@ describe("a head", () => {
     const chunks = [...Array.from({ length: 130_000 }, () => group(1, [1])), group(1, [1, 1, 1])];
     rig.begin(makeReel(chunks, { frameRate: 25 }), FAST);
     await Promise.all([rig.player.load(), pass(5)]);
-    expect(rig.player.info).toMatchObject({ frameCount: 130_001, mostQuality: 2 });
+    expect(rig.player.info).toMatchObject({ frameCount: 130_001, mostLayers: 2 });
   });
 
   test("longer than the first request is read whole", async () => {

@@ -51,7 +51,7 @@ export class FakeWorker implements WorkerLike {
   readonly forgotten: number[] = [];
   readonly number: number;
   readonly #all: FakeWorkers;
-  readonly #states = new Map<string, number>(); // quality by file and chunk
+  readonly #states = new Map<string, number>(); // layers beyond the first, by file and chunk
   #isStarted = false;
   #isBusy = false;
 
@@ -105,7 +105,7 @@ export class FakeWorker implements WorkerLike {
   #finish(id: number, job: DecodeJob): void {
     if (job.form === Form.LAYERS || job.kind === "static") {
       this.#states.delete(`${job.file}/${job.chunk}`);
-      this.#states.set(`${job.file}/${job.chunk}`, job.quality ?? Infinity);
+      this.#states.set(`${job.file}/${job.chunk}`, job.layers ?? Infinity);
       for (const key of this.#states.keys()) if (this.#states.size > this.#all.mostStates) this.#states.delete(key);
     }
     const packed = job.stateOnly ? null : packedOf(job, this.#all.bytesPerFrame);
@@ -115,15 +115,15 @@ export class FakeWorker implements WorkerLike {
   /** Damage, which a real worker finds, too; and offences of the player, which it would not. */
   #wrongWith(job: DecodeJob): string {
     const { offences } = this.#all;
-    const size = job.layers.reduce((sum, layer) => sum + layer.size, 0);
+    const size = job.ranges.reduce((sum, layer) => sum + layer.size, 0);
     if (size !== job.payload.length) offences.push(`chunk ${job.chunk}: ${job.payload.length} bytes for layers of ${size}`);
-    if (job.quality !== null && job.layers.length !== job.quality + 1) offences.push(`chunk ${job.chunk}: ${job.layers.length} layers at quality ${job.quality}`);
+    if (job.layers !== null && job.ranges.length !== job.layers + 1) offences.push(`chunk ${job.chunk}: ${job.ranges.length} ranges for ${job.layers} layers beyond the first`);
     if (job.previous !== null && job.kind === "group") {
       const state = this.#states.get(`${job.file}/${job.previous}`);
-      if (state !== undefined && state < job.layers.length - 1) offences.push(`chunk ${job.chunk}: finer than chunk ${job.previous} before it`);
+      if (state !== undefined && state < job.ranges.length - 1) offences.push(`chunk ${job.chunk}: finer than chunk ${job.previous} before it`);
     }
     let at = 0;
-    for (const { size: bytes, crc } of job.layers) {
+    for (const { size: bytes, crc } of job.ranges) {
       if (crc32(job.payload.subarray(at, (at += bytes))) !== crc) return "a layer is damaged";
     }
     return "";
@@ -136,7 +136,7 @@ function packedOf(job: DecodeJob, bytesPerFrame: number): Packed {
   if (job.kind === "static") return { kind: "static", texels: new Uint16Array(4), ...shared };
   const { track, firstFrame, frameCount } = job;
   const texels = new Uint16Array((frameCount * bytesPerFrame) / 2);
-  const quality = job.layers.length - 1;
+  const layers = job.ranges.length - 1;
   const extra = { extra: new Uint32Array(0), extraStarts: new Uint32Array(frameCount + 1), textureWidth: 1, textureHeight: 1 };
-  return { kind: "group", track, firstFrame, frameCount, quality, texels, ...extra, ...shared };
+  return { kind: "group", track, firstFrame, frameCount, layers, texels, ...extra, ...shared };
 }

@@ -31,8 +31,8 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-function want(chunks: readonly number[], layers = 2, when: When = "soon"): void {
-  wishes = chunks.map((number) => ({ chunk: HEAD.chunks[number], layers, when }));
+function want(chunks: readonly number[], count = 2, when: When = "soon"): void {
+  wishes = chunks.map((number) => ({ chunk: HEAD.chunks[number], count, when }));
   fetcher.want(wishes);
 }
 

@@ -100,9 +100,9 @@ describe.each(NAMES)("%s", (name) => {
     expect(viewer.warnings).toEqual([]);
   });
 
-  test.runIf(golden.frames_with_one_component)("at quality 1 has the faces that Python gives", async () => {
+  test.runIf(golden.frames_with_one_component)("with one layer beyond the first has the faces that Python decodes", async () => {
     open(file);
-    player.quality = 1;
+    player.layers = 1;
     await player.load();
     for (let frame = 0; frame < golden.frames.length; frame++) {
       expect(facesOf(await shownAt(frame, head))).toBe(golden.frames_with_one_component![frame].faces);
@@ -110,16 +110,16 @@ describe.each(NAMES)("%s", (name) => {
     expect(viewer.warnings).toEqual([]);
   });
 
-  test.runIf(head.info.mostQuality > 0)("changes its quality by hand to and fro, in every frame", async () => {
+  test.runIf(head.info.mostLayers > 0)("changes its number of layers by hand to and fro, in every frame", async () => {
     open(file);
     await player.load();
     for (let frame = golden.frames.length - 1; frame >= 0; frame -= 3) {
-      for (const quality of [1, head.info.mostQuality, 0, head.info.mostQuality]) {
-        player.quality = quality;
+      for (const layers of [1, head.info.mostLayers, 0, head.info.mostLayers]) {
+        player.layers = layers;
         player.currentTime = head.timestamp(frame);
-        const wanted = head.tracks.map((_, track) => Math.min(quality, head.chunkOfFrame(frame, track).layers.length - 1));
-        const qualities = (): number[] => viewer.shown?.groups.map((group, track) => group?.quality ?? wanted[track]) ?? [];
-        await expect.poll(() => viewer.shown?.frame === frame && qualities(), { interval: 2, timeout: 5000 }).toEqual(wanted);
+        const wanted = head.tracks.map((_, track) => Math.min(layers, head.chunkOfFrame(frame, track).layers.length - 1));
+        const layersShown = (): number[] => viewer.shown?.groups.map((group, track) => group?.layers ?? wanted[track]) ?? [];
+        await expect.poll(() => viewer.shown?.frame === frame && layersShown(), { interval: 2, timeout: 5000 }).toEqual(wanted);
       }
       expect(facesOf(viewer.shown!)).toBe(golden.frames[frame].faces);
     }
@@ -132,7 +132,7 @@ describe.each(NAMES)("%s", (name) => {
       const copy = file.slice();
       copy[chunk.offset + (chunk.size >> 1)] ^= 0x10;
       open(copy);
-      player.quality = head.info.mostQuality;
+      player.layers = head.info.mostLayers;
       await player.load();
       for (let frame = 0; frame < golden.frames.length; frame += 2) await shownAt(frame, head);
       expect(viewer.warnings).toHaveLength(1);

@@ -29,9 +29,9 @@ beforeAll(async () => {
 function jobOf(chunk: Chunk, payload: Uint8Array, previous: Chunk | null): DecodeJob {
   const { number, kind, form, track, firstFrame, frameCount } = chunk;
   let at = 0;
-  const layers = chunk.layers.map(({ size }) => ({ size, crc: crc32(payload.subarray(at, (at += size))) }));
+  const ranges = chunk.layers.map(({ size }) => ({ size, crc: crc32(payload.subarray(at, (at += size))) }));
   const place = { kind, form, track, firstFrame, frameCount } as const;
-  return { file: 1, chunk: number, ...place, payload, layers, quality: null, previous: previous?.number ?? null, scale: 1, stateOnly: false };
+  return { file: 1, chunk: number, ...place, payload, ranges, layers: null, previous: previous?.number ?? null, scale: 1, stateOnly: false };
 }
 
 /** With one to four bytes changed, most of them near the start, where sizes and counts are; never the form. */

@@ -8,8 +8,8 @@ export function jobOf(head: Head, chunk: Chunk, data: Uint8Array): DecodeJob {
   const before = chunk.kind === "static" ? head.changedFrom(chunk) : head.groupBefore(chunk);
   const { number, kind, form, track, firstFrame, frameCount } = chunk;
   const payload = data.slice(chunk.offset, chunk.offset + chunk.size);
-  const layers = chunk.layers.map(({ size, crc }) => ({ size, crc }));
+  const ranges = chunk.layers.map(({ size, crc }) => ({ size, crc }));
   const previous = before?.number ?? null;
-  const whole = { quality: null, previous, scale: head.header.scale, stateOnly: false };
-  return { file: 1, chunk: number, kind, form, track, firstFrame, frameCount, payload, layers, ...whole };
+  const whole = { layers: null, previous, scale: head.header.scale, stateOnly: false };
+  return { file: 1, chunk: number, kind, form, track, firstFrame, frameCount, payload, ranges, ...whole };
 }

@@ -139,7 +139,7 @@ test("payloads with any byte changed and their checksums made to fit are refused
         const job = jobOf(head, chunk, data);
         job.payload[at] ^= 0x55;
         try {
-          new ChunkDecoder({ core: tools.core, draco: tools.draco }).decode({ ...job, layers: [] });
+          new ChunkDecoder({ core: tools.core, draco: tools.draco }).decode({ ...job, ranges: [] });
         } catch (error) {
           expect(error, `${name} chunk ${chunk.number} byte ${at}: ${error}`).toBeInstanceOf(FormatError);
         }

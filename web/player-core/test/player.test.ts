@@ -21,7 +21,7 @@ describe("playing", () => {
     expect(rig.player.currentTime - time).toBeCloseTo((performance.now() - now) / 1000, 1);
     await pass(3);
     expect(rig.viewer.frames).toEqual(frames(0, 100));
-    expect(rig.viewer.events.filter((event) => event !== "qualitychange")).toEqual(
+    expect(rig.viewer.events.filter((event) => event !== "layerschange")).toEqual(
       ["play", "waiting", "loadedmetadata", "canplay", "playing", "pause", "ended"],
     );
     expect(rig.player).toMatchObject({ ended: true, paused: true, currentTime: 4, duration: 4, currentFrame: 99 });
@@ -165,7 +165,7 @@ describe("playing", () => {
 describe("a stall", () => {
   test("holds time at a group's border, is told, and ends when enough is at hand", async () => {
     rig.begin(stream(20, FULL), 100 * RATE, { bufferSeconds: 2 });
-    rig.player.quality = 3;
+    rig.player.layers = 3;
     await Promise.all([rig.player.play(), pass(1)]);
     rig.source.bytesPerSecond = 1;
     await pass(5);

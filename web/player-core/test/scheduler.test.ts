@@ -4,7 +4,7 @@ import { describe, expect, test } from "vitest";
 
 import { Timeline } from "../src/time/clock.ts";
 import { Form } from "../src/format/layout.gen.ts";
-import { Links, mostQuality } from "../src/format/links.ts";
+import { Links, mostLayers } from "../src/format/links.ts";
 import { Head } from "../src/format/reader.ts";
 import type { Chunk } from "../src/format/reader.ts";
 import { plan } from "../src/time/scheduler.ts";
@@ -25,7 +25,7 @@ class Table implements Holdings {
   bytesOf = (): number => this.bytes;
 }
 
-const OUTLOOK: Outlook = { time: 0, loop: false, fetchSeconds: 4, decodeSeconds: 2, behindSeconds: 1, memory: 1e9, quality: 9, exact: false };
+const OUTLOOK: Outlook = { time: 0, loop: false, fetchSeconds: 4, decodeSeconds: 2, behindSeconds: 1, memory: 1e9, layers: 9, exact: false };
 
 function planned(file: Uint8Array, outlook: Partial<Outlook> = {}, table = new Table()): Plan {
   const head = Head.parse(file);
@@ -38,7 +38,7 @@ function timelineOf(head: Head): Timeline {
   return new Timeline(frameCount, (frame) => (frame < frameCount ? head.timestamp(frame) : duration));
 }
 
-const told = ({ steps }: Plan): [number, number, boolean, boolean][] => steps.map(({ chunk, quality, show, decode }) => [chunk.number, quality, show, decode]);
+const told = ({ steps }: Plan): [number, number, boolean, boolean][] => steps.map(({ chunk, layers, show, decode }) => [chunk.number, layers, show, decode]);
 const numbers = ({ steps }: Plan): number[] => steps.map(({ chunk }) => chunk.number);
 
 describe("ahead", () => {
@@ -110,7 +110,7 @@ describe("a chain", () => {
     expect(told(planned(file, at7, table)).slice(0, 3)).toEqual([[5, 2, false, true], [6, 2, false, true], [7, 2, true, true]]);
   });
 
-  test("goes on at a state's quality where that is lower, and rises at the next group that stands alone", () => {
+  test("goes on with a state's layers where those are fewer, and rises at the next group that stands alone", () => {
     const table = new Table();
     for (let chunk = 0; chunk < 8; chunk++) table.decoded.set(chunk, 1);
     table.states.set(7, 1);
@@ -128,9 +128,9 @@ describe("a chain", () => {
   test("goes down at once, from the finer state", () => {
     const table = new Table();
     for (let chunk = 0; chunk < 10; chunk++) [table.decoded, table.states].forEach((map) => map.set(chunk, 2));
-    expect(told(planned(file, { ...at7, exact: true, quality: 0 }, table))).toEqual([[7, 0, true, true], [8, 0, true, true]]);
+    expect(told(planned(file, { ...at7, exact: true, layers: 0 }, table))).toEqual([[7, 0, true, true], [8, 0, true, true]]);
     table.decoded.delete(8);
-    expect(told(planned(file, { ...at7, quality: 0 }, table))).toEqual([[8, 0, true, true]]);
+    expect(told(planned(file, { ...at7, layers: 0 }, table))).toEqual([[8, 0, true, true]]);
   });
 });
 
@@ -188,18 +188,18 @@ describe("whatever the file and whatever is at hand", () => {
         if (random() < 0.03) for (const number of links.withDependents(chunk.number)) table.failed.add(number);
       }
       const time = random() * head.info.duration;
-      const outlook = { ...OUTLOOK, time, loop: random() < 0.5, quality: Math.floor(3 * random()), exact: random() < 0.5, memory: random() * 1e5 };
+      const outlook = { ...OUTLOOK, time, loop: random() < 0.5, layers: Math.floor(3 * random()), exact: random() < 0.5, memory: random() * 1e5 };
       const made = plan(head, links, timelineOf(head), outlook, table);
       const states = new Map(table.states);
       const decoded = new Map(table.decoded);
-      for (const { chunk, quality, show, decode } of made.steps) {
+      for (const { chunk, layers, show, decode } of made.steps) {
         steps++;
         expect(table.failed.has(chunk.number)).toBe(false);
-        expect(quality).toBeLessThanOrEqual(mostQuality(chunk));
+        expect(layers).toBeLessThanOrEqual(mostLayers(chunk));
         const previous = links.previousOf(chunk);
-        if (previous && decode) expect(states.get(previous.number) ?? -1).toBeGreaterThanOrEqual(Math.min(quality, mostQuality(previous)));
-        if (decode) states.set(chunk.number, quality);
-        if (decode && show) decoded.set(chunk.number, quality);
+        if (previous && decode) expect(states.get(previous.number) ?? -1).toBeGreaterThanOrEqual(Math.min(layers, mostLayers(previous)));
+        if (decode) states.set(chunk.number, layers);
+        if (decode && show) decoded.set(chunk.number, layers);
         if (show && decode) expect(made.keep.has(chunk.number)).toBe(true);
       }
       expect(new Set(numbers(made)).size).toBe(made.steps.length);
@@ -208,7 +208,7 @@ describe("whatever the file and whatever is at hand", () => {
       for (const chunk of [...shown, head.staticOfFrame(frame)]) {
         if (chunk === null || chunk.form === Form.EMPTY || table.failed.has(chunk.number)) continue;
         expect(decoded.has(chunk.number)).toBe(true);
-        if (outlook.exact && chunk.kind === "group") expect(decoded.get(chunk.number)).toBe(Math.min(outlook.quality, mostQuality(chunk)));
+        if (outlook.exact && chunk.kind === "group") expect(decoded.get(chunk.number)).toBe(Math.min(outlook.layers, mostLayers(chunk)));
         expect(made.keep.has(chunk.number)).toBe(true);
       }
     }

@@ -13,7 +13,7 @@ const rig = useRig();
 describe("seeking", () => {
   test("shows the frame after its group's bytes and decoding, and keeps what was shown until then", async () => {
     rig.begin(stream(60, FULL), 2 * RATE, { bufferSeconds: 4 });
-    rig.player.quality = 3;
+    rig.player.layers = 3;
     void rig.player.load();
     await pass(8);
     rig.player.currentTime = 30;
@@ -116,7 +116,7 @@ describe("seeking", () => {
     expect(rig.player.currentTime).toBe(0);
     expect(() => (rig.player.currentTime = NaN)).toThrow(TypeError);
     expect(() => (rig.player.playbackRate = NaN)).toThrow(TypeError);
-    expect(() => (rig.player.quality = -1)).toThrow(TypeError);
+    expect(() => (rig.player.layers = -1)).toThrow(TypeError);
   });
 
   test("by steps goes from frame to frame, and stops at the ends", async () => {

@@ -63,9 +63,9 @@ describe("throttled", () => {
   slowTest("to twice the rate, it plays at best, without a stall", AGAIN, async () => {
     throttle(2 * RATE);
     await ended();
-    expect(new Set(viewer.qualities)).toEqual(new Set([3]));
+    expect(new Set(viewer.layersShown)).toEqual(new Set([3]));
     everyFrame();
-    expect(player.stats).toMatchObject({ stalls: 0, skippedGroups: 0, quality: 3 });
+    expect(player.stats).toMatchObject({ stalls: 0, skippedGroups: 0, layers: 3 });
     expect(player.stats.bandwidthMbps).toBeGreaterThan((RATE * 8) / 1e6);
     expect(player.stats.bandwidthMbps).toBeLessThan((3 * RATE * 8) / 1e6);
   });
@@ -75,8 +75,8 @@ describe("throttled", () => {
     await ended();
     everyFrame();
     expect(player.stats).toMatchObject({ stalls: 0, skippedGroups: 0 });
-    expect(Math.max(...viewer.qualities)).toBeLessThan(3);
-    expect(Math.max(...viewer.qualities)).toBeGreaterThan(0);
+    expect(Math.max(...viewer.layersShown)).toBeLessThan(3);
+    expect(Math.max(...viewer.layersShown)).toBeGreaterThan(0);
   });
 
   test("it shows the first frame before a tenth of the file has come", async () => {
@@ -88,7 +88,7 @@ describe("throttled", () => {
 
   test("a seek leaves what was on its way and shows the frame after its chain's bytes", async () => {
     throttle(RATE);
-    player.quality = 3;
+    player.layers = 3;
     void player.load();
     await expect.poll(() => viewer.shown?.frame, { timeout: 5000, interval: 10 }).toBe(0);
     await expect.poll(() => server.asked.length).toBeGreaterThan(1);
@@ -115,7 +115,7 @@ describe("a server", () => {
     await ended();
     everyFrame();
     expect(server.asked).toHaveLength(1);
-    expect(player.stats).toMatchObject({ quality: 3, stalls: 0 });
+    expect(player.stats).toMatchObject({ layers: 3, stalls: 0 });
     expect(player.stats.fetchedBytes).toBe(FILE.length);
   });
 

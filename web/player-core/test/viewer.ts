@@ -6,15 +6,15 @@ import { Head } from "../src/format/reader.ts";
 import type { Packed, Shown } from "../src/types.ts";
 
 const EVENTS = [
-  "loadedmetadata", "canplay", "play", "playing", "pause", "waiting", "seeking", "seeked", "ended", "ratechange", "qualitychange", "error",
+  "loadedmetadata", "canplay", "play", "playing", "pause", "waiting", "seeking", "seeked", "ended", "ratechange", "layerschange", "error",
 ] as const;
 
 export class Viewer {
   readonly player: Player;
   /** Frames in the order in which they were shown, each once. */
   readonly frames: number[] = [];
-  /** Qualities of what track 0 showed, one a picture. */
-  readonly qualities: number[] = [];
+  /** Layers beyond the first of what track 0 showed, one number a picture. */
+  readonly layersShown: number[] = [];
   readonly events: string[] = [];
   readonly warnings: string[] = [];
   readonly errors: Error[] = [];
@@ -51,7 +51,7 @@ export class Viewer {
     if (shown === null) return;
     this.shown = shown;
     if (this.frames.at(-1) !== shown.frame) this.frames.push(shown.frame);
-    this.qualities.push(shown.groups[0]?.quality ?? -1);
+    this.layersShown.push(shown.groups[0]?.layers ?? -1);
     this.#check(shown);
   }
 

@@ -6,7 +6,7 @@ import type { Stage } from "./stage.ts";
 
 export function applyToPlayback(name: string, settings: Reflected, playback: Playback): void {
   if (name === "loop") playback.loop = settings.loop;
-  if (name === "quality") playback.quality = settings.quality;
+  if (name === "layers") playback.layers = settings.layers;
   if (name === "speed" || name === "playbackrate") playback.playbackRate = settings.playbackRate;
   if (name === "interpolate") playback.interpolate = settings.interpolate;
 }

@@ -1,7 +1,7 @@
 // Attributes and properties: what a page writes, and what the player takes from it. Nothing here knows the DOM.
 
 import { PLAYBACK_RATES } from "@meshreel/player-core/types";
-import type { Quality } from "@meshreel/player-core/types";
+import type { Layers } from "@meshreel/player-core/types";
 import { MODES } from "@meshreel/player-three/modes";
 import type { Mode } from "@meshreel/player-three/modes";
 import type { Up } from "./upright.ts";
@@ -10,7 +10,7 @@ export type Theme = "auto" | "light" | "dark";
 
 /** Attributes whose change the element must hear of. */
 export const OBSERVED = [
-  "src", "controls", "autoplay", "loop", "poster", "quality", "speed", "playbackrate", "interpolate", "mode", "camera",
+  "src", "controls", "autoplay", "loop", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
   "up", "stats", "background", "theme",
 ] as const;
 
@@ -22,7 +22,7 @@ const words = <T extends string>(...known: readonly T[]): Reader<T> =>
 
 const readNumber: Reader<number> = (text) => (text.trim() !== "" && Number.isFinite(Number(text)) ? Number(text) : null);
 
-const readQuality: Reader<Quality> = (text) => (/^\s*\d+\s*$/.test(text) ? Number(text) : words("auto")(text));
+const readLayers: Reader<Layers> = (text) => (/^\s*\d+\s*$/.test(text) ? Number(text) : words("auto")(text));
 
 const readMode: Reader<Mode> = (text) => (words("color")(text) ? "colour" : words(...MODES)(text));
 
@@ -47,7 +47,7 @@ const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>>
   interpolate: { read: readInterpolate, wanted: "on, or off" },
   mode: { read: readMode, wanted: MODES.join(", ") },
   playbackrate: { read: readNumber, wanted: "a number" },
-  quality: { read: readQuality, wanted: "auto, or a whole number of layers from 0" },
+  layers: { read: readLayers, wanted: "auto, or a whole number of layers from 0" },
   speed: { read: readNumber, wanted: "a number" },
   theme: { read: readTheme, wanted: "auto, light, dark" },
   up: { read: readUp, wanted: "y, z, -y, -z" },
@@ -66,8 +66,8 @@ export function parseSpeed(text: string | null): number {
 }
 
 /** Layers beyond the first, or "auto" where the text is no whole number from 0. */
-export function parseQuality(text: string | null): Quality {
-  return readQuality(text ?? "") ?? "auto";
+export function parseLayers(text: string | null): Layers {
+  return readLayers(text ?? "") ?? "auto";
 }
 
 export function parseMode(text: string | null): Mode {
@@ -95,6 +95,6 @@ export function parseFlag(text: string | null): boolean {
 
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
-  "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "quality", "playbackRate", "interpolate", "mode", "theme",
+  "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "layers", "playbackRate", "interpolate", "mode", "theme",
   "up", "background", "camera", "currentTime",
 ];

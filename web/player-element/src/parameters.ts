@@ -1,4 +1,4 @@
-// What an address asks of the page: ?src, ?t, ?autoplay, ?loop, ?stats, ?mode, ?quality, ?camera, ?speed, ?theme, ?up, ?background,
+// What an address asks of the page: ?src, ?t, ?autoplay, ?loop, ?stats, ?mode, ?layers, ?camera, ?speed, ?theme, ?up, ?background,
 // ?poster, ?interpolate, ?controls, ?bench. All but t and bench are attributes of the element.
 
 export interface Parameters {
@@ -8,7 +8,7 @@ export interface Parameters {
   readonly bench: number | null; // s to measure for; null where it is not asked for
 }
 
-const TEXTS = ["src", "mode", "quality", "camera", "speed", "theme", "up", "background", "poster", "interpolate"];
+const TEXTS = ["src", "mode", "layers", "camera", "speed", "theme", "up", "background", "poster", "interpolate"];
 const BENCH = 20; // s, where none are given
 const FLAGS = ["autoplay", "loop", "stats", "controls"];
 

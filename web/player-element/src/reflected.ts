@@ -1,6 +1,6 @@
 // Properties that are attributes: the attribute is the one place where a setting is kept, so HTML, scripts and controls agree.
 
-import type { Quality } from "@meshreel/player-core/types";
+import type { Layers } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import * as parse from "./attributes.ts";
 import type { Up } from "./upright.ts";
@@ -88,11 +88,11 @@ export class Reflected extends Element {
   }
 
   /** Layers beyond the first, or "auto". */
-  get quality(): Quality {
-    return parse.parseQuality(this.getAttribute("quality"));
+  get layers(): Layers {
+    return parse.parseLayers(this.getAttribute("layers"));
   }
-  set quality(value: Quality) {
-    this.setAttribute("quality", String(value));
+  set layers(value: Layers) {
+    this.setAttribute("layers", String(value));
   }
 
   /** 0.1 to 4; the attribute is `speed`, and `playbackrate` is taken too. */

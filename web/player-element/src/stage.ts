@@ -1,6 +1,6 @@
 // What the element needs of something that draws, and of something that opens files. The element knows no WebGL.
 
-import type { Info, Packed, Playback, Quality, Shown } from "@meshreel/player-core/types";
+import type { Info, Layers, Packed, Playback, Shown } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import type { VrActions } from "@meshreel/xr";
 import type { Up } from "./upright.ts";
@@ -45,7 +45,7 @@ export interface Stage extends EventTarget {
 }
 
 export interface Settings {
-  readonly quality: Quality;
+  readonly layers: Layers;
   readonly interpolate: boolean;
   readonly loop: boolean;
   readonly playbackRate: number;

@@ -19,7 +19,7 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
     ["Fetched", info ? `${formatAmount(stats.fetchedBytes, "B")} of ${formatAmount(info.size, "B")}` : formatAmount(stats.fetchedBytes, "B")],
     ["Decode", `${stats.decodeMs.toFixed(1)} ms a group, load ${(stats.decodeLoad * 100).toFixed(0)} %`],
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
-    ["Quality", qualityText(stats, info?.mostQuality ?? 0)],
+    ["Layers", layersText(stats, info?.mostLayers ?? 0)],
     ["Triangles", formatCount(stats.triangles)],
     ["Display", stats.fps > 0 ? `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each` : "still"],
     ["GPU memory", formatAmount(stats.gpuBytes, "B")],
@@ -28,7 +28,7 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
 }
 
 /** Layers beyond the first, of those that there are; all of the file's where nothing of what is shown is left out. */
-function qualityText({ quality, wholeQuality }: Statistics, most: number): string {
+function layersText({ layers, wholeLayers }: Statistics, most: number): string {
   if (most === 0) return "one only";
-  return quality >= wholeQuality ? `${most} of ${most}` : `${quality} of ${wholeQuality}`;
+  return layers >= wholeLayers ? `${most} of ${most}` : `${layers} of ${wholeLayers}`;
 }

@@ -96,16 +96,16 @@ describeOnPage("controls of <meshreel-player>", (on) => {
     expect(await on.page.locator(".time").getAttribute("title")).toBe("Frame 13 of 48");
   });
 
-  test("speed, quality and shading are chosen in the settings and are then attributes", async () => {
+  test("speed, layers and shading are chosen in the settings and are then attributes", async () => {
     await on.shown();
     await on.page.getByRole("button", { name: "Settings" }).click();
     await on.page.getByLabel("Speed").selectOption("0.5");
-    await on.page.getByLabel("Quality").selectOption("1");
+    await on.page.getByLabel("Layers").selectOption("1");
     await on.page.getByLabel("Shading").selectOption("wireframe");
-    expect(await on.get((player) => ["speed", "quality", "mode"].map((name) => player.getAttribute(name)))).toEqual(["0.5", "1", "wireframe"]);
-    expect(await on.page.evaluate(() => [engine.playbacks[0]!.playbackRate, engine.playbacks[0]!.quality, engine.stages[0]!.mode])).toEqual([0.5, 1, "wireframe"]);
-    await on.page.getByLabel("Quality").selectOption("auto");
-    expect(await on.page.evaluate(() => engine.playbacks[0]!.quality)).toBe("auto");
+    expect(await on.get((player) => ["speed", "layers", "mode"].map((name) => player.getAttribute(name)))).toEqual(["0.5", "1", "wireframe"]);
+    expect(await on.page.evaluate(() => [engine.playbacks[0]!.playbackRate, engine.playbacks[0]!.layers, engine.stages[0]!.mode])).toEqual([0.5, 1, "wireframe"]);
+    await on.page.getByLabel("Layers").selectOption("auto");
+    expect(await on.page.evaluate(() => engine.playbacks[0]!.layers)).toBe("auto");
     await on.page.keyboard.press("Escape");
     expect(await on.page.locator(".settings").isHidden()).toBe(true);
     expect(await on.page.getByRole("button", { name: "Settings" }).evaluate((node) => node.matches(":focus"))).toBe(true);

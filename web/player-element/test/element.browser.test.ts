@@ -137,9 +137,9 @@ describeOnPage("<meshreel-player>", (on) => {
   });
 
   test("properties set before the element is defined or the source is there are kept", async () => {
-    await on.put('<meshreel-player src="walk.reel" speed="2" quality="1" interpolate="off" loop mode="normal" t></meshreel-player>');
-    const { playbackRate, quality, interpolate, loop } = await on.page.evaluate(() => engine.playbacks[0]!);
-    expect({ playbackRate, quality, interpolate, loop }).toEqual({ playbackRate: 2, quality: 1, interpolate: false, loop: true });
+    await on.put('<meshreel-player src="walk.reel" speed="2" layers="1" interpolate="off" loop mode="normal" t></meshreel-player>');
+    const { playbackRate, layers, interpolate, loop } = await on.page.evaluate(() => engine.playbacks[0]!);
+    expect({ playbackRate, layers, interpolate, loop }).toEqual({ playbackRate: 2, layers: 1, interpolate: false, loop: true });
     expect(await on.page.evaluate(() => engine.stages[0]!.mode)).toBe("normal");
     const time = await on.page.evaluate(async () => {
       const player = document.createElement("meshreel-player");
@@ -168,8 +168,8 @@ describeOnPage("<meshreel-player>", (on) => {
     expect(told).toEqual(["z", "-y", "-y", null]);
   });
 
-  test("a camera, mode or quality that is none leaves what was set, and warns", async () => {
-    await on.put('<meshreel-player src="walk.reel" controls mode="x" quality="1" camera="1,2,3,0,0,0"></meshreel-player>');
+  test("a camera, a mode or a number of layers that is none leaves what was set, and warns", async () => {
+    await on.put('<meshreel-player src="walk.reel" controls mode="x" layers="1" camera="1,2,3,0,0,0"></meshreel-player>');
     await on.page.locator(".toast", { hasText: 'mode "x" is passed over' }).waitFor();
     const told = await on.get((player) => {
       const messages: string[] = [];
@@ -178,16 +178,16 @@ describeOnPage("<meshreel-player>", (on) => {
       engine.stages[0]!.camera = "7,7,7,0,0,0"; // somebody has moved it
       player.setAttribute("camera", "1,2");
       player.setAttribute("mode", "pink");
-      player.setAttribute("quality", "high");
-      player.quality = NaN;
-      const { mode, quality, camera } = player;
-      return { messages, mode, quality, camera, attributes: ["mode", "quality", "camera"].map((name) => player.getAttribute(name)) };
+      player.setAttribute("layers", "high");
+      player.layers = NaN;
+      const { mode, layers, camera } = player;
+      return { messages, mode, layers, camera, attributes: ["mode", "layers", "camera"].map((name) => player.getAttribute(name)) };
     });
     expect(told.messages.map((message) => message.split(" is passed over: give ")[0])).toEqual(
-      ['camera "1,2"', 'mode "pink"', 'quality "high"', 'quality "NaN"'],
+      ['camera "1,2"', 'mode "pink"', 'layers "high"', 'layers "NaN"'],
     );
-    expect(told).toMatchObject({ mode: "normal", quality: 1, camera: "7,7,7,0,0,0", attributes: ["normal", "1", "1,2,3,0,0,0"] });
-    expect(await on.page.evaluate(() => [engine.stages[0]!.mode, engine.playbacks[0]!.quality])).toEqual(["normal", 1]);
+    expect(told).toMatchObject({ mode: "normal", layers: 1, camera: "7,7,7,0,0,0", attributes: ["normal", "1", "1,2,3,0,0,0"] });
+    expect(await on.page.evaluate(() => [engine.stages[0]!.mode, engine.playbacks[0]!.layers])).toEqual(["normal", 1]);
     await on.get((player) => player.removeAttribute("mode"));
     expect(await on.page.evaluate(() => engine.stages[0]!.mode)).toBe("shaded");
   });

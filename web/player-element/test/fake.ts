@@ -1,14 +1,14 @@
 // A playback and a stage that fetch, decode and draw nothing: what the element does with them can be seen from outside.
 
 import { SourceError, type SourceErrorKind } from "@meshreel/player-core/errors";
-import type { Info, Packed, Playback, Quality, Shown, Stats } from "@meshreel/player-core/types";
+import type { Info, Layers, Packed, Playback, Shown, Stats } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import { GraphicsError } from "../src/stage.ts";
 import type { Engine, Settings, Stage } from "../src/stage.ts";
 
 export const INFO: Info = {
   frameCount: 48, frameRate: 24, duration: 2, origin: [0, 0, 0], box: { minimum: [-1, 0, -1], size: [2, 2, 2] }, trackCount: 1,
-  mostQuality: 3, size: 123_456, metadata: {},
+  mostLayers: 3, size: 123_456, metadata: {},
 };
 
 /** Keeps time like a real one; a head comes after 10 ms, a seek takes 20 ms. An address with "404" in it fails. */
@@ -20,7 +20,7 @@ export class FakePlayback extends EventTarget implements Playback {
   loop: boolean;
   playbackRate: number;
   interpolate: boolean;
-  quality: Quality;
+  layers: Layers;
   stalled = false; // set by tests
   updates = 0;
   disposed = false;
@@ -36,7 +36,7 @@ export class FakePlayback extends EventTarget implements Playback {
     this.loop = settings.loop;
     this.playbackRate = settings.playbackRate;
     this.interpolate = settings.interpolate;
-    this.quality = settings.quality;
+    this.layers = settings.layers;
     const bad = typeof source === "string" && source.includes("404");
     this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`, "missing") : this.#head()));
   }
@@ -65,7 +65,7 @@ export class FakePlayback extends EventTarget implements Playback {
   get stats(): Stats {
     return {
       mbps: 2.41, bandwidthMbps: 48.2, decodeMs: 12.3, decodeLoad: 0.08, bufferedSeconds: this.info ? 0.75 : 0, fetchedBytes: 61_000,
-      quality: 3, wholeQuality: 3, stalls: 0, skippedGroups: 0,
+      layers: 3, wholeLayers: 3, stalls: 0, skippedGroups: 0,
     };
   }
 

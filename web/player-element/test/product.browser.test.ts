@@ -115,13 +115,13 @@ describeInBrowser("the built player", () => {
   });
 
   test("the address sets time, shading and camera", async () => {
-    const { page } = await site.visit("player/index.html?src=/scene.reel&t=0.1&mode=normal&quality=0&loop");
+    const { page } = await site.visit("player/index.html?src=/scene.reel&t=0.1&mode=normal&layers=0&loop");
     await ready(page);
     const state = await page.evaluate(() => {
-      const { currentTime, mode, quality, loop, paused } = document.querySelector("meshreel-player")!;
-      return { currentTime, mode, quality, loop, paused };
+      const { currentTime, mode, layers, loop, paused } = document.querySelector("meshreel-player")!;
+      return { currentTime, mode, layers, loop, paused };
     });
-    expect(state).toEqual({ currentTime: 0.1, mode: "normal", quality: 0, loop: true, paused: true });
+    expect(state).toEqual({ currentTime: 0.1, mode: "normal", layers: 0, loop: true, paused: true });
     await page.close();
   });
 
@@ -143,16 +143,16 @@ describeInBrowser("the built player", () => {
     await page.close();
   });
 
-  test("the quality that is chosen is shown, also while it is paused", async () => {
-    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&quality=0");
+  test("the layers that are chosen are shown, also while it is paused", async () => {
+    const { page, errors } = await site.visit("player/index.html?src=/layers.reel&layers=0");
     await ready(page);
-    const shown = (quality: number) =>
-      page.waitForFunction((wanted) => document.querySelector("meshreel-player")!.statistics!.quality === wanted, quality);
+    const shown = (layers: number) =>
+      page.waitForFunction((wanted) => document.querySelector("meshreel-player")!.statistics!.layers === wanted, layers);
     await shown(0);
-    const most = await page.evaluate(() => document.querySelector("meshreel-player")!.info!.mostQuality);
+    const most = await page.evaluate(() => document.querySelector("meshreel-player")!.info!.mostLayers);
     expect(most).toBeGreaterThan(0);
     await page.locator("button.more").click();
-    await page.getByLabel("Quality").selectOption({ label: "Full" });
+    await page.getByLabel("Layers").selectOption({ label: "Full" });
     await shown(most);
     expect(errors).toEqual([]);
     await page.close();

@@ -2,7 +2,7 @@ import { FormatError, SourceError } from "@meshreel/player-core/errors";
 import { MODES, type Mode } from "@meshreel/player-three/modes";
 import { describe, expect, test } from "vitest";
 import * as parse from "../src/attributes.ts";
-import { modeChoices, nextMode, qualityChoices, qualityValue, speedChoices } from "../src/controls/choices.ts";
+import { layersChoices, layersValue, modeChoices, nextMode, speedChoices } from "../src/controls/choices.ts";
 import { chosenFile } from "../src/drop.ts";
 import { formatAmount, formatRate, formatSpeed, formatTime, recordingName, speakTime, timeDigits } from "../src/format.ts";
 import { actionOf, KEYS, seekStep, takesKey } from "../src/keyboard.ts";
@@ -37,8 +37,8 @@ describe("attributes", () => {
   test("a speed is held between 0.1 and 4, and is 1 where it is no number", () => {
     expect(["0.5", "9", "-2", "fast", "", null, "NaN", "Infinity"].map(parse.parseSpeed)).toEqual([0.5, 4, 0.1, 1, 1, 1, 1, 1]);
   });
-  test("a quality is a whole number from 0, else auto", () => {
-    expect(["0", " 3 ", "auto", "-1", "1.5", "", null].map(parse.parseQuality)).toEqual([0, 3, "auto", "auto", "auto", "auto", "auto"]);
+  test("layers are a whole number from 0, else auto", () => {
+    expect(["0", " 3 ", "auto", "-1", "1.5", "", null].map(parse.parseLayers)).toEqual([0, 3, "auto", "auto", "auto", "auto", "auto"]);
   });
   test("a mode that is not known is shaded", () => {
     expect(["normal", "WIREFRAME", "color", "colour", "x", null].map(parse.parseMode)).toEqual([
@@ -52,7 +52,7 @@ describe("attributes", () => {
     for (const [name, good, bad] of [
       ["camera", ["0,1,3,0,1,0", " 1e-3, -2,3,4,5,6 ", ""], ["1,2,3", "1,,3,4,5,6", "a,b,c,d,e,f", "1,2,3,4,5,Infinity"]],
       ["mode", ["normal", "WIREFRAME", "color", " "], ["x", "shaded,normal"]],
-      ["quality", ["auto", "Auto", " 3 ", "0", ""], ["high", "-1", "1.5", "NaN"]],
+      ["layers", ["auto", "Auto", " 3 ", "0", ""], ["high", "-1", "1.5", "NaN"]],
       ["speed", ["1", " .5 ", "-2", "9", ""], ["fast", "NaN", "Infinity", "2x"]],
       ["playbackrate", ["1"], ["fast"]],
       ["interpolate", ["on", "off", "No", "0", "true", ""], ["maybe", "2"]],
@@ -62,7 +62,7 @@ describe("attributes", () => {
       expect(good.filter((text) => parse.complaint(name, text) !== null)).toEqual([]);
       expect(bad.filter((text) => parse.complaint(name, text) === null)).toEqual([]);
     }
-    expect(parse.complaint("quality", "high")).toBe('quality "high" is passed over: give auto, or a whole number of layers from 0');
+    expect(parse.complaint("layers", "high")).toBe('layers "high" is passed over: give auto, or a whole number of layers from 0');
     expect(parse.complaint("poster", "high")).toBeNull();
   });
   test("interpolation is on unless it is switched off", () => {
@@ -144,22 +144,22 @@ describe("menus", () => {
     expect(speedChoices(1).map(({ value }) => value)).not.toContain("0.6");
     expect(speedChoices(0.6).map(({ value }) => value).slice(2, 5)).toEqual(["0.5", "0.6", "0.75"]);
   });
-  test("qualities go from full to lowest below auto", () => {
-    const choices = qualityChoices(INFO.mostQuality, "auto");
+  test("numbers of layers go from full to lowest below auto", () => {
+    const choices = layersChoices(INFO.mostLayers, "auto");
     expect(choices.map(({ value }) => value)).toEqual(["auto", "3", "2", "1", "0"]);
     expect(choices.map(({ text }) => text)).toEqual(["Auto", "Full", "Level 2 of 3", "Level 1 of 3", "Lowest"]);
   });
-  test("of many qualities some are offered, and always the one that is set", () => {
-    const values = qualityChoices(40, 7).map(({ value }) => value);
+  test("of many numbers of layers some are offered, and always the one that is set", () => {
+    const values = layersChoices(40, 7).map(({ value }) => value);
     expect(values).toHaveLength(8);
     expect(values).toContain("7");
     expect(values.slice(0, 2)).toEqual(["auto", "40"]);
     expect(values.at(-1)).toBe("0");
   });
-  test("a quality beyond the richest is the richest", () => {
-    expect(qualityValue(3, 9)).toBe("3");
-    expect(qualityValue(3, "auto")).toBe("auto");
-    expect(qualityChoices(0, 9).map(({ value }) => value)).toEqual(["auto", "0"]);
+  test("more layers than the richest group has are those of the richest", () => {
+    expect(layersValue(3, 9)).toBe("3");
+    expect(layersValue(3, "auto")).toBe("auto");
+    expect(layersChoices(0, 9).map(({ value }) => value)).toEqual(["auto", "0"]);
   });
   test("the next mode of the last is the first", () => {
     const all = modeChoices().map(({ value }) => value);
@@ -186,7 +186,7 @@ describe("messages", () => {
 describe("drawing only what changed", () => {
   const shown = { frame: 3, blend: 0.5, frames: [3], groups: [null], background: null };
   test("a paused playback that has shown something needs no pictures", () => {
-    const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, loop: false, playbackRate: 1 });
     expect(goesOn(playback, null)).toBe(true);
     expect(goesOn(playback, shown)).toBe(false);
     playback.seeking = true;
@@ -212,32 +212,32 @@ describe("small parts", () => {
     expect([ranges(2, 2).length, ranges(0, NaN).length]).toEqual([0, 0]);
   });
   test("the statistics name what the overlay must show", () => {
-    const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, loop: false, playbackRate: 1 });
     const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
     expect(Object.fromEntries(lines)).toMatchObject({
-      Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Quality: "3 of 3",
+      Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Layers: "3 of 3",
       "Skipped groups": "0", Display: "60 fps, 0.4 ms each",
     });
     playback.dispose();
   });
 });
 
-describe("the quality that is told", () => {
+describe("the layers in the overlay", () => {
   test.each([
     [3, 3, 3, "3 of 3"], [1, 3, 3, "1 of 3"], [0, 0, 3, "3 of 3"], [2, 2, 3, "3 of 3"], [1, 2, 3, "1 of 2"], [0, 0, 0, "one only"],
-  ])("%i layers of the %i there are, of %i in the file: %s", (quality, wholeQuality, mostQuality, text) => {
-    const playback = new FakePlayback("x", { quality: "auto", interpolate: true, loop: false, playbackRate: 1 });
-    const numbers = { ...playback.stats, quality, wholeQuality, triangles: 0, gpuBytes: 0, headsetRate: 0, fps: 0, frameMs: 0, drawn: 0 };
-    expect(Object.fromEntries(statisticsLines(numbers, { ...INFO, mostQuality }, 0)).Quality).toBe(text);
+  ])("%i layers of the %i there are, of %i in the file: %s", (layers, wholeLayers, mostLayers, text) => {
+    const playback = new FakePlayback("x", { layers: "auto", interpolate: true, loop: false, playbackRate: 1 });
+    const numbers = { ...playback.stats, layers, wholeLayers, triangles: 0, gpuBytes: 0, headsetRate: 0, fps: 0, frameMs: 0, drawn: 0 };
+    expect(Object.fromEntries(statisticsLines(numbers, { ...INFO, mostLayers }, 0)).Layers).toBe(text);
     playback.dispose();
   });
 });
 
 describe("the address of the page", () => {
   test("parameters are attributes; flags that say no take them away", () => {
-    const { attributes, time, bench } = readParameters("?src=a%20b.reel&loop&autoplay=1&controls=0&mode=normal&quality=2&evil=1&speed=&t=1:05.5&bench");
+    const { attributes, time, bench } = readParameters("?src=a%20b.reel&loop&autoplay=1&controls=0&mode=normal&layers=2&evil=1&speed=&t=1:05.5&bench");
     expect([...attributes]).toEqual([
-      ["src", "a b.reel"], ["mode", "normal"], ["quality", "2"], ["autoplay", ""], ["loop", ""], ["controls", null],
+      ["src", "a b.reel"], ["mode", "normal"], ["layers", "2"], ["autoplay", ""], ["loop", ""], ["controls", null],
     ]);
     expect([time, bench]).toEqual([65.5, 20]);
   });

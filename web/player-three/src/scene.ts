@@ -152,6 +152,6 @@ function checkSize(packed: Packed, renderer: WebGLRenderer): void {
   const { textureWidth, textureHeight, texels } = packed;
   const most = renderer.capabilities.maxTextureSize;
   const size = `a texture of ${textureWidth} x ${textureHeight}`;
-  if (Math.max(textureWidth, textureHeight) > most) throw new RangeError(`group of chunk ${packed.chunk}: ${size}, the GPU's largest is ${most}; choose a lower quality`);
+  if (Math.max(textureWidth, textureHeight) > most) throw new RangeError(`group of chunk ${packed.chunk}: ${size}, the GPU's largest is ${most}; choose fewer layers`);
   if (texels.length !== 4 * textureWidth * textureHeight) throw new RangeError(`group of chunk ${packed.chunk}: ${texels.length / 4} texels for ${size}`);
 }

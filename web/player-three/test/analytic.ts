@@ -78,7 +78,7 @@ export function makeGroup(options: GroupOptions = {}): MadeGroup {
   const extraStarts = Uint32Array.from({ length: frameCount + 1 }, (_, t) => (t > squareFrame ? extra.length : 0));
   const packed: PackedGroup = {
     kind: "group", chunk: 1, track, firstFrame, frameCount, vertexCount, textureWidth, textureHeight, texels, box,
-    faces: Uint32Array.from(frames[0].faces), extra, extraStarts, quality: 0, bytes: 1000, decodeMs: 1,
+    faces: Uint32Array.from(frames[0].faces), extra, extraStarts, layers: 0, bytes: 1000, decodeMs: 1,
   };
   const positions = frames.map((frame, t) => [...frame.positions, ...(lone?.positions ?? []).map((p) => (t === squareFrame ? p : null))]);
   return { packed, positions };

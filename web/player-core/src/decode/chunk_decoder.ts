@@ -52,7 +52,7 @@ export class ChunkDecoder {
   /** What the job's chunk is, in metres from the header's origin; null where only its state is wanted. */
   decode(job: DecodeJob): Packed | null {
     const start = performance.now();
-    checkPayload(describe({ ...job, number: job.chunk }), job.form, job.payload, job.layers);
+    checkPayload(describe({ ...job, number: job.chunk }), job.form, job.payload, job.ranges);
     const place = { scale: job.scale, origin: [0, 0, 0] };
     const made = job.kind === "static" ? this.background(job, place) : this.group(job, place);
     return made && { ...made, decodeMs: performance.now() - start };
@@ -67,11 +67,11 @@ export class ChunkDecoder {
   private group(job: DecodeJob, place: Placement): Packed | null {
     const { file, chunk, track, firstFrame, payload } = job;
     const previous = this.needed(this.states, job);
-    const { group, state } = continueGroup(this.tools, payload, { frameCount: job.frameCount, quality: job.quality, previous, place });
+    const { group, state } = continueGroup(this.tools, payload, { frameCount: job.frameCount, layers: job.layers, previous, place });
     if (state !== null) this.states.set(file, chunk, state);
     if (job.stateOnly) return null;
-    const quality = Math.max(0, job.layers.length - 1);
-    return { kind: "group", chunk, track, firstFrame, ...packGroup(this.tools.core, group), quality, bytes: payload.length, decodeMs: 0 };
+    const layers = Math.max(0, job.ranges.length - 1);
+    return { kind: "group", chunk, track, firstFrame, ...packGroup(this.tools.core, group), layers, bytes: payload.length, decodeMs: 0 };
   }
 
   private background(job: DecodeJob, place: Placement): Packed | null {

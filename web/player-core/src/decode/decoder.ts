@@ -31,7 +31,7 @@ export class Video {
   constructor(
     private readonly tools: Tools,
     private readonly data: Uint8Array,
-    private readonly quality: number | null = null,
+    private readonly layers: number | null = null,
   ) {
     this.head = Head.parse(data);
     this.place = { scale: this.head.header.scale, origin: this.head.header.origin };
@@ -52,9 +52,9 @@ export class Video {
     if (known !== undefined) return known;
     const before = this.head.groupBefore(chunk);
     const previous = before === null ? null : this.decoded(before).state;
-    const layers = this.quality === null ? chunk.layers.length : this.quality + 1;
-    const { quality, place } = this;
-    const made = continueGroup(this.tools, this.payload(chunk, layers), { frameCount: chunk.frameCount, quality, previous, place });
+    const count = this.layers === null ? chunk.layers.length : this.layers + 1;
+    const { layers, place } = this;
+    const made = continueGroup(this.tools, this.payload(chunk, count), { frameCount: chunk.frameCount, layers, previous, place });
     this.groups.set(chunk.number, made);
     return made;
   }

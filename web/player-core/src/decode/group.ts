@@ -32,7 +32,7 @@ export interface Continued {
 /** How a group is decoded, besides its payload. */
 export interface GroupContext {
   readonly frameCount: number; // as the index has it
-  readonly quality: number | null; // layers beyond the first, at most; null: all
+  readonly layers: number | null; // layers beyond the first, at most; null: all
   readonly previous: LayersState | null; // that the group before gave
   readonly place: Placement;
 }
@@ -45,20 +45,20 @@ export function continueGroup(tools: Tools, data: Uint8Array, context: GroupCont
   return made;
 }
 
-function decodeLayers({ core, draco }: Tools, data: Uint8Array, { quality, previous, place }: GroupContext): Continued {
-  const records = readLayers(data, quality);
+function decodeLayers({ core, draco }: Tools, data: Uint8Array, { layers, previous, place }: GroupContext): Continued {
+  const records = readLayers(data, layers);
   const { faces, positions, state } = placeLayers(core, draco, records, previous, place);
   const frameCount = records.head.frames;
   const vertices = positions.length / 3 / frameCount;
   const group = { frameCount, vertexCount: vertices, positions, faces, dropped: null, patches: null };
-  const isPlain = records.end === data.length || (quality !== null && quality <= records.head.levels);
+  const isPlain = records.end === data.length || (layers !== null && layers <= records.head.levels);
   if (isPlain) return { group, state };
   const record = unpackAll(LayersPatches, data.subarray(records.end));
   const { dropped, meshes } = decodePatches(core, draco, record, frameCount, faces.length / 3);
   return { group: { ...group, dropped, patches: meshes.map((mesh) => placed(mesh, place)) }, state };
 }
 
-function decodeAlone(tools: Tools, data: Uint8Array, { frameCount, quality, place }: GroupContext): Continued {
+function decodeAlone(tools: Tools, data: Uint8Array, { frameCount, layers, place }: GroupContext): Continued {
   switch (data[0]) {
     case Form.EMPTY:
       unpackAll(EmptyGroup, data);
@@ -66,7 +66,7 @@ function decodeAlone(tools: Tools, data: Uint8Array, { frameCount, quality, plac
     case Form.DRACO:
       return { group: ofMeshes(decodeIntra(tools, data).map((mesh) => placed(mesh, place))), state: null };
     case Form.LAPLACIAN:
-      return { group: decodeLaplacian(tools, unpackAll(LaplacianGroup, data), quality, place), state: null };
+      return { group: decodeLaplacian(tools, unpackAll(LaplacianGroup, data), layers, place), state: null };
     default:
       throw new FormatError(`group form ${data[0]} is not known to this player`);
   }
@@ -82,13 +82,13 @@ function decodeIntra({ core, draco }: Tools, data: Uint8Array): Mesh[] {
   });
 }
 
-function decodeLaplacian({ core, draco }: Tools, record: LaplacianGroup, quality: number | null, place: Placement): DecodedGroup {
+function decodeLaplacian({ core, draco }: Tools, record: LaplacianGroup, layers: number | null, place: Placement): DecodedGroup {
   checkStep(record.step);
   const reference = decodeMesh(draco, record.reference, record.step);
   const frameCount = framesOf(record.displacements);
   checkGrowth(reference, record.levels, frameCount);
   const base = subdivideMidpoint(core, reference, record.levels);
-  const field = decodeDisplacements(core, record.displacements, base, quality);
+  const field = decodeDisplacements(core, record.displacements, base, layers);
   const count = vertexCount(base);
   const positions = new Float64Array(field.length);
   for (let t = 0; t < frameCount; t++) {

@@ -37,7 +37,7 @@ export class Links {
 }
 
 /** The most layers beyond the first that a chunk has. */
-export function mostQuality(chunk: Chunk): number {
+export function mostLayers(chunk: Chunk): number {
   return chunk.layers.length - 1;
 }
 

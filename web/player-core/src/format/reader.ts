@@ -178,7 +178,7 @@ function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, fr
     origin: header.origin as unknown as Info["origin"],
     box: boxOf(header),
     trackCount,
-    mostQuality: scaled.reduce((most, chunk) => Math.max(most, chunk.layers.length - 1), 0),
+    mostLayers: scaled.reduce((most, chunk) => Math.max(most, chunk.layers.length - 1), 0),
     size: last.offset + last.size,
     metadata: metadataOf(header.metadata),
   };

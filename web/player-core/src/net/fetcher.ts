@@ -9,7 +9,7 @@ import type { Source } from "./source.ts";
 /** The first layers of a chunk. */
 export interface Wish {
   readonly chunk: Chunk;
-  readonly layers: number;
+  readonly count: number;
   readonly when: When;
 }
 
@@ -132,9 +132,9 @@ export class Fetcher {
     this.#heldBytes = 0;
   }
 
-  #missingOf({ chunk, layers, when }: Wish): Range {
+  #missingOf({ chunk, count, when }: Wish): Range {
     const held = this.#held.get(chunk.number)?.length ?? 0;
-    return { from: chunk.offset + held, to: chunk.offset + sizeOfLayers(chunk, layers), when };
+    return { from: chunk.offset + held, to: chunk.offset + sizeOfLayers(chunk, count), when };
   }
 
   #notOnItsWay({ from, to, when }: Range): Range {

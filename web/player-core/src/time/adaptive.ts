@@ -1,7 +1,7 @@
-// Quality that follows the network and the processor: layers are dropped before frames are.
+// How many layers are played follows the network and the processor: layers are dropped before frames are.
 
 import type { Timeline } from "./clock.ts";
-import { mostQuality, sizeOfLayers } from "../format/links.ts";
+import { mostLayers, sizeOfLayers } from "../format/links.ts";
 import type { Head } from "../format/reader.ts";
 import { groupsBetween } from "./scheduler.ts";
 
@@ -19,7 +19,7 @@ export interface Conditions {
 
 const OUTLOOK = 10; // s of content that its rate is averaged over
 const SCARCE = 1; // s at hand: the next group must come soon
-const AMPLE = 2; // s at hand: enough to try a better quality
+const AMPLE = 2; // s at hand: enough to try one layer more (guess)
 const PLENTY = 6; // s at hand: enough to use nearly all of the bandwidth
 const BEARABLE = 0.8; // load that a level may make
 const HOLD_MS = 2000; // between a change and a rise
@@ -68,7 +68,7 @@ export class Adaptive {
     const groups = groupsBetween(this.#head, this.#timeline.frameAt(from), this.#timeline.frameAt(from + OUTLOOK));
     const frames = groups.reduce((sum, group) => sum + group.frameCount, 0);
     const perByte = (8 * this.#head.tracks.length * frameCount) / (frames * duration);
-    const most = groups.reduce((found, group) => Math.max(found, mostQuality(group)), 0);
+    const most = groups.reduce((found, group) => Math.max(found, mostLayers(group)), 0);
     return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeOfLayers(group, level + 1), 0));
   }
 

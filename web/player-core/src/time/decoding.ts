@@ -3,7 +3,7 @@
 import { FormatError } from "../errors.ts";
 import type { Fetcher } from "../net/fetcher.ts";
 import { Form } from "../format/layout.gen.ts";
-import { mostQuality } from "../format/links.ts";
+import { mostLayers } from "../format/links.ts";
 import type { Links } from "../format/links.ts";
 import type { Outcome, Share } from "./pool.ts";
 import { describe } from "../format/reader.ts";
@@ -19,7 +19,7 @@ export interface DecodingEvents {
 }
 
 interface State {
-  readonly quality: number;
+  readonly layers: number;
   readonly worker: number;
 }
 
@@ -35,7 +35,7 @@ export class Decoding implements Holdings {
   readonly #fetcher: Fetcher;
   readonly #share: Share;
   readonly #events: DecodingEvents;
-  readonly #decoded = new Map<number, { packed: Packed; quality: number; bytes: number }>(); // by chunk, as all below
+  readonly #decoded = new Map<number, { packed: Packed; layers: number; bytes: number }>(); // by chunk, as all below
   readonly #states = new Map<number, State>();
   readonly #running = new Map<number, Step>();
   readonly #submitted = new Map<number, Step>();
@@ -65,15 +65,15 @@ export class Decoding implements Holdings {
   }
 
   decodedAt(chunk: Chunk): number {
-    return this.#decoded.get(chunk.number)?.quality ?? -1;
+    return this.#decoded.get(chunk.number)?.layers ?? -1;
   }
 
   stateAt(chunk: Chunk): number {
     const { number } = chunk;
     const running = this.#running.get(number);
-    if (running) return running.quality;
+    if (running) return running.layers;
     const state = this.#states.get(number);
-    return state && this.#share.isAt(this.#links.rootOf(chunk), state.worker) ? state.quality : -1;
+    return state && this.#share.isAt(this.#links.rootOf(chunk), state.worker) ? state.layers : -1;
   }
 
   isFailed(chunk: Chunk): boolean {
@@ -105,7 +105,7 @@ export class Decoding implements Holdings {
     this.#submitted.clear();
     for (const step of steps) {
       if (!step.decode || this.#running.has(step.chunk.number)) continue;
-      if (this.#fetcher.layersOf(step.chunk) <= step.quality || !this.#hasState(step)) continue;
+      if (this.#fetcher.layersOf(step.chunk) <= step.layers || !this.#hasState(step)) continue;
       this.#submitted.set(step.chunk.number, step);
     }
     for (const step of [...this.#submitted.values()]) this.#submit(step);
@@ -168,15 +168,15 @@ export class Decoding implements Holdings {
     this.#events.warn(new FormatError(`${text}; it is skipped${more}`));
   }
 
-  #hasState({ chunk, quality }: Step): boolean {
+  #hasState({ chunk, layers }: Step): boolean {
     const previous = this.#links.previousOf(chunk);
     if (previous === null) return true;
-    const state = this.#submitted.get(previous.number)?.quality ?? this.stateAt(previous);
-    return state >= Math.min(quality, mostQuality(previous));
+    const state = this.#submitted.get(previous.number)?.layers ?? this.stateAt(previous);
+    return state >= Math.min(layers, mostLayers(previous));
   }
 
   #submit(step: Step): void {
-    const { chunk, quality } = step;
+    const { chunk, layers } = step;
     const job = {
       chunk: chunk.number,
       kind: chunk.kind,
@@ -184,8 +184,8 @@ export class Decoding implements Holdings {
       track: chunk.track,
       firstFrame: chunk.firstFrame,
       frameCount: chunk.frameCount,
-      layers: chunk.layers.slice(0, quality + 1).map(({ size, crc }) => ({ size, crc })),
-      quality: quality === mostQuality(chunk) ? null : quality,
+      ranges: chunk.layers.slice(0, layers + 1).map(({ size, crc }) => ({ size, crc })),
+      layers: layers === mostLayers(chunk) ? null : layers,
       previous: this.#links.previousOf(chunk)?.number ?? null,
       scale: this.#head.header.scale,
       stateOnly: !step.show,
@@ -195,20 +195,20 @@ export class Decoding implements Holdings {
       start: () => {
         this.#submitted.delete(chunk.number);
         this.#running.set(chunk.number, step);
-        return { ...job, payload: this.#fetcher.payload(chunk, quality + 1) };
+        return { ...job, payload: this.#fetcher.payload(chunk, layers + 1) };
       },
       settle: (outcome) => this.#settle(step, outcome),
     });
   }
 
   #settle(step: Step, outcome: Outcome): void {
-    const { chunk, quality } = step;
+    const { chunk, layers } = step;
     this.#running.delete(chunk.number);
     if (outcome.kind === "decoded") {
-      this.#states.set(chunk.number, { quality, worker: outcome.worker });
+      this.#states.set(chunk.number, { layers, worker: outcome.worker });
       this.#tries.delete(chunk.number);
       this.#time(chunk, outcome.ms);
-      if (outcome.packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, outcome.packed, quality);
+      if (outcome.packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, outcome.packed, layers);
     } else {
       this.#share.clear(); // what follows in the chain would fail, too: it is planned again
       this.#submitted.clear();
@@ -219,10 +219,10 @@ export class Decoding implements Holdings {
     this.#events.changed();
   }
 
-  #add(chunk: Chunk, packed: Packed, quality: number): void {
+  #add(chunk: Chunk, packed: Packed, layers: number): void {
     const old = this.packedOf(chunk);
     const bytes = bytesOf(packed);
-    this.#decoded.set(chunk.number, { packed, quality, bytes });
+    this.#decoded.set(chunk.number, { packed, layers, bytes });
     if (packed.kind === "group") {
       const perFrame = bytes / packed.frameCount;
       this.#bytesPerFrame = this.#bytesPerFrame === 0 ? perFrame : (this.#bytesPerFrame + perFrame) / 2;

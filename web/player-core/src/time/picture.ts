@@ -1,7 +1,7 @@
 // What is to be shown, in two objects that are used in turn: `update` allocates nothing.
 
 import type { Decoding } from "./decoding.ts";
-import { mostQuality } from "../format/links.ts";
+import { mostLayers } from "../format/links.ts";
 import type { Chunk, Head } from "../format/reader.ts";
 import type { Packed, PackedGroup, PackedStatic, Shown } from "../types.ts";
 
@@ -33,9 +33,9 @@ export class Picture {
   }
 
   /** Layers beyond the first that the richest of the groups shown has in the file. */
-  get wholeQuality(): number {
+  get wholeLayers(): number {
     const { chunks } = this.#head;
-    return this.#shown.groups.reduce((most, group) => (group === null ? most : Math.max(most, mostQuality(chunks[group.chunk]))), 0);
+    return this.#shown.groups.reduce((most, group) => (group === null ? most : Math.max(most, mostLayers(chunks[group.chunk]))), 0);
   }
 
   /** Whether all that a frame shows is at hand, but for what can never be. */
@@ -72,7 +72,7 @@ export class Picture {
     if (background !== null) keep.add(background.chunk);
   }
 
-  /** Takes what came in the place of what is shown, as at another quality: the old is released. */
+  /** Takes what came in the place of what is shown, as with other layers: the old is released. */
   #renew(): void {
     const { frame, blend } = this.#shown;
     if (frame < 0 || this.#decoding.version === this.#version) return;
@@ -109,7 +109,7 @@ export class Picture {
     this.#version = this.#decoding.version;
   }
 
-  /** What is shown in place of a damaged chunk: what was shown before, in the quality that it has now. */
+  /** What is shown in place of a damaged chunk: what was shown before, with the layers that it has now. */
   #held(chunk: Chunk, before: Packed | null): Packed | null {
     return before !== null && this.#decoding.isFailed(chunk) ? this.#decoding.packedOf(this.#head.chunks[before.chunk]) : null;
   }

@@ -2,11 +2,11 @@
 
 import type { Timeline } from "./clock.ts";
 import { Form } from "../format/layout.gen.ts";
-import { mostQuality } from "../format/links.ts";
+import { mostLayers } from "../format/links.ts";
 import type { Links } from "../format/links.ts";
 import type { Chunk, Head } from "../format/reader.ts";
 
-/** What a plan builds on. Qualities are layers beyond the first; -1: not at hand. */
+/** What a plan builds on. Layers are counted beyond the first; -1: not at hand. */
 export interface Holdings {
   /** Of a chunk that is decoded and packed. */
   decodedAt(chunk: Chunk): number;
@@ -26,15 +26,15 @@ export interface Outlook {
   readonly decodeSeconds: number; // of content, ahead; not more than fetchSeconds
   readonly behindSeconds: number; // of content: what is decoded behind the play head is kept
   readonly memory: number; // bytes that decoded groups may take
-  readonly quality: number;
-  /** Whether groups decoded at another quality are decoded again, with the chains they are predicted from. */
+  readonly layers: number;
+  /** Whether groups decoded with other layers are decoded again, with the chains they are predicted from. */
   readonly exact: boolean;
 }
 
 /** One chunk to fetch and, in a worker, to decode. */
 export interface Step {
   readonly chunk: Chunk;
-  readonly quality: number;
+  readonly layers: number;
   show: boolean; // or only its state is wanted, for the next of its chain
   decode: boolean; // or it is only fetched, for later
   ahead: number; // s of content until a frame needs it; 0 or less: that at the play head does
@@ -59,7 +59,7 @@ const SURE_GROUPS = 2; // of each track, the shown one and the next: wanted what
 /**
  * Steps for the frame at the play head first, then for those ahead in their order, from the start again with `loop`.
  *
- * A group predicted from another is decoded to its level or a coarser one. So in the midst of a chain quality only falls;
+ * A group predicted from another is decoded to its level or a coarser one. So within a chain the number of layers only falls;
  * a rise waits for the next group that stands alone. With `exact` it does not wait: the chain is decoded again, finer.
  */
 export function plan(head: Head, links: Links, timeline: Timeline, outlook: Outlook, holdings: Holdings): Plan {
@@ -145,32 +145,32 @@ class Planner {
     const decoded = this.#holdings.decodedAt(chunk);
     if (decoded === wanted || (decoded >= 0 && !this.#outlook.exact)) return;
     const before: Chunk[] = [];
-    let quality = wanted;
+    let layers = wanted;
     for (let previous = this.#links.previousOf(chunk); previous !== null; previous = this.#links.previousOf(previous)) {
       const state = this.#stateOf(previous);
-      if (state >= Math.min(quality, mostQuality(previous))) break;
+      if (state >= Math.min(layers, mostLayers(previous))) break;
       if (state >= 0 && !this.#outlook.exact) {
-        quality = state;
+        layers = state;
         break;
       }
       before.push(previous);
     }
-    for (const other of before.reverse()) this.#step(other, quality, false, need);
-    this.#step(chunk, quality, true, need);
+    for (const other of before.reverse()) this.#step(other, layers, false, need);
+    this.#step(chunk, layers, true, need);
   }
 
   #wantedOf(chunk: Chunk): number {
-    return chunk.kind === "static" ? mostQuality(chunk) : Math.min(this.#outlook.quality, mostQuality(chunk));
+    return chunk.kind === "static" ? mostLayers(chunk) : Math.min(this.#outlook.layers, mostLayers(chunk));
   }
 
   /** Of the state that will be there: that of a step takes the place of one at hand, be it coarser. */
   #stateOf(chunk: Chunk): number {
-    return this.#steps.get(chunk.number)?.quality ?? this.#holdings.stateAt(chunk);
+    return this.#steps.get(chunk.number)?.layers ?? this.#holdings.stateAt(chunk);
   }
 
-  #step(chunk: Chunk, quality: number, show: boolean, { ahead, decode }: Need): void {
+  #step(chunk: Chunk, layers: number, show: boolean, { ahead, decode }: Need): void {
     const old = this.#steps.get(chunk.number);
-    const step = old ?? { chunk, quality: Math.min(quality, mostQuality(chunk)), show, decode, ahead };
+    const step = old ?? { chunk, layers: Math.min(layers, mostLayers(chunk)), show, decode, ahead };
     step.show ||= show && decode;
     step.decode ||= decode;
     step.ahead = Math.min(step.ahead, ahead);

@@ -3,8 +3,8 @@
 import type { MeshreelPlayer } from "../element.ts";
 import { formatTime, timeDigits } from "../format.ts";
 import type { Action } from "../keyboard.ts";
-import { parseMode, parseQuality } from "../attributes.ts";
-import { modeChoices, qualityChoices, qualityValue, speedChoices } from "./choices.ts";
+import { parseLayers, parseMode } from "../attributes.ts";
+import { layersChoices, layersValue, modeChoices, speedChoices } from "./choices.ts";
 import { Button, type Look, make, Menu, setText } from "./dom.ts";
 import { SeekBar } from "./seek.ts";
 
@@ -131,13 +131,13 @@ export class Bar {
 
   #menus(): HTMLElement[] {
     const player = this.#player;
-    const most = () => player.info?.mostQuality ?? 0;
+    const most = () => player.info?.mostLayers ?? 0;
     const menus = [
       new Menu("speed", "Speed", () => ({ choices: speedChoices(player.playbackRate), value: String(player.playbackRate) }),
         (value) => void (player.playbackRate = Number(value))),
-      new Menu("quality", "Quality",
-        () => ({ choices: qualityChoices(most(), player.quality), value: qualityValue(most(), player.quality), enabled: most() > 0 }),
-        (value) => void (player.quality = parseQuality(value))),
+      new Menu("layers", "Layers",
+        () => ({ choices: layersChoices(most(), player.layers), value: layersValue(most(), player.layers), enabled: most() > 0 }),
+        (value) => void (player.layers = parseLayers(value))),
       new Menu("mode", "Shading", () => ({ choices: modeChoices(), value: player.mode }), (value) => void (player.mode = parseMode(value))),
     ];
     this.#parts.push(...menus);

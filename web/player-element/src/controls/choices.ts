@@ -1,6 +1,6 @@
 // What the menus offer.
 
-import type { Quality } from "@meshreel/player-core/types";
+import type { Layers } from "@meshreel/player-core/types";
 import { MODES, type Mode } from "@meshreel/player-three/modes";
 import { formatSpeed } from "../format.ts";
 import type { Choice } from "./dom.ts";
@@ -18,18 +18,18 @@ export function speedChoices(current: number): readonly Choice[] {
 }
 
 /** Auto, then levels from full to base; of many levels some, evenly apart, and the one that is set. */
-export function qualityChoices(mostQuality: number, current: Quality): readonly Choice[] {
+export function layersChoices(mostLayers: number, current: Layers): readonly Choice[] {
   const levels = new Set<number>();
-  const count = Math.min(mostQuality + 1, MOST_LEVELS);
-  for (let i = 0; i < count; i++) levels.add(Math.round((mostQuality * i) / Math.max(1, count - 1)));
-  if (typeof current === "number") levels.add(Math.min(current, mostQuality));
+  const count = Math.min(mostLayers + 1, MOST_LEVELS);
+  for (let i = 0; i < count; i++) levels.add(Math.round((mostLayers * i) / Math.max(1, count - 1)));
+  if (typeof current === "number") levels.add(Math.min(current, mostLayers));
   const descending = [...levels].sort((a, b) => b - a);
-  return [{ value: "auto", text: "Auto" }, ...descending.map((level) => ({ value: String(level), text: levelName(level, mostQuality) }))];
+  return [{ value: "auto", text: "Auto" }, ...descending.map((level) => ({ value: String(level), text: levelName(level, mostLayers) }))];
 }
 
-/** The value of `qualityChoices` for a setting. */
-export function qualityValue(mostQuality: number, current: Quality): string {
-  return current === "auto" ? current : String(Math.min(current, mostQuality));
+/** The value of `layersChoices` for a setting. */
+export function layersValue(mostLayers: number, current: Layers): string {
+  return current === "auto" ? current : String(Math.min(current, mostLayers));
 }
 
 function levelName(level: number, most: number): string {

@@ -12,7 +12,7 @@ const BEST = 3;
 
 const rig = useRig();
 
-const seen = (): number[] => rig.viewer.qualities;
+const seen = (): number[] => rig.viewer.layersShown;
 const mean = (values: readonly number[]): number => values.reduce((sum, value) => sum + value, 0) / values.length;
 
 async function play(seconds: number): Promise<void> {
@@ -53,7 +53,7 @@ describe("auto", () => {
     await pass(15);
     expect(rig.viewer.frames).toEqual(frames(0, 2250));
     expect(rig.player.stats.stalls).toBe(0);
-    expect(rig.viewer.count("qualitychange")).toBeLessThan(12);
+    expect(rig.viewer.count("layerschange")).toBeLessThan(12);
   });
 
   slowTest("settles where the network gives just what a level takes", async () => {
@@ -62,14 +62,14 @@ describe("auto", () => {
       await play(62);
       expect(rig.viewer.frames).toHaveLength(1500);
       expect(rig.player.stats.stalls).toBe(0);
-      expect(rig.viewer.count("qualitychange")).toBeLessThan(16);
+      expect(rig.viewer.count("layerschange")).toBeLessThan(16);
       rig.viewer.stop();
       rig.player.dispose();
     }
   });
 
   test("drops layers where workers are too slow for all of them", async () => {
-    rig.workers.msOf = ({ layers }) => [100, 200, 400, 900][layers.length - 1]; // of groups of 400 ms
+    rig.workers.msOf = ({ ranges }) => [100, 200, 400, 900][ranges.length - 1]; // of groups of 400 ms
     rig.begin(stream(60, FULL, 5), 20 * RATE, { count: 1 });
     await play(70);
     expect(rig.viewer.frames).toEqual(frames(0, 1500));
@@ -93,7 +93,7 @@ describe("auto", () => {
   });
 
   test("does not count on workers that have nothing to do: a chain is in one", async () => {
-    rig.workers.msOf = ({ layers }) => 200 * layers.length;
+    rig.workers.msOf = ({ ranges }) => 200 * ranges.length;
     rig.begin(stream(20, FULL, 100), 20 * RATE, { count: 3 });
     await play(30);
     expect(seen().slice(600)).not.toContain(BEST);
@@ -114,10 +114,10 @@ describe("auto", () => {
     await play(1);
     rig.source.bytesPerSecond = 10 * RATE;
     await pass(40);
-    const rises = seen().flatMap((quality, k) => (k > 0 && quality > seen()[k - 1] ? [k] : []));
+    const rises = seen().flatMap((layers, k) => (k > 0 && layers > seen()[k - 1] ? [k] : []));
     expect(rises.length).toBeGreaterThan(0);
     expect(new Set(rig.workers.chunks).size).toBe(rig.workers.chunks.length);
-    const starts = new Set(rig.workers.begun.filter(({ job }, k, all) => k > 0 && job.layers.length > all[k - 1].job.layers.length).map(({ job }) => job.chunk % 20));
+    const starts = new Set(rig.workers.begun.filter(({ job }, k, all) => k > 0 && job.ranges.length > all[k - 1].job.ranges.length).map(({ job }) => job.chunk % 20));
     expect(starts).toEqual(new Set([0]));
   });
 
@@ -130,83 +130,83 @@ describe("auto", () => {
   });
 });
 
-describe("a quality by hand", () => {
+describe("layers chosen by hand", () => {
   test("is what is fetched and shown, and no more", async () => {
     rig.begin(stream(20, FULL, 5), 10 * RATE);
-    rig.player.quality = 1;
+    rig.player.layers = 1;
     await play(22);
     expect(new Set(seen())).toEqual(new Set([1]));
     expect(rig.source.sentBytes).toBeLessThan(20 * 13_000 + 16_384);
-    expect(rig.player.stats).toMatchObject({ quality: 1, mbps: expect.closeTo((12_000 * 8) / 1e6, 2) as number });
+    expect(rig.player.stats).toMatchObject({ layers: 1, mbps: expect.closeTo((12_000 * 8) / 1e6, 2) as number });
   });
 
   test("that is finer is shown at once, its chain decoded again in the same worker; old groups stay until then", async () => {
     rig.begin(stream(20, FULL, 10), 10 * RATE);
-    rig.player.quality = 1;
+    rig.player.layers = 1;
     void rig.player.load();
     await pass(2);
     rig.player.currentTime = 2.5; // group 6
     await pass(2);
     const begun = rig.workers.begun.length;
-    rig.player.quality = 3;
+    rig.player.layers = 3;
     await pass(0.02);
-    expect(rig.viewer.shown?.groups[0]?.quality).toBe(1);
+    expect(rig.viewer.shown?.groups[0]?.layers).toBe(1);
     await pass(1);
-    expect(rig.viewer.shown?.groups[0]).toMatchObject({ quality: 3, chunk: 6 });
+    expect(rig.viewer.shown?.groups[0]).toMatchObject({ layers: 3, chunk: 6 });
     const again = rig.workers.begun.slice(begun);
     expect(again.slice(0, 7).map(({ job }) => [job.chunk, job.stateOnly])).toEqual(
       [[0, true], [1, true], [2, true], [3, true], [4, true], [5, true], [6, false]],
     );
-    expect(again.every(({ job }) => job.quality === null)).toBe(true);
+    expect(again.every(({ job }) => job.layers === null)).toBe(true);
     expect(rig.source.sentBytes).toBeLessThanOrEqual(rig.source.size!);
-    expect(rig.viewer.count("qualitychange")).toBe(2);
+    expect(rig.viewer.count("layerschange")).toBe(2);
   });
 
   test("that is coarser is shown at once and needs no chain", async () => {
     rig.begin(stream(20, FULL, 10), 10 * RATE);
-    rig.player.quality = 3;
+    rig.player.layers = 3;
     void rig.player.load();
     await pass(2);
     rig.player.currentTime = 2.5;
     await pass(2);
     const begun = rig.workers.begun.length;
-    rig.player.quality = 0;
+    rig.player.layers = 0;
     await pass(1);
-    expect(rig.viewer.shown?.groups[0]?.quality).toBe(0);
-    expect(rig.workers.begun[begun].job).toMatchObject({ chunk: 6, quality: 0, stateOnly: false });
+    expect(rig.viewer.shown?.groups[0]?.layers).toBe(0);
+    expect(rig.workers.begun[begun].job).toMatchObject({ chunk: 6, layers: 0, stateOnly: false });
   });
 
   test("beyond what there is means all of it, and chunks of fewer layers are whole", async () => {
     const chunks = [group(10, [500, 500]), group(10, [300]), group(10, [500, 500, 500], { dependsOn: [1] })];
     rig.begin(makeReel(chunks, { frameRate: 25 }), 10 * RATE);
-    rig.player.quality = 7;
+    rig.player.layers = 7;
     await play(2);
-    expect(rig.workers.begun.map(({ job }) => [job.layers.length, job.quality])).toEqual([[2, null], [1, null], [3, null]]);
+    expect(rig.workers.begun.map(({ job }) => [job.ranges.length, job.layers])).toEqual([[2, null], [1, null], [3, null]]);
   });
 
   test("that comes while a seek is under way is shown in the place of what it replaces", async () => {
     rig.begin(stream(60, FULL), 10 * RATE);
-    rig.player.quality = 0;
+    rig.player.layers = 0;
     void rig.player.load();
     await pass(1);
     rig.workers.msOf = () => 100;
     rig.source.latencyMs = 500;
-    rig.player.quality = 3;
+    rig.player.layers = 3;
     await pass(0.6); // the fine layers are there, and are being decoded
     const before = rig.viewer.shown;
-    expect(before).toMatchObject({ frame: 0, groups: [{ quality: 0 }] });
+    expect(before).toMatchObject({ frame: 0, groups: [{ layers: 0 }] });
     rig.player.currentTime = 50;
     await pass(0.3);
-    expect(rig.viewer.shown).toMatchObject({ frame: 0, groups: [{ chunk: 0, quality: 3 }] });
+    expect(rig.viewer.shown).toMatchObject({ frame: 0, groups: [{ chunk: 0, layers: 3 }] });
     await pass(2);
-    expect(rig.viewer.shown).toMatchObject({ frame: 1250, groups: [{ quality: 3 }] });
+    expect(rig.viewer.shown).toMatchObject({ frame: 1250, groups: [{ layers: 3 }] });
   });
 
   test("changed in mid-play many times never breaks a chain", async () => {
     rig.begin(stream(30, FULL, 10), 5 * RATE);
     await play(1);
     for (let k = 0; k < 40; k++) {
-      rig.player.quality = ([3, 0, 2, "auto", 1] as const)[k % 5];
+      rig.player.layers = ([3, 0, 2, "auto", 1] as const)[k % 5];
       await pass(0.1 + (k % 7) / 5);
     }
     expect(rig.viewer.warnings).toEqual([]);
@@ -219,14 +219,14 @@ test("how many layers the group shown has is told, as it may have fewer than the
   rig.begin(makeReel([group(25, [100]), group(25, [100, 100, 100, 100]), group(25, [100, 100])], { frameRate: 25 }), 1e6);
   void rig.player.load();
   const told: number[][] = [];
-  for (const quality of [3, 1] as const) {
-    rig.player.quality = quality;
+  for (const layers of [3, 1] as const) {
+    rig.player.layers = layers;
     for (const time of [0.5, 1.5, 2.5]) {
       rig.player.currentTime = time;
       await pass(1);
-      told.push([rig.player.stats.quality, rig.player.stats.wholeQuality]);
+      told.push([rig.player.stats.layers, rig.player.stats.wholeLayers]);
     }
   }
-  expect(rig.player.info?.mostQuality).toBe(3);
+  expect(rig.player.info?.mostLayers).toBe(3);
   expect(told).toEqual([[0, 0], [3, 3], [1, 1], [0, 0], [1, 3], [1, 1]]);
 });
