@@ -79,7 +79,7 @@ int64_t code_integer(Coder& coder, IntegerModels& models, int64_t value) {
 using namespace meshreel;
 
 int mr_encode_weights(const mr_weights* weights, uint8_t* out, size_t capacity, size_t* sizes) {
-    if (!is_causal(*weights)) return MR_BAD_INPUT;
+    if (!is_causal(*weights)) return MR_NOT_CAUSAL;
     return guarded(MR_NO_MEMORY, [&] {
         std::vector<uint8_t> bytes;
         Surroundings around(*weights);
@@ -94,7 +94,7 @@ int mr_encode_weights(const mr_weights* weights, uint8_t* out, size_t capacity, 
 }
 
 int mr_decode_weights(const mr_weights* weights, const uint8_t* data, const size_t* sizes, size_t* column) {
-    if (!is_causal(*weights)) return MR_BAD_INPUT;
+    if (!is_causal(*weights)) return MR_NOT_CAUSAL;
     return guarded(MR_NO_MEMORY, [&]() -> int {
         Surroundings around(*weights);
         for (size_t c = 0; c < weights->columns; data += sizes[c], ++c) {
@@ -115,7 +115,7 @@ int mr_decode_weights(const mr_weights* weights, const uint8_t* data, const size
 }
 
 int mr_weight_contexts(const mr_weights* weights, uint8_t* classes, uint8_t* signs) {
-    if (!is_causal(*weights)) return MR_BAD_INPUT;
+    if (!is_causal(*weights)) return MR_NOT_CAUSAL;
     return guarded(MR_NO_MEMORY, [&] {
         Surroundings around(*weights);
         for (size_t c = 0; c < weights->columns; ++c) {

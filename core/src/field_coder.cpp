@@ -168,7 +168,7 @@ bool decode_symbols(const mr_weights& weights, const mr_bytes& stream) {
 using namespace meshreel;
 
 int mr_encode_field(const mr_weights* weights, uint8_t* out, size_t capacity, size_t* size, size_t* ends) {
-    if (!is_causal(*weights)) return MR_BAD_INPUT;
+    if (!is_causal(*weights)) return MR_NOT_CAUSAL;
     return guarded(MR_NO_MEMORY, [&]() -> int {
         std::vector<uint8_t> bytes;
         RangeEncoder coder(bytes);

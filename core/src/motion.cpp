@@ -51,7 +51,7 @@ int decode_motion(const LayersGroup& record, const mr_mesh& base, double* rows) 
 using namespace meshreel;
 
 int mr_decode_field(const mr_bytes* record, const mr_graph* graph, size_t width, int has_mean, double* rows) {
-    if (!is_causal(*graph)) return MR_BAD_INPUT;
+    if (!is_causal(*graph)) return MR_NOT_CAUSAL;
     CodedField coded;
     if (!parse(*record, coded)) return MR_BAD_RECORD;
     return guarded(MR_NO_MEMORY, [&]() -> int {

@@ -33,7 +33,7 @@ using namespace meshreel;
 
 int mr_predict_forward(const mr_graph* graph, const double* values, size_t columns, double step, double price,
                        int32_t* symbols, double* decoded) {
-    if (!is_causal(*graph)) return MR_BAD_INPUT;
+    if (!is_causal(*graph)) return MR_NOT_CAUSAL;
     for (size_t c = 0; c < columns; ++c, values += graph->count, symbols += graph->count, decoded += graph->count) {
         double mean = 1.0;
         if (!forward(*graph, values, step, 0.0, mean, symbols, decoded)) return MR_OVERFLOW;

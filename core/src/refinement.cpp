@@ -209,9 +209,8 @@ bool is_good(const mr_level& level) {
 // The arrays of a level and a record of it; MR_OK where both can be used.
 int open_level(const mr_bytes& bytes, const mr_level& level, LayersLevel& record) {
     const int64_t links = level.starts[level.edge_count];
-    if (!is_good(level) || level.frames == 0 || !is_causal(level.edge_count, level.starts, level.near, links)) {
-        return MR_BAD_INPUT;
-    }
+    if (!is_good(level) || level.frames == 0) return MR_BAD_INPUT;
+    if (!is_causal(level.edge_count, level.starts, level.near, links)) return MR_NOT_CAUSAL;
     return parse(bytes, record) ? MR_OK : MR_BAD_RECORD;
 }
 

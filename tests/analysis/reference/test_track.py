@@ -140,7 +140,7 @@ def test_an_option_out_of_range_is_named(name: str, value: float) -> None:
 def test_core_refuses_indices_out_of_range_and_values_that_are_not_finite() -> None:
     points, owners = np.random.default_rng(0).random((20, 3)), np.zeros(20, np.int32)
     lists = np.array([0, 1, 2], np.int32), np.array([1, 9], np.int32), np.ones(2)
-    with pytest.raises(ValueError, match="in range"):
+    with pytest.raises(ValueError, match="out of range"):
         _core.follow_centers(
             points, points[:2], *lists, points[:2].copy(), np.zeros((2, 9)), owners, 1.0, 1.0, 1e-4, 10
         )

@@ -5,7 +5,7 @@ import type { Mesh } from "../mesh.ts";
 
 type Call = (...values: (number | bigint)[]) => number | bigint | undefined;
 
-const NO_MEMORY = 3; // mr_status, core/include/meshreel/status.h
+const NO_MEMORY = 4; // mr_status, core/include/meshreel/status.h
 
 /** What C++ takes for one argument or one field of a struct. */
 type Scalar = readonly ["u32" | "i32" | "f64", number];
