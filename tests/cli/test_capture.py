@@ -61,7 +61,7 @@ def test_frames_of_other_options_are_not_mixed(rig, tmp_path, capsys):
     assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 2
     (out / "capture.json").unlink()
     assert main(["capture", str(rig), "-o", str(out), "--voxel", "0.05"]) == 2
-    assert "no capture.json tells" in capsys.readouterr().err
+    assert "without a capture.json" in capsys.readouterr().err
 
 
 def test_what_is_missing_is_told_once_and_errors_take_one_line(rig, tmp_path, capsys):

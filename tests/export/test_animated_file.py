@@ -191,7 +191,7 @@ def test_frames_coded_one_by_one_do_not_become_each_other_though_their_faces_are
 
 
 def test_a_long_group_is_several_meshes_and_moves_on_all_the_same(tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.export.animated_file.MOST_TOGETHER", 3)
+    monkeypatch.setattr("meshreel.export.animated_file.MOST_FRAMES", 3)
     video = meshreel.open(GOLDEN / "layers.reel")
     assert export(video, tmp_path / "a.glb") == 6
     played = PlayedGlb(tmp_path / "a.glb")

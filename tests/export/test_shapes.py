@@ -26,12 +26,12 @@ def animation(count: int = 3, origin: tuple[float, float, float] = (0.0, 0.0, 0.
 
 
 def shape(
-    count: int = 3, vertices: np.ndarray = TRIANGLE, spans: tuple[tuple[int, int], ...] = ((0, 3),), first: int = 0
+    count: int = 3, vertices: np.ndarray = TRIANGLE, shown: tuple[tuple[int, int], ...] = ((0, 3),), first: int = 0
 ) -> Shape:
     """A triangle that rises by 1 from frame to frame."""
     up = np.tile([0.0, 0, 1], (len(vertices), 1))
     frames = [Points(vertices + number * up, up) for number in range(count)]
-    return Shape("part", "name", np.array([[0, 1, 2]], np.int32), first, count, frames, spans)
+    return Shape("part", "name", np.array([[0, 1, 2]], np.int32), first, count, frames, shown)
 
 
 @pytest.fixture(params=WRITERS)
@@ -121,7 +121,7 @@ def test_usd_counts_in_frames_but_keeps_times_apart(tmp_path):
     rounded, close = np.array([0, 0.033333, 0.066667, 0.11]), np.array([0, 1e-7, 2e-7, 3e-7])
     for number, (times, codes) in enumerate(((rounded, [0, 1, 2, 3.3]), (close, [0, 3e-6, 6e-6, 9e-6]))):
         with animated_usd(tmp_path / f"{number}.usdc", Animation(times, 30.0)) as writer:
-            writer.add(shape(4, spans=((0, 4),)))
+            writer.add(shape(4, shown=((0, 4),)))
         stage = Usd.Stage.Open(str(tmp_path / f"{number}.usdc"))
         assert stage.GetPrimAtPath("/scene/part/name").GetAttribute("points").GetTimeSamples() == pytest.approx(
             codes, abs=1e-12
@@ -144,7 +144,7 @@ def test_usd_is_saved_piece_by_piece_and_whole_all_the_same(tmp_path, monkeypatc
 
 
 def _rest(made: Shape) -> tuple[object, ...]:
-    return made.faces, made.first, made.count, made.frames, made.spans
+    return made.faces, made.first, made.count, made.frames, made.shown
 
 
 def test_without_usd_the_extra_is_named(tmp_path, monkeypatch):
@@ -154,14 +154,14 @@ def test_without_usd_the_extra_is_named(tmp_path, monkeypatch):
 
 
 def test_a_shape_is_shown_in_its_spans():
-    assert list(changes(shape(spans=((0, 3),)), 3)) == [(0, True)]
-    assert list(changes(shape(spans=((1, 2), (4, 6))), 6)) == [(0, False), (1, True), (2, False), (4, True)]
-    assert list(changes(shape(spans=((0, 2), (4, 5))), 6)) == [(0, True), (2, False), (4, True), (5, False)]
+    assert list(changes(shape(shown=((0, 3),)), 3)) == [(0, True)]
+    assert list(changes(shape(shown=((1, 2), (4, 6))), 6)) == [(0, False), (1, True), (2, False), (4, True)]
+    assert list(changes(shape(shown=((0, 2), (4, 5))), 6)) == [(0, True), (2, False), (4, True), (5, False)]
 
 
 def test_a_still_shape_comes_and_goes_in_a_glb(tmp_path):
     with animated_glb(tmp_path / "a.glb", animation(6)) as writer:
-        writer.add(shape(1, spans=((1, 2), (4, 6)), first=1))
+        writer.add(shape(1, shown=((1, 2), (4, 6)), first=1))
     played = PlayedGlb(tmp_path / "a.glb")
     seen = [len(played.shown(time)["part"]) for time in (0, 0.1, 0.15, 0.2, 0.35, 0.4, 0.55)]
     assert seen == [0, 1, 1, 0, 0, 1, 1]

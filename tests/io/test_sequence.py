@@ -12,7 +12,8 @@ import pytest
 from meshreel.errors import InputError
 from meshreel.geometry.topology import weld
 from meshreel.io import meshes
-from meshreel.io.sequence import SequenceOptions, open_sequence
+from meshreel.io.sequence import CAPTURED, SequenceOptions, open_sequence
+from meshreel.io.write import write_mesh
 from meshreel.types import Mesh
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -252,3 +253,14 @@ def test_meshes_are_float64_and_int32(tmp_path: Path) -> None:
     mesh = open_sequence(put(tmp_path, "m.obj")[0])[0]
     assert isinstance(mesh, Mesh)
     assert (mesh.vertices.dtype, mesh.faces.dtype) == (np.float64, np.int32)
+
+
+@pytest.mark.parametrize(
+    ("record", "up"), [('{"up": "-z"}', "-z"), ('{"up": "x"}', "y"), ("[]", "y"), ("{", "y"), (None, "y")]
+)
+def test_the_up_axis_is_the_one_that_capture_recorded(tmp_path, record, up):
+    write_mesh(Mesh.of(np.eye(3), [[0, 1, 2]]), tmp_path / "frame_00000.ply")
+    if record is not None:
+        (tmp_path / CAPTURED).write_text(record)
+    assert open_sequence(tmp_path).up == up
+    assert open_sequence([tmp_path / "frame_00000.ply"]).up == "y"

@@ -1,7 +1,7 @@
-"""The command line: `meshreel capture|segment|encode|decode|export|info|compare|play|serve|bench|demo`.
+"""The command line `meshreel capture|segment|encode|decode|export|info|compare|play|serve|bench|demo`.
 
-Errors take one line on standard error and exit code 2; `--debug` shows the traceback. A command's module is imported
-when it is called: `decode` and `info` work where the extra `encode` is not installed.
+Errors take one line on standard error and exit code 2; `--debug` shows the traceback. The module of a command is
+imported when the command is called, so that `decode` and `info` work without the extra `encode`.
 """
 
 from __future__ import annotations
@@ -29,32 +29,32 @@ TERMINATED = 143  # 128 + SIGTERM
 PIPE_CLOSED = 141  # 128 + SIGPIPE
 
 COMMANDS = {
-    "capture": "Fuse recordings of depth cameras into a mesh per frame.",
-    "segment": "Tell which faces of a scene move, and with which body.",
+    "capture": "Fuse recordings of depth cameras into one mesh per frame.",
+    "segment": "Label which faces of a scene move, and with which body.",
     "encode": "Encode a sequence of meshes into one .reel file.",
     "decode": "Decode a .reel file into a directory of meshes.",
     "export": "Write a .reel file as one animated file, GLB or USD, that other programs play.",
-    "info": "Show rate by part, objects over time, groups, forms and the quality recorded when the file was encoded.",
-    "compare": "Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.",
-    "play": "Play a .reel file in a browser, or in a headset's.",
-    "serve": "Serve a folder of .reel files: a gallery, and a page to play each.",
-    "demo": "Make a short capture of moving people, encode it, and measure what comes back.",
+    "info": "Show the rate by content, tracks over time, groups and forms, and what the encoder recorded.",
+    "compare": "Compare original meshes with decoded ones by every metric, and print the rate of a .reel file.",
+    "play": "Play a .reel file in a browser, on this machine or on a headset.",
+    "serve": "Serve a folder of .reel files: a gallery, and a page that plays each.",
+    "demo": "Make a short capture of moving people, encode it, and measure the result.",
 }
 BENCH = "Measure codecs against each other (a distribution of its own: pip install meshreel-bench)."
 
 
-PLAY_NEEDS = ("starlette", "uvicorn", "trustme")  # of the extra `play`; what else may be missing is of `encode`
+PLAY_NEEDS = ("starlette", "uvicorn", "trustme")  # packages of the extra `play`; all others are of `encode`
 
 
 class Terminated(BaseException):
-    """SIGTERM arrived; an exception, so that temporary files are removed on the way out."""
+    """Raised on SIGTERM, so that temporary files are removed on the way out."""
 
 
 PLUGINS = "meshreel.commands"  # entry points by which other distributions add commands: meshreel-bench adds `bench`
 
 
 def make_app() -> App:
-    """The command line's parser, with the commands that other distributions add."""
+    """Return the parser of the command line, with the commands that other distributions add."""
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
     for name, text in COMMANDS.items():
@@ -68,46 +68,46 @@ def make_app() -> App:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The program `meshreel`; what it returns is said of `run_app`."""
+    """Run the program `meshreel`; return its exit code as `run_app` does."""
     return run_app(make_app, arguments)
 
 
 def run_app(make: Callable[[], App], arguments: Sequence[str] | None = None) -> int:
-    """Runs one command and returns its exit code: 0, 2 after an error, or 128 and a signal's number.
+    """Run one command and return its exit code: 0, 2 after an error, or 128 plus the number of a signal.
 
-    Exits where called bare.
+    Without `arguments` it takes those of the process and exits with the code.
     """
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     stopped: list[int] = []
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a file name that the terminal cannot show is no failure
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file name that the terminal cannot show is no error
     try:
         with _signals_raise(stopped):
             make()(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         code = 0
     except KeyboardInterrupt:
-        code = _tell("interrupted", INTERRUPTED)
+        code = _report("interrupted", INTERRUPTED)
     except Terminated:
-        code = _tell("terminated", TERMINATED)
-    except BrokenPipeError:  # whoever read our output has left; nothing more can be said there
+        code = _report("terminated", TERMINATED)
+    except BrokenPipeError:  # the reader of our output is gone
         sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  (or the interpreter complains at its end)
         code = PIPE_CLOSED
     except Exception as error:
-        if stopped:  # a compiled module that is being imported makes an ImportError of a signal
-            code = _tell(*(("terminated", TERMINATED) if signal.SIGTERM in stopped else ("interrupted", INTERRUPTED)))
+        if stopped:  # a signal during the import of a compiled module becomes an ImportError
+            code = _report(*(("terminated", TERMINATED) if signal.SIGTERM in stopped else ("interrupted", INTERRUPTED)))
         elif "--debug" in tokens:
             raise
         else:
-            code = _tell(f"error: {one_line(error)}", FAILED)
+            code = _report(f"error: {one_line(error)}", FAILED)
     if arguments is None:
         sys.exit(code)
     return code
 
 
 def one_line(error: Exception) -> str:
-    """What went wrong and what to do, without line breaks."""
+    """Return what went wrong and what to do, without line breaks."""
     if isinstance(error, ImportError) and isinstance(error.__cause__, ModuleNotFoundError):
-        error = error.__cause__  # of the command's own module, which the parser imports
+        error = error.__cause__  # raised by the import of the command's module
     text = " ".join(str(error).split()) or type(error).__name__
     if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("meshreel"):
         extra = "play" if error.name in PLAY_NEEDS else "encode"
@@ -126,23 +126,23 @@ def one_line(error: Exception) -> str:
 
 
 def _missing(error: MissingArgumentError, command: str) -> str:
-    """Which argument a command lacks, and what it is as the command's own help has it."""
+    """Name the missing argument of a command, with the first sentence of its help."""
     assert error.argument is not None
     arguments = [] if error.app is None else error.app.assemble_argument_collection(parse_docstring=True)
     helps = {argument.name: argument.parameter.help or "" for argument in arguments}
     meaning = " ".join(helps.get(error.argument.name, "").split()).split(". ")[0].rstrip(".")
-    told = f": {meaning}" if meaning else ""
-    return f"{command}: {error.keyword or error.argument.name} is missing{told} (see {command} --help)"
+    shown = f": {meaning}" if meaning else ""
+    return f"{command}: {error.keyword or error.argument.name} is missing{shown} (see {command} --help)"
 
 
-def _tell(text: str, code: int) -> int:
+def _report(text: str, code: int) -> int:
     print(f"meshreel: {text}", file=sys.stderr)
     return code
 
 
 @contextmanager
 def _signals_raise(stopped: list[int]) -> Iterator[None]:
-    """SIGINT and SIGTERM become exceptions, and their numbers are put into `stopped`."""
+    """Turn SIGINT and SIGTERM into exceptions and append their numbers to `stopped`."""
 
     def stop(number: int, _frame: FrameType | None) -> NoReturn:
         stopped.append(number)

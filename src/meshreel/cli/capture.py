@@ -1,4 +1,4 @@
-"""`meshreel capture`: recordings of depth cameras become one mesh file per frame."""
+"""`meshreel capture`: fuse recordings of depth cameras into one mesh file per frame."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from cyclopts import Parameter
 from ..capture.fusion import FusionOptions
 from ..capture.recording import Recording, open_recording
 from ..errors import InputError
+from ..io.sequence import CAPTURED
 from ..io.write import frame_names, make_folder, replacing, write_mesh
 from .console import Common
 
-MADE = "capture.json"  # in the output: from what and how it was made
 _FUSION = FusionOptions()
 
 
@@ -32,9 +32,9 @@ def command(
     format: Literal["ply", "obj", "glb"] = "ply",
     common: Common = Common(),
 ) -> None:
-    """Fuse the depth pictures of a rig of still cameras into a mesh per frame.
+    """Fuse the depth pictures of a rig of still cameras into one mesh per frame.
 
-    Run again after an interruption, it goes on with the frames that are missing.
+    Run again after an interruption, it makes the missing frames.
 
     Parameters
     ----------
@@ -45,17 +45,17 @@ def command(
         end in the frame's number. Cameras look along +z, x right, y down. Or a folder with camera.json (one such
         camera, with frames_per_second) and depth/.
     output
-        The directory to write frame_00000.ply and so on into; made if needed.
+        The directory for frame_00000.ply and so on; created if needed.
     voxel
         Side of a voxel, m.
     truncation
-        Voxels before and behind a measurement that it says something about.
+        Number of voxels before and behind a measurement that it changes.
     fragment
-        Connected pieces of less area are dropped, m^2.
+        Smallest area of a connected piece, m^2; smaller ones are dropped.
     frames
-        Which frames, as A:B with B excluded.
+        Frames to fuse, as A:B with B excluded.
     format
-        Of the mesh files.
+        Format of the mesh files.
     """
     options = FusionOptions(voxel, truncation, fragment)
     recording, warnings = open_recording(rig, options, frames, keep=False)
@@ -74,12 +74,12 @@ def command(
         common.warn([f"{output}: {len(bare)} of {len(missing)} fused frames have no surface, as {bare[0]}"])
     row = {"output": str(output), "frames": len(names), "fused": len(missing), "frame_rate": recording.frame_rate}
     kept = "" if len(missing) == len(names) else f", {len(names) - len(missing)} of them from before"
-    told = f"{output}: {len(names)} {format} files{kept}, {recording.frame_rate:g} frames a second"
-    common.result(row | {"format": format}, told)
+    text = f"{output}: {len(names)} {format} files{kept}, {recording.frame_rate:g} frames a second"
+    common.result(row | {"format": format}, text)
 
 
 def _made(rig: Path, recording: Recording) -> dict[str, Any]:
-    """What decides the frames; of the pictures their sizes, which are other ones where a recording is another."""
+    """Return all that the frames depend on; pictures count by their sizes, which differ between recordings."""
     cameras = [camera.record() for camera in recording.rig.cameras]
     sizes = [[_size(files[n]) if n in files else -1 for n in recording.numbers] for files in recording.rig.files]
     return {
@@ -94,7 +94,7 @@ def _made(rig: Path, recording: Recording) -> dict[str, Any]:
 
 
 def _size(path: Path) -> int:
-    """Bytes of a file; those of one that cannot be read are told when it is."""
+    """Return the size of a file; a file that cannot be read is an error later, when it is read."""
     try:
         return path.stat().st_size
     except OSError:
@@ -102,8 +102,8 @@ def _size(path: Path) -> int:
 
 
 def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
-    """The files that are still to be made; the folder says from what. Raises InputError where it is of another run."""
-    path = output / MADE
+    """Record the run in the folder; return the missing files. Raises InputError for a folder of another run."""
+    path = output / CAPTURED
     make_folder(output)
     there = {name for name in names if (output / name).exists()}
     if path.exists():
@@ -115,7 +115,7 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
             text = f"{output}: holds frames of another rig or of other options"
             raise InputError(f"{text} ({_difference(before, now)}); choose another folder")
     elif any(output.glob("frame_*")):
-        raise InputError(f"{output}: holds frames that no {MADE} tells the making of; choose another folder")
+        raise InputError(f"{output}: holds frames without a {CAPTURED}; choose another folder")
     else:
         with replacing(path) as file:
             file.write((json.dumps(made, indent=1) + "\n").encode())
@@ -123,12 +123,12 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
 
 
 def _difference(before: Any, now: Any, name: str = "") -> str:
-    """The first thing that two records have differently, and both values where they are short."""
+    """Return the first entry in which two records differ, and the beginning of both values."""
     if isinstance(before, dict) and isinstance(now, dict):
         key = next(key for key in {**now, **before} if key not in now or key not in before or before[key] != now[key])
         return _difference(before.get(key), now.get(key), f"{name}.{key}" if name else key)
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
         number = next(number for number, pair in enumerate(zip(before, now, strict=True)) if pair[0] != pair[1])
         return _difference(before[number], now[number], f"{name}[{number}]")
-    told = [json.dumps(value) for value in (before, now)]
-    return f"{name} {told[0]:.60}, now {told[1]:.60}"
+    values = [json.dumps(value) for value in (before, now)]
+    return f"{name} {values[0]:.60}, now {values[1]:.60}"

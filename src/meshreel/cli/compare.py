@@ -1,4 +1,4 @@
-"""`meshreel compare`: every metric between original meshes and decoded ones."""
+"""`meshreel compare`: compare original meshes with decoded ones by every metric."""
 
 from __future__ import annotations
 
@@ -46,22 +46,23 @@ def command(
     knowing: Knowing = Knowing(),
     common: Common = Common(),
 ) -> None:
-    """Compare original meshes with decoded ones by every metric, and tell the rate of a .reel file.
+    """Compare original meshes with decoded ones by every metric, and print the rate of a .reel file.
 
-    With --truth, a scene's original and decoded meshes are also compared with the clean ones: all of it, people (faces
-    whose nearest clean face moves) and background; the originals' numbers are the noise floor.
+    With --truth, the original and decoded meshes of a scene are also compared with the clean ones: the whole scene,
+    people (faces whose nearest clean face moves) and background. The numbers of the originals are the noise floor.
 
     Parameters
     ----------
     originals
-        The original sequence: a directory, a glob, a file, an .npz or a rig's folder. It takes --frames and --scale as
-        `encode` did.
+        The original sequence: a directory, a glob, a file, an .npz or a rig's folder. Give --frames and --scale as for
+        `encode`.
     decoded
         A .reel file, or the decoded meshes.
     sheet
-        Write a PNG: original, decoded, error heat map; seen from the cameras of --cameras or of a rig, or the front.
+        Write a PNG of original, decoded mesh and error heat map, seen from --cameras, from a rig's cameras, or from the
+        front.
     sheet_frames
-        The frames in it; the first, the middle and the last where none is given.
+        Frames in the sheet; by default the first, the middle and the last.
     """
     options = looking.options()
     if sheet is not None and not sheet.parent.is_dir():
@@ -84,7 +85,7 @@ def command(
                 row |= {"truth": _against_truth(sequence, other, truth, knowing.truth_every, progress)}
         if sheet is not None:
             write_sheet(sequence, other, sheet, shown)
-    except FormatError as error:  # a chunk that the decoder knows by its number only
+    except FormatError as error:  # names the chunk, but not the file
         raise FormatError(f"{decoded}: {error}; copy the file again, or compare frames before it") from None
     if reel:
         described = describe_file(Path(decoded))
@@ -97,7 +98,7 @@ def command(
 
 
 def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[PinholeCamera, ...]:
-    """Those that are given, or those of the rig that are of its first one's size."""
+    """Return the given cameras, or those of the rig that have the picture size of its first one."""
     if looking.cameras is not None:
         return tuple(read_cameras(looking.cameras))
     views = [camera.view for camera in sequence.rig.cameras] if isinstance(sequence, Recording) else []
@@ -106,14 +107,14 @@ def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[PinholeCam
 
 @dataclass(frozen=True, slots=True)
 class ChosenTruth:
-    """The clean frames that belong to the originals' --frames."""
+    """Clean frames for the --frames of the originals."""
 
     truth: Truth
     numbers: range
 
     @property
     def cameras(self) -> tuple[DepthCamera, ...]:
-        """Where they really stood."""
+        """True poses of the cameras."""
         return self.truth.cameras
 
     def __len__(self) -> int:
@@ -124,7 +125,7 @@ class ChosenTruth:
 
 
 def open_truth(folder: Path, reading: Reading, count: int) -> ChosenTruth:
-    """The truth of `count` frames that were read so. Raises InputError where it is of another length."""
+    """Open the truth of `count` frames chosen by `reading`. Raises InputError if it has another length."""
     truth = read_truth(folder)
     numbers = reading.options().chosen(len(truth))
     if len(numbers) != count:
@@ -142,7 +143,7 @@ def _against_truth(
 
 
 def truth_table(row: dict[str, Any]) -> Table:
-    """The means against the truth, one metric a line: of the originals, and of the decoded meshes."""
+    """Return a table of means against the truth, for originals and decoded meshes, one metric per line."""
     table = Table(f"against the truth, {len(row['frames'])} frames", "originals (noise floor)", "decoded")
     for name in row["decoded"]:
         table.add_row(name, *(_number(row[which][name]) for which in ("noise_floor", "decoded")))
@@ -150,7 +151,7 @@ def truth_table(row: dict[str, Any]) -> Table:
 
 
 def is_reel(path: str) -> bool:
-    """True for a name that ends in .reel and for a file that begins as one."""
+    """Return True for names that end in .reel and for files with its signature."""
     if path.endswith(".reel"):
         return True
     if not Path(path).is_file():
@@ -160,14 +161,14 @@ def is_reel(path: str) -> bool:
 
 
 def recorded_keys(metadata: dict[str, Any], count: int) -> tuple[int, ...]:
-    """The key frames of `count` that the encoder has recorded in a file; what else may stand there is passed over."""
+    """Return the key frames below `count` recorded in a file; ignore other values, which a foreign file may have."""
     recorded = metadata.get("key_frames")
     numbers = recorded if isinstance(recorded, list) else []
     return tuple(number for number in numbers if type(number) is int and 0 <= number < count)
 
 
 def metric_table(row: dict[str, Any]) -> Table:
-    """The numbers of a row, one metric a line: the mean over frames, the worst frame, and the mean without keys."""
+    """Return a table of metrics, one per line: mean over frames, worst frame, and mean without key frames."""
     columns = {"mean": "", "worst frame": "_worst"}
     if any(name.endswith("_without_keys") for name in row):
         columns["without key frames"] = "_without_keys"
@@ -180,14 +181,14 @@ def metric_table(row: dict[str, Any]) -> Table:
 
 
 def counted(sequence: MeshSequence, progress: StageBars) -> Iterator[Mesh]:
-    """The frames of a sequence, each reported when it has been used."""
+    """Yield the frames of a sequence and report each after its use."""
     for i, mesh in enumerate(sequence):
         yield mesh
         progress("compare", i + 1, len(sequence))
 
 
 def _cameras(row: dict[str, Any]) -> list[str]:
-    """A line for each view of SSIM; all of a camera is in the JSON."""
+    """Return a line for each view of SSIM; the JSON has the complete cameras."""
     lines = []
     for number, camera in enumerate(row["cameras"]):
         extrinsic = np.reshape(camera["extrinsic"], (4, 4)).T

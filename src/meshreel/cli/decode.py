@@ -1,21 +1,17 @@
-"""`meshreel decode`: a .reel file becomes one mesh file per frame."""
+"""`meshreel decode`: decode a .reel file into one mesh file per frame."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..container.reader import ReelReader
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
-from ..io.write import frame_names, left_over, make_folder, write_mesh
-from ..types import Mesh
+from ..export.frames import Part, check_part, write_frames
+from ..io.write import frame_names, left_over, make_folder
 from .console import Common
-
-Part = Literal["all", "background", "moving"]
 
 
 def command(
@@ -33,47 +29,30 @@ def command(
     Parameters
     ----------
     file
-        The .reel file. Frames of a damaged group are left out and the others written.
+        The .reel file. Frames of a damaged group are skipped; the others are written.
     output
-        The directory to write frame_00000.ply and so on into; made if needed.
+        The directory for frame_00000.ply and so on; created if needed.
     format
-        Of the mesh files.
+        Format of the mesh files.
     layers
-        Use at most this many layers of a group beyond its first (subdivisions, or KLT components): a coarser, still
-        valid shape.
+        Largest number of layers (subdivisions, or KLT components) to decode of each group beyond its first: fewer
+        give coarser, valid meshes from fewer bytes.
     only
-        Of a scene, what does not move or what moves; all of every frame if not given.
+        Of a scene, only the background or only the moving bodies; by default whole frames.
     """
     if layers is not None and layers < 0:
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
     check_part(file, video.reader, only)
-    look: dict[str, Callable[[int], Mesh]]
-    look = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
+    decode = {"all": video.__getitem__, "background": video.background, "moving": video.moving}[only]
     make_folder(output)
     names = frame_names(len(video), format)
     common.warn(left_over(output, names, f"frame_*.{format}"))
-    failed: list[FormatError] = []
     with common.stages(len(video)) as progress:
-        for i, name in enumerate(names):
-            try:
-                mesh = look[only](i)
-            except FormatError as error:
-                failed.append(error)
-                (output / name).unlink(missing_ok=True)  # one of a run before would pass for this frame
-            else:
-                write_mesh(mesh, output / name)
-            progress("decode", i + 1, len(video))
+        paths = [output / name for name in names]
+        failed = write_frames(decode, paths, lambda done: progress("decode", done, len(video)))
     if failed:
         text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
         raise FormatError(f"{text}; copy the file again")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")
-
-
-def check_part(file: Path, reader: ReelReader, only: Part) -> None:
-    """InputError where a file has no frame with the part that is asked for."""
-    if only == "background" and not reader.has_background:
-        raise InputError(f"{file}: has no background, leave out --only background")
-    if only == "moving" and not reader.has_moving:
-        raise InputError(f"{file}: has nothing that moves, leave out --only moving")

@@ -1,6 +1,6 @@
-"""`meshreel demo`: a room in which two people move is recorded, captured, encoded, decoded and measured.
+"""`meshreel demo`: record, capture, encode, decode and measure a room in which two people move.
 
-Everything is procedural. What it leaves can be looked at: the rig with its truth, the file, a picture.
+Everything is procedural. The output is the rig with its truth, the .reel file and a picture.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from .encode import describe, summary_row, workers
 from .info import describe_file, rate_table
 
 _QUALITY = preset_options().quality
-_JUDGED = 4  # frames, at most, that are compared with the truth
+_JUDGED = 4  # frames, at most, that are compared with the truth: each takes seconds
 
 
 def command(
@@ -42,29 +42,28 @@ def command(
     jobs: int = 1,
     common: Common = Common(),
 ) -> None:
-    """Simulate depth cameras in a room where two people move, capture and encode it, and measure what comes back.
+    """Simulate depth cameras in a room where two people move, capture and encode it, and measure the result.
 
-    The numbers are against the truth, which a simulation knows: those of the captured meshes, which are noisy, stand
-    beside those of the decoded ones.
+    Captured and decoded meshes are compared with the truth, which a simulation knows; the captured ones are noisy.
 
     Parameters
     ----------
     output
         The directory for the rig's recording, demo.reel and the picture demo.png.
     frames
-        How many frames to make.
+        Number of frames.
     quality
         0 (small) to 100 (fine).
     seed
-        Of the sensor's noise.
+        Seed of the sensor noise.
     jobs
-        Moving bodies to encode side by side.
+        Number of intervals to encode side by side; the file is the same.
     """
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     if seed < 0:
         raise InputError(f"--seed must not be negative, got {seed}")
-    options, room = preset_options(quality=quality), RoomOptions(frames=frames, seed=seed)  # refused before work begins
+    options, room = preset_options(quality=quality), RoomOptions(frames=frames, seed=seed)  # errors before work begins
     file, picture = output / "demo.reel", output / "demo.png"
     with common.stages(frames) as progress, workers(jobs) as executor:
         capture = _captured(output / "rig", room, progress)
@@ -73,8 +72,8 @@ def command(
             truth = _judged(output / "rig", capture, video, progress)
             write_sheet(capture, video, picture, SheetOptions(frames=_spread(frames, 3), height=360, unit="mm"))
     described = describe_file(file)
-    parts = {name: described[name] for name in ("bytes_by_content", "mbps_by_content")}
-    row = summary_row(summary, capture.frame_rate) | parts | {"truth": truth}
+    sizes = {name: described[name] for name in ("bytes_by_content", "mbps_by_content")}
+    row = summary_row(summary, capture.frame_rate) | sizes | {"truth": truth}
     common.warn(summary.warnings)
     common.result(
         {"output": str(output), "warnings": summary.warnings} | row,
@@ -89,17 +88,17 @@ def command(
 
 
 def _captured(folder: Path, room: RoomOptions, progress: StageBars) -> Recording:
-    """The room as its cameras see it, fused."""
+    """Record the room with its cameras and fuse all frames."""
     _forget(folder, [camera.name for camera in room_cameras(WIDTH)])
     record_room(folder, room, WIDTH, lambda k: progress("simulate", k, room.frames))
     recording, _ = open_recording(folder, FusionOptions(VOXEL))
-    for number, _ in enumerate(recording):  # which keeps them
+    for number, _ in enumerate(recording):  # the recording keeps fused frames
         progress("fuse", number + 1, len(recording))
     return recording
 
 
 def _forget(folder: Path, names: list[str]) -> None:
-    """Removes the frames of a demo before: rig and truth must have the same ones. Raises InputError for another rig."""
+    """Remove the frames of an earlier demo, so that rig and truth match. Raises InputError if the rig is no demo's."""
     if not (folder / RIG).exists():
         return
     if not (folder / TRUTH).is_dir() or [camera.name for camera in read_cameras(folder)[0]] != names:
@@ -116,5 +115,5 @@ def _judged(rig: Path, capture: MeshSequence, video: Video, progress: StageBars)
 
 
 def _spread(count: int, most: int) -> tuple[int, ...]:
-    """Frames from the first to the last."""
+    """Return `most` frame numbers, evenly spread from the first to the last."""
     return tuple(sorted({k * (count - 1) // (most - 1) for k in range(most)}))

@@ -1,4 +1,4 @@
-"""`meshreel export`: a .reel file becomes one animated file that other programs play."""
+"""`meshreel export`: write a .reel file as one animated file that other programs play."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..export.animated_file import ExportOptions, export
 from ..export.animated_usd import EXTENSIONS
+from ..export.frames import Part, check_part
 from ..io.sequence import SequenceOptions
 from ..types import Up
 from .console import Common
-from .decode import Part, check_part
 
 
 def command(
@@ -40,24 +40,24 @@ def command(
         The file to write: .glb, .usdc or .usd (binary), .usda (text), .usdz (package). If not given, the name of the
         .reel file with .glb or .usdc, in the current directory.
     glb
-        Write GLB; need not be said where `output` tells.
+        Write GLB; implied by the extension of `output`.
     usd
-        Write USD; needs the extra `usd`.
+        Write USD; implied by the extension of `output`. Needs the extra `usd`.
     layers
-        Use at most this many layers of a group beyond its first (subdivisions, or KLT components): a coarser, still
-        valid shape.
+        Largest number of layers (subdivisions, or KLT components) to decode of each group beyond its first: fewer
+        give coarser, valid meshes from fewer bytes.
     frames
-        Which frames, as A:B with B excluded.
+        Frames to export, as A:B with B excluded.
     only
-        Of a scene, what does not move or what moves; all of every frame if not given.
+        Of a scene, only the background or only the moving bodies; by default whole frames.
     up
-        The axis of the meshes that points up, as the .reel file tells it if not given; in the file written it is +y.
+        Axis of the meshes that points up; by default the one that the .reel file names. In the written file it is +y.
     """
     options = ExportOptions(layers, only, up)
     target = _target(file, output, glb, usd)
     wanted = SequenceOptions(frames=frames)
     with open_video(file) as video:
-        if target.exists() and target.samefile(file):  # whatever the recording's name, and behind whatever link
+        if target.exists() and target.samefile(file):  # also through links and under other names
             raise InputError(f"{target}: is the recording itself, which would be lost; give another name with -o")
         check_part(file, video.reader, only)
         chosen = wanted.chosen(len(video))
@@ -75,7 +75,7 @@ def command(
 
 
 def _target(file: Path, output: Path | None, glb: bool, usd: bool) -> Path:
-    """The file to write. Raises InputError where flags and name do not tell the format, or not the same one."""
+    """Return the file to write. Raises InputError if flags and name give no format, or different ones."""
     if glb and usd:
         raise InputError("--glb and --usd: give one of both")
     if output is None:

@@ -1,4 +1,4 @@
-"""Flags that several commands share: how meshes are read, and how SSIM looks at them."""
+"""Flags that several commands share: reading meshes, comparing them, and the truth of simulated rigs."""
 
 from __future__ import annotations
 
@@ -22,52 +22,52 @@ _VIEWS = ViewOptions()
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """How mesh files become a sequence."""
+    """Flags for reading mesh files as a sequence."""
 
     fps: float = _READ.frame_rate
-    """Frames per second of the meshes; of a folder that `capture` wrote, those of the recording."""
+    """Frames per second; by default 30, or the rate of the recording for a folder that `capture` wrote."""
     frames: str = _READ.frames
-    """Which frames, as A:B with B excluded."""
+    """Frames to use, as A:B with B excluded."""
     scale: float = _READ.scale
-    """Factor on all coordinates, to metres."""
+    """Factor from the unit of the files to metres."""
 
     def options(self) -> SequenceOptions:
-        """The same for `open_sequence`; vertices that repeat a position are welded."""
+        """Return the options of `open_sequence`, which welds vertices that repeat a position."""
         return SequenceOptions(self.fps, self.frames, self.scale, weld)
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Looking:
-    """What is compared, and from where."""
+    """Flags for what is compared, and from which cameras."""
 
     ssim: bool = True
-    """Render and compare pictures too (some seconds a frame)."""
+    """Also render pictures and compare them by SSIM (some seconds per frame)."""
     cameras: Path | None = None
-    """A file of Open3D pinhole cameras for SSIM; four views around the sequence where it is not given."""
+    """File of Open3D pinhole cameras for SSIM; by default four views around the sequence."""
     width: int = _VIEWS.width
-    """Of the rendered pictures, pixels."""
+    """Size of the rendered pictures, pixels."""
     height: int = _VIEWS.height
-    """Of the rendered pictures, pixels."""
+    """Size of the rendered pictures, pixels."""
     up: Annotated[Up, Parameter(allow_leading_hyphen=True)] = "y"
     """The axis that points up."""
     keys: Annotated[tuple[int, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """Key frames: means are also given without them. Those that a .reel file names where none is given."""
+    """Key frames: means without them are printed, too. By default those that the .reel file names."""
 
     def options(self) -> ComparisonOptions:
-        """The same for `compare_sequences`."""
+        """Return the options of `compare_sequences`."""
         return ComparisonOptions(self.cameras, ViewOptions(self.width, self.height, up=self.up), self.ssim, self.keys)
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Knowing:
-    """The truth, where it is known."""
+    """Flags for a comparison with the truth of a simulated rig."""
 
     truth: Path | None = None
-    """The folder `truth` of the simulated rig that the originals were captured from: both are compared with it, too."""
+    """Folder `truth` of the simulated rig from which the originals were captured: both are also compared with it."""
     truth_every: int = 1
-    """Compare the first frame with the truth and every so many after it (seconds for half a million faces)."""
+    """Compare each Nth frame with the truth, from the first (seconds per frame of half a million faces)."""
 
     def __post_init__(self) -> None:
         if self.truth_every < 1:

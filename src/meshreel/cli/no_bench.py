@@ -1,4 +1,4 @@
-"""`meshreel bench` where the distribution meshreel-bench is not installed."""
+"""`meshreel bench` without the distribution meshreel-bench: an error that says what to install."""
 
 from __future__ import annotations
 

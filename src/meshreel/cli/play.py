@@ -1,4 +1,4 @@
-"""`meshreel play`: one .reel file in a browser."""
+"""`meshreel play`: play one .reel file in a browser."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ def command(
     server: Annotated[ServerOptions, Parameter(name="*")] = ServerOptions(),
     common: Common = Common(),
 ) -> None:
-    """Play a .reel file in a browser, or in a headset's; stops with Ctrl-C.
+    """Play a .reel file in a browser, on this machine or on a headset. Ctrl-C stops it.
 
     Parameters
     ----------
     file
         The .reel file.
     browser
-        Open the page in this machine's browser.
+        Open the page in the browser of this machine.
     """
-    with open_video(file):  # raises what is wrong with it before a page is there
+    with open_video(file):  # a damaged file is an error before the server starts
         pass
 
-    def tell(found: list[str]) -> None:
+    def announce(found: list[str]) -> None:
         common.result({"file": str(file), "addresses": found}, f"playing {file} at {' '.join(found)}  (Ctrl-C stops)")
-        if browser:  # beside: a browser in the terminal returns when it is closed
+        if browser:  # in a thread: a text browser returns only when it is closed
             threading.Thread(target=_open, args=(found[0], common), daemon=True).start()
 
-    with suppress(KeyboardInterrupt):  # the way to end it
-        run(make_app(Library.of_file(file), hosts=server.hosts), server, tell)
+    with suppress(KeyboardInterrupt):  # the regular end of the server
+        run(make_app(Library.of_file(file), hosts=server.hosts), server, announce)
 
 
 def _open(address: str, common: Common) -> None:

@@ -1,4 +1,4 @@
-"""`meshreel segment`: which faces of a scene move, and with which body."""
+"""`meshreel segment`: label which faces of a scene move, and with which body."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ from .console import Common
 from .flags import Reading
 from .sources import Masking, Source, open_source
 
-COLUMNS = 4  # views in the sheet
-MOST_PREVIEWS = 16  # frames whose pictures are in memory together
+COLUMNS = 4  # views in the sheet (guess)
+MOST_PREVIEWS = 16  # frames whose pictures are in memory together (guess)
 LABELS, COLORED, SHEET = "labels", "colored", "sheet.png"
 
 
@@ -43,22 +43,22 @@ def command(
     previews: int = 4,
     common: Common = Common(),
 ) -> None:
-    """Tell which faces of a scene move, and with which body.
+    """Label which faces of a scene move, and with which body.
 
     Parameters
     ----------
     inputs
         A directory, a glob, mesh files or an .npz, as `encode` takes them; or a rig's folder, as `capture` takes it.
     output
-        The directory to write into; made if needed. In labels/frame_00000.npz and so on, `np.load(file)["moving"]` is
-        True for each face that moves, `np.load(file)["bodies"]` the number of its body from 1 on, 0 for none; faces are
-        the triangles of the frame as it was read and welded. Beside them cameras.json, the views; sheet.png, some
-        frames from some of the views, a color a body; and colored/, the same frames as PLY with colors.
+        The output directory; created if needed. In labels/frame_00000.npz and so on, `np.load(file)["moving"]` is True
+        for each face that moves, and `np.load(file)["bodies"]` is the number of its body from 1, 0 for none; faces are
+        the triangles of the frame after reading and welding. The views are in cameras.json; sheet.png shows some frames
+        from some views, with a color for each body, and colored/ holds the same frames as PLY with colors.
     views_only
-        Write only what the views see, view00/frame_00000.png and so on (normals as colors), and cameras.json. A
-        tool that makes masks of the pictures under the same names makes the folder that --masks takes.
+        Write only pictures of the views (normals as colors), view00/frame_00000.png and so on, and cameras.json. Masks
+        of these pictures, under the same names, are a folder for --masks.
     previews
-        Frames in the sheet and in colored/, evenly spread; 0 for neither.
+        Number of frames in the sheet and in colored/, evenly spread; 0 for neither.
     """
     if not 0 <= previews <= MOST_PREVIEWS:
         raise InputError(f"--previews {previews}: give 0 to {MOST_PREVIEWS}")
@@ -74,14 +74,14 @@ def command(
         text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
     else:
         row = _write_labels(source, masker, output, options, previews, common)
-        text = f"{output}: {_told(row)}"
+        text = f"{output}: {_describe(row)}"
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *left)
     common.warn(warnings)
     common.result({"output": str(output), "warnings": warnings} | row, text)
 
 
 def _left_over(output: Path, count: int, views_only: bool, previews: int) -> tuple[str, ...]:
-    """A line for each folder with files of a run before that are not replaced. InputError where pictures are masks."""
+    """Return a line for each folder with other files of an earlier run. Raises InputError for masks."""
     if views_only:
         places = sorted(output.glob("view*"))
         painted = [path for place in places for path in sorted(place.glob("frame_*.png")) if is_mask(path)]
@@ -137,14 +137,14 @@ def _write_labels(
 
 
 class _Tally:
-    """Counts faces."""
+    """Counts of faces over all frames."""
 
     def __init__(self) -> None:
         self._faces, self._moving = list[int](), list[int]()
-        self._bodies: dict[int, list[int]] = {}  # of each, its faces in each frame where it is there
+        self._bodies: dict[int, list[int]] = {}  # face counts of each body in the frames that have it
 
     def add(self, labels: FrameLabels) -> None:
-        """Takes in a frame."""
+        """Count the faces of a frame."""
         self._faces.append(len(labels.moving))
         self._moving.append(int(labels.moving.sum()))
         for number, faces in enumerate(np.bincount(labels.bodies).tolist()):
@@ -152,37 +152,37 @@ class _Tally:
                 self._bodies.setdefault(number, []).append(faces)
 
     def row(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the counts, ready for JSON."""
         bodies = [
             {"body": number, "frames": len(faces), "faces": sum(faces) // len(faces)}
             for number, faces in sorted(self._bodies.items())
         ]
         shares = [moving / max(faces, 1) for moving, faces in zip(self._moving, self._faces, strict=True)]
         share = sum(self._moving) / max(sum(self._faces), 1)
-        told = {"moving_share": share, "moving_share_least": min(shares), "moving_share_most": max(shares)}
+        shares_row = {"moving_share": share, "moving_share_least": min(shares), "moving_share_most": max(shares)}
         counted = {"frames": len(self._faces), "faces": sum(self._faces), "moving": sum(self._moving)}
-        return counted | told | {"bodies": bodies}
+        return counted | shares_row | {"bodies": bodies}
 
 
 class _Preview:
-    """Pictures of some frames; the sheet has those views that see most faces that move."""
+    """Pictures of some frames; the sheet shows the views that see most moving faces."""
 
     def __init__(self) -> None:
         self._rows = list[FrameViews]()
         self._counts = list[list[int]]()
 
     def add(self, frame: int, pictures: list[UInt8[np.ndarray, "H W 3"]], moving: list[int]) -> None:
-        """Takes in a frame: a picture a view, and how many moving faces it sees."""
+        """Add a frame: a picture from each view, and the number of moving faces that it shows."""
         self._rows.append(FrameViews(frame, pictures))
         self._counts.append(moving)
 
     def picture(self) -> UInt8[np.ndarray, "Y X 3"]:
-        """A row a frame."""
+        """Return the sheet, one row for each frame."""
         best = sorted(np.argsort(-np.sum(self._counts, axis=0), kind="stable")[:COLUMNS].tolist())
         return sheet([FrameViews(row.frame, [row.pictures[view] for view in best]) for row in self._rows], best)
 
 
-def _told(row: dict[str, Any]) -> str:
+def _describe(row: dict[str, Any]) -> str:
     share = f"{100 * row['moving_share']:.1f} % of the faces move"
     spread = f"{100 * row['moving_share_least']:.1f} to {100 * row['moving_share_most']:.1f} % in a frame"
     bodies = [f"{body['body']} in {body['frames']} frames, {body['faces']} faces" for body in row["bodies"]]

@@ -1,4 +1,4 @@
-"""`meshreel serve`: a folder of .reel files as a gallery in a browser."""
+"""`meshreel serve`: serve a folder of .reel files as a gallery."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ def command(
     server: Annotated[ServerOptions, Parameter(name="*")] = ServerOptions(),
     common: Common = Common(),
 ) -> None:
-    """Serve a folder of .reel files: a gallery, a page to play each, and the files; stops with Ctrl-C.
+    """Serve a folder of .reel files: a gallery, a page that plays each, and the files. Ctrl-C stops it.
 
     Parameters
     ----------
     folder
-        The folder; those below it count, too. It is looked at anew with each request.
+        The folder; its subfolders are included. It is listed again for each request.
     cors
-        An origin whose pages may read the files, such as https://example.org; * for all. May be given several times.
+        Origin whose pages may read the files, such as https://example.org, or * for all; can be repeated.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no folder; give one with .reel files, or use meshreel play for one file")
 
-    def tell(found: list[str]) -> None:
+    def announce(found: list[str]) -> None:
         text = f"serving {folder} at {' '.join(found)}  (Ctrl-C stops)"
         common.result({"folder": str(folder), "addresses": found}, text)
 
-    with suppress(KeyboardInterrupt):  # the way to end it
-        run(make_app(Library(folder), cors=cors, hosts=server.hosts), server, tell)
+    with suppress(KeyboardInterrupt):  # the regular end of the server
+        run(make_app(Library(folder), cors=cors, hosts=server.hosts), server, announce)

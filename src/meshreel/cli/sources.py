@@ -1,12 +1,11 @@
-"""What the commands that take scenes share: inputs that may be a rig, and flags for who says what moves."""
+"""Inputs of commands that take scenes: mesh files or the folder of a rig, and flags for what moves."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -17,9 +16,8 @@ from ..capture.recording import open_recording
 from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
 from ..geometry.cameras import unpack_cameras
-from ..io.sequence import open_sequence
-from ..types import MeshSequence, Up, known_up
-from .capture import MADE
+from ..io.sequence import captured, open_sequence
+from ..types import MeshSequence, Up
 from .flags import Reading
 
 _READ = Reading()
@@ -27,22 +25,22 @@ _READ = Reading()
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A sequence, and what a user must know of where it comes from."""
+    """A sequence, and the warnings and the up axis of its source."""
 
     sequence: MeshSequence
     remarks: tuple[str, ...] = ()
-    up: Up = "y"  # as the cameras have it, where they are known
+    up: Up = "y"  # axis that points up, as recorded with the cameras
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """A line each; complete once the sequence has been read."""
+        """One line each; complete after the last frame was read."""
         return (*self.remarks, *getattr(self.sequence, "warnings", ()))
 
 
 def open_source(inputs: Sequence[str], reading: Reading) -> Source:
-    """The frames of mesh files, or of a rig's folder, fused when they are asked for. Raises InputError.
+    """Open mesh files, or the folder of a rig, whose frames are fused on access. Raises InputError.
 
-    A simulated rig's truth describes its cameras, too, but has the frames themselves.
+    The truth of a simulated rig has a description of cameras, too, but is opened as the mesh files that it holds.
     """
     folder = Path(inputs[0])
     described = any((folder / name).is_file() for name in (RIG, SINGLE))
@@ -52,8 +50,8 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
         if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:
             options = replace(options, frame_rate=float(rate))
         sequence = open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options)
-        return Source(sequence, up=known_up(made.get("up")))
-    reading.options()  # refuses what no sequence can have
+        return Source(sequence, up=sequence.up)
+    reading.options()  # raises InputError for values that no sequence can have
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
     recording, remarks = open_recording(folder, frames=reading.frames)
@@ -63,35 +61,26 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
     return Source(recording, tuple(remarks), recording.rig.up)
 
 
-def captured(folder: Path) -> dict[str, Any]:
-    """What `capture` has written of a recording beside its meshes; nothing where it has not."""
-    try:
-        made = json.loads((folder / MADE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return made if isinstance(made, dict) else {}
-
-
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Masking:
-    """Who says what moves in a scene; geometric change over the sequence where nobody else does."""
+    """Flags for the source of masks of what moves; without them, geometric change over the sequence."""
 
     masks: Path | None = None
     """Masks of another tool: a folder with cameras.json, and view00/frame_00000.png ... of its cameras, 8-bit
-    PNG of object numbers, 0 for what stands still. `segment --views-only` makes pictures and cameras for it."""
+    PNG of object numbers, 0 for what stands still. `segment --views-only` writes the pictures and cameras."""
     sam3: Path | None = None
-    """Masks by SAM3 (extra `sam3`): a folder with its weights, as of facebook/sam3."""
+    """Masks by SAM3 (extra `sam3`): a folder with its weights, such as those of facebook/sam3."""
     prompts: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """What SAM3 looks for, in words, as --prompts person --prompts dog; of it counts what moves. Common words where
-    none is given."""
+    """Words for objects that SAM3 looks for, as --prompts person --prompts dog; only moving ones count. Common words
+    if not given."""
     device: str = "cpu"
-    """Where SAM3 runs, as torch names it: cpu, cuda, cuda:1."""
+    """Device of SAM3 in torch's notation: cpu, cuda, cuda:1."""
     views: Path | None = None
-    """A file of Open3D pinhole cameras, all of one size, that look at the scene; placed where it is not given."""
+    """File of Open3D pinhole cameras of one size that look at the scene; by default they are placed."""
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None
-    """The axis that points up: players stand the recording on it, and pictures of placed views are upright. That of
-    the cameras, where they are known, else y."""
+    """Axis that points up, for players and for the pictures of placed views. By default the axis recorded with the
+    cameras, or y."""
 
     def __post_init__(self) -> None:
         if self.masks is not None and self.sam3 is not None:
@@ -103,11 +92,11 @@ class Masking:
 
     @property
     def wanted(self) -> bool:
-        """True where any flag says something."""
+        """True if any flag except --up is given."""
         return replace(self, up=None) != Masking()
 
     def options(self, options: SegmentOptions, source: Source) -> SegmentOptions:
-        """The same with the views that were asked for. Raises InputError where their file is wrong."""
+        """Return the options with the requested views. Raises InputError if their file cannot be used."""
         options = replace(options, views=replace(options.views, up=self.up or source.up))
         if self.views is None:
             return options
@@ -119,7 +108,7 @@ class Masking:
         return replace(options, cameras=one_size(unpack_cameras(data, str(self.views)), str(self.views)))
 
     def masker(self, frames: int) -> Masker | None:
-        """Who has masks of so many frames; None: geometric change. Raises InputError where masks are wrong."""
+        """Return the source of masks of `frames` frames, None for geometric change. Raises InputError."""
         if self.masks is not None:
             return ImageMasks(self.masks, frames)
         if self.sam3 is not None:

@@ -1,7 +1,7 @@
-"""A .reel file as one animated file that other programs play: GLB, or USD.
+"""Export of a .reel file to one animated file that other programs play: GLB or USD.
 
-In: a reader and a path. Out: the file. Frames of a group that have the same vertices become one shape that moves; other
-frames a shape each, shown for one frame. The states of a background are shapes that stand still.
+In: a reader and a path. Out: the file. Frames of a group that have the same vertices become one moving shape; every
+other frame becomes a shape that is shown for one frame. The states of a background are shapes that stand still.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -23,21 +22,24 @@ from ..geometry.topology import vertex_normals
 from ..types import Mesh, Up
 from .animated_glb import animated_glb
 from .animated_usd import EXTENSIONS, animated_usd
+from .frames import Part
 from .shapes import Animation, AnimationWriter, Points, Shape, check_target
 
-MOST_TOGETHER = 64  # frames of a shape: what viewers take as morph targets of one mesh, and what is in memory
-_FAR = 8.0  # diagonals from the origin from which float32 coordinates count from elsewhere
+MOST_FRAMES = 64  # of a shape, which are in memory together; viewers limit the morph targets of a mesh (guess)
+_FAR = 8.0  # diagonals; coordinates that far from the origin are stored relative to the center (guess)
 
-Progress = Callable[[str, int, int], None]  # stage, frames done, frames of all
+Progress = Callable[[str, int, int], None]  # stage, number of frames done, number of all frames
 
 
 @dataclass(frozen=True, slots=True)
 class ExportOptions:
-    """What of a file is exported."""
+    """Layers, parts and orientation of an export."""
 
-    layers: int | None = None  # of a group beyond its first, at most; None: all
-    only: Literal["all", "background", "moving"] = "all"
-    up: Up | None = None  # axis of the meshes that points up, the file's if not given; +y does in what is written
+    layers: int | None = None  # at most, of each group beyond its first; None: all
+    only: Part = "all"
+    up: Up | None = (
+        None  # axis of the meshes that points up, None: as the .reel file names it; in the exported file it is +y
+    )
 
     def __post_init__(self) -> None:
         if self.layers is not None and self.layers < 0:
@@ -46,7 +48,7 @@ class ExportOptions:
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """A file, decoded as it is asked for, and which frames of it are wanted."""
+    """A .reel file, decoded on access, and the frames to export."""
 
     reader: ReelReader
     tracks: tuple[Track, ...]
@@ -61,10 +63,10 @@ def export(
     options: ExportOptions = ExportOptions(),
     progress: Progress | None = None,
 ) -> int:
-    """Writes some frames in a row, all if not given, to a .glb, .usd, .usdc, .usda or .usdz file; how many shapes.
+    """Write consecutive frames, by default all, to a .glb, .usd, .usdc, .usda or .usdz file; return the shape count.
 
-    The file appears when it is complete. Memory is that of two groups. Raises InputError where the format cannot hold
-    them or the file cannot be written, and FormatError where a chunk is damaged.
+    The file appears when it is complete. Two groups are in memory. Raises InputError if the format cannot hold the
+    frames or the file cannot be written, and FormatError if a chunk is damaged.
     """
     frames = range(reader.frame_count) if frames is None else frames
     tracks = tuple(Track(reader, number, options.layers) for number in range(len(reader.tracks)))
@@ -92,7 +94,7 @@ def _writer(path: Path, animation: Animation) -> AbstractContextManager[Animatio
 
 
 def _animation(reader: ReelReader, frames: range, up: Up) -> Animation:
-    """Time begins with the first of the frames."""
+    """Return the times of the frames, from 0 for the first, and the coordinate system."""
     header = reader.header
     if header.intervals:
         chosen = header.intervals[frames.start : frames.stop - 1]
@@ -106,16 +108,16 @@ def _animation(reader: ReelReader, frames: range, up: Up) -> Animation:
 
 
 def _states(source: _Source) -> Iterator[Shape]:
-    """A shape for each state of the background, shown where groups name it; frames count from the first wanted."""
+    """Yield a shape for each state of the background, with the ranges of exported frames that show it."""
     reader, frames = source.reader, source.frames
-    spans: dict[int, list[tuple[int, int]]] = {}
+    ranges: dict[int, list[tuple[int, int]]] = {}
     starts = sorted({frames.start, *(group.first_frame for group in reader.groups if group.first_frame in frames)})
     for start, end in pairwise([*starts, frames.stop]):
         if (chunk := reader.static_of_frame(start)) is not None:
-            own = spans.setdefault(chunk.number, [])
+            own = ranges.setdefault(chunk.number, [])
             first = own.pop()[0] if own and own[-1][1] == start else start
             own.append((first, end))
-    for number, own in enumerate(spans.values()):
+    for number, own in enumerate(ranges.values()):
         mesh = source.background.of_frame(own[0][0])
         if mesh is not None and not mesh.is_empty:
             shown = tuple((first - frames.start, end - frames.start) for first, end in own)
@@ -123,7 +125,7 @@ def _states(source: _Source) -> Iterator[Shape]:
 
 
 def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
-    """The shapes of one track after the other."""
+    """Yield the shapes of one track after the other."""
     frames = source.frames
     for number, groups in enumerate(source.reader.tracks):
         for group in groups:
@@ -136,13 +138,13 @@ def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
 
 
 def _group_shapes(source: _Source, group: Chunk, own: range) -> Iterator[Shape]:
-    """The shapes of those frames of a group that are wanted."""
+    """Yield the shapes of the exported frames of a group."""
     track = source.tracks[group.track]
     if group.form == Form.EMPTY:
-        track[own.start]  # damage is told, however little there is
+        track[own.start]  # raises FormatError if the group is damaged
         return
     meshes = [track[frame] for frame in own]
-    for a, b in _runs(meshes):
+    for a, b in _shape_ranges(meshes):
         if not meshes[a].is_empty:
             moving = [*meshes[a:b], *_ahead(source, group, meshes[:b], own[b - 1] + 1)]
             first, name = own[a] - source.frames.start, f"frames_{own[a]}_to_{own[b - 1]}"
@@ -151,20 +153,20 @@ def _group_shapes(source: _Source, group: Chunk, own: range) -> Iterator[Shape]:
             yield Shape(part, name, meshes[a].faces, first, len(moving), map(_points, moving), (span,))
 
 
-def _runs(meshes: Sequence[Mesh]) -> Iterator[tuple[int, int]]:
-    """First frame and end of frames in a row that are one shape, at most so many."""
+def _shape_ranges(meshes: Sequence[Mesh]) -> Iterator[tuple[int, int]]:
+    """Yield first frame and end of consecutive frames that form one shape, at most MOST_FRAMES each."""
     first = 0
     for frame in range(1, len(meshes) + 1):
-        if frame == len(meshes) or frame - first == MOST_TOGETHER or not _is_moved(meshes[frame - 1], meshes[frame]):
+        if frame == len(meshes) or frame - first == MOST_FRAMES or not _is_moved(meshes[frame - 1], meshes[frame]):
             yield first, frame
             first = frame
 
 
 def _ahead(source: _Source, group: Chunk, meshes: Sequence[Mesh], frame: int) -> list[Mesh]:
-    """The frame behind `meshes`, which are of a group, where the last of them moves on to it; else none.
+    """Return the frame after `meshes`, the frames of a group, if the shape continues to move into it.
 
-    A group that is predicted from this one may have the same vertices. A patch may have the same faces by chance, so
-    the last two frames must be known to have none.
+    The group after this one, if predicted from it, may have the same vertices. The faces of patches may be equal by
+    chance, so the last two frames must be known to have no patches.
     """
     if frame not in source.frames:
         return []
@@ -179,10 +181,10 @@ def _ahead(source: _Source, group: Chunk, meshes: Sequence[Mesh], frame: int) ->
 
 
 def _is_moved(before: Mesh, after: Mesh) -> bool:
-    """Whether two frames of a group have the same vertices elsewhere.
+    """Return whether two frames of a group have the same vertices, in other places.
 
-    Frames that one template is decoded to share its faces in memory. Faces that are only equal do not tell: those of
-    patches, or of frames coded one by one, may be equal by chance.
+    Frames that are decoded from one template share its faces in memory. Equal faces prove nothing: faces of patches,
+    or of frames coded one by one, may be equal by chance.
     """
     same_place = before.faces.ctypes.data == after.faces.ctypes.data
     return same_place and before.faces.shape == after.faces.shape and len(before.vertices) == len(after.vertices)

@@ -1,8 +1,8 @@
-"""Animated GLB (binary glTF 2.0): a node and a mesh for each shape, morph targets for its frames.
+"""Writer of animated GLB (binary glTF 2.0): a node and a mesh for each shape, morph targets for its frames.
 
-In: shapes, one after the other. Out: a file whose binary chunk was never in memory. Core glTF alone, no extension: a
-node is hidden by a scale of 0, which the specification ("Transformations") names for that, and weights go linearly from
-one frame to the next.
+In: shapes, one after the other. Out: a file whose binary chunk is never in memory as a whole. Core glTF without
+extensions: a scale of 0 hides a node, as the specification ("Transformations") says, and weights are interpolated
+linearly between frames.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from ..errors import InputError
 from ..io.write import replacing
 from .shapes import Animation, Shape, changes, unit_normals
 
-MOST_BYTES = (1 << 32) - 1  # of a GLB file, which tells its length in 32 bits
+MOST_BYTES = (1 << 32) - 1  # of a GLB file, whose header has 32 bits for its length (glTF 2.0, "GLB File Format")
 _FLOAT, _U16, _U32 = 5126, 5123, 5125
-_VERTICES, _INDICES = 34962, 34963  # what a buffer view is for
-_RESTART = 65535  # no index: the last of 16 bits
+_VERTICES, _INDICES = 34962, 34963  # targets of a buffer view (glTF 2.0)
+_RESTART = 65535  # largest value of 16 bits: restarts a primitive, so it is no index (glTF 2.0)
 _SURFACE = {
     "name": "surface",
     "doubleSided": True,  # surfaces may be open
@@ -34,9 +34,9 @@ _SURFACE = {
 
 @contextmanager
 def animated_glb(path: Path, animation: Animation) -> Iterator[GlbWriter]:
-    """A writer of shapes; the file appears at the end of the block, and not at all where that fails.
+    """Open a writer of shapes; the file appears at the end of the block, and not at all if the block fails.
 
-    Raises InputError where the file cannot be written, or where its float32 times cannot tell frames apart.
+    Raises InputError if the file cannot be written, or if float32 times cannot distinguish its frames.
     """
     with replacing(path) as file, tempfile.TemporaryFile(dir=path.parent) as spool:
         writer = GlbWriter(path, animation, spool)
@@ -45,7 +45,7 @@ def animated_glb(path: Path, animation: Animation) -> Iterator[GlbWriter]:
 
 
 class GlbWriter:
-    """Puts numbers into a file beside the target, and keeps what says where they are."""
+    """Writer that spools arrays to a temporary file and collects their glTF description."""
 
     def __init__(self, path: Path, animation: Animation, spool: IO[bytes]) -> None:
         self._path, self._animation, self._spool = path, animation, spool
@@ -60,17 +60,17 @@ class GlbWriter:
         self._samplers: list[dict[str, Any]] = []
 
     def add(self, shape: Shape) -> None:
-        """Writes a shape. Raises InputError where the file would be longer than a GLB may be."""
+        """Write a shape. Raises InputError if the file would exceed the size of a GLB file."""
         primitive = {"indices": self._indices(shape), **self._vertices(shape), "mode": 4, "material": 0}
         self._meshes.append({"name": shape.name, "primitives": [primitive]})
         node = {"name": shape.name, "mesh": len(self._meshes) - 1}
-        if shape.spans[0][0] > 0:
-            node["scale"] = [0, 0, 0]  # as in the first frame, for who does not play
+        if shape.shown[0][0] > 0:
+            node["scale"] = [0, 0, 0]  # as in the first frame, for viewers that do not animate
         self._child(self._part(shape.part), node)
         self._animate(shape, len(self._nodes) - 1)
 
     def finish(self, file: BinaryIO) -> None:
-        """The whole file, from what was written beside it."""
+        """Write the complete file: header, description, and the spooled arrays."""
         text = json.dumps(self._tree(), separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
         chunks = [(b"JSON", len(text)), *([(b"BIN\0", self._size)] if self._size else [])]
@@ -83,7 +83,7 @@ class GlbWriter:
             shutil.copyfileobj(self._spool, file, 1 << 20)
 
     def _vertices(self, shape: Shape) -> dict[str, Any]:
-        """Of the first frame the vertices, of the others how far they are from it; normals alike."""
+        """Write vertices and normals of the first frame, and the difference of each other frame from them."""
         self._open_view(_VERTICES)
         primitive: dict[str, Any] = {"targets": []}
         base = np.zeros((2, 0, 3), np.float32)
@@ -107,13 +107,13 @@ class GlbWriter:
         return self._put(shape, corners, "SCALAR")
 
     def _animate(self, shape: Shape, node: int) -> None:
-        """When it is shown, and how it moves. What is always there and never moves has no channel."""
+        """Write the channels that show, hide and move a shape; a still shape that is always shown has none."""
         count = len(self._animation.times)
-        if shape.count == 1 and shape.spans == ((0, count),):
+        if shape.count == 1 and shape.shown == ((0, count),):
             return
         self._open_view(None)
         shown = list(changes(shape, count))
-        keys = self._times[[frame for frame, _ in shown] + [count]]  # the last: as long as the last frame
+        keys = self._times[[frame for frame, _ in shown] + [count]]  # with the end of the last frame
         states = np.array([is_shown for _, is_shown in shown] + [shown[-1][1]], np.float32)
         values = np.repeat(states[:, None], 3, axis=1)
         times = self._put(shape, keys, "SCALAR", True)
@@ -128,7 +128,7 @@ class GlbWriter:
         self._channels.append({"sampler": len(self._samplers) - 1, "target": {"node": node, "path": path}})
 
     def _open_view(self, target: int | None) -> None:
-        """Begins a buffer view, which grows by all that is put into it."""
+        """Begin a buffer view, which each `_put` extends."""
         view: dict[str, Any] = {"buffer": 0, "byteOffset": self._size, "byteLength": 0}
         if target == _VERTICES:
             view["byteStride"] = 12
@@ -137,7 +137,7 @@ class GlbWriter:
         self._views.append(view)
 
     def _put(self, shape: Shape, values: np.ndarray, kind: str, bounded: bool = False) -> int:
-        """The number of an accessor to these values, which go to the end of the newest view."""
+        """Append values to the newest view and return the number of their accessor."""
         view = self._views[-1]
         data = values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes()
         data += bytes(-len(data) % 4)
@@ -160,8 +160,8 @@ class GlbWriter:
 
     def _check(self, size: int, what: object) -> None:
         if size > MOST_BYTES:
-            told = f"{self._path}: at {what} it has more than the {MOST_BYTES} bytes of a GLB file"
-            raise InputError(f"{told}; export fewer frames or layers, or to USD")
+            text = f"{self._path}: at {what} it has more than the {MOST_BYTES} bytes of a GLB file"
+            raise InputError(f"{text}; export fewer frames or layers, or to USD")
 
     def _part(self, name: str) -> int:
         if name not in self._parts:
@@ -185,12 +185,12 @@ class GlbWriter:
 
 
 def _times(path: Path, animation: Animation) -> np.ndarray:
-    """When frames begin and the last one ends, as a GLB has it."""
+    """Return the times at which frames begin, and the end of the last one, as float32."""
     times = animation.ends.astype(np.float32)
     stuck = np.flatnonzero(np.diff(times) <= 0)
     if len(stuck):
-        told = f"{path}: frame {stuck[0]} of those exported and the next begin at {animation.times[stuck[0]]:.9g} s"
-        raise InputError(f"{told} for the float32 times of a GLB file; export fewer frames, or to USD")
+        text = f"{path}: frame {stuck[0]} of those exported and the next begin at {animation.times[stuck[0]]:.9g} s"
+        raise InputError(f"{text} for the float32 times of a GLB file; export fewer frames, or to USD")
     return times
 
 

@@ -1,7 +1,8 @@
-"""USD: a Mesh prim for each shape, its points as time samples, shown and hidden by its visibility.
+"""Writer of USD: a Mesh prim for each shape, its points as time samples, shown and hidden by its visibility.
 
 In: shapes, one after the other. Out: a .usd or .usdc file (crate), .usda (text) or .usdz (package). Needs the extra
-`usd`; the only module that imports `pxr`. What is in memory is saved before it is much, so it stays flat.
+`usd`; the only module that imports `pxr`. The stage is saved whenever _MOST_UNSAVED bytes are pending, so that memory
+stays bounded.
 """
 
 from __future__ import annotations
@@ -24,16 +25,16 @@ from .shapes import Animation, Shape, changes, unit_normals
 
 EXTENSIONS = (".usdc", ".usda", ".usdz", ".usd")
 _GREY = (0.8, 0.8, 0.8)
-_MOST_UNSAVED = 64 << 20  # bytes; each time it is saved, the names of all prims are written again
-_MOST_PACKED = (1 << 32) - (1 << 16)  # of a crate in a .usdz file: a zip without 64-bit lengths
+_MOST_UNSAVED = 64 << 20  # bytes (guess); each save writes the names of all prims again
+_MOST_PACKED = (1 << 32) - (1 << 16)  # bytes of a crate in a .usdz file, a zip without 64-bit lengths
 _ROUNDED = 1e-6  # s: times of .reel files are whole microseconds
 
 
 @contextmanager
 def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
-    """A writer of shapes; the file appears at the end of the block, and not at all where that fails.
+    """Open a writer of shapes; the file appears at the end of the block, and not at all if the block fails.
 
-    Raises InputError where the file cannot be written, or where `pxr` is not installed.
+    Raises InputError if the file cannot be written, or if `pxr` is not installed.
     """
     try:
         from pxr import Tf
@@ -57,7 +58,7 @@ def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
 
 
 class UsdWriter:
-    """Adds prims to a stage that lies in a new crate file."""
+    """Writer that adds prims to a stage in a new crate file."""
 
     def __init__(self, crate: Path, animation: Animation) -> None:
         from pxr import Gf, Kind, Usd, UsdGeom
@@ -74,12 +75,14 @@ class UsdWriter:
         UsdGeom.SetStageMetersPerUnit(stage, 1)
         scene = UsdGeom.Xform.Define(stage, "/scene")
         if not np.array_equal(animation.root, np.eye(4)):
-            scene.AddTransformOp().Set(Gf.Matrix4d(animation.root.T.tolist()))  # rows, times which a point is taken
+            scene.AddTransformOp().Set(
+                Gf.Matrix4d(animation.root.T.tolist())
+            )  # USD multiplies row vectors from the left
         Usd.ModelAPI(scene).SetKind(Kind.Tokens.component)
         stage.SetDefaultPrim(scene.GetPrim())
 
     def add(self, shape: Shape) -> None:
-        """Writes a shape."""
+        """Write a shape."""
         from pxr import UsdGeom, Vt
 
         part = UsdGeom.Xform.Define(self._stage, f"/scene/{_identifier(shape.part)}")
@@ -96,28 +99,30 @@ class UsdWriter:
             self.save()
 
     def save(self) -> None:
-        """Writes what is in memory."""
+        """Write pending changes to the file."""
         self._stage.Save()
         self._unsaved = 0
 
     def close(self) -> None:
-        """Closes the file, which Windows neither moves nor deletes while it is open."""
+        """Close the file; Windows can neither move nor delete an open file."""
         self._stage = None
 
     def _show(self, mesh: Any, shape: Shape) -> None:
-        """When it is visible; USD holds such a value until the next."""
+        """Write the visibility of a shape; USD holds each value until the next."""
         from pxr import UsdGeom
 
         states = {True: UsdGeom.Tokens.inherited, False: UsdGeom.Tokens.invisible}
         shown = list(changes(shape, len(self._codes)))
         if shown == [(0, True)]:
             return
-        visibility = mesh.CreateVisibilityAttr(states[shown[0][1]])  # as in the first frame, for who does not play
+        visibility = mesh.CreateVisibilityAttr(
+            states[shown[0][1]]
+        )  # as in the first frame, for viewers that do not animate
         for frame, is_shown in shown:
             visibility.Set(states[is_shown], self._codes[frame])
 
     def _move(self, mesh: Any, shape: Shape) -> int:
-        """Where it is; USD goes linearly from one sample to the next. How many bytes that takes."""
+        """Write points and normals, which USD interpolates linearly between samples; return their bytes."""
         from pxr import Usd, Vt
 
         size = 0
@@ -133,7 +138,7 @@ class UsdWriter:
 
 
 def _codes(animation: Animation) -> list[float]:
-    """When frames are shown, in frames: whole numbers where times are those of the frame rate, but for rounding."""
+    """Return the times of frames in units of a frame: whole numbers if they follow the frame rate up to rounding."""
     exact = animation.times * animation.frame_rate
     whole = np.round(exact)
     near: Float64[np.ndarray, " T"]
@@ -147,7 +152,7 @@ def _identifier(name: str) -> str:
 
 
 def _converted(crate: Path, path: Path) -> Path:
-    """The same file, where it is, in the form that its final name tells. OSError where it is not whole."""
+    """Convert a crate, in its folder, to the format of the extension of `path`. Raises OSError if that fails."""
     from pxr import Sdf, UsdUtils
 
     extension = path.suffix.lower()
@@ -156,8 +161,8 @@ def _converted(crate: Path, path: Path) -> Path:
         whole = Sdf.Layer.FindOrOpen(str(crate)).Export(str(target))
     elif extension == ".usdz":
         if crate.stat().st_size > _MOST_PACKED:
-            told = f"{path}: more than the {_MOST_PACKED} bytes that a .usdz file holds"
-            raise InputError(f"{told}; export fewer frames or layers, or to .usdc")
+            text = f"{path}: more than the {_MOST_PACKED} bytes that a .usdz file holds"
+            raise InputError(f"{text}; export fewer frames or layers, or to .usdc")
         whole = UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(str(crate)), str(target)) and _is_whole(target)
     else:
         crate.replace(target)
@@ -168,7 +173,7 @@ def _converted(crate: Path, path: Path) -> Path:
 
 
 def _is_whole(package: Path) -> bool:
-    """Whether all of a .usdz file is there: USD does not tell when a disk is full."""
+    """Return whether a .usdz file is complete: USD reports no error when a disk is full."""
     try:
         with zipfile.ZipFile(package) as content:
             return content.testzip() is None
@@ -177,7 +182,7 @@ def _is_whole(package: Path) -> bool:
 
 
 def _reason(error: Exception) -> str:
-    """What happened, without where in USD's source it did."""
+    """Return the message of an error without the location in the source of USD."""
     if isinstance(error, OSError):
         return str(error.strerror or error)
     quoted = re.findall(r"'([^']*)'", str(error).strip().splitlines()[0])

@@ -1,40 +1,43 @@
-"""A sequence of meshes from files: lazy, one frame in memory at a time.
+"""Sequences of meshes from files, read lazily: one frame in memory at a time.
 
 In: a folder, a glob, a list of files, one file or an .npz, and SequenceOptions. Out: FileSequence (a MeshSequence).
 """
 
 from __future__ import annotations
 
+import json
 import operator
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..types import Mesh, MeshSequence
+from ..types import Mesh, MeshSequence, Up, known_up
 from .file_names import find_frames
 from .meshes import Loaded, read_mesh
 from .npz import Archive
 
+CAPTURED = "capture.json"  # in a folder that `meshreel capture` wrote: how the frames were made
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
-# Between the diagonals of two frames: more than a person who crouches or a second one who enters.
+# Ratio of the diagonals of two frames (guess): above that of a person who crouches, or of a second one who enters.
 _SUSPICIOUS_RATIO = 20.0
 
 
 @dataclass(frozen=True, slots=True)
 class SequenceOptions:
-    """How files become a sequence."""
+    """Frame rate, range, unit and welding of a sequence from files."""
 
     frame_rate: float = 30.0  # 1/s
-    frames: str = ":"  # which frames, "a:b" as Python slices
+    frames: str = ":"  # frames to use, "a:b" as Python slices
     scale: float = 1.0  # multiplies every coordinate: 0.001 for files in millimetres
-    weld: Callable[[Mesh], Mesh] | None = None  # merges equal positions (geometry.topology.weld); None keeps them
+    weld: Callable[[Mesh], Mesh] | None = None  # merges equal positions (geometry.topology.weld); None: no welding
 
     def __post_init__(self) -> None:
-        """Refuses values that no sequence can have."""
+        """Raise InputError for values that no sequence can have."""
         for name, value in (("frame rate", self.frame_rate), ("scale", self.scale)):
             if not 1e-9 <= value <= 1e9:  # also refuses NaN
                 raise InputError(f"{name} {value} is not between 1e-9 and 1e9; give such a number, as 30 or 0.001")
@@ -42,7 +45,7 @@ class SequenceOptions:
             raise InputError(f"frames {self.frames!r} is not a range; give A:B, A: or :B, as 0:10")
 
     def chosen(self, count: int) -> range:
-        """The frames that are wanted out of `count`. Raises InputError where there are none."""
+        """Return the numbers of the frames to use out of `count`. Raises InputError if there are none."""
         begin, end = (int(part) if part else None for part in self.frames.split(":"))
         wanted = range(count)[begin:end]
         if len(wanted) == 0:
@@ -52,7 +55,7 @@ class SequenceOptions:
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """One file a frame."""
+    """Frames stored as one file each."""
 
     paths: tuple[Path, ...]
 
@@ -60,30 +63,36 @@ class Files:
         return len(self.paths)
 
     def name(self, index: int) -> str:
-        """What an error calls a frame."""
+        """Return the name of a frame in error messages."""
         return str(self.paths[index])
 
     def load(self, index: int, where: str) -> Loaded:
-        """One frame, checked."""
+        """Read and check one frame."""
         return read_mesh(self.paths[index], where)
 
 
 @dataclass(slots=True)
 class _Seen:
-    """What reading has shown so far; a frame that is read twice counts once."""
+    """Counts for warnings, from the frames read so far; a frame that is read twice counts once."""
 
-    merged: dict[int, tuple[int, int, int]] = field(default_factory=dict)  # frame: merged, of positions, faces lost
-    dropped: dict[str, int] = field(default_factory=dict)  # what: first frame that has it
+    merged: dict[int, tuple[int, int, int]] = field(
+        default_factory=dict
+    )  # by frame: merged vertices, all vertices, lost faces
+    dropped: dict[str, int] = field(default_factory=dict)  # kind of dropped data: first frame that has it
     smallest: tuple[float, int] | None = None  # diagonal, frame
     largest: tuple[float, int] | None = None
 
 
 class FileSequence(MeshSequence):
-    """Frames read from files when they are asked for; nothing of them is kept but counts."""
+    """Frames read from files on access; only counts are kept of them."""
 
-    def __init__(self, frames: Files | Archive, options: SequenceOptions, remarks: Sequence[str] = ()) -> None:
+    def __init__(
+        self, frames: Files | Archive, options: SequenceOptions, remarks: Sequence[str] = (), up: Up = "y"
+    ) -> None:
+        """Read `frames` with `options`; `remarks` are warnings known already, `up` is the axis that points up."""
         self._frames, self._options, self._remarks, self._seen = frames, options, tuple(remarks), _Seen()
         self._chosen = options.chosen(len(frames))
+        self.up: Up = up
 
     @property
     def frame_rate(self) -> float:
@@ -92,7 +101,7 @@ class FileSequence(MeshSequence):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What a user must know about the frames read so far, a line each; complete after the last frame."""
+        """Warnings about the frames read so far, one line each; complete after the last frame."""
         return tuple(_warnings(self._seen, self._remarks))
 
     def __len__(self) -> int:
@@ -112,7 +121,7 @@ class FileSequence(MeshSequence):
         return mesh
 
     def name(self, index: int) -> str:
-        """What an error calls a frame: its number in the source and its file."""
+        """Return the name of a frame in error messages: its number in the source and its file."""
         number = self._chosen[operator.index(index)]
         return f"frame {number} ({self._frames.name(number)})"
 
@@ -127,7 +136,10 @@ class FileSequence(MeshSequence):
 
 
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
-    """The frames of a folder, a glob pattern, a list of files, one file or an .npz, none of them read yet."""
+    """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
+
+    The up axis is the one that `meshreel capture` recorded in the folder, otherwise y.
+    """
     options = options or SequenceOptions()
     if isinstance(source, str | Path) and Path(source).suffix.lower() == ".npz" and Path(source).is_file():
         archive = Archive(Path(source))
@@ -137,7 +149,17 @@ def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOp
     paths, remarks = find_frames(source)
     if not paths:
         raise InputError("the list of files has 0 frames; give at least one")
-    return FileSequence(Files(paths), options, remarks)
+    up = known_up(captured(Path(source)).get("up")) if isinstance(source, str | Path) else "y"
+    return FileSequence(Files(paths), options, remarks, up)
+
+
+def captured(folder: Path) -> dict[str, Any]:
+    """Return the record that `meshreel capture` wrote beside its meshes; empty for other folders and files."""
+    try:
+        record = json.loads((folder / CAPTURED).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}
 
 
 def _warnings(seen: _Seen, remarks: tuple[str, ...]) -> Iterator[str]:
