@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -11,6 +12,7 @@ from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..export.frames import Part, check_part, write_frames
 from ..io.write import frame_names, left_over, make_folder
+from ..types import Mesh
 from .console import Common
 
 
@@ -44,13 +46,14 @@ def command(
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
     check_part(file, video.reader, only)
-    decode = {"all": video.__getitem__, "background": video.background, "moving": video.moving}[only]
+    decode: dict[Part, Callable[[int], Mesh]]
+    decode = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
     make_folder(output)
     names = frame_names(len(video), format)
     common.warn(left_over(output, names, f"frame_*.{format}"))
     with common.stages(len(video)) as progress:
         paths = [output / name for name in names]
-        failed = write_frames(decode, paths, lambda done: progress("decode", done, len(video)))
+        failed = write_frames(decode[only], paths, lambda done: progress("decode", done, len(video)))
     if failed:
         text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
         raise FormatError(f"{text}; copy the file again")
