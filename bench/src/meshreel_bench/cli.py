@@ -1,15 +1,15 @@
-"""`meshreel bench run|report`: codecs swept over sequences into JSON rows, and pages made from rows."""
+"""`meshreel-bench run|report|list|codecs`: codecs swept over sequences into JSON rows, and pages made from rows."""
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
+import msgspec
 from cyclopts import App, Parameter
 from rich.table import Table
 
@@ -18,27 +18,21 @@ from meshreel.cli.console import Common
 from meshreel.cli.flags import Reading
 from meshreel.errors import InputError
 
-from .apart import begin, end_all
-from .bench import PICTURES, Bench
-from .datasets import own_digest
-from .experiment import Experiment
-from .experiments import EXPERIMENTS
-from .experiments import experiment as find_experiment
-from .identity import check_one_source
-from .promises import Promise
-from .rd_rows import FLOOR as RATED_FLOOR
+from .codecs import codec_names, codec_version, make_codec
+from .datasets import Store
+from .experiments import EXPERIMENTS, find_experiment
+from .experiments.study import Sweep as Points
+from .measure.runner import Sweep, run_points
 from .report import write_report
-from .row_form import FAILED, UNPICTURED
-from .rows import Point, Row, experiment_of, failed_rows, join_rows, measured_rows, read_rows
-from .runner import run_points
-from .said import one_line
-from .scene_rows import FLOOR, MEMORY, SCENE, SEGMENTATION
-from .study import Study
+from .report.pages import parts_of
+from .report.values import value
+from .report.verdicts import Verdict, verdicts
+from .rows import Options, Point, Row, failed_rows, join_rows, measured_rows, read_rows
 
 HELP = "Measure codecs against each other, and make tables and plots of the rows."
-command = App(name="bench", help=HELP)  # of `meshreel bench`
-BESIDE = (".cache", PICTURES)  # endings of folders
+CACHE = ".cache"  # ending of the folder beside the rows where sequences are kept
 DATA = Path("../shared/data")
+command = App(name="bench", help=HELP)  # of `meshreel bench`
 
 
 @Parameter(name="*")
@@ -66,62 +60,45 @@ class Selection:
     """Which points, of which data."""
 
     data: Path = DATA
-    """The folder of the sequences."""
+    """The folder of the benchmark's sequences."""
     small: bool = False
-    """A few points on a few frames only, minutes; the paper's experiments take procedural frames for that."""
+    """A point of each codec on a few procedural frames: minutes, and no data."""
     only: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """Only the points of these codecs, as `tvmc`; the others keep the rows they have."""
+    """Only the points of these codecs, as `tvmc`."""
     on: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """Only the points on these sequences, as `synthetic4`; the paper's experiments are run on any other, too: a name
-    below the folder of the sequences, or a path."""
+    """Only the points on these sequences, as `synthetic4`; or on any other: a name below the data, or a path."""
     add: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()
-    """Operating points more, of any codec, as `zipmesh` or `draco:qp=12` (`codec:option=value,option=value`)."""
+    """More operating points, of any codec, as `zipmesh` or `draco:qp=12` (`codec:option=value,option=value`)."""
 
-    def of(self, chosen: Experiment, experiment: str) -> list[Point]:
-        """The points of an experiment. InputError where there are none."""
-        if isinstance(chosen, Study):
-            known = {point.sequence for point in chosen.points(self.small)}
-            chosen = chosen.extended([] if known.issuperset(self.on) else self.on, self.add)
-        elif self.add:
-            raise InputError(f"--add {' '.join(self.add)}: {experiment} has points of its own kinds; take figure6")
-        points = list(chosen.points(self.small))
-        for name, wanted, there in (("--only", self.only, _codecs(points)), ("--on", self.on, _sequences(points))):
-            if unknown := [each for each in wanted if each not in there]:
-                which = f"{experiment} --small" if self.small else experiment
-                told = f"{which} has no such points; it has {', '.join(there)}"
-                raise InputError(f"{name} {' '.join(unknown)}: {told}")
-        found = [
-            point
-            for point in points
-            if (not self.only or point.codec in self.only) and (not self.on or point.sequence in self.on)
-        ]
-        if not found:
-            raise InputError(f"{experiment} has no points of {' '.join(self.only)} on {' '.join(self.on)}")
-        return found
+    def points(self, name: str, ssim: bool) -> list[Point]:
+        """Return the points of an experiment. Raises InputError where there are none."""
+        study = find_experiment(name)
+        others = [each for each in self.on if each not in study.sequences]
+        added = [Points(codec, {}, options) for codec, options in map(operating_point, self.add)]
+        points = list(study.extended(self.on if others else [], added).points(self.small))
+        points = [point for point in points if point.codec in (self.only or [point.codec])]
+        points = [point for point in points if point.sequence in (self.on or [point.sequence])]
+        if not points:
+            known = list(dict.fromkeys(point.codec for point in study.points(self.small)))
+            of = f"{name}{' --small' if self.small else ''}"
+            raise InputError(f"{of} has no points of {' '.join(self.only or self.on)}; its codecs: {', '.join(known)}")
+        return points if ssim else [msgspec.structs.replace(point, metrics="distances") for point in points]
 
 
-def _codecs(points: Sequence[Point]) -> list[str]:
-    return list(dict.fromkeys(point.codec for point in points))
-
-
-def _sequences(points: Sequence[Point]) -> list[str]:
-    return list(dict.fromkeys(point.sequence for point in points))
-
-
-@contextmanager
-def side_by_side(jobs: int) -> Iterator[Executor | None]:
-    """Threads that wait for so many processes, none for one; an interrupt ends these at once."""
-    begin()
-    if jobs == 1:
-        yield None
-        return
-    with ThreadPoolExecutor(jobs) as executor:
+def operating_point(point: str) -> tuple[str, Options]:
+    """Return a codec and its options. Raises InputError where the text is neither `codec` nor `codec:option=value`."""
+    codec, _, listed = point.partition(":")
+    options: Options = {}
+    for each in listed.split(",") if listed else ():
+        name, sign, found = each.partition("=")
+        if not (sign and name):
+            raise InputError(f"operating point {point!r}: {each!r} is no option=value")
         try:
-            yield executor
-        except BaseException:
-            executor.shutdown(wait=False, cancel_futures=True)
-            end_all()
-            raise
+            options[name] = json.loads(found)
+        except json.JSONDecodeError:
+            options[name] = found  # text without quotes
+    make_codec(codec, options)  # refuses what it does not know
+    return codec, options
 
 
 @command.command
@@ -144,40 +121,33 @@ def run(
     Parameters
     ----------
     experiment
-        Which one: the paper's `figure6`, `table1`, `table2`, `ablation_centers`, `ablation_gof`, `ablation_basis` and
-        `ablation_stages`, which share the rows of points that they have in common; or `scenes`, `layers`, `targets`.
+        Which one; `meshreel-bench list` has their names.
     output
         A JSON-lines file.
     """
-    chosen = find_experiment(experiment)
-    if not output.name or output.suffix in BESIDE:
-        raise InputError(f"--output {output}: give a file, as rows.jsonl; {' and '.join(BESIDE)} are folders beside it")
-    points = selection.of(chosen, experiment)
-    comparison, cache = replace(chosen.COMPARISON, ssim=running.ssim), output.with_suffix(".cache")
-    alike = [name for name, other in EXPERIMENTS.items() if isinstance(other, Study) and isinstance(chosen, Study)]
-    bench = Bench(
-        selection.data, experiment, comparison, cache, running.limit, running.retry, tuple(alike), reading.options()
-    )
-    if reading != Reading() and not any(own_digest(name, bench.data, bench.own) for name in _sequences(points)):
-        raise InputError("--fps, --frames, --scale: the benchmark's sequences are what they are; name one with --on")
-    with common.stages(len(points)) as progress, side_by_side(running.jobs) as executor:
+    if not output.name or output.suffix == CACHE:
+        raise InputError(f"--output {output}: give a file, as rows.jsonl; {CACHE} is a folder beside it")
+    points = selection.points(experiment, running.ssim)
+    store = Store(selection.data.absolute(), output.absolute().with_suffix(CACHE), reading.options())
+    sweep = Sweep(store, running.limit, running.retry, running.jobs)
+    with common.stages(len(points)) as progress:
+        done = 0
 
-        def tell(row: Row, new: bool) -> None:
-            done[0] += 1
-            progress("points", done[0], len(points))
-            before = "" if new else " (before; --retry tries again)" if FAILED in row else " (measured before)"
-            common.note(f"{done[0]}/{len(points)} {describe(row)}{before}")
+        def report(row: Row, new: bool) -> None:
+            nonlocal done
+            done += 1
+            progress("points", done, len(points))
+            before = "" if new else " (before; --retry tries again)" if row.failed else " (measured before)"
+            common.note(f"{done}/{len(points)} {describe(row)}{before}")
 
-        done = [0]
-        rows = run_points(points, output, bench, tell, executor)
+        rows = run_points(points, output, sweep, report)
     failed = failed_rows(rows)
     common.warn(tuple(describe(row) for row in failed))
-    promises = chosen.promises(measured_rows(rows))
-    reached = [each for each in promises if each.value is not None] or promises  # of a part, what it tells
-    told = {"output": str(output), "rows": len(rows), "failed": len(failed)}
-    common.result(told | _promised(reached), promise_table(reached))
+    found = verdicts(find_experiment(experiment), measured_rows(rows))
+    counts = {"output": str(output), "rows": len(rows), "failed": len(failed)}
+    common.result(counts | _promised(found), verdict_table(found))
     if len(failed) == len(rows):
-        raise InputError(f"{output}: all {len(rows)} points failed; mend what they say, and run again with --retry")
+        raise InputError(f"{output}: all {len(rows)} points failed; mend what they report, and run again with --retry")
 
 
 @command.command
@@ -190,101 +160,101 @@ def report(
 ) -> None:
     """Write pages, plots and tables from rows, and from nothing else.
 
-    `index.html` has all in one file; `results.md` is the same with the plots beside it, as PNG and SVG, in `results/`.
-    Rows on the paper's sequences also make `reproducing.md`: its numbers beside ours.
-    Points that failed are listed with their reasons. Same rows, same bytes.
+    `results.md` is the first page; `results/` beside it has an appendix and a plot for each experiment. Rows on the
+    paper's sequences also make `reproducing.md`: its numbers beside ours. Same rows, same bytes.
 
     Parameters
     ----------
     rows
-        JSON-lines files that `run` wrote, of any experiments; of a point that several have, the first counts. The
-        pictures that rows name are in a folder beside their file, whose name ends in `.pictures`: they make sheets.
+        JSON-lines files that `run` wrote, of any experiments; of a point that several have, the first counts.
     output
         The folder to write into.
     """
-    files = [_reported(path) for path in rows]
-    check_one_source([row for file in files for row in measured_rows(file)])
-    joined = join_rows(files)
-    measured = measured_rows(joined)
+    joined = join_rows(_some_rows(path) for path in rows)
+    check_one_source(joined)
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
-    pictures = [path.with_suffix(PICTURES) for path in rows]
-    written = [str(path) for path in write_report(joined, EXPERIMENTS, output, pictures)]
-    reached = [
-        promise
-        for name, chosen in EXPERIMENTS.items()
-        if (own := [row for row in measured if experiment_of(row) == name])
-        for promise in chosen.promises(own)
-    ]
-    common.result({"files": written} | _promised(reached), promise_table(reached), *written)
+    written = [str(path) for path in write_report(joined, output)]
+    found = [verdict for part in parts_of(joined) for verdict in verdicts(part.study, part.rows)]
+    common.result({"files": written} | _promised(found), verdict_table(found), *written)
 
 
-def _reported(path: Path) -> list[Row]:
-    """The rows of a file. Raises InputError where a report of them would lack all or some of them."""
+@command.command(name="list")
+def list_experiments(*, common: Common = Common()) -> None:
+    """List the experiments, their sequences, and how many points each has."""
+    table = Table("experiment", "title", "sequences", "points")
+    records = []
+    for name, study in EXPERIMENTS.items():
+        count = sum(1 for _ in study.points())
+        records.append({"experiment": name, "sequences": list(study.sequences), "points": count})
+        table.add_row(name, study.title, ", ".join(study.sequences), str(count))
+    common.result({"experiments": records}, table)
+
+
+@command.command
+def codecs(*, common: Common = Common()) -> None:
+    """List the codecs that can be compared, and the distributions that bring them."""
+    found = {name: codec_version(name) or "meshreel-bench" for name in codec_names()}
+    table = Table("codec", "from")
+    for name, version in found.items():
+        table.add_row(name, version)
+    common.result({"codecs": found}, table)
+
+
+def check_one_source(rows: Sequence[Row]) -> None:
+    """Raise InputError where rows of one name are of sequences of different content, which share no curve."""
+    sources: dict[str, str] = {}
+    for row in rows:
+        if row.source and sources.setdefault(row.point.sequence, row.source) != row.source:
+            text = f"rows of {row.point.sequence} are of sequences of different content, or read in different ways"
+            raise InputError(f"{text}; make a report of each, or delete the lines of one")
+
+
+def _some_rows(path: Path) -> list[Row]:
     rows = read_rows(path)
     if not rows:
-        raise InputError(f"{path}: has no rows; make some with `meshreel bench run`")
-    for number, row in enumerate(rows, 1):
-        if (name := experiment_of(row)) not in EXPERIMENTS:
-            known = ", ".join(EXPERIMENTS)
-            raise InputError(
-                f"{path}, line {number}: no experiment is called {name!r}; known: {known}; delete that line"
-            )
+        raise InputError(f"{path}: has no rows; make some with `meshreel-bench run`")
     return rows
 
 
 def describe(row: Row) -> str:
-    """A row in one line."""
-    options = " ".join(f"{k} {v}" for k, v in row["options"].items() if v is not None)
-    return one_line(f"{row['sequence']} {row['codec']} {options}: {_measured(row)}")
+    """Return a row in one line."""
+    options = " ".join(f"{name} {option}" for name, option in row.options.items() if option is not None)
+    line = f"{row.point.sequence} {row.name} {options}: {_measured(row)}"
+    return "".join(sign if sign.isprintable() else "?" for sign in " ".join(line.split()))
 
 
 def _measured(row: Row) -> str:
-    """What was measured of a point, or why nothing was."""
-    if FAILED in row:
-        return f"failed: {row[FAILED]}"
-    if row["kind"] == "decode":
-        peer = f"DracoPy {row['draco_ms']:.2f}, with subdivision {row['subdivided_ms']:.2f}"
-        return f"{row['frame_ms']:.2f} ms/frame, {peer}"
-    if row["kind"] in ("memory", MEMORY):
-        return f"{row['frames']} frames, peak {row['peak_rss_mb']:.0f} MB"
-    if row["kind"] == SEGMENTATION:
-        return f"IoU {row['iou_mean']:.3f}, worst frame {row['iou_worst']:.3f}"
-    if row["kind"] == RATED_FLOOR:
-        return f"{_told(row, 'd2_psnr_paper', 'dB')} to the input"
-    if row["kind"] in (FLOOR, SCENE):
-        rate = f"{row['mbps']:.3f} Mbps, " if "mbps" in row else ""
-        return f"{rate}to the truth {row['truth_d2_psnr_backward']:.2f} dB, SSIM {row['truth_ssim_masked']:.3f}"
-    values = (("d2_psnr_paper", "dB"), ("normal_error_deg", "degrees"), ("encode_s", "s/frame"))
-    told = [_told(row, key, unit) for key, unit in values]
-    without = f"; no pictures: {row[UNPICTURED]}" if UNPICTURED in row else ""
-    return f"{row['mbps']:.3f} Mbps, {', '.join(told)}{without}"
+    """Return what was measured of a point, or why nothing was."""
+    if row.failed:
+        return f"failed: {row.failed}"
+    parts = [f"{row.mbps:.3f} Mbps"] if row.stream else []
+    shown = (("d2_psnr_paper", "dB"), ("truth_d2_psnr_backward", "dB to the truth"), ("encode_s", "s/frame"))
+    found = [(value(row, key), unit) for key, unit in (*shown, ("iou_mean", "IoU"))]
+    return ", ".join([*parts, *(f"{number:.2f} {unit}" for number, unit in found if number is not None)])
 
 
-def _told(row: Row, key: str, unit: str) -> str:
-    """A value with two digits; a metric that is not finite is null in rows."""
-    return f"no {unit}" if row.get(key) is None else f"{row[key]:.2f} {unit}"
-
-
-def promise_table(promises: Sequence[Promise]) -> Table:
-    """The targets, a line each."""
+def verdict_table(found: Sequence[Verdict]) -> Table:
+    """Return the targets that rows decide, or all where none does, a line each."""
     table = Table("target", "bound", "measured", "")
-    for promise in promises:
-        table.add_row(promise.text, promise.bound, promise.value or "", promise.verdict)
+    for verdict in [each for each in found if each.value is not None] or found:
+        table.add_row(verdict.text, verdict.bound, verdict.value or "", verdict.word)
     return table
 
 
-def _promised(promises: Sequence[Promise]) -> dict[str, object]:
-    return {"promises": [asdict(promise) for promise in promises]}
+def _promised(found: Sequence[Verdict]) -> dict[str, object]:
+    return {"promises": [asdict(verdict) for verdict in found]}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The program `meshreel-bench`; exit codes are those of `meshreel`."""
+    """Run the program `meshreel-bench`; exit codes are those of `meshreel`."""
     return run_app(make_app, arguments)
 
 
 def make_app() -> App:
-    """The parser of `meshreel-bench`."""
+    """Return the parser of `meshreel-bench`."""
     app = App(name="meshreel-bench", help=HELP, suppress_keyboard_interrupt=False)
-    for each in (run, report):
-        app.command(each)
+    app.command(run)
+    app.command(report)
+    app.command(list_experiments, name="list")
+    app.command(codecs)
     return app

@@ -1,7 +1,7 @@
 """Names of curves, as rows have them and as papers write them.
 
-In -> out: the name of a curve -> its title. The name of a curve is its codec's `name`, with
-more behind it where a basis is fixed (`curves.curve_of`).
+In -> out: the name of a curve -> its title. A curve is named by its codec; where a basis is fixed, other options that
+are not `USUAL` follow (`report.values.curve_of`).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ TUNED = "meshreel paper"  # the same system, the quality varied and the basis ch
 TVMC, DRACO, KLT, NECGS = "tvmc", "draco", "klt_tsdf", "necgs"
 DECIMATED, SUBDIVIDED = "decimated_draco", "decimated_draco_subdivided"
 ONCE, ONCE_SUBDIVIDED = "background_once_draco", "background_once_draco_subdivided"
+USUAL = {"centers": 2000, "group_size": 10}  # the paper's own
 
 _TITLES = {
     TSMC: "TSMC (meshreel paper, m varied)",
@@ -28,7 +29,7 @@ _TITLES = {
 
 
 def title(name: str) -> str:
-    """What a legend calls a curve; what a variant changes stays behind the title of what it is a variant of."""
+    """Return what a legend calls a curve; what a variant changes stays behind the title of what it is a variant of."""
     known = [base for base in _TITLES if name == base or name.startswith(f"{base}, ")]
     if not known:
         return name

@@ -1,166 +1,163 @@
-"""Rows: what was measured, as JSON lines. In -> out: a file <-> a list of rows; points by their key."""
+"""Points and rows: what is to be measured, and what was measured. In -> out: a file of JSON lines <-> rows."""
 
 from __future__ import annotations
 
 import json
-import tempfile
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Literal
+
+import msgspec
 
 from meshreel.errors import InputError
 
-from .locked import locked
-from .row_form import CURVE_KINDS, FAILED, problem_of
-
-Row = dict[str, Any]
-FIRST = "targets"  # the experiment of rows that do not name theirs
+Option = str | int | float | bool | None
+Options = dict[str, Option]
+Metrics = Literal["distances", "views", "parallel views", "regions"]
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
-    """One thing to measure: a codec at an operating point on a sequence, or its memory."""
+class Point(msgspec.Struct, frozen=True):
+    """A codec at an operating point on a sequence: what one row measures."""
 
     sequence: str
     codec: str
-    options: dict[str, Any] = field(default_factory=dict)
-    frames: int | None = None  # the first so many; None: all
-    # "quality": rate, times, metrics; "curve": rate and metrics only; "floor": quality, and each group against Draco;
-    # "backwards": "curve" of the frames in reverse; "memory": peak memory of an encode in a fresh process;
-    # "decode": decoding beside the anchor of equal quality; those of `scene_rows.KINDS` are about scenes, and those of
-    # `rd_rows.KINDS` alike for all sequences
-    kind: str = "quality"
+    options: Options = {}
+    frames: int | None = None  # the first frames of the sequence; None: all
+    sampled: bool = False  # the codec is given some frames of a scene only: it is slow, or codes every frame alone
+    # distances alone; also pictures, from where the cameras stood or from four sides (perspective, or parallel); or
+    # people and background of a simulated scene, each against the truth and against the input
+    metrics: Metrics = "views"
 
     @property
     def key(self) -> str:
-        """Equal for equal points; a row carries it."""
-        return json.dumps(asdict(self), sort_keys=True)
+        """Text that is equal for equal points."""
+        return json.dumps(msgspec.to_builtins(self), sort_keys=True)
+
+
+class Maker(msgspec.Struct, frozen=True):
+    """Version and machine that made a row; None: not recorded."""
+
+    meshreel: str | None = None
+    commit: str | None = None
+    platform: str | None = None
+    python: str | None = None
+    cpu: str | None = None
+    cores: int | None = None
+
+
+class Group(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Group of frames in a .reel file."""
+
+    first_frame: int
+    frames: int
+    form: str
+    bytes: int
+    key: int | None = None  # frame that the others are predicted from, where the file names it
+
+
+class Stream(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Encoded sequence."""
+
+    bytes: int
+    coded_frames: int
+    background_bytes: int = 0  # share of `bytes` that is sent once
+    groups: list[Group] = []
+
+
+class Encoding(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Cost of an encode, processor time."""
+
+    s: float | None = None  # a frame
+    stages_s: dict[str, float] = {}  # a frame
+    peak_rss_mb: float | None = None  # of the process, points of a shared analysis included
+
+
+class Decoding(msgspec.Struct, frozen=True):
+    """Cost of a decode in a fresh process, one thread, processor time."""
+
+    first_frame_ms: float
+    frame_ms: float
+    vertices: float  # of a frame, mean
+    peak_rss_mb: float | None = None
+
+
+class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
+    """What was measured of a point, or why nothing was."""
+
+    point: Point
+    name: str  # of the codec, as it calls itself: points of one name are a curve
+    options: Options = {}  # of the codec, its defaults included
+    frames: int = 0  # of the sequence
+    frame_rate: float = 30.0  # 1/s
+    measured_frames: list[int] = []
+    stream: Stream | None = None
+    encoding: Encoding | None = None
+    decoding: Decoding | None = None
+    metrics: dict[str, float | None] = {}  # by name, over the measured frames; None: not finite
+    per_frame: dict[str, list[float | None]] = {}  # by name, for each measured frame
+    made_by: Maker | None = None
+    source: str | None = None  # digest of a sequence that is none of the benchmark's
+    codec_version: str | None = None  # of another distribution's codec
+    failed: str | None = None  # reason why nothing was measured
+
+    @property
+    def mbps(self) -> float:
+        """Rate: all bytes over the time that the coded frames play."""
+        assert self.stream is not None
+        return self.stream.bytes * 8 * self.frame_rate / self.stream.coded_frames / 1e6
 
 
 def read_rows(path: Path) -> list[Row]:
-    """The rows of a JSON-lines file, without one that was not written to its end.
+    """Return the rows of a file; of several rows of a point the last that was measured counts.
 
-    Raises InputError where the file is missing or a line is no row.
+    A last line that was not written to its end is left out. Raises InputError where a line is no row.
     """
-    if path.exists() and not (path.is_file() or path.is_fifo()):  # devices may have no end
-        raise InputError(f"{path}: is no file; give one that `meshreel bench run` made")
     try:
-        data = path.read_bytes()
-        lines = data[: _whole(data)].decode("utf-8-sig").split("\n")  # texts may have other ends of lines
+        lines = path.read_bytes().split(b"\n")
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}; make it with `meshreel bench run`") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 ({error.reason}); make it with `meshreel bench run`") from error
-    rows = []
+        raise InputError(f"{path}: cannot be read ({error.strerror}); make it with `meshreel-bench run`") from None
+    rows = list[Row]()
     for number, line in enumerate(lines, 1):
         if not line.strip():
             continue
         try:
-            row = json.loads(line, parse_constant=_not_json)
-        except (ValueError, RecursionError) as error:
-            told = error.msg if isinstance(error, json.JSONDecodeError) else error
-            raise InputError(f"{path}, line {number}: not JSON: {told}; delete that line") from error
-        if problem := problem_of(row):
-            raise InputError(f"{path}, line {number}: not a row: {problem}; delete that line")
-        rows.append(_printable(row) if "\\ud" in line else row)
-    return rows
+            rows.append(msgspec.json.decode(line, type=Row))
+        except msgspec.DecodeError as error:
+            if number == len(lines) and not isinstance(error, msgspec.ValidationError):
+                continue  # a sweep that was killed while it wrote
+            raise InputError(f"{path}, line {number}: not a row: {error}; delete that line") from None
+    return join_rows([rows[::-1]])[::-1]
 
 
-def _printable(row: Row) -> Row:
-    """The row with ? for halves of characters, as in names of files: they can be neither written nor drawn."""
-    return dict(json.loads(json.dumps(row, ensure_ascii=False).encode(errors="replace")))
-
-
-def _not_json(found: str) -> float:
-    raise ValueError(f"{found} is no number")
-
-
-def experiment_of(row: Row) -> str:
-    """The name of the experiment that a row is of."""
-    return str(row.get("experiment", FIRST))
-
-
-def join_rows(files: Sequence[Sequence[Row]]) -> list[Row]:
-    """The rows of several files, each point of an experiment once: the first of a point counts that has not failed."""
+def join_rows(files: Iterable[Sequence[Row]]) -> list[Row]:
+    """Return the rows of several files, each point once: the first that was measured counts."""
     rows = [row for file in files for row in file]
-    ordered = measured_rows(rows) + failed_rows(rows)
-    joined = {(experiment_of(row), row["point"]): row for row in reversed(ordered)}
-    return list(reversed(joined.values()))
+    found: dict[str, Row] = {}
+    for row in rows:
+        known = found.get(row.point.key)
+        if known is None or (known.failed and not row.failed):
+            found[row.point.key] = row
+    return list(found.values())
 
 
 def append_row(path: Path, row: Row) -> None:
-    """The row as one more line of the file, made if needed, in the place of one that was not written to its end.
-
-    Several processes may do so at once. Raises InputError where it cannot be written.
-    """
-    line = (json.dumps(row, allow_nan=False) + "\n").encode()
+    """Append a row to a file, in the place of a last line that was not written to its end."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a+b") as file, locked(file):
+        with path.open("a+b") as file:
             file.seek(0)
-            data = file.read()
-            end = _whole(data)
-            file.truncate(end)
-            file.write(b"\n" * (end > 0 and data[end - 1 : end] != b"\n") + line)
+            file.truncate(file.read().rfind(b"\n") + 1)
+            file.write(msgspec.json.encode(row) + b"\n")
     except OSError as error:
-        raise _not_written(path, error) from None
+        text = f"{path}: cannot be written ({error.strerror or error})"
+        raise InputError(f"{text}; free space, or choose another file") from None
 
 
-def check_appendable(path: Path) -> None:
-    """Raises InputError where rows could not be written: hours before the first one is there."""
-    if path.is_fifo():  # whoever reads rows back from it waits for ever
-        raise InputError(f"{path}: is a pipe; rows are kept in a file")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("r+b") if path.exists() else tempfile.TemporaryFile(dir=path.parent):
-            pass
-    except OSError as error:
-        raise _not_written(path, error) from None
+def measured_rows(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows of which something was measured."""
+    return [row for row in rows if row.failed is None]
 
 
-def check_folder(path: Path) -> None:
-    """Raises InputError where nothing could be kept in a folder, which is made if needed."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path) as file:
-            file.write(b"0")
-    except OSError as error:
-        raise _not_written(path, error) from None
-
-
-def _not_written(path: Path, error: OSError) -> InputError:
-    if isinstance(error, (FileExistsError, NotADirectoryError)):
-        return InputError(f"{path}: cannot be written (a part of that path is a file); choose another")
-    return InputError(f"{path}: cannot be written ({error.strerror or error}); free space, or choose another file")
-
-
-def _whole(data: bytes) -> int:
-    """Where the rows end: a process that is killed while it writes leaves a part of one behind them."""
-    start = data.rfind(b"\n") + 1
-    try:
-        json.loads(data[start:] or b"0")
-    except (ValueError, RecursionError):
-        return start
-    return len(data)
-
-
-def curve_rows(rows: Sequence[Row], sequence: str, codec: str | None = None) -> list[Row]:
-    """The rows of a sequence and, where it is given, of a codec that have a rate and metrics."""
-    return [row for kind in CURVE_KINDS for row in select(rows, sequence, codec, kind)]
-
-
-def select(rows: Sequence[Row], sequence: str, codec: str | None = None, kind: str = "quality") -> list[Row]:
-    """The rows of a sequence and, where it is given, of a codec; without those that failed."""
-    own = [r for r in rows if r["sequence"] == sequence and codec in (None, r["codec"]) and r["kind"] == kind]
-    return measured_rows(own)
-
-
-def measured_rows(rows: Sequence[Row]) -> list[Row]:
-    """Those of which something was measured."""
-    return [row for row in rows if FAILED not in row]
-
-
-def failed_rows(rows: Sequence[Row]) -> list[Row]:
-    """Those of which nothing was measured."""
-    return [row for row in rows if FAILED in row]
+def failed_rows(rows: Iterable[Row]) -> list[Row]:
+    """Return the rows of which nothing was measured."""
+    return [row for row in rows if row.failed is not None]

@@ -16,12 +16,10 @@ from meshreel_bench.codecs.klt_tsdf.grid import VOLUME, prepared, sample, voxel_
 from meshreel_bench.codecs.klt_tsdf.surface import Field, agreed, crossed, field_of, polygonize
 from meshreel_bench.codecs.klt_tsdf.weights import STEP_ONE, Model, distances, forward
 from meshreel_bench.codecs.klt_tsdf.wire import Reader, Writer
-from meshreel_bench.measure import run_curve_point
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.topology import border_edges, components, part_of
-from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
 
@@ -78,13 +76,6 @@ def test_a_body_comes_back_to_a_fraction_of_a_voxel(body, stream):
         assert surface_errors(original, decoded).symmetric_rms < 0.25 * voxel
         assert len(border_edges(decoded)) == 0
     assert len(stream) < 3500
-
-
-def test_a_row_tells_the_rate_and_the_options(body):
-    row = run_curve_point("body", body, make_codec("klt_tsdf", SMALL.options), ComparisonOptions(ssim=False))
-    assert row["bytes"] == len(SMALL.encode(body))
-    assert row["options"]["basis_in"] == "stream"
-    assert row["groups"] == []
 
 
 def test_quality_rises_with_the_rate(body):

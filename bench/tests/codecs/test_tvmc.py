@@ -13,8 +13,6 @@ from meshreel_bench.codecs.tvmc.layout import LONGEST, Group, Kind, State, Strea
 from meshreel_bench.codecs.tvmc.tracked import decode_tracked, encode_tracked
 from meshreel_bench.codecs.tvmc.tracking import Tracked, track_sequence
 from meshreel_bench.codecs.tvmc.video import TvmcVideo
-from meshreel_bench.groups import without_keys
-from meshreel_bench.measure import run_curve_point
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.intra import encode_intra
@@ -24,7 +22,6 @@ from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate
-from meshreel.metrics.comparison import ComparisonOptions
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
 from tests.scenes import CELL, NOISE, ball, of_body, quick_scene, room, with_room
@@ -128,13 +125,6 @@ def test_empty_frames_are_legal_and_stay_in_their_places():
     assert [mesh.is_empty for mesh in SMALL.decode(data)] == [True, False, True, True]
     nothing = SMALL.decode(SMALL.encode(MeshList((Mesh.empty(),) * 3)))
     assert [len(mesh.vertices) for mesh in nothing] == [0, 0, 0]
-
-
-def test_a_row_tells_the_rate_and_the_metrics_of_a_stream():
-    row = run_curve_point("ball", MeshList((BALL, Mesh.empty())), SMALL, ComparisonOptions(ssim=False))
-    assert row["codec"] == "tvmc" and row["options"]["qp"] == 8 and row["groups"] == []
-    assert row["bytes"] == len(SMALL.encode(MeshList((BALL, Mesh.empty())))) and row["d2_psnr_paper"] > 50
-    assert without_keys(row, "d2_psnr_paper") is None
 
 
 def test_no_frames_are_refused():

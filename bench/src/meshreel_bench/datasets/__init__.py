@@ -1,15 +1,15 @@
 """Sequences by name: bodies, four of them side by side, scenes, recordings; or any folder.
 
-In: a name, the folder of the benchmark data, a folder to keep things in. Out: a MeshSequence. What is known by a name
-is what it was when its checksum was taken (`checksums`); of anything else `own_digest` tells what it is. Sequences of
-files are welded: seams count as one surface.
+In: a name, the folder of the benchmark data, a folder to keep things in. Out: a Dataset. Benchmark data are compared
+with their checksums; other sequences have a digest, which rows carry. Sequences of files are welded: seams count as one
+surface.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from meshreel.capture.recording import open_recording
 from meshreel.capture.truth import Truth
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.derived_sequences import Chosen, forth_and_back
 from meshreel.geometry.topology import weld
 from meshreel.io.file_names import find_frames, is_pattern
 from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
@@ -27,7 +28,7 @@ from .captured import Captured
 from .checksums import check_source, checksum, known_checksums
 from .remesh import RemeshedSequence
 from .rooms import PEOPLE, ROOM
-from .scenes import PROCEDURAL, SCENES, open_scene
+from .scenes import PROCEDURAL, SCENES, SceneData, open_scene
 from .side_by_side import Place, SideBySide
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
@@ -40,11 +41,16 @@ BODIES: dict[str, Place] = {  # of SYNTHETIC, m: on one floor, 30 cm apart
 }
 SYNTHETIC_FRAMES = 10
 RECORDINGS = ("living_room",)
-MADE = (*SCENES, PROCEDURAL, *RECORDINGS)  # simulated or fused, and kept: minutes
 PERFORMERS, RECORDED = "performers", "captures"  # folders of the benchmark data
 SCALES = {"basketball_player": 0.1}  # to metres; the others are in metres
 REMESHED = {"crane60": "crane", "samba60": "samba"}  # new connectivity in every frame, from a body that has one
 REMESHED_FRAMES = 60
+NAMES = (DEMO, SYNTHETIC, *SCENES, PROCEDURAL, *RECORDINGS, *REMESHED)
+# Endings of names: the same sequence in another order, as many frames of it as are asked for.
+PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
+    "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
+    "-forth-and-back": forth_and_back,
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,54 +59,66 @@ class Dataset:
 
     sequence: MeshSequence
     cameras: tuple[PinholeCamera, ...] = ()  # where it was seen from; none: look from around it
-    truth: Truth | None = None
+    scene: SceneData | None = None  # of a simulated scene
+
+    @property
+    def truth(self) -> Truth | None:
+        """The clean frames of a simulated scene."""
+        return None if self.scene is None else self.scene.truth
 
 
-def open_dataset(
-    name: str, data: Path, frames: int | None = None, cache: Path | None = None, own: SequenceOptions | None = None
-) -> MeshSequence:
-    """The sequence called `name` below `data`, or a path; its first `frames` frames where that is asked for.
+@dataclass(frozen=True, slots=True)
+class Store:
+    """Where sequences are found, and where those that take long to make are kept."""
 
-    What takes long to make is kept below `cache`, where that is given; scenes and recordings need it. `own` says how
-    files that are not the benchmark's become a sequence. Raises InputError where data are missing or are not what the
-    name means.
-    """
-    return open_known(name, data, frames, cache, own).sequence
+    data: Path  # the folder of the benchmark data
+    cache: Path | None = None  # scenes, recordings and remeshed bodies are kept here; scenes and recordings need it
+    own: SequenceOptions = SequenceOptions()  # how files that are not the benchmark's become a sequence
+
+    def open(self, name: str, frames: int | None = None) -> Dataset:
+        """Return the sequence of that name or path; its first `frames` frames where that is asked for.
+
+        Raises InputError where data are missing or are not those of the benchmark.
+        """
+        for ending, played in PLAYED.items():
+            if name.endswith(ending):
+                known = self.open(name.removesuffix(ending), None)
+                return Dataset(played(known.sequence, frames or len(known.sequence)), known.cameras)
+        if name == DEMO:
+            return Dataset(soft_bodies(SoftBodiesOptions(frames=frames or SoftBodiesOptions().frames)))
+        if name in (*SCENES, PROCEDURAL):
+            return _scene(name, self.data, frames, self.cache)
+        if name in RECORDINGS:
+            return _recording(name, self.data, frames, self.cache)
+        if name == SYNTHETIC:
+            count = min(frames or SYNTHETIC_FRAMES, SYNTHETIC_FRAMES)
+            bodies = [(_open_files(body, self.data, count), place) for body, place in BODIES.items()]
+            return Dataset(SideBySide(bodies))
+        if name in REMESHED:
+            source = _open_files(REMESHED[name], self.data, min(frames or REMESHED_FRAMES, REMESHED_FRAMES))
+            return Dataset(RemeshedSequence(source, None if self.cache is None else self.cache / name))
+        return Dataset(_open_files(name, self.data, frames, self.own))
+
+    def digest(self, name: str) -> str | None:
+        """Return what a sequence of one's own consists of, and how it is read; None for those of the benchmark.
+
+        Raises InputError where it is missing.
+        """
+        for ending in PLAYED:
+            name = name.removesuffix(ending)
+        if name in NAMES:
+            return None
+        path = _found(name, self.data)
+        if _is_known(path, self.data):
+            return None
+        files = [path] if path.exists() else find_frames(path)[0]
+        read = (*map(checksum, files), self.own.frame_rate, self.own.frames, self.own.scale)
+        return hashlib.sha256(repr(read).encode()).hexdigest()
 
 
-def open_known(
-    name: str, data: Path, frames: int | None = None, cache: Path | None = None, own: SequenceOptions | None = None
-) -> Dataset:
-    """As `open_dataset`, with what is known of the sequence."""
-    if name == DEMO:
-        return Dataset(soft_bodies(SoftBodiesOptions(frames=frames or SoftBodiesOptions().frames)))
-    if name in (*SCENES, PROCEDURAL):
-        return _scene(name, data, frames, cache)
-    if name in RECORDINGS:
-        return _recording(name, data, frames, cache)
-    if name == SYNTHETIC:
-        count = min(frames or SYNTHETIC_FRAMES, SYNTHETIC_FRAMES)
-        bodies = [(_open_files(body, data, count), place) for body, place in BODIES.items()]
-        return Dataset(SideBySide(bodies))
-    if name in REMESHED:
-        source = _open_files(REMESHED[name], data, min(frames or REMESHED_FRAMES, REMESHED_FRAMES))
-        return Dataset(RemeshedSequence(source, None if cache is None else cache / name))
-    return Dataset(_open_files(name, data, frames, own))
-
-
-def own_digest(name: str, data: Path, own: SequenceOptions | None = None) -> str | None:
-    """What a sequence that has no name here consists of, and how it is read; None for those of the benchmark.
-
-    Raises InputError where it is missing.
-    """
-    if name in (DEMO, SYNTHETIC, *SCENES, PROCEDURAL, *RECORDINGS, *REMESHED):
-        return None
-    path, options = _found(name, data), own or SequenceOptions()
-    if _is_known(path, data):
-        return None
-    files = [path] if path.exists() else find_frames(path)[0]
-    told = (*map(checksum, files), options.frame_rate, options.frames, options.scale)
-    return hashlib.sha256(repr(told).encode()).hexdigest()
+def open_dataset(name: str, data: Path, frames: int | None = None, cache: Path | None = None) -> MeshSequence:
+    """Return the sequence called `name` (`Store.open`)."""
+    return Store(data, cache).open(name, frames).sequence
 
 
 def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:
@@ -108,7 +126,7 @@ def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dat
         for source in (ROOM, *(Path(PERFORMERS, f"{body}.npz") for body in PEOPLE)):
             check_source(data / source, source)
     scene = open_scene(name, data, _kept(name, cache), frames)
-    return Dataset(scene.meshes, scene.meshes.cameras, scene.truth)
+    return Dataset(scene.meshes, scene.meshes.cameras, scene)
 
 
 def _recording(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:

@@ -34,7 +34,6 @@ from meshreel.io.meshes import read_mesh
 from meshreel.io.write import make_folder, replacing, write_mesh
 from meshreel.types import Mesh, MeshSequence, evenly
 
-from ..provenance import sources
 from .captured import Captured
 from .rooms import SPEEDS, RoomOptions, simulate_room
 
@@ -130,8 +129,9 @@ def _kept_as(source: str) -> str:
     if source != FOUND:
         return source
     digest = hashlib.sha256(repr(SegmentOptions()).encode())
-    for path in (*sources(segmenter), *sources(geometry)):
-        digest.update(path.read_bytes())
+    for package in (segmenter, geometry):
+        for path in sorted(path for folder in package.__path__ for path in Path(folder).glob("*.py")):
+            digest.update(path.read_bytes())
     return f"{FOUND}-{digest.hexdigest()[:12]}"
 
 

@@ -1,40 +1,29 @@
-"""The experiments by name; each declares its points, and what is promised and told of their rows."""
+"""Experiments by name: declarations of what is run, compared and promised."""
 
 from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from ..experiment import Experiment
-from . import (
-    ablation_basis,
-    ablation_centers,
-    ablation_gof,
-    ablation_stages,
-    figure6,
-    layers,
-    scenes,
-    table1,
-    table2,
-    targets,
-)
+from . import ablations, figure6, layers, scenes, tables, targets
+from .study import Study
 
 # In the order of the report.
-EXPERIMENTS: dict[str, Experiment] = {
+EXPERIMENTS: dict[str, Study] = {
     "figure6": figure6.STUDY,
-    "table1": table1.STUDY,
-    "table2": table2.STUDY,
-    "ablation_centers": ablation_centers.STUDY,
-    "ablation_gof": ablation_gof.STUDY,
-    "ablation_basis": ablation_basis.STUDY,
-    "ablation_stages": ablation_stages.STUDY,
-    "scenes": scenes,
-    "layers": layers,
-    "targets": targets,
+    "table1": tables.TABLE_1,
+    "table2": tables.TABLE_2,
+    "ablation_centers": ablations.CENTERS,
+    "ablation_gof": ablations.GOF,
+    "ablation_basis": ablations.BASIS,
+    "ablation_stages": ablations.STAGES,
+    "scenes": scenes.STUDY,
+    "layers": layers.STUDY,
+    "targets": targets.STUDY,
 }
 
 
-def experiment(name: str) -> Experiment:
-    """The experiment called `name`. Raises InputError for an unknown one."""
+def find_experiment(name: str) -> Study:
+    """Return the experiment of that name. Raises InputError for an unknown one."""
     if name not in EXPERIMENTS:
         raise InputError(f"no experiment is called {name!r}; known: {', '.join(sorted(EXPERIMENTS))}")
     return EXPERIMENTS[name]

@@ -1,167 +1,81 @@
-"""The first experiment: meshreel's preset `paper` against the anchors on captured performers.
-
-Declares which codecs run at which operating points on which sequences, and what is promised of the rows: the targets
-of the first milestone, ten frames at 30 a second (collision: sixty), every byte counted.
-"""
+"""Targets of the preset `paper`: against per-frame anchors and the released code of TSMC, on captured performers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any
-
-from meshreel.metrics.comparison import ComparisonOptions
-
-from ..curves import bd_lines
-from ..promises import Promise, flat_memory, of_row, of_rows
-from ..published import RELEASED as PUBLISHED
-from ..rows import Point, Row, select
+from ..names import TUNED
+from .study import D2, MASKED, NORMALS, SYMMETRIC, Always, Bound, Flat, Promise, Reaches, Study, Sweep, Which
 
 BODIES = ("dancer", "basketball_player", "mitch")
-BASIS_SIZES = (3, 5, 10, 30)
-QUALITIES = (15.0, 35.0, 50.0, 75.0)
-DRACO = (7, 8, 9)
+# The authors' released code on dancer, one group of 10 frames, K = 2000: m -> Mbps, D2 in dB (`report.published`).
+RELEASED = {3: (2.23, 51.87), 5: (3.29, 54.35), 10: (5.78, 56.4), 30: (15.46, 59.02)}
 LARGEST = {"basis_size": 10, "quality": 100.0}  # the reference subdivides to 20k vertices
 # Fractions and bits on or near the hull of a full sweep on dancer; others only cost time.
-DECIMATED = ((0.04, 9), (0.08, 9), (0.2, 10))
-# The authors' released code on dancer, one group of 10 frames, K = 2000: m -> (Mbps, D2-PSNR in dB, the paper's form).
-# Not run here: measured once, on another day and machine. Its encoder took 27 CPU s a frame, its decoder 61 ms.
-RELEASED = {m: (row.mbps or 0.0, row.d2_psnr) for m, row in zip(BASIS_SIZES, PUBLISHED["dancer"], strict=True)}
-COMPARISON = ComparisonOptions()
-MESHREEL, FIXED = "meshreel paper", "meshreel paper m"
+DECIMATED = {"fraction": (0.04, 0.08, 0.2), "qp": (9, 9, 10)}
+HALF = Which("dancer", TUNED, {"quality": 50.0, "basis_size": None})
+MEMORY = {"quality": 50.0, "centers": 200}
 
 
-def points(small: bool) -> Iterator[Point]:
-    """All operating points; a handful on three frames where `small`."""
-    if small:
-        yield from _small_points()
-        return
-    for m in BASIS_SIZES:
-        yield Point("dancer", "meshreel", {"basis_size": m})
-    yield Point("dancer", "meshreel", LARGEST)
-    for body in BODIES:
-        for quality in QUALITIES:
-            yield Point(body, "meshreel", {"quality": quality})
-        for qp in DRACO:
-            yield Point(body, "draco", {"qp": qp})
-        for levels in (0, 1):
-            for fraction, qp in DECIMATED:
-                yield Point(body, "decimated_draco", {"fraction": fraction, "qp": qp, "levels": levels})
-    yield Point("collision", "meshreel", {"quality": 50.0})
-    for frames in (20, 60):
-        yield Point("collision", "meshreel", {"quality": 50.0, "centers": 200}, frames, "memory")
+def _of_m(m: int) -> Which:
+    return Which("dancer", f"{TUNED} m", {"basis_size": m, "quality": 50.0})
 
 
-def references(sequence: str) -> dict[str, list[tuple[float, float]]]:
-    """Curves that were not measured here, as (Mbps, D2-PSNR paper form) by name."""
-    return {"TSMC, released code": list(RELEASED.values())} if sequence == "dancer" else {}
-
-
-def promises(rows: Sequence[Row]) -> list[Promise]:
-    """The targets, with what the rows say."""
-    dancer, collision = select(rows, "dancer", MESHREEL), select(rows, "collision", MESHREEL)
-    found = [_less_rate_more_quality(m, _with(rows, "dancer", FIXED, basis_size=m, quality=50.0)) for m in BASIS_SIZES]
-    found.append(_one_point(dancer))
-    for body in ("mitch", "basketball_player"):
-        found.append(_worst_frame(body, select(rows, body, MESHREEL)))
-    text = "collision: decoded triangles that bridge the bodies once they are apart"
-    found.append(of_rows(text, "0", collision, lambda r: (str(_bridges(r)), _bridges(r) == 0)))
-    default = _with(rows, "dancer", MESHREEL, quality=50.0)
-    text = "dancer, quality 50: D2-PSNR of the first and last frame below that of the middle"
-    found.append(of_row(text, "<= 3 dB", default, _ends))
-    text = "dancer at quality 50: faces with less than a thousandth of the median area"
-    found.append(
-        of_row(text, "0", default, lambda r: (str(sum(r["degenerate_faces"])), not sum(r["degenerate_faces"])))
-    )
-    text = "volume tracking, dancer, K = 2000"
-    found.append(of_row(text, "<= 2 CPU s/frame", default, _tracking))
-    text = "encode, dancer at quality 50"
-    found.append(of_row(text, "<= 8 CPU s/frame", default, lambda r: (f"{r['encode_s']:.2f}", r["encode_s"] <= 8)))
-    found.append(flat_memory(select(rows, "collision", "meshreel", "memory")))
-    found.append(of_row("decode, dancer at m = 10", "<= 25 ms/frame", _with(rows, "dancer", FIXED, **LARGEST), _decode))
-    return found
-
-
-def comparisons(rows: Sequence[Row]) -> Iterator[str]:
-    """Lines of Markdown on the rows of one sequence: BD-rates against the subdivided anchor."""
-    yield from bd_lines(rows)
-    for name, curve in references(rows[0]["sequence"]).items():
-        told = "; ".join(f"{mbps:g} Mbps {psnr:g} dB" for mbps, psnr in curve)
-        yield f"- Reference, not run here: {name}: {told} (D2-PSNR, paper form)"
-
-
-def shown(rows: Sequence[Row]) -> list[Row]:
-    """The rows of one sequence that its table has: all."""
-    return list(rows)
-
-
-def sections(_rows: Sequence[Row]) -> Iterator[str]:
-    """Lines of Markdown behind all sequences: none."""
-    return iter(())
-
-
-def _small_points() -> Iterator[Point]:
-    yield Point("dancer", "draco", {"qp": 9}, 3)
-    for levels in (0, 1):
-        yield Point("dancer", "decimated_draco", {"fraction": 0.15, "qp": 9, "levels": levels}, 3)
-    yield Point("dancer", "meshreel", {"basis_size": 5}, 3)
-    yield Point("dancer", "meshreel", {"quality": 50.0}, 3)
-    yield Point("collision", "meshreel", {"quality": 50.0, "centers": 500}, 4)
-    for frames in (4, 8):
-        yield Point("collision", "meshreel", {"quality": 50.0, "centers": 500, "group_size": 4}, frames, "memory")
-
-
-def _with(rows: Sequence[Row], sequence: str, codec: str, **options: Any) -> Row | None:
-    return next(
-        (r for r in select(rows, sequence, codec) if all(r["options"][k] == v for k, v in options.items())), None
-    )
-
-
-def _less_rate_more_quality(m: int, row: Row | None) -> Promise:
-    mbps, psnr = RELEASED[m]
-
-    def measure(row: Row) -> tuple[str, bool]:
-        met = row["mbps"] < mbps and row["d2_psnr_paper"] > psnr
-        return f"{row['mbps']:.3f} Mbps, {row['d2_psnr_paper']:.2f} dB", met
-
-    return of_row(f"dancer, m = {m}: against the released code", f"< {mbps} Mbps and > {psnr} dB", row, measure)
-
-
-def _one_point(rows: Sequence[Row]) -> Promise:
-    def measure(rows: Sequence[Row]) -> tuple[str, bool]:
-        met = [r for r in rows if r["mbps"] <= 1.8 and r["d2_psnr_paper"] >= 61 and r["normal_error_deg"] <= 6]
-        cheap = [r for r in rows if r["mbps"] <= 1.8] or [min(rows, key=lambda r: r["mbps"])]
-        row = min(met, key=lambda r: r["mbps"]) if met else max(cheap, key=lambda r: r["d2_psnr_paper"])
-        text = f"{row['mbps']:.3f} Mbps, {row['d2_psnr_paper']:.2f} dB, {row['normal_error_deg']:.2f} degrees"
-        return text, bool(met)
-
-    return of_rows("dancer: one point by rate-distortion", "<= 1.8 Mbps, >= 61.0 dB, <= 6.0 degrees", rows, measure)
-
-
-def _worst_frame(body: str, rows: Sequence[Row]) -> Promise:
-    def measure(rows: Sequence[Row]) -> tuple[str, bool]:
-        row = min(rows, key=lambda r: r["d2_psnr_paper_worst"])
-        worst = row["d2_psnr_paper_worst"]
-        return f"{worst:.2f} dB at quality {row['options']['quality']:g}", worst >= 55
-
-    return of_rows(f"{body}: worst frame of the whole curve", ">= 55 dB", rows, measure)
-
-
-def _bridges(rows: Sequence[Row]) -> int:
-    return sum(sum(row["bridges"]) for row in rows)
-
-
-def _ends(row: Row) -> tuple[str, bool]:
-    psnr = [frame["d2_psnr_paper"] for frame in row["per_frame"]]
-    fall = psnr[len(psnr) // 2] - min(psnr[0], psnr[-1])
-    return f"{fall:.2f} dB", fall <= 3
-
-
-def _tracking(row: Row) -> tuple[str, bool]:
-    seconds = row["encode_stages_s"]["track"]
-    return f"{seconds:.2f}", seconds <= 2
-
-
-def _decode(row: Row) -> tuple[str, bool]:
-    ms, vertices = row["decode"]["frame_ms"], row["decode"]["vertices"]
-    ratio = f"{row['decode_over_peer']:.1f} times DracoPy's at qp 9 ({row['peer']['frame_ms']:.2f} ms)"
-    return f"{ms:.1f} ms for {vertices:.0f} vertices, {ratio}", ms <= 25
+PROMISES: tuple[Promise, ...] = (
+    *(
+        Reaches(
+            f"dancer, m = {m}: against the released code",
+            _of_m(m),
+            (Bound("mbps", mbps, "Mbps", least=False), Bound("d2_psnr_paper", db, "dB")),
+        )
+        for m, (mbps, db) in RELEASED.items()
+    ),
+    Reaches(
+        "dancer: one point by rate-distortion",
+        Which("dancer", TUNED),
+        (
+            Bound("mbps", 1.8, "Mbps", least=False),
+            Bound("d2_psnr_paper", 61.0, "dB"),
+            Bound("normal_error_deg", 6.0, "degrees", least=False),
+        ),
+    ),
+    *(
+        Always(f"{body}: worst frame of the whole curve", Which(body, TUNED), Bound("d2_psnr_paper_worst", 55.0, "dB"))
+        for body in ("mitch", "basketball_player")
+    ),
+    Always(
+        "collision: decoded triangles that bridge the bodies once they are apart",
+        Which("collision", TUNED, {"centers": None}),
+        Bound("bridges", 0, least=False),
+    ),
+    Reaches(
+        "dancer, quality 50: D2 of the first and last frame below that of the middle",
+        HALF,
+        (Bound("fall_at_ends_db", 3.0, "dB", least=False),),
+    ),
+    Reaches(
+        "dancer, quality 50: faces with less than a thousandth of the median area",
+        HALF,
+        (Bound("degenerate_faces", 0, least=False),),
+    ),
+    Reaches("volume tracking, dancer, K = 2000", HALF, (Bound("encode_s.track", 2.0, "CPU s/frame", least=False),)),
+    Reaches("encode, dancer at quality 50", HALF, (Bound("encode_s", 8.0, "CPU s/frame", least=False),)),
+    Flat(Which("collision", TUNED, {"centers": 200})),
+    Reaches(
+        "decode, dancer at m = 10", Which("dancer", f"{TUNED} m", LARGEST), (Bound("decode_ms", 25.0, "ms", False),)
+    ),
+)
+STUDY = Study(
+    title="Targets of the preset `paper`",
+    sequences=(*BODIES, "collision"),
+    sweeps=(
+        Sweep("meshreel", {"basis_size": tuple(RELEASED)}, only=("dancer",)),
+        Sweep("meshreel", {}, LARGEST, only=("dancer",)),
+        Sweep("meshreel", {"quality": (15.0, 35.0, 50.0, 75.0)}, on={"collision": {"quality": (50.0,)}}),
+        Sweep("draco", {"qp": (7, 8, 9)}, only=BODIES),
+        Sweep("decimated_draco", DECIMATED, {"levels": 0}, only=BODIES),
+        Sweep("decimated_draco", DECIMATED, {"levels": 1}, only=BODIES),
+        *(Sweep("meshreel", {}, MEMORY, only=("collision",), frames=frames) for frames in (20, 60)),
+    ),
+    measures=(D2, MASKED, SYMMETRIC, NORMALS),
+    anchor="decimated_draco_subdivided",
+    promises=PROMISES,
+)

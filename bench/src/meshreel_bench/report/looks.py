@@ -1,6 +1,6 @@
-"""What a codec looks like in every plot, in which order codecs are told, and which way a metric is better.
+"""Look of each curve in plots, order of curves in tables, and the direction in which a metric is better.
 
-In -> out: names of curves -> a color, a marker and a line for each; the key of a metric -> a sign.
+In -> out: names of curves -> a color, a marker and a line for each; the name of a metric -> a sign.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from ..names import BEST, DECIMATED, DRACO, KLT, NECGS, ONCE, ONCE_SUBDIVIDED, S
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a curve is drawn."""
+    """Color, marker and line of a curve."""
 
     color: str
     marker: str
@@ -46,18 +46,18 @@ _COLORS = ("#882255", "#6699CC", "#999933", "#332288", "#AA4499", "#661100", "#4
 _MARKERS = (">", "p", "<", "H", "d")
 
 _HIGHER = ("psnr", "ssim", "iou", "covered")
-_LOWER = ("error", "rms", "hausdorff", "median", "mbps", "bytes", "rss", "called_dynamic", "encode", "decode", "seam_")
+_LOWER = ("error", "rms", "hausdorff", "median", "mbps", "bytes", "called_dynamic", "encode", "decode", "seam_", "fall")
 _LOWER_UNITS = ("_deg", "_m", "_mm", "_ms", "_s", "_percent")
 
 
 def in_order(names: Iterable[str]) -> list[str]:
-    """Each name once: those that are known in their order, then the others sorted."""
+    """Return each name once: those that are known in their order, then the others sorted."""
     found = set(names)
     return [name for name in KNOWN if name in found] + sorted(found - set(KNOWN))
 
 
 def looks_of(names: Iterable[str]) -> dict[str, Look]:
-    """A look for each name, in order. Give the names of a whole report: others are told apart among themselves."""
+    """Return a look for each name, in order; names that are not known get looks of their own."""
     ordered = in_order(names)
     others = [name for name in ordered if name not in KNOWN]
     rest = {
@@ -67,12 +67,12 @@ def looks_of(names: Iterable[str]) -> dict[str, Look]:
 
 
 def direction(key: str) -> int:
-    """1 where more of a metric is better, -1 where less is, 0 where its name does not tell."""
+    """Return 1 where more of a metric is better, -1 where less is, 0 where its name does not say."""
     if any(word in key for word in _LOWER) or key.endswith(_LOWER_UNITS):
         return -1
     return 1 if any(word in key for word in _HIGHER) else 0
 
 
 def arrow(sign: int) -> str:
-    """The direction in a table's head; empty for 0."""
+    """Return the direction in a table's head; empty for 0."""
     return {1: " ↑", -1: " ↓"}.get(sign, "")

@@ -1,165 +1,178 @@
-"""The pages of a report: results.md, and the same as one HTML file.
+"""Pages of a report: `results.md`, an appendix for each experiment, `reproducing.md`, and the README's numbers.
 
-In -> out: rows, and the folders of pictures beside them -> files. A part an experiment, a section a sequence; then
-what failed, and how all of it was made. No clock is asked.
+In -> out: rows -> Markdown, PNG and JSON. Same rows, same bytes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import json
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 
 from meshreel.io.write import make_folder, replacing
 
-from ..curves import curve_of, repeated
-from ..experiment import Experiment
-from ..filenames import file_name
-from ..provenance import makers
-from ..reproducing import reproducing_page
-from ..rows import Row, curve_rows, experiment_of, failed_rows, measured_rows
-from .html import html_page
-from .looks import Look, looks_of
-from .plots import METRICS, plot_curves
-from .sheets import Shots, draw_sheet, find_shots
+from ..experiments import EXPERIMENTS
+from ..experiments.study import D2, MASKED, Study
+from ..names import title
+from ..rows import Row, failed_rows, measured_rows
+from .equal import rate_table
+from .headline import headline
+from .looks import looks_of
+from .plots import plot_curves
+from .reproducing import reproducing_page
 from .tables import (
-    DAGGER,
-    NEAR,
+    bd_table,
+    comparable_table,
     failure_table,
-    is_near,
     maker_table,
     point_table,
-    promise_table,
-    sequences,
+    summary_table,
     text,
-    without_html,
+    value_table,
+    verdict_table,
 )
+from .values import curve_of, rated, sequences
+from .verdicts import verdicts
 
-FOLDER = "results"  # of plots and sheets, beside the pages
-TITLE = "meshreel: results"
-SHEET = "-sheet"  # ends the names of sheets
+FOLDER = "results"  # of appendices, plots and the README's numbers, beside the pages
+OPEN = "figure6"  # the experiment that rows belong to which none declares: other codecs, other sequences
+SHOWN = ("synthetic4", "dancer", "room2")  # sequences whose curves are on the first page
+TEXT = "results.md"  # package data: the first page, with a line {NAME} for each part that is made
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One experiment's rows, and where its plots and sheets go."""
+    """An experiment and its rows."""
 
     name: str
-    chosen: Experiment
-    rows: Sequence[Row]  # that were measured
-    folder: Path
+    study: Study
+    rows: list[Row]  # that were measured
+    failed: list[Row]
 
-    def path(self, sequence: str, kind: str = "") -> Path:
-        """Of a plot, or of a sheet by its ending."""
-        return self.folder / FOLDER / f"{file_name(f'{self.name}-{sequence}')}{kind}.png"
-
-    def link(self, sequence: str, told: str, kind: str = "") -> str:
-        """The same in Markdown."""
-        return f"![{text(sequence)}: {told}]({FOLDER}/{self.path(sequence, kind).name})"
+    @property
+    def rated(self) -> list[Row]:
+        """Rows that have a rate and a quality."""
+        return rated(self.rows)
 
 
-def write_report(
-    rows: Sequence[Row], experiments: Mapping[str, Experiment], folder: Path, pictures: Sequence[Path] = ()
-) -> list[Path]:
-    """Writes `results.md`, `index.html` and, per experiment and sequence, a plot as PNG and SVG; the paths.
-
-    With rows of the paper's experiments, also `reproducing.md`.
-
-    `experiments` are those that the rows may be of, by name, in the order of the page. `rows` may have some that
-    failed. `pictures` are folders with the pictures that rows name, of which sheets are made: a file a sequence.
-    """
-    make_folder(folder / FOLDER)
-    measured = measured_rows(rows)
-    looks = looks_of(curve_of(row) for row in measured)
-    files, lines = list[Path](), list[str]()
-    for name, chosen in experiments.items():
-        own = [row for row in measured if experiment_of(row) == name]
+def parts_of(rows: Sequence[Row]) -> list[Part]:
+    """Return the experiments that have rows; a point of several experiments is in each of them."""
+    declared = {name: {point.key for point in study.points()} for name, study in EXPERIMENTS.items()}
+    every = set[str]().union(*declared.values())
+    parts = []
+    for name, study in EXPERIMENTS.items():
+        own = [r for r in rows if r.point.key in declared[name] or (name == OPEN and r.point.key not in every)]
         if own:
-            part = Part(name, chosen, own, folder)
-            shots = {sequence: find_shots(curve_rows(own, sequence), pictures) for sequence in sequences(own)}
-            files += _draw(part, looks, {sequence: found for sequence, found in shots.items() if found})
-            lines += [*([""] if lines else []), *map(without_html, _part(part, shots))]
-    lines += [*_failures(failed_rows(rows)), *_origin(rows, experiments)]
-    # The page has the PNG of each plot; its SVG twin comes after it, and takes its place in HTML.
-    inlined = {f"{FOLDER}/{path.with_suffix('.png').name}": path.read_bytes() for path in files}
-    lines = [line for line, last in zip(lines, ["", *lines], strict=False) if line or last]  # no two empty ones
-    pages = {"results.md": "\n".join(lines) + "\n", "index.html": html_page(TITLE, lines, inlined)}
-    if told := reproducing_page(measured):
-        pages["reproducing.md"] = "\n".join(told) + "\n"
-    for page, content in pages.items():
-        with replacing(folder / page) as file:
-            file.write(content.encode(errors="backslashreplace"))
-    return [*(folder / page for page in pages), *files]
+            parts.append(Part(name, study, measured_rows(own), failed_rows(own)))
+    return parts
 
 
-def _draw(part: Part, looks: Mapping[str, Look], shots: Mapping[str, Shots]) -> Iterator[Path]:
-    """Plots and sheets; their paths."""
-    for sequence in sequences(part.rows):
-        own = [row for row in part.rows if row["sequence"] == sequence]
-        names = set(map(curve_of, own))
-        here = {name: look for name, look in looks.items() if name in names}
-        yield from plot_curves(own, part.chosen, here, part.path(sequence))
-        if sequence in shots:
-            yield draw_sheet(shots[sequence], part.path(sequence, SHEET))
+def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
+    """Write the pages and their plots into a folder; return the paths."""
+    make_folder(folder / FOLDER)
+    parts = parts_of(rows)
+    looks = looks_of(curve_of(row) for part in parts for row in part.rated)
+    pages = {Path("results.md"): _first_page(parts)}
+    plots = list[Path]()
+    for part in parts:
+        pages[Path(FOLDER, f"appendix-{part.name}.md")] = list(_appendix(part))
+        if part.rated:
+            path = folder / FOLDER / f"{part.name}.png"
+            plots.append(plot_curves(part.rows, part.study.measures[:2], looks, path))
+    for part, sequence in _shown(parts):
+        own = [row for row in part.rows if row.point.sequence == sequence]
+        plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
+    if page := reproducing_page([row for part in parts if part.name == OPEN for row in part.rows]):
+        pages[Path("reproducing.md")] = page
+    if found := headline({part.name: part.rows for part in parts}):
+        pages[Path(FOLDER, "headline.json")] = json.dumps(found, indent=2).splitlines()
+    for name, lines in pages.items():
+        with replacing(folder / name) as file:
+            file.write(("\n".join(lines) + "\n").encode(errors="backslashreplace"))
+    return [*(folder / name for name in pages), *plots]
 
 
-def _part(part: Part, shots: Mapping[str, Shots | None]) -> Iterator[str]:
-    """The Markdown of one experiment."""
-    yield from (f"# Results of `{part.name}`", "")
-    promises = part.chosen.promises(part.rows)
-    if promises:
-        yield from promise_table(promises)
-    for sequence in sequences(part.rows):
-        own = curve_rows(part.rows, sequence)
-        yield from ("", f"## {text(sequence)}, {own[0]['frames']} frames", "")
-        yield from (part.link(sequence, "quality against rate"), "")
-        yield from _doubts(own)
-        shown, metrics = part.chosen.shown(own), getattr(part.chosen, "METRICS", METRICS)
-        yield from (*part.chosen.comparisons(own), "", *(point_table(shown, metrics) if shown else ()))
-        if (found := shots[sequence]) is not None:
-            yield from ("", *_sheet(part, found))
-    yield from part.chosen.sections(part.rows)
+def _shown(parts: Sequence[Part]) -> list[tuple[Part, str]]:
+    """Return the sequences whose curves are on the first page."""
+    for part in parts:
+        if part.name == OPEN:
+            names = sequences(part.rows)
+            return [(part, name) for name in ([each for each in SHOWN if each in names] or names[:3])]
+    return []
 
 
-def _doubts(rows: Sequence[Row]) -> Iterator[str]:
-    """What a reader must know of the rows of a sequence before believing them."""
-    if len(made := makers(rows)) > 1:
-        yield from (f"Rows of more than one version: {text(', '.join(made))}.", "")
-    for name, (apart, count) in repeated(rows).items():
-        yield from (f"**{text(name)}: points apart: {apart} of {count}.** What is varied does nothing here.", "")
+def _plot_name(part: Part, sequence: str) -> str:
+    safe = "".join(sign if sign.isalnum() or sign in "._-" else "_" for sign in sequence)[-80:]
+    return f"{part.name}-{safe}.png"
 
 
-def _sheet(part: Part, shots: Shots) -> Iterator[str]:
-    """The sheet and what it shows."""
-    yield from (f"### {text(shots.sequence)} in pictures", "", part.link(shots.sequence, "pictures", SHEET), "")
-    yield f"Frame {shots.frame} of the original and of each codec's point nearest to {shots.mbps:.3g} Mbps. Colors are"
-    yield "normals; the solid red box magnifies the dotted one. Below: the error, in % of the diagonal."
-    yield "Rates and qualities are those of all frames that were coded, and of those that were measured."
-    if any(not is_near(files.row, shots.mbps) for files in shots.columns):
-        yield f"{DAGGER} not within a factor of {NEAR:g} of that rate."
-    if shots.left_out:
-        yield f"Not shown, as their pictures are of another frame, scale or size: {text(', '.join(shots.left_out))}."
+def _first_page(parts: Sequence[Part]) -> list[str]:
+    """Return what to believe, three plots and one table."""
+    made = {
+        "{verdicts}": _kept_promises(parts),
+        "{plots}": [
+            line
+            for part, name in _shown(parts)
+            for line in (f"![{text(name)}: quality against rate]({FOLDER}/{_plot_name(part, name)})", "")
+        ],
+        "{table}": [line for part in parts if part.name == OPEN for line in _summary(part)],
+        "{appendices}": [f"- [{p.study.title}]({FOLDER}/appendix-{p.name}.md), {_counted(p)}" for p in parts],
+    }
+    page = (files(__package__) / TEXT).read_text(encoding="utf-8")
+    return [line for text in page.splitlines() for line in made.get(text, [text])]
 
 
-def _failures(rows: Sequence[Row]) -> Iterator[str]:
-    if rows:
-        yield from ("", "# What failed", "", "Of these points nothing was measured.", "", *failure_table(rows))
+def _kept_promises(parts: Sequence[Part]) -> list[str]:
+    """Return how many targets are met, and those that are not."""
+    found = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is not None]
+    missed = [verdict for verdict in found if not verdict.met]
+    if not missed:
+        return [f"All {len(found)} targets that were measured are met."]
+    head = f"Of {len(found)} targets {len(found) - len(missed)} are met. Missed:"
+    return [head, "", *(f"- {text(v.text)} ({v.bound}): {text(v.value)}" for v in missed)]
 
 
-def _origin(rows: Sequence[Row], experiments: Mapping[str, Experiment]) -> Iterator[str]:
-    """Command lines, and what made the rows."""
-    found = {experiment_of(row) for row in rows}
-    names = [name for name in experiments if name in found]
-    if not names:
-        return
-    yield from ("", "# How this was made", "")
-    told = "Of rows, of the pictures that these name, and of nothing else; the names of their files are free:"
-    yield from (told, "", "```")
-    for name in names:
-        measured = sequences([row for row in rows if experiment_of(row) == name])
-        declared = {point.sequence for point in experiments[name].points(False)}
-        some = [] if declared <= set(measured) else ["--on", *measured]  # the others of what it declares have no rows
-        yield " ".join(["meshreel bench run", name, f"-o {name}.jsonl --data DATA", *map(text, some)])
-    yield from (f"meshreel bench report {' '.join(f'{name}.jsonl' for name in names)} -o FOLDER", "```", "")
-    yield "Lines of plots join a codec's points in the order of their rates."
-    yield from ("", *maker_table([row for row in rows if experiment_of(row) in names]))
+def _summary(part: Part) -> list[str]:
+    """Return BD-rates of the best codec against all others on all sequences, by D2."""
+    return summary_table(part.rows, part.study.best, D2) if part.study.best else []
+
+
+def _counted(part: Part) -> str:
+    failed = f", {len(part.failed)} of them failed" if part.failed else ""
+    return f"{len(part.rows) + len(part.failed)} points{failed}"
+
+
+def _appendix(part: Part) -> Iterator[str]:
+    study = part.study
+    yield from (f"# {study.title}", "")
+    yield from ("```", f"meshreel-bench run {part.name} -o {part.name}.jsonl --data DATA", "```", "")
+    yield from (*study.notes, "") if study.notes else ()
+    if found := verdicts(study, part.rows):
+        yield from ("## Targets", "", *verdict_table(found), "")
+    if part.rated:
+        yield from (f"![{title(part.name)}: quality against rate]({part.name}.png)", "")
+    for name in sequences(part.rows):
+        own = rated(part.rows, name)
+        yield from (f"## {text(name)}", "")
+        for table in (*_comparisons(study, own), point_table(own, study.measures)):
+            yield from (*table, "") if table else ()
+    for measure, wanted in ((None, study.common_mbps), *([study.common] if study.common else [])):
+        if wanted is not None:
+            near = f"{wanted:g} Mbps" if measure is None else measure.shown(wanted)
+            yield from (f"## Near {near}", "", *comparable_table(part.rows, wanted, measure), "")
+    if others := [row for row in part.rows if not (row.stream and row.metrics)]:
+        yield from ("## Without rate or quality", "", *value_table(others), "")
+    if part.failed:
+        yield from ("## Failed", "", "Nothing was measured of these points.", "", *failure_table(part.failed), "")
+    yield from ("## Machines and versions", "", *maker_table([*part.rows, *part.failed]))
+
+
+def _comparisons(study: Study, rows: Sequence[Row]) -> Iterator[list[str]]:
+    """Yield tables of rates at equal quality."""
+    if study.best:
+        yield rate_table(rows, study.best, study.measures[:2])
+        yield bd_table(rows, study.best, study.measures)
+    if study.anchor:
+        yield bd_table(rows, study.anchor, study.measures, is_anchor=True)

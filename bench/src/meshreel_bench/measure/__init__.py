@@ -1,0 +1,1 @@
+"""Measurements: points become rows, each in a fresh process."""

@@ -1,0 +1,113 @@
+"""Metrics of decoded frames: against the input, and where a scene is simulated, against the truth.
+
+In: the frames that are measured, original and decoded. Out: values by name, over the frames and for each. Names that
+begin with `truth_` or `input_` are of whole scenes, people and background; `seam_` is where these meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from meshreel.decoder.video import open as open_video
+from meshreel.errors import InputError
+from meshreel.format.layout import MAGIC
+from meshreel.geometry.derived_sequences import Chosen
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
+from meshreel.metrics.scene_accuracy import Scene, scene_means, scene_row
+from meshreel.metrics.scene_comparison import finite, true_scene
+from meshreel.metrics.seams import measure_seam, seam_row
+from meshreel.metrics.viewpoints import ParallelViewOptions, ViewOptions
+from meshreel.types import Mesh
+
+from ..datasets import Dataset
+from ..datasets.scenes import SceneData
+from ..rows import Metrics
+from .bridges import count_bridges, count_degenerate
+
+KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
+NO_METRICS = ("frames_compared", "frames_missing", "key_frames", "per_frame", "cameras")  # of a comparison's record
+Values = dict[str, float | None]
+PerFrame = dict[str, list[float | None]]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Frames of a sequence, and what a codec made of them."""
+
+    known: Dataset
+    numbers: Sequence[int]
+    decoded: Sequence[Mesh]
+    data: bytes = b""  # that was decoded; none: the decoded frames are the truth
+
+
+def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
+    """Return values over all frames, and some for each of them. Raises InputError where nothing has surface."""
+    if metrics == "regions":
+        return _regions(frames), {}
+    values, per_frame = _to_input(frames, metrics)
+    if frames.known.scene is not None:
+        values |= _means("truth", [(_true(frames.known.scene, number)) for number in frames.numbers], frames.decoded)
+    return values, per_frame
+
+
+def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
+    originals = Chosen(frames.known.sequence, frames.numbers)
+    views = ParallelViewOptions() if metrics == "parallel views" else ViewOptions()
+    options = ComparisonOptions(frames.known.cameras or None, views, ssim=metrics != "distances")
+    row: dict[str, Any] = compare_sequences(originals, frames.decoded, options).to_row()
+    if row.pop("frames_empty") == row["frames_compared"]:
+        raise InputError("no frame has a face with an area; give a sequence with surface")
+    per_frame = {key: [frame[key] for frame in row["per_frame"]] for key in KEPT if key in row["per_frame"][0]}
+    values: Values = {key: value for key, value in row.items() if key not in NO_METRICS}
+    if not frames.known.cameras:  # scans of scenes are many pieces from the start
+        values["bridges"] = sum(count_bridges(a, b) for a, b in zip(originals, frames.decoded, strict=True))
+        values["degenerate_faces"] = sum(map(count_degenerate, frames.decoded))
+    return values, per_frame
+
+
+def _regions(frames: Measured) -> Values:
+    """Return means of people, background and all of it, and of the seam between them."""
+    scene = frames.known.scene
+    if scene is None:
+        raise InputError("regions are those of simulated scenes, whose truth is known")
+    clean = [_true(scene, number) for number in frames.numbers]
+    if not frames.data:  # the noise floor: the input against the truth
+        return _means("truth", clean, [scene.meshes[number] for number in frames.numbers])
+    noisy = [_noisy(scene, number) for number in frames.numbers]
+    values = _means("truth", clean, frames.decoded) | _means("input", noisy, frames.decoded, clean)
+    return values | _seams(scene, frames)
+
+
+def _means(against: str, references: Sequence[Scene], decoded: Sequence[Mesh], clean: Sequence[Scene] = ()) -> Values:
+    """Return means over frames by name; what moves is what is nearest to what moves in the truth."""
+    pairs = zip(references, clean or references, decoded, strict=True)
+    rows = [scene_row(reference, true.labelled(mesh)) for reference, true, mesh in pairs]
+    return {f"{against}_{name}": value for name, value in finite(scene_means(rows)).items()}
+
+
+def _seams(scene: SceneData, frames: Measured) -> Values:
+    """Return means of the seam between bodies and what they touch; none for codecs that code a scene as one."""
+    if not frames.data.startswith(MAGIC):
+        return {}
+    video = open_video(frames.data)
+    if len(video) != len(scene.meshes):
+        return {}
+    rows = []
+    for number in frames.numbers:
+        parts = (video.background(number), video.moving(number))
+        rows.append(seam_row(measure_seam(scene.meshes[number], scene.labels(number), *parts)))
+    return dict(finite(scene_means(rows)))
+
+
+@lru_cache(maxsize=10)  # 2 GB: what is prepared for one point serves the next
+def _true(scene: SceneData, number: int) -> Scene:
+    return true_scene(scene.truth, number)
+
+
+@lru_cache(maxsize=10)
+def _noisy(scene: SceneData, number: int) -> Scene:
+    clean = _true(scene, number)
+    return Scene(scene.meshes[number], scene.labels(number), clean.sights, clean.options)

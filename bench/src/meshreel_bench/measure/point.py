@@ -1,0 +1,166 @@
+"""What is measured of a point: rate of all bytes, metrics of decoded frames, times of both directions.
+
+In: a point, and where its sequence is. Out: its row. Bodies are judged by all frames, scenes by some. A codec is given
+all frames, or those of a sampled point alone; the rate is then theirs. Two names stand in a codec's place: `captured`
+is the truth itself, beyond which noise is coded, and `segmentation` is the encoder's labels of what moves.
+"""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+
+from meshreel.container.reader import ReelReader
+from meshreel.container.sources import BytesSource
+from meshreel.errors import InputError
+from meshreel.format.layout import MAGIC, ChunkKind
+from meshreel.geometry.derived_sequences import Chosen
+from meshreel.types import MeshSequence, evenly
+
+from ..codec import Codec, TwoStepCodec
+from ..codecs import codec_version, make_codec
+from ..datasets import Dataset, Store
+from ..datasets.scenes import FOUND, SceneFrames
+from ..rows import Encoding, Group, Point, Row, Stream
+from .clock import StageTimer, peak_rss_mb
+from .decode import decoded_apart
+from .maker import maker
+from .metrics import Measured, measure_frames
+from .segmentation import score_labels
+
+TRUTH, SEGMENTATION = "captured", "segmentation"  # in a codec's place
+TRUTH_NAME = "the truth itself"
+SOME = 10  # frames of a scene that a sampled point has; of all other points every second of these is measured
+KEYS = "key_frames"  # of a file's metadata: numbers of the frames that others are predicted from
+
+
+def measure_points(points: Sequence[Point], store: Store) -> Iterator[Row]:
+    """Yield the row of each point; those that share an analysis should come together."""
+    for point in points:
+        yield measure_point(point, store)
+
+
+def measure_point(point: Point, store: Store) -> Row:
+    """Return the row of a point. Raises InputError where it cannot be measured, and whatever its codec raises."""
+    known = _opened(point.sequence, point.frames, store)
+    count = len(known.sequence)
+    some = evenly(count, SOME) if known.cameras else list(range(count))
+    whole = not known.cameras or point.sampled or point.metrics == "regions"
+    numbers = some if whole else some[::2]
+    row = empty_row(point, store, frames=count, frame_rate=known.sequence.frame_rate, measured_frames=numbers)
+    if point.codec == SEGMENTATION:
+        return msgspec.structs.replace(row, metrics=_segmentation(known))
+    if point.codec == TRUTH:
+        if known.truth is None:
+            raise InputError("the truth itself is known of simulated scenes only")
+        clean = [known.truth[number].mesh for number in numbers]
+        metrics, per_frame = measure_frames(Measured(known, numbers, clean), point.metrics)
+        return msgspec.structs.replace(row, name=TRUTH_NAME, metrics=metrics, per_frame=per_frame)
+    codec = make_codec(point.codec, point.options)
+    decoder = pickle.dumps(codec)  # before it has seen a frame, so that it can keep none
+    source = _sampled(known, some) if point.sampled else known.sequence
+    data, encoding = _encoded(codec, source, (point.sequence, point.frames, point.sampled))
+    wanted = list(range(len(some))) if point.sampled else numbers
+    decoding, meshes = decoded_apart(decoder, data, wanted, len(source))
+    metrics, per_frame = measure_frames(Measured(known, numbers, meshes, data), point.metrics)
+    return msgspec.structs.replace(
+        row,
+        name=codec.name,
+        options=codec.options,
+        stream=_stream(data, len(source)),
+        encoding=encoding,
+        decoding=decoding,
+        metrics=metrics,
+        per_frame=per_frame,
+    )
+
+
+def empty_row(point: Point, store: Store, **known: Any) -> Row:
+    """Return the row of a point without what is measured of it."""
+    return Row(
+        point=point,
+        name=point.codec,
+        options=point.options,
+        made_by=maker(),
+        source=store.digest(point.sequence),
+        codec_version=codec_version(point.codec),
+        **known,
+    )
+
+
+@lru_cache(maxsize=1)
+def _opened(name: str, frames: int | None, store: Store) -> Dataset:
+    return store.open(name, frames)
+
+
+def _sampled(known: Dataset, numbers: Sequence[int]) -> MeshSequence:
+    return Chosen(known.sequence, numbers) if known.scene is None else SceneFrames(known.scene, numbers)
+
+
+@dataclass(slots=True)
+class _Analysed:
+    """The last analysis, for points that share it."""
+
+    key: object = None
+    analysis: Any = None
+    timer: StageTimer | None = None
+    seconds: float = 0.0
+
+
+_LAST = _Analysed()
+
+
+def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, Encoding]:
+    """Return the bytes and what they cost; a shared analysis counts in each of its points."""
+    timer, seconds, stages = StageTimer(), 0.0, dict[str, float]()
+    if isinstance(codec, TwoStepCodec):
+        key = (what, codec.analysis_key)
+        if _LAST.key != key:
+            _LAST.key = _LAST.analysis = None  # one in memory is enough
+            _LAST.analysis = codec.analyse(source, timer)
+            _LAST.seconds, _LAST.timer, _LAST.key = timer.stop(), timer, key
+            timer = StageTimer()
+        assert _LAST.timer is not None
+        seconds, stages = _LAST.seconds, dict(_LAST.timer.seconds)
+        data = codec.code(_LAST.analysis, timer)
+    else:
+        data = codec.encode(source, timer)
+    seconds += timer.stop()
+    if type(data) is not bytes or not data:
+        raise InputError(
+            f"{codec.name} encodes to {type(data).__name__} of length {len(data)}; give bytes, one at least"
+        )
+    for stage, spent in timer.seconds.items():
+        stages[stage] = stages.get(stage, 0.0) + spent
+    count = len(source)
+    shares = {stage: spent / count for stage, spent in stages.items()}
+    return data, Encoding(seconds / count, shares, peak_rss_mb())
+
+
+def _stream(data: bytes, frames: int) -> Stream:
+    """Return size and groups; no groups of bytes that are no .reel file."""
+    if not data.startswith(MAGIC):
+        return Stream(len(data), frames)
+    reader = ReelReader(BytesSource(data))
+    keys = {int(key) for key in reader.metadata.get(KEYS, ())}
+    groups = list[Group]()
+    for chunk in reader.groups:
+        own = keys & set(range(chunk.first_frame, chunk.first_frame + chunk.frame_count))
+        form = chunk.form.name.lower()
+        groups.append(Group(chunk.first_frame, chunk.frame_count, form, chunk.size, min(own, default=None)))
+    once = sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
+    return Stream(len(data), frames, once, groups)
+
+
+def _segmentation(known: Dataset) -> dict[str, float | None]:
+    """Return how well the encoder's labels of what moves fit the true ones, over all frames."""
+    if known.scene is None:
+        raise InputError("a segmentation is judged on simulated scenes only, whose labels are known")
+    scene, numbers = known.scene, range(len(known.sequence))
+    score = score_labels((scene.labels(i, FOUND) for i in numbers), (scene.labels(i) for i in numbers))
+    return {"iou_mean": score.mean, "iou_worst": score.worst, "static_called_dynamic": score.static_called_dynamic}

@@ -1,0 +1,112 @@
+"""Sweeps: points become rows of a file, one after the other or side by side.
+
+In: points, the file of their rows. Out: rows, each in the file as soon as it is there. A point whose codec crashes,
+raises, takes too long or decodes nonsense has a row as well, that says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from ..codec import TwoStepCodec
+from ..codecs import codec_version, make_codec
+from ..datasets import Store
+from ..rows import Point, Row, append_row, read_rows
+from .point import empty_row, measure_points
+from .worker import WorkerError, end_all, in_fresh_process
+
+Report = Callable[[Row, bool], None]  # of a row, and whether it is new
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """How points are measured."""
+
+    store: Store
+    limit_s: float | None = None  # wall time of a point
+    retry: bool = False  # points that failed before are measured again
+    jobs: int = 1  # points side by side
+
+
+def run_points(points: Sequence[Point], file: Path, sweep: Sweep, report: Report = lambda *_: None) -> list[Row]:
+    """Return the rows of all points, and append each new one to the file as soon as it is there.
+
+    Points that have a row in the file are not measured again, unless their sequence or codec has changed. Raises
+    InputError where a sequence is missing: that is no codec's failure.
+    """
+    wanted, stored = {point.key for point in points}, read_rows(file) if file.exists() else []
+    found = {row.point.key: row for row in stored if row.point.key in wanted and _is_valid(row, sweep)}
+    missing = [point for point in points if point.key not in found]
+    for row in [found[point.key] for point in points if point.key in found]:
+        report(row, False)
+    for sequence, frames in dict.fromkeys((point.sequence, point.frames) for point in missing):
+        sweep.store.open(sequence, frames)  # what takes long to make is made once, before processes need it
+    for row in _measured(runs_of(missing), sweep):
+        append_row(file, row)
+        found[row.point.key] = row
+        report(row, True)
+    return [found[point.key] for point in points]
+
+
+def _is_valid(row: Row, sweep: Sweep) -> bool:
+    """Whether a row stands for its point as it would be measured now."""
+    if row.failed and sweep.retry:
+        return False
+    return row.source == sweep.store.digest(row.point.sequence) and row.codec_version == codec_version(row.point.codec)
+
+
+def runs_of(points: Sequence[Point]) -> list[list[Point]]:
+    """Return the points in runs of those that share an analysis (`TwoStepCodec`)."""
+    runs: dict[object, list[Point]] = {}
+    for point in points:
+        runs.setdefault(_shared(point), []).append(point)
+    return list(runs.values())
+
+
+def _shared(point: Point) -> object:
+    """Return what is equal for points that share an analysis."""
+    try:
+        codec = make_codec(point.codec, point.options)
+        if isinstance(codec, TwoStepCodec):
+            return point.sequence, point.frames, point.sampled, str(codec.analysis_key)
+    except (Exception, SystemExit):  # its row reports it
+        pass
+    return point.key
+
+
+def _measured(runs: Sequence[list[Point]], sweep: Sweep) -> Iterator[Row]:
+    if sweep.jobs == 1:
+        for run in runs:
+            yield from _rows_of(run, sweep)
+        return
+    with ThreadPoolExecutor(sweep.jobs) as executor:
+        longest_first = sorted(runs, key=len, reverse=True)
+        try:
+            for done in as_completed(
+                [executor.submit(lambda run: list(_rows_of(run, sweep)), r) for r in longest_first]
+            ):
+                yield from done.result()
+        except BaseException:
+            executor.shutdown(wait=False, cancel_futures=True)
+            end_all()
+            raise
+
+
+def _rows_of(run: Sequence[Point], sweep: Sweep) -> Iterator[Row]:
+    """Yield the rows of a run from a process of its own, and from another one after a point that ends it."""
+    left = list(run)
+    while left:
+        try:
+            for row in in_fresh_process(measure_points, left, sweep.store, limit_s=sweep.limit_s):
+                yield row
+                left.pop(0)
+        except WorkerError as error:
+            if not left:
+                return
+            row = empty_row(left.pop(0), sweep.store)
+            yield msgspec.structs.replace(row, failed=str(error))

@@ -1,0 +1,90 @@
+"""Functions in a fresh process, with a time limit: a crash, an error or an endless loop costs its caller an exception.
+
+In: a generator function and its arguments. Out: what it yields, as it comes. The process has one thread for numerical
+libraries, so that times can be compared, and ends with its parent.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess, parent_process
+from typing import Any
+
+_SPAWN = multiprocessing.get_context("spawn")  # a forked process would have what its parent has in memory
+_ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+_LONGEST = 300  # characters of an error's text
+_LIVE: set[BaseProcess] = set()
+
+
+class WorkerError(Exception):
+    """Reason why a process has not yielded what it was asked for."""
+
+
+def in_fresh_process(task: Callable[..., Iterator[Any]], *about: object, limit_s: float | None = None) -> Iterator[Any]:
+    """Yield what `task(*about)` yields in a fresh process; each value may take `limit_s` seconds of wall time.
+
+    Raises WorkerError where it takes longer, raises an error or ends. Arguments and values are pickled.
+    """
+    os.environ.update(_ONE_THREAD)  # of processes that start from now on: libraries here have read theirs
+    here, there = _SPAWN.Pipe(duplex=False)
+    process = _SPAWN.Process(target=_answer, args=(there, task, about))
+    process.start()
+    _LIVE.add(process)
+    there.close()
+    try:
+        while (value := _received(here, process, limit_s)) is not None:
+            yield value[0]
+    finally:
+        process.kill()
+        process.join()
+        _LIVE.discard(process)
+        here.close()
+
+
+def end_all() -> None:
+    """End all processes that other threads wait for."""
+    for process in list(_LIVE):
+        process.kill()
+
+
+def _received(here: Connection, process: BaseProcess, limit_s: float | None) -> tuple[Any] | None:
+    """Return the next value; None after the last one."""
+    if not here.poll(limit_s):
+        raise WorkerError(f"took longer than {limit_s:g} s of wall time")
+    try:
+        kind, value = here.recv()
+    except EOFError:
+        process.join()
+        code = process.exitcode or 0
+        ended = f"signal {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+        raise WorkerError(f"its process ended by {ended}") from None
+    if kind == "error":
+        raise WorkerError(value)
+    return (value,) if kind == "value" else None
+
+
+def _answer(there: Connection, task: Callable[..., Iterator[Any]], about: tuple[object, ...]) -> None:
+    """Run the task in the fresh process; what codecs print goes where errors go."""
+    os.dup2(2, 1)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        for value in task(*about):
+            there.send(("value", value))
+        there.send(("end", None))
+    except (Exception, SystemExit) as error:  # a codec may raise anything
+        reason = str(error) if isinstance(error, WorkerError) else f"{type(error).__name__}: {error}"
+        there.send(("error", " ".join(reason.split())[:_LONGEST]))
+    there.close()
+    os._exit(0)  # threads that a codec has left do not matter
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)

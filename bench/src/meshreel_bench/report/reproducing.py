@@ -1,0 +1,117 @@
+"""The page `reproducing.md`: the paper's numbers beside ours, and what differs between them.
+
+In: rows. Out: lines of Markdown. Ours are of rows, theirs of `published`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from importlib.resources import files
+
+from ..names import BEST, TSMC, TUNED
+from ..rows import Row
+from .published import RELEASED, RELEASED_TVMC, TABLE_1, TABLE_2, Published
+from .values import curve_of, rated, value
+
+SCENES = ("room2", "living_room", "procedural_room")
+SYNTHETIC = "synthetic4"
+SLACK_DB, SHORT = 0.1, " †"  # a point that is worse by more is marked
+TEXT = "reproducing.md"  # package data: the page, with a line {NAME} for each table
+
+
+def reproducing_page(rows: Sequence[Row]) -> list[str]:
+    """Return the lines of the page; no lines where no row is of a sequence that the paper's tables stand beside."""
+    own = [row for row in rated(rows) if row.point.metrics == "views"]
+    if not {row.point.sequence for row in own} & {*SCENES, SYNTHETIC, *RELEASED}:
+        return []
+    tables = {"{table_1}": _table_1, "{table_2}": _table_2, "{released}": _released}
+    page = (files(__package__) / TEXT).read_text(encoding="utf-8")
+    return [line for text in page.splitlines() for line in (tables[text](own) if text in tables else [text])]
+
+
+def _table_1(rows: Sequence[Row]) -> Iterator[str]:
+    scenes = [scene for scene in SCENES if rated(rows, scene)] or list(SCENES)
+    yield from _heads(["paper", *(f"here, {scene}" for scene in scenes)])
+    for system in (*TABLE_1, None):
+        codec = BEST if system is None else system.codec
+        yield _line(system, codec, [_published(system), *(_near_best(rated(rows, scene), codec) for scene in scenes)])
+
+
+def _table_2(rows: Sequence[Row]) -> Iterator[str]:
+    yield from _heads(["paper", f"here, {SYNTHETIC}"])
+    own = rated(rows, SYNTHETIC)
+    for system in (*TABLE_2, None):
+        codec = BEST if system is None else system.codec
+        wanted = TABLE_2[0].d2_psnr if system is None else system.d2_psnr
+        yield _line(system, codec, [_published(system), _as_good(own, codec, wanted)])
+
+
+def _released(rows: Sequence[Row]) -> Iterator[str]:
+    yield "| sequence | released code | the same system here | `best` |"
+    yield "|---|---|---|---|"
+    shown = [(name, each) for name, several in RELEASED.items() for each in several]
+    for name, each in (*shown, (SYNTHETIC, RELEASED_TVMC)):
+        own = rated(rows, name)
+        cells = [_as_good(own, codec, each.d2_psnr) for codec in (each.codec, BEST)]
+        ssim = "" if each.ssim is None else f", SSIM {each.ssim:.3f}"
+        yield f"| {name} | {each.system}: {each.mbps:g} Mbps, {each.d2_psnr:g} dB{ssim} | {' | '.join(cells)} |"
+
+
+def _heads(columns: Sequence[str]) -> Iterator[str]:
+    yield f"| {' | '.join(['system', *columns])} |"
+    yield "|" + "---|" * (len(columns) + 1)
+
+
+def _line(system: Published | None, codec: str, cells: Sequence[str]) -> str:
+    name = f"meshreel `{codec.removeprefix('meshreel ')}`" if system is None else f"{system.system} (`{codec}`)"
+    return f"| {name} | {' | '.join(cells)} |"
+
+
+def _published(system: Published | None) -> str:
+    if system is None:
+        return ""
+    rate = "" if system.mbps is None else f"{system.mbps:.4g} Mbps, "
+    return f"{rate}{system.d2_psnr:.2f} dB, SSIM {system.ssim:.3f}, {system.decode_ms:.1f} ms"
+
+
+def _shown(row: Row | None) -> str:
+    if row is None:
+        return "not measured"
+    ssim, decode = value(row, "ssim"), value(row, "decode_ms")
+    parts = [f"{row.mbps:.3g} Mbps", f"{_d2(row):.2f} dB"]
+    parts += [] if ssim is None else [f"SSIM {ssim:.3f}"]
+    parts += [] if decode is None else [f"{decode:.1f} ms"]
+    return ", ".join(parts) + _setting(row)
+
+
+def _setting(row: Row) -> str:
+    """Return what TSMC is set to: several of its options choose a rate."""
+    name = curve_of(row)
+    if name == TSMC:
+        return f" (m {row.options['basis_size']})"
+    return f" (quality {row.options.get('quality', 50):g})" if name == TUNED else ""
+
+
+def _of(rows: Sequence[Row], codec: str) -> list[Row]:
+    """Return a codec's rows from the cheapest on; of TSMC those of both its curves."""
+    curves = (TSMC, TUNED) if codec == TSMC else (codec,)
+    return sorted((row for row in rows if curve_of(row) in curves), key=lambda row: row.mbps)
+
+
+def _near_best(rows: Sequence[Row], codec: str) -> str:
+    """Return the cheapest point of a codec that is as good in D2, but for `SLACK_DB`, as all of `best`; or its best."""
+    best = [_d2(row) for row in _of(rows, BEST)]
+    return _as_good(rows, codec, max(best) - SLACK_DB) if best else _shown(None)
+
+
+def _as_good(rows: Sequence[Row], codec: str, db: float) -> str:
+    """Return the cheapest point that is as good; the best one, marked, where none is."""
+    own = _of(rows, codec)
+    good = [row for row in own if _d2(row) >= db]
+    if good:
+        return _shown(good[0])
+    return _shown(max(own, key=_d2, default=None)) + SHORT * bool(own)
+
+
+def _d2(row: Row) -> float:
+    return value(row, "d2_psnr_paper") or 0.0

@@ -1,0 +1,133 @@
+"""Values and curves of rows. In -> out: a row and a name -> a number; rows of a sequence -> rate-distortion curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from meshreel.metrics.bd_rate import Curve, hull
+
+from ..experiments.study import FLOOR, Measure
+from ..names import USUAL
+from ..rows import Group, Row
+
+SECONDS = 10.0  # in which a background is sent once, for `mbps_background_10s`
+HALF = 30  # frames of each half of a long sequence
+
+
+def value(row: Row, key: str) -> float | None:
+    """Return what a row knows by a name: a metric, or one of `DERIVED`; None where it was not measured."""
+    if key.startswith("encode_s."):
+        return row.encoding.stages_s.get(key.removeprefix("encode_s.")) if row.encoding else None
+    return DERIVED[key](row) if key in DERIVED else row.metrics.get(key)
+
+
+def _mbps_background_10s(row: Row) -> float | None:
+    """Return the rate where a background counts as sent every ten seconds, whatever the sequence's length."""
+    if row.stream is None:
+        return None
+    moving = (row.stream.bytes - row.stream.background_bytes) * row.frame_rate / row.stream.coded_frames
+    return 8 * (moving + row.stream.background_bytes / SECONDS) / 1e6
+
+
+def _without_keys(row: Row) -> float | None:
+    """Return the mean of masked SSIM over the frames that are no key frames; over all where every frame is one.
+
+    A key frame that the file does not name is taken to be the best frame of its group.
+    """
+    found = row.per_frame.get("ssim_masked")
+    if row.stream is None or not row.stream.groups or not found or len(found) != row.frames:
+        return None
+    values = np.array([1.0 if each is None else each for each in found])
+    keys = [_key(group, values) for group in row.stream.groups]
+    others = np.setdiff1d(np.arange(len(values)), keys)
+    return float(np.mean(values[others] if len(others) else values))
+
+
+def _key(group: Group, values: np.ndarray) -> int:
+    if group.key is not None:
+        return group.key
+    return group.first_frame + int(np.argmax(values[group.first_frame : group.first_frame + group.frames]))
+
+
+def _second_half_over_first(row: Row) -> float | None:
+    """Return the bytes of frames 31 to 60 over those of 1 to 30; a group's are spread evenly over its frames."""
+    if row.frames < 2 * HALF or row.stream is None or not row.stream.groups:
+        return None
+    halves = [0.0, 0.0]
+    for group in row.stream.groups:
+        for frame in range(group.first_frame, group.first_frame + group.frames):
+            halves[min(frame // HALF, 1)] += group.bytes / group.frames
+    return halves[1] / halves[0]
+
+
+def _fall_at_ends(row: Row) -> float | None:
+    """Return by how much D2 of the first or the last frame is below that of the middle one, dB."""
+    found = [each for each in row.per_frame.get("d2_psnr_paper", ()) if each is not None]
+    return found[len(found) // 2] - min(found[0], found[-1]) if found else None
+
+
+DERIVED: dict[str, Callable[[Row], float | None]] = {
+    "mbps": lambda row: row.mbps if row.stream else None,
+    "mbps_background_10s": _mbps_background_10s,
+    "background_bytes": lambda row: row.stream.background_bytes if row.stream else None,
+    "encode_s": lambda row: row.encoding.s if row.encoding else None,
+    "encode_mb": lambda row: row.encoding.peak_rss_mb if row.encoding else None,
+    "decode_ms": lambda row: row.decoding.frame_ms if row.decoding else None,
+    "first_frame_ms": lambda row: row.decoding.first_frame_ms if row.decoding else None,
+    "decode_mb": lambda row: row.decoding.peak_rss_mb if row.decoding else None,
+    "ssim_masked_without_keys": _without_keys,
+    "second_half_over_first": _second_half_over_first,
+    "fall_at_ends_db": _fall_at_ends,
+}
+
+
+def curve_of(row: Row) -> str:
+    """Return the curve of a point: its codec, and where the basis is fixed, what else is not the preset's own."""
+    if row.options.get("basis_size") is None:
+        return row.name
+    quality = row.options.get("quality")
+    parts = [f"quality {quality:g}"] if isinstance(quality, (int, float)) else []
+    for key, usual in USUAL.items():
+        parts += [f"{key} {row.options[key]}"] if row.options.get(key) not in (None, usual) else []
+    return ", ".join([row.name, *parts])
+
+
+def rated(rows: Iterable[Row], sequence: str | None = None) -> list[Row]:
+    """Return the rows that have a rate and a quality, of one sequence where it is given."""
+    own = (row for row in rows if row.stream and row.metrics)
+    return [row for row in own if sequence in (None, row.point.sequence)]
+
+
+def sequences(rows: Iterable[Row]) -> list[str]:
+    """Return the names of sequences whose rows have a rate and a quality."""
+    return list(dict.fromkeys(row.point.sequence for row in rated(rows)))
+
+
+def curve(rows: Sequence[Row], name: str, measure: Measure) -> Curve:
+    """Return the points of a curve that have the measure; larger is better."""
+    found = [(row.mbps, value(row, measure.key)) for row in rows if curve_of(row) == name]
+    points = [(mbps, measure.sign * quality) for mbps, quality in found if quality is not None]
+    return Curve(name, [p[0] for p in points], [p[1] for p in points])
+
+
+def hull_of(rows: Sequence[Row], names: Sequence[str], measure: Measure) -> Curve:
+    """Return the hull of several curves: at every rate the best of them."""
+    there = set(map(curve_of, rows))
+    return hull(f"hull of {', '.join(names)}", [curve(rows, name, measure) for name in names if name in there])
+
+
+def floors(rows: Iterable[Row]) -> dict[str, float]:
+    """Return what the truth itself reaches, by metric, from the rows of one sequence; empty where it is not measured.
+
+    Against the input it is worth what the input is worth against the truth.
+    """
+    found = [row for row in rows if row.point.codec == FLOOR and not row.failed]
+    known: dict[str, Any] = dict(found[0].metrics) if found else {}
+    if found and found[0].point.metrics == "regions":
+        for name in ("ssim_masked", "people_ssim_masked"):
+            known[f"input_{name}"] = known.get(f"truth_{name}")
+        known["input_d2_psnr_forward"] = known.get("truth_d2_psnr_backward")
+    return {key: number for key, number in known.items() if number is not None}

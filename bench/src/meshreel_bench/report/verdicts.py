@@ -1,0 +1,219 @@
+"""Verdicts on promises. In: the promises of a study, its rows. Out: what was measured, and whether it is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import singledispatch
+from itertools import pairwise
+from math import inf
+
+from meshreel.metrics.bd_rate import BdRate, bd_bound, beats, gain_end
+
+from ..experiments.study import Always, Bound, Flat, Gains, LeastRate, Promise, Reaches, Rises, Study, Which
+from ..rows import Row
+from .values import curve, curve_of, floors, hull_of, rated, sequences, value
+
+# Misses that weigh the same where the row nearest to all bounds is looked for (guess); others count in the bound's own.
+STEPS = {"Mbps": 0.03, "dB": 0.5, "degrees": 0.25, "SSIM": 0.01}
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A promise and what was measured; `value` and `met` are None where no row decides."""
+
+    text: str
+    bound: str
+    value: str | None = None
+    met: bool | None = None
+
+    @property
+    def word(self) -> str:
+        """One word for a table."""
+        return {None: "not measured", True: "met", False: "MISSED"}[self.met]
+
+
+def verdicts(study: Study, rows: Sequence[Row]) -> list[Verdict]:
+    """Return a verdict on each promise of a study."""
+    return [found for promise in study.promises for found in _judged(promise, rows)]
+
+
+@singledispatch
+def _judged(promise: Promise, _rows: Sequence[Row]) -> list[Verdict]:
+    raise TypeError(f"no verdict on a {type(promise).__name__}")
+
+
+@_judged.register
+def _(promise: Reaches, rows: Sequence[Row]) -> list[Verdict]:
+    """The cheapest row that keeps all bounds, or the nearest one."""
+    floor = floors(row for row in rows if row.point.sequence == promise.which.sequence)
+    limits = [_resolved(bound, floor) for bound in promise.bounds]
+    own = [row for row in _chosen(rows, promise.which) if all(value(row, b.key) is not None for b in promise.bounds)]
+    told = ", ".join(map(_text, promise.bounds)) + (f" (aim {promise.aim})" if promise.aim else "")
+    if not own or None in limits:
+        return [Verdict(promise.text, told)]
+    bounds = [bound for bound in limits if bound is not None]
+    good = [row for row in own if not any(_miss(row, bound) for bound in bounds)]
+    if good:
+        row = min(good, key=lambda row: value(row, "mbps") or 0.0)
+    else:
+        row = min(own, key=lambda row: sum(_miss(row, bound) for bound in bounds))
+    found = [_number(value(row, b.key), b.unit) + (" (short)" if _miss(row, b) else "") for b in bounds]
+    return [Verdict(promise.text, told, ", ".join(found) + _where(row), bool(good))]
+
+
+@_judged.register
+def _(promise: Always, rows: Sequence[Row]) -> list[Verdict]:
+    """The worst row."""
+    own = [row for row in _chosen(rows, promise.which) if value(row, promise.bound.key) is not None]
+    bound = f"{_text(promise.bound)} at every point"
+    if not own:
+        return [Verdict(promise.text, bound)]
+    sign = 1 if promise.bound.least else -1
+    worst = min(own, key=lambda row: sign * (value(row, promise.bound.key) or 0.0))
+    missed = sum(_miss(row, promise.bound) > 0 for row in own)
+    place = "" if promise.which.sequence else f", {worst.point.sequence}"
+    found = f"{_number(value(worst, promise.bound.key), promise.bound.unit)}{_where(worst)}{place}"
+    return [Verdict(promise.text, bound, f"{found}; {missed} of {len(own)} points miss it", not missed)]
+
+
+@_judged.register
+def _(promise: Gains, rows: Sequence[Row]) -> list[Verdict]:
+    text = f"{promise.sequence}: rate at equal quality against the hull of {', '.join(promise.anchors)}"
+    text += ", below the noise floor" if promise.below_floor else ""
+    bound = f"<= {promise.most:g} % by each measure"
+    own = rated(rows, promise.sequence)
+    names = set(map(curve_of, own))
+    if promise.curve not in names or not names & set(promise.anchors):
+        return [Verdict(text, bound)]
+    rates = {measure: _gain(promise, rows, measure.key) for measure in promise.measures}
+    found = [f"{m.name} {_percent(rate)} ({m.shown(rate.low)} to {m.shown(rate.high)})" for m, rate in rates.items()]
+    met = all(rate.percent is not None and rate.percent <= promise.most for rate in rates.values())
+    return [Verdict(text, bound, "; ".join(found), met), *_ends(promise, own)]
+
+
+def _gain(promise: Gains, rows: Sequence[Row], key: str) -> BdRate:
+    """Return the BD-rate by one measure; over all qualities where none of both is below the floor."""
+    own = rated(rows, promise.sequence)
+    [measure] = [each for each in promise.measures if each.key == key]
+    anchor, test = hull_of(own, promise.anchors, measure), curve(own, promise.curve, measure)
+    known = floors(row for row in rows if row.point.sequence == promise.sequence)
+    highest = known.get(key, inf) if promise.below_floor else inf
+    rate = bd_bound(anchor, test, highest)
+    return rate if rate.percent is not None else bd_bound(anchor, test)
+
+
+def _ends(promise: Gains, own: Sequence[Row]) -> list[Verdict]:
+    """Return up to which quality there is a gain, where that is promised."""
+    if promise.ends_past is None:
+        return []
+    [measure] = [each for each in promise.measures if each.key == promise.ends_past.key]
+    end = gain_end(hull_of(own, promise.anchors, measure), curve(own, promise.curve, measure))
+    text, bound = f"{promise.sequence}: the gain in {measure.name} ends past", _text(promise.ends_past)
+    if end.quality is None:
+        return [Verdict(text, bound, end.where, False)]
+    return [Verdict(text, bound, f"{measure.shown(end.quality)} ({end.where})", end.quality >= promise.ends_past.limit)]
+
+
+@_judged.register
+def _(promise: LeastRate, rows: Sequence[Row]) -> list[Verdict]:
+    return [_least_rate(promise, rated(rows, sequence)) for sequence in sequences(rows)]
+
+
+def _least_rate(promise: LeastRate, own: Sequence[Row]) -> Verdict:
+    sequence = own[0].point.sequence
+    text = f"{sequence}: {promise.curve} needs less rate than every other codec wherever both reach a quality"
+    met, lost, beyond = list[bool | None](), list[str](), dict[str, list[str]]()
+    for name in dict.fromkeys(map(curve_of, own)):
+        for measure in promise.measures if name != promise.curve else ():
+            best, other = curve(own, promise.curve, measure), curve(own, name, measure)
+            several = min(len(best.rates), len(other.rates)) > 1  # a point is no range
+            met.append(beats(best, other, measure.least) if several else None)
+            lost += [f"not {name} ({measure.name})"] if met[-1] is False else []
+            if several and max(other.qualities) > max(best.qualities) + measure.least:
+                beyond.setdefault(measure.name, []).append(name)
+    decided = [left for left in met if left is not None]
+    bound = "in " + " and ".join(measure.name for measure in promise.measures)
+    if not decided:
+        return Verdict(text, bound)
+    found = f"in {sum(decided)} of {len(met)} comparisons, {len(met) - len(decided)} undecided"
+    past = [f"past its best point in {measure}: {', '.join(names)}" for measure, names in beyond.items()]
+    return Verdict(text, bound, "; ".join([found, *lost, *past]), all(decided))
+
+
+@_judged.register
+def _(promise: Rises, rows: Sequence[Row]) -> list[Verdict]:
+    falls, checked = list[str](), 0
+    for sequence in sequences(rows):
+        points = curve(rated(rows, sequence), promise.curve, promise.measure)
+        rising = sorted(zip(points.rates, points.qualities, strict=True))
+        checked += len(rising) > 1
+        shown = promise.measure.shown
+        falls += [f"{sequence}: {shown(a[1])} and {shown(b[1])}" for a, b in pairwise(rising) if b[1] <= a[1]]
+    text = f"{promise.curve}: quality rises with rate on every sequence"
+    value = "; ".join(falls) or f"on {checked} sequences"
+    return [Verdict(text, promise.measure.name, value, not falls) if checked else Verdict(text, promise.measure.name)]
+
+
+@_judged.register
+def _(promise: Flat, rows: Sequence[Row]) -> list[Verdict]:
+    text = f"{promise.which.sequence}: memory of an encode does not grow with the number of frames"
+    bound = f"within {100 * promise.within:g} %"
+    own = [row for row in _chosen(rows, promise.which) if row.point.frames and value(row, "encode_mb") is not None]
+    if len(own) < 2:
+        return [Verdict(text, bound)]
+    few, many = (pick(own, key=lambda row: row.frames) for pick in (min, max))
+    before, after = value(few, "encode_mb") or 0.0, value(many, "encode_mb") or 0.0
+    found = f"{before:.0f} MB at {few.frames} frames, {after:.0f} at {many.frames}: {100 * (after / before - 1):+.1f} %"
+    return [Verdict(text, bound, found, after / before - 1 <= promise.within)]
+
+
+def _chosen(rows: Sequence[Row], which: Which) -> list[Row]:
+    """Return the rows that a promise is about."""
+    return [
+        row
+        for row in rows
+        if which.sequence in ("", row.point.sequence)
+        and which.curve in (row.name, curve_of(row))
+        and which.metrics in (None, row.point.metrics)
+        and all(row.options.get(name) == option for name, option in which.options.items())
+    ]
+
+
+def _resolved(bound: Bound, floor: dict[str, float]) -> Bound | None:
+    """Return the bound as a number; None where it is beyond a noise floor that is not known."""
+    if not bound.over_floor:
+        return bound
+    known = floor.get(bound.key)
+    return None if known is None else Bound(bound.key, known + bound.limit, bound.unit, bound.least)
+
+
+def _miss(row: Row, bound: Bound) -> float:
+    """Return how far a row is from a bound; 0 where it keeps it."""
+    found = value(row, bound.key)
+    if found is None:
+        return inf
+    step = STEPS.get(bound.unit, abs(bound.limit) or 1.0)
+    return max(0.0, (bound.limit - found if bound.least else found - bound.limit) / step)
+
+
+def _text(bound: Bound) -> str:
+    sign = ">=" if bound.least else "<="
+    if not bound.over_floor:
+        return f"{sign} {_number(bound.limit, bound.unit)}"
+    return f"{sign} the input's" + (f" + {_number(bound.limit, bound.unit)}" if bound.limit else "")
+
+
+def _number(number: float | None, unit: str) -> str:
+    return "none" if number is None else f"{number:.4g} {unit}".rstrip()
+
+
+def _percent(rate: BdRate) -> str:
+    if rate.percent is None:
+        return f"not known: {rate.reason}"
+    return f"{'at most ' if rate.at_most else ''}{rate.percent:+.1f} %"
+
+
+def _where(row: Row) -> str:
+    quality = row.options.get("quality")
+    return f" at quality {quality:g}" if isinstance(quality, (int, float)) else ""

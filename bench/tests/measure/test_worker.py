@@ -1,0 +1,53 @@
+"""Fresh processes: values come as they are there; a timeout, a crash and an error cost an exception each."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+from meshreel_bench.measure.worker import WorkerError, in_fresh_process
+
+
+def numbers(count):
+    yield from range(count)
+
+
+def ending(how):
+    """Yield once, then end in some way."""
+    yield os.getpid()
+    if how == "crash":
+        os.abort()
+    if how == "exit":
+        os._exit(3)
+    if how == "raise":
+        raise ValueError("not\ntoday")
+    time.sleep(600)
+
+
+def threads():
+    print("codecs may print")
+    yield os.environ["OMP_NUM_THREADS"]
+
+
+def test_values_come_from_another_process_with_one_thread():
+    assert list(in_fresh_process(numbers, 3, limit_s=60)) == [0, 1, 2]
+    assert list(in_fresh_process(threads)) == ["1"]
+
+
+@pytest.mark.parametrize(
+    ("how", "reason"),
+    [
+        ("crash", "ended by signal SIGABRT"),
+        ("exit", "ended by exit code 3"),
+        ("raise", "^ValueError: not today$"),
+        ("hang", "longer than 5 s of wall time"),
+    ],
+)
+def test_a_process_that_ends_or_takes_too_long_says_why(how, reason):
+    values = in_fresh_process(ending, how, limit_s=60 if how != "hang" else 5)
+    pid = next(values)
+    with pytest.raises(WorkerError, match=reason):
+        next(values)
+    with pytest.raises(OSError, match="No such process"):
+        os.kill(pid, 0)

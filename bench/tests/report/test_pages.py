@@ -1,0 +1,75 @@
+"""Pages: one of results, an appendix for each experiment; those of docs are those of their rows."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from meshreel_bench.experiments.study import D2, MASKED
+from meshreel_bench.names import BEST
+from meshreel_bench.report import pages, write_report
+from meshreel_bench.report.looks import direction, looks_of
+from meshreel_bench.report.plots import curves_figure
+from meshreel_bench.rows import join_rows, read_rows
+
+from bench.tests.made_up import failed, floor, row
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
+ROWS = [row("ball", codec, rate, 55 + 5 * rate) for codec in (BEST, "zipmesh") for rate in (0.5, 1.0, 2.0)]
+
+
+@pytest.fixture
+def no_plots(monkeypatch):
+    monkeypatch.setattr(pages, "plot_curves", lambda *about: about[-1])
+
+
+def test_rows_of_anybodys_codec_are_in_the_appendix_of_figure_6(tmp_path):
+    files = write_report([*ROWS, failed("ball", "other", "no <luck>")], tmp_path)
+    names = {str(path.relative_to(tmp_path)) for path in files}
+    assert names == {"results.md", "results/appendix-figure6.md", "results/figure6.png", "results/figure6-ball.png"}
+    page = (tmp_path / "results" / "appendix-figure6.md").read_text()
+    assert "## ball" in page and "| zipmesh | quality 2.0 |" in page and r"| other | qp 9 | no \<luck> |" in page
+    first = (tmp_path / "results.md").read_text()
+    assert "(results/figure6-ball.png)" in first and "7 points, 1 of them failed" in first and "{" not in first
+    again = {path: path.read_bytes() for path in files}
+    assert {
+        path: path.read_bytes() for path in write_report([*ROWS, failed("ball", "other", "no <luck>")], tmp_path)
+    } == again
+
+
+def test_a_plot_has_a_panel_for_each_measure_and_a_line_for_each_curve_and_the_floor():
+    rows = [*ROWS, floor("ball", d2_psnr_paper=62.0)]
+    figure = curves_figure(rows, (D2, MASKED), looks_of([BEST, "zipmesh"]))
+    first, second = figure.axes
+    assert [line.get_label() for line in first.lines] == [BEST, "zipmesh", "the truth itself"]
+    assert len(second.lines) == 2 and first.get_title(loc="left") == "ball, 10 frames"
+
+
+def test_curves_that_are_not_known_have_looks_of_their_own():
+    looks = looks_of(["b", "a", BEST])
+    assert list(looks) == [BEST, "a", "b"] and looks["a"] != looks["b"]
+    assert (direction("ssim_masked"), direction("normal_error_deg"), direction("decode_ms")) == (1, -1, -1)
+
+
+@pytest.mark.usefixtures("no_plots")
+def test_the_pages_of_docs_are_those_of_their_rows(tmp_path):
+    rows = join_rows([read_rows(path) for path in sorted((DOCS / "results").glob("*.jsonl"))])
+    written = [path.relative_to(tmp_path) for path in write_report(rows, tmp_path)]
+    assert len(written) > 15
+    for path in written:
+        assert (DOCS / path).is_file(), "write them again: meshreel-bench report docs/results/*.jsonl -o docs"
+        if path.suffix != ".png":
+            assert (tmp_path / path).read_text() == (DOCS / path).read_text(), path
+    shown = {path.name for path in written if path.suffix == ".png"}
+    assert {path.name for path in (DOCS / "results").glob("*.png")} == shown
+
+
+@pytest.mark.usefixtures("no_plots")
+def test_the_headline_is_the_size_of_a_person_and_how_much_larger_others_are(tmp_path):
+    rows = join_rows([read_rows(DOCS / "results" / f"{name}.jsonl") for name in ("figure6", "layers")])
+    write_report(rows, tmp_path)
+    found = json.loads((tmp_path / "results" / "headline.json").read_text())
+    sizes = [1.5 * each["bytes"] / 1000 for each in found["person"]["from"]]  # two seconds are measured
+    assert found["person"]["kilobytes"] == round(sum(sizes) / len(sizes))
+    assert all(others["median"] > 1 for others in found["times_larger_at_equal_d2"].values())

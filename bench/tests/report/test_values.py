@@ -1,0 +1,70 @@
+"""Values of rows: metrics, rates, what follows from groups and frames."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+from meshreel_bench.experiments.study import D2, NORMALS
+from meshreel_bench.names import TSMC, TVMC, title
+from meshreel_bench.report.values import curve, curve_of, floors, hull_of, rated, value
+from meshreel_bench.rows import Group, Stream
+
+from bench.tests.made_up import failed, floor, row
+
+ROW = row("ball", "best", 1.0, 60.0)
+
+
+def with_stream(bytes, **changed):
+    return msgspec.structs.replace(ROW, stream=Stream(bytes, **changed))
+
+
+def test_values_are_metrics_rates_and_times():
+    assert value(ROW, "d2_psnr_paper") == 60.0 and value(ROW, "encode_s") == 7.0 and value(ROW, "decode_ms") == 2.0
+    assert value(ROW, "encode_s.code") == 7.0 and value(ROW, "encode_s.track") is None and value(ROW, "none") is None
+    assert value(failed("ball", "best", "slow"), "mbps") is None
+
+
+def test_a_background_counts_as_sent_every_ten_seconds():
+    made = with_stream(1000, coded_frames=10, background_bytes=400)
+    assert value(made, "mbps_background_10s") == pytest.approx(8 * (600 * 30 / 10 + 40) / 1e6)
+
+
+def test_ssim_without_keys_leaves_out_key_frames_and_takes_the_best_frame_for_one_that_is_not_named():
+    frames = {"ssim_masked": [0.5] * 4 + [0.9] + [0.5] * 5}
+    made = msgspec.structs.replace(ROW, per_frame=frames)
+    named = msgspec.structs.replace(made, stream=Stream(9, 10, 0, [Group(0, 10, "layers", 9, 0)]))
+    unnamed = msgspec.structs.replace(made, stream=Stream(9, 10, 0, [Group(0, 10, "layers", 9)]))
+    assert value(unnamed, "ssim_masked_without_keys") == pytest.approx(0.5)
+    assert value(named, "ssim_masked_without_keys") == pytest.approx(4.9 / 9)
+
+
+def test_bytes_of_a_group_are_spread_over_its_frames():
+    groups = [Group(0, 40, "layers", 400), Group(40, 20, "layers", 100)]
+    made = msgspec.structs.replace(ROW, frames=60, stream=Stream(500, 60, 0, groups))
+    assert value(made, "second_half_over_first") == pytest.approx((100 + 100) / 300)
+    assert value(ROW, "second_half_over_first") is None
+
+
+def test_the_fall_at_the_ends_is_that_of_the_worse_end():
+    made = msgspec.structs.replace(ROW, per_frame={"d2_psnr_paper": [58.0, 60.0, 59.0]})
+    assert value(made, "fall_at_ends_db") == 2.0
+
+
+def test_a_curve_has_the_points_of_its_name_and_larger_is_better():
+    rows = [row("ball", "best", 1.0, 60.0), row("ball", "best", 2.0, 65.0), row("ball", "draco", 3.0, 66.0)]
+    found = curve(rows, "best", NORMALS)
+    assert list(found.qualities) == pytest.approx([-6.0, -5.0]) and list(found.rates) == pytest.approx([1, 2], rel=1e-4)
+    assert len(hull_of(rows, ("best", "draco", "none"), D2).rates) >= 2
+
+
+def test_points_with_a_fixed_basis_are_a_curve_by_what_else_is_chosen():
+    options = {"basis_size": 3, "quality": 50.0, "centers": 2000}
+    assert curve_of(msgspec.structs.replace(ROW, name="meshreel paper m", options=options)) == TSMC
+    more = msgspec.structs.replace(ROW, name="meshreel paper m", options=options | {"centers": 1000})
+    assert curve_of(more) == f"{TSMC}, centers 1000" and title(f"{TSMC}, centers 1000").startswith("TSMC (")
+    assert title(TVMC) == "TVMC*" and title("zipmesh") == "zipmesh"
+
+
+def test_rows_without_a_rate_are_on_no_curve_and_the_floor_is_that_of_the_truth():
+    rows = [ROW, failed("ball", "best", "slow"), floor("ball", d2_psnr_paper=59.0, ssim=None)]
+    assert rated(rows, "ball") == [ROW] and floors(rows) == {"d2_psnr_paper": 59.0}

@@ -1,0 +1,95 @@
+"""Verdicts: what rows say of each kind of promise."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+from meshreel_bench.experiments.study import (
+    D2,
+    MASKED,
+    Always,
+    Bound,
+    Flat,
+    Gains,
+    LeastRate,
+    Reaches,
+    Rises,
+    Study,
+    Which,
+)
+from meshreel_bench.report.verdicts import verdicts
+from meshreel_bench.rows import Point
+
+from bench.tests.made_up import floor, row
+
+BEST = [row("ball", "best", rate, 60 + 5 * rate) for rate in (0.5, 1.0, 2.0)]
+DRACO = [row("ball", "draco", rate, 50 + 4 * rate) for rate in (2.0, 4.0, 8.0)]
+ROWS = [*BEST, *DRACO]
+
+
+def judged(promise, rows=ROWS):
+    return verdicts(Study("made up", (), (), promises=(promise,)), rows)
+
+
+def test_of_the_points_that_keep_all_bounds_the_cheapest_is_shown():
+    bounds = (Bound("mbps", 3.0, "Mbps", least=False), Bound("d2_psnr_paper", 64.0, "dB"))
+    [found] = judged(Reaches("cheap and good", Which("ball", "best"), bounds))
+    assert found.met and found.value == "1 Mbps, 65 dB at quality 1" and found.bound == "<= 3 Mbps, >= 64 dB"
+
+
+def test_where_no_point_keeps_all_bounds_the_nearest_is_shown():
+    [found] = judged(Reaches("too good", Which("ball", "best"), (Bound("d2_psnr_paper", 80.0, "dB"),)))
+    assert found.met is False and found.value == "70 dB (short) at quality 2" and found.word == "MISSED"
+
+
+def test_a_bound_may_be_relative_to_the_noise_floor():
+    promise = Reaches("beyond the input", Which("ball", "best"), (Bound("d2_psnr_paper", 1.0, "dB", over_floor=True),))
+    assert judged(promise)[0].met is None
+    assert judged(promise, [*ROWS, floor("ball", d2_psnr_paper=68.0)])[0].met is True
+    assert judged(promise, [*ROWS, floor("ball", d2_psnr_paper=69.5)])[0].met is False
+
+
+def test_every_point_has_to_keep_a_bound_and_the_worst_is_shown():
+    [found] = judged(Always("good", Which("", "best"), Bound("d2_psnr_paper", 63.0, "dB")))
+    assert found.met is False and found.value == "62.5 dB at quality 0.5, ball; 1 of 3 points miss it"
+    assert judged(Always("good", Which("", "best"), Bound("d2_psnr_paper", 62.0, "dB")))[0].met is True
+
+
+def test_a_gain_is_the_rate_against_the_hull_by_every_measure():
+    end = Bound("d2_psnr_paper", 69.0, "dB")
+    rate, past = judged(Gains("ball", "best", ("draco",), (D2, MASKED), -50.0, ends_past=end))
+    assert rate.met and "D2, paper form -" in rate.value and past.met
+    assert judged(Gains("ball", "best", ("draco",), (D2,), -99.9))[0].met is False
+    assert judged(Gains("cube", "best", ("draco",), (D2,), -50.0))[0].word == "not measured"
+
+
+def test_the_least_rate_is_needed_on_every_sequence():
+    promise = LeastRate("best", (D2, MASKED))
+    [found] = judged(promise)
+    assert found.met and found.value.startswith("in 2 of 2 comparisons") and "past its best point" in found.value
+    worse = [row("cube", "best", rate, 50 + rate) for rate in (1.0, 2.0)]
+    better = [row("cube", "draco", rate, 55 + rate) for rate in (0.5, 1.0)]
+    assert [each.met for each in judged(promise, [*ROWS, *worse, *better])] == [True, False]
+
+
+def test_quality_rises_with_rate_or_the_fall_is_shown():
+    assert judged(Rises("best", D2))[0].met
+    [found] = judged(Rises("best", D2), [*BEST, row("ball", "best", 3.0, 61.0)])
+    assert found.met is False and found.value == "ball: 70 dB and 61 dB"
+
+
+@pytest.mark.parametrize(("peak", "met"), [(105.0, True), (130.0, False)])
+def test_memory_is_flat_where_more_frames_need_no_more(peak, met):
+    few, many = (msgspec.structs.replace(BEST[0], point=Point("ball", "best", frames=n), frames=n) for n in (20, 60))
+    many = msgspec.structs.replace(many, encoding=msgspec.structs.replace(many.encoding, peak_rss_mb=peak))
+    assert judged(Flat(Which("ball", "best")), [few, many])[0].met is met
+
+
+def test_what_no_row_decides_is_not_measured():
+    promises = (
+        Reaches("a", Which("ball", "best"), (Bound("mbps", 1.0),)),
+        Always("b", Which("ball", "best"), Bound("mbps", 1.0)),
+        Rises("best", D2),
+        Flat(Which("ball", "best")),
+    )
+    assert [found.word for found in verdicts(Study("made up", (), (), promises=promises), [])] == ["not measured"] * 4

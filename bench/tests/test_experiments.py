@@ -1,0 +1,47 @@
+"""Experiments: what their declarations mean."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from meshreel_bench.codecs import make_codec
+from meshreel_bench.codecs.variants import VARIANTS
+from meshreel_bench.experiments import EXPERIMENTS, ablations, find_experiment
+from meshreel_bench.rows import read_rows
+
+from meshreel.errors import InputError
+
+RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results"
+INSTEAD = ("captured", "segmentation")  # in a codec's place
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_every_point_is_declared_once_and_its_codec_takes_its_options(name):
+    for small in (False, True):
+        points = list(EXPERIMENTS[name].points(small))
+        assert points and len({point.key for point in points}) == len(points)
+        for point in points:
+            if point.codec not in INSTEAD:
+                make_codec(point.codec, dict(point.options))
+
+
+def test_every_row_that_is_shown_is_of_a_point_that_an_experiment_declares():
+    for file in sorted(RESULTS.glob("*.jsonl")):
+        declared = {point.key for point in EXPERIMENTS[file.stem].points()}
+        assert [row.point.key for row in read_rows(file) if row.point.key not in declared] == []
+
+
+def test_tables_share_the_points_of_figure_6():
+    all_points = {point.key for point in find_experiment("figure6").points()}
+    for name in ("table1", "table2"):
+        assert {point.key for point in find_experiment(name).points()} < all_points
+
+
+def test_every_part_that_is_switched_off_is_a_variant():
+    assert set(ablations.PARTS) <= set(VARIANTS)
+
+
+def test_an_unknown_experiment_is_refused():
+    with pytest.raises(InputError, match="no experiment is called 'figure7'; known: ablation_basis"):
+        find_experiment("figure7")

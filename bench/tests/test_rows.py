@@ -1,0 +1,70 @@
+"""Rows: what a file of them means, and which of several rows of a point counts."""
+
+from __future__ import annotations
+
+import pytest
+from meshreel_bench.rows import Point, append_row, join_rows, read_rows
+
+from bench.tests.made_up import failed, floor, row
+from meshreel.errors import InputError
+
+
+def test_rows_come_back_from_a_file_as_they_were(tmp_path):
+    rows = [row("ball", "best", 1.0, 60.0), floor("ball", d2_psnr_paper=None), failed("ball", "draco", "no\nluck")]
+    for each in rows:
+        append_row(tmp_path / "new" / "rows.jsonl", each)
+    assert read_rows(tmp_path / "new" / "rows.jsonl") == rows
+
+
+def test_the_rate_is_that_of_all_bytes_over_the_time_that_they_play():
+    assert row("ball", "best", 1.5, 60.0).mbps == pytest.approx(1.5, rel=1e-5)
+
+
+def test_a_row_that_was_not_written_to_its_end_is_left_out_and_replaced(tmp_path):
+    file = tmp_path / "rows.jsonl"
+    append_row(file, row("ball", "best", 1.0, 60.0))
+    with file.open("ab") as end:
+        end.write(b'{"point": {"sequ')
+    assert len(read_rows(file)) == 1
+    append_row(file, row("ball", "best", 2.0, 65.0))
+    assert [round(each.mbps) for each in read_rows(file)] == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ('{"name": "a"}', "line 2: not a row: .*point"),
+        ('{"point": {"sequence": "a", "codec": "b"}, "name": "b", "frames": "ten"}', "Expected `int`, got `str`"),
+        ('{"point": {"sequence": "a", "codec": "b"}, "name": "b", "speed": 1}', "unknown field `speed`"),
+        ("no JSON", "line 2: not a row: .*; delete that line"),
+    ],
+)
+def test_a_line_that_is_no_row_is_refused(tmp_path, line, reason):
+    file = tmp_path / "rows.jsonl"
+    append_row(file, row("ball", "best", 1.0, 60.0))
+    file.write_bytes(file.read_bytes() + line.encode() + b"\n")
+    with pytest.raises(InputError, match=reason):
+        read_rows(file)
+
+
+def test_what_is_no_file_of_rows_is_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        read_rows(tmp_path / "none.jsonl")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written"):
+        append_row(tmp_path / "file" / "rows.jsonl", row("ball", "best", 1.0, 60.0))
+
+
+def test_of_a_point_the_last_row_of_a_file_counts_and_of_several_files_the_first_that_was_measured(tmp_path):
+    first, second = row("ball", "best", 1.0, 60.0), row("ball", "best", 1.0, 61.0)
+    bad = failed("ball", "best", "slow")
+    lost = type(bad)(point=first.point, name="best", failed="slow")
+    for each in (first, second, lost):
+        append_row(tmp_path / "rows.jsonl", each)
+    assert read_rows(tmp_path / "rows.jsonl") == [second]
+    assert join_rows([[lost], [first], [second]]) == [first]
+
+
+def test_points_that_differ_in_frames_or_metrics_are_different_points():
+    points = [Point("a", "b"), Point("a", "b", frames=3), Point("a", "b", metrics="regions"), Point("a", "b", {"q": 1})]
+    assert len({point.key for point in points}) == 4
