@@ -1,8 +1,9 @@
-"""Bjontegaard delta rate: how much more or less rate a codec needs than a named anchor for the same quality, in %.
+"""Bjontegaard delta rate: the change of rate, in %, of a codec against an anchor at equal quality.
 
 Rate-distortion points of both -> BdRate. log rate is interpolated over quality by PCHIP and averaged over the range
 of quality that both curves reach (Bjontegaard, VCEG-M33; PCHIP as in the JCT-VC common test conditions, JCTVC-L1100).
-Several anchors are one by their hull. Where a gain ends is told too: a mean hides a curve that crosses.
+Several anchors are combined by their hull. GainEnd says where a gain ends, because a mean hides curves that cross
+(decision 22).
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from jaxtyping import Float64
 
 from ..errors import InputError
 
-_GRID = 2001  # qualities at which two curves are compared
+_GRID = 2001  # qualities at which two curves are compared (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Rate-distortion points of one codec; larger quality is better (give an error as its negative)."""
+    """Rate-distortion points of one codec; larger quality is better, so an error is given negated."""
 
     name: str
     rates: Sequence[float]  # any unit, over 0
@@ -38,27 +39,28 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class BdRate:
-    """The answer, or why there is none."""
+    """BD-rate of a test curve against an anchor, or the reason why there is none."""
 
     anchor: str
     test: str
     percent: float | None  # mean change of rate against the anchor; negative is a saving
     low: float  # quality range that both curves reach
     high: float
-    points: tuple[int, int]  # used of anchor and test, after dropping points that another one beats
+    points: tuple[int, int]  # used points of anchor and test, without those that another point beats
     reason: str = ""  # why `percent` is None
-    at_most: bool = False  # `percent` is a bound: the cheapest point of the test is better than all of the anchor
+    at_most: bool = False  # `percent` is an upper bound: the test's cheapest point is better than the whole anchor
 
     def __str__(self) -> str:
         if self.percent is None:
             return f"{self.test} against {self.anchor}: no BD-rate ({self.reason})"
-        told = f"{self.percent:+.1f} % over {self.low:.4g} to {self.high:.4g}"
-        bound = f"{told}, at most: its cheapest point is better than all of the other's" if self.at_most else told
-        return f"{self.test} against {self.anchor}: {bound}"
+        text = f"{self.percent:+.1f} % over {self.low:.4g} to {self.high:.4g}"
+        if self.at_most:
+            text += ", at most: its cheapest point is better than all of the other's"
+        return f"{self.test} against {self.anchor}: {text}"
 
 
 def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
-    """The mean change of rate at equal quality, over the overlap only, up to `highest`; nothing is extrapolated.
+    """Return the mean change of rate at equal quality over the overlap up to `highest`; nothing is extrapolated.
 
     A point that costs no less than another and is no better is dropped: quality must grow with rate.
     """
@@ -78,9 +80,9 @@ def bd_rate(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
 
 
 def bd_bound(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
-    """As `bd_rate`; where the test's cheapest point is better than all of the anchor up to `highest`, a bound of it.
+    """Return `bd_rate`, or an upper bound where the test's cheapest point beats the whole anchor up to `highest`.
 
-    That point's rate is compared with those of all of the anchor: who made it worse still would need no more.
+    The bound compares that point's rate with all rates of the anchor: a worse quality would need no higher rate.
     """
     found = bd_rate(anchor, test, highest)
     a, b = _front(anchor), _front(test)
@@ -95,14 +97,14 @@ def bd_bound(anchor: Curve, test: Curve, highest: float = math.inf) -> BdRate:
 
 @dataclass(frozen=True, slots=True)
 class RateAt:
-    """The rate that a curve needs for a quality."""
+    """Rate that a curve needs for a quality."""
 
-    rate: float | None  # None: none of its points is as good
-    at_most: bool = False  # `rate` is that of its cheapest point, which is better still
+    rate: float | None  # None: no point of the curve reaches the quality
+    at_most: bool = False  # `rate` is that of the cheapest point, whose quality is higher
 
 
 def rate_at(curve: Curve, quality: float) -> RateAt:
-    """The rate for a quality, interpolated as for `bd_rate`; nothing is extrapolated."""
+    """Return the rate for a quality, interpolated as for `bd_rate`; nothing is extrapolated."""
     ends = reach(curve)
     if ends is None or quality > ends[1][0]:
         return RateAt(None)
@@ -112,24 +114,24 @@ def rate_at(curve: Curve, quality: float) -> RateAt:
 
 
 def reach(curve: Curve) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """(quality, rate) of the worst and of the best of the points that no other beats; None where there are none."""
+    """Return (quality, rate) of the worst and the best point that no other beats; None for an empty curve."""
     points = _best(curve)
     return (points[0], points[-1]) if points else None
 
 
 @dataclass(frozen=True, slots=True)
 class GainEnd:
-    """Up to which quality a codec needs less rate than its anchor, going down from the best that both reach."""
+    """Highest quality at which a codec needs less rate than its anchor, within the range that both reach."""
 
-    quality: float | None  # where the curves cross; None: there is no gain at all, or no overlap
-    reached: bool  # False: at the end of the overlap the gain goes on, and `quality` is that end
-    anchor_best: float  # best quality of the anchor; over it there is nothing to gain against
-    test_best: float
-    share: float = 0.0  # of the overlap, in quality, where there is a gain
+    quality: float | None  # where the curves cross; None: no gain, or no overlap
+    reached: bool  # False: the gain lasts to the end of the overlap, and `quality` is that end
+    anchor_best: float  # best quality of the anchor
+    test_best: float  # best quality of the codec
+    share: float = 0.0  # of the overlap, in quality, over which there is a gain
 
     @property
     def where(self) -> str:
-        """In words, without a number: what ends there."""
+        """Description of what ends the gain, without numbers."""
         if self.quality is None:
             return "no gain at any common quality"
         if self.reached:
@@ -140,10 +142,10 @@ class GainEnd:
 
 
 def hull(name: str, curves: Sequence[Curve]) -> Curve:
-    """All curves' points on their lower convex hull in (quality, rate): the strongest anchor they make.
+    """Return the lower convex hull of all curves' points in (quality, rate), the strongest anchor they form.
 
-    Not in (quality, ln rate): there curves of dB bend the other way, and a chord from the first point to the last would
-    be far under all that any of the codecs reaches.
+    The hull is not taken in (quality, ln rate): there curves over dB bend the other way, and a chord from the first to
+    the last point would lie far below what any of the codecs reaches.
     """
     rates = [rate for curve in curves for rate in curve.rates]
     points = _best(Curve(name, rates, [quality for curve in curves for quality in curve.qualities]))
@@ -156,7 +158,7 @@ def hull(name: str, curves: Sequence[Curve]) -> Curve:
 
 
 def gain_end(anchor: Curve, test: Curve) -> GainEnd:
-    """The highest quality, within the overlap, at which `test` still needs less rate than `anchor`."""
+    """Find the highest quality within the overlap at which `test` needs less rate than `anchor`."""
     a, b = _front(anchor), _front(test)
     best = [float(points[-1, 0]) if len(points) else math.nan for points in (a, b)]
     low, high = (max(a[0, 0], b[0, 0]), min(best)) if len(a) and len(b) else (0.0, 0.0)
@@ -170,10 +172,10 @@ def gain_end(anchor: Curve, test: Curve) -> GainEnd:
 
 
 def beats(test: Curve, anchor: Curve, least: float = 0.0) -> bool | None:
-    """Whether `test` needs less rate wherever both reach a quality; None where nothing decides.
+    """Return whether `test` needs less rate at every common quality; None where that cannot be decided.
 
-    Where their overlap is not above `least`, points decide: whose are better and cheaper than all that the other has in
-    its reach.
+    Where the overlap of the curves is not above `least`, their points decide: the winner has a better and cheaper point
+    for each point of the other up to its own best quality.
     """
     if have_range(test, anchor, least):
         return gain_end(anchor, test).share == 1.0
@@ -183,25 +185,25 @@ def beats(test: Curve, anchor: Curve, least: float = 0.0) -> bool | None:
 
 
 def have_range(test: Curve, anchor: Curve, least: float = 0.0) -> bool:
-    """Whether two curves have a BD-rate over a range of qualities above `least`."""
+    """Return whether two curves have a BD-rate over a range of qualities wider than `least`."""
     found = bd_rate(anchor, test)
     return found.percent is not None and found.high - found.low > least
 
 
 def _dominates(b: Float64[np.ndarray, "N 2"], a: Float64[np.ndarray, "M 2"]) -> bool:
-    """Whether each point of `a` up to the best of `b`, at least one, has one of `b` that is better and cheaper."""
+    """Return whether `b` has a better and cheaper point for each point of `a` up to the best of `b`, at least one."""
     reached = [point for point in a if len(b) and point[0] <= b[-1, 0]]
     return bool(reached) and all(((b[:, 0] >= quality) & (b[:, 1] < rate)).any() for quality, rate in reached)
 
 
 def _front(curve: Curve) -> Float64[np.ndarray, "N 2"]:
-    """(quality, ln rate) of the points that no other beats, both strictly growing."""
+    """Return (quality, ln rate) of the points that no other beats, both strictly ascending."""
     points = [(quality, math.log(rate)) for quality, rate in _best(curve)]
     return np.array(points, dtype=np.float64).reshape(-1, 2)
 
 
 def _best(curve: Curve) -> list[tuple[float, float]]:
-    """(quality, rate) of the points that no other beats, both strictly growing."""
+    """Return (quality, rate) of the points that no other beats, both strictly ascending."""
     kept: list[tuple[float, float]] = []
     for rate, quality in sorted(zip(curve.rates, curve.qualities, strict=True), key=lambda p: (p[0], -p[1])):
         if not kept or quality > kept[-1][0]:
@@ -222,7 +224,7 @@ def _log_rate(points: Float64[np.ndarray, "N 2"], at: Float64[np.ndarray, " Q"])
 
 
 def _cross(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Over 0 where the way from a over b to c turns upwards."""
+    """Return a number above 0 where the path from a over b to c turns upward."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 

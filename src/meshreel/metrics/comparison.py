@@ -1,10 +1,8 @@
-"""Every metric of a decoded sequence against its originals: a row a frame, aggregates, and the cameras used.
+"""All metrics of a decoded sequence against its originals: a row per frame, aggregates, and the cameras.
 
-Two iterables of meshes -> Comparison. Frames are read once and one at a time (once more before, for the bounding box,
-where the cameras are not given). Rate and times are not here: only who has the bytes and the clock knows them.
-
-How frames are put together: the mean of the frames' values (PSNR: mean of dB, an infinite one counted as
-`PSNR_CEILING`) and the worst frame. Frames without surface on both sides say nothing and are left out of means.
+Two iterables of meshes -> Comparison. Frames are read one at a time, and once before for the bounding box if no cameras
+are given. Rate and times are measured elsewhere. Aggregates are the mean over frames (PSNR: mean of dB, an infinite
+value counts as `PSNR_CEILING`) and the worst frame; frames without surface on both sides are left out.
 """
 
 from __future__ import annotations
@@ -42,12 +40,12 @@ _PSNRS = _LARGER_IS_BETTER[:4]
 
 @dataclass(frozen=True, slots=True)
 class ComparisonOptions:
-    """What is measured."""
+    """Options of a comparison."""
 
     cameras: Path | Sequence[PinholeCamera] | None = None  # Open3D pinhole JSON; None: four views around the originals
     views: ViewOptions | ParallelViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
-    ssim: bool = True  # rendering and SSIM cost some 2 s a frame at 1920 x 1080
-    keys: Sequence[int] = ()  # key frames: aggregates are also given without them
+    ssim: bool = True  # rendering and SSIM take about 2 s per frame at 1920 x 1080
+    keys: Sequence[int] = ()  # key frames, without which aggregates are also computed
 
     def __post_init__(self) -> None:
         if any(key < 0 for key in self.keys):
@@ -56,7 +54,7 @@ class ComparisonOptions:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """The metrics of a sequence; values in m, % of the diagonal, dB and degrees, as their names say."""
+    """Metrics of a sequence, in m, % of the diagonal, dB and degrees, as their names say."""
 
     frames: tuple[Row, ...]  # metrics of each frame; inf and nan are kept here
     empty: tuple[bool, ...]  # frames without surface on both sides
@@ -64,9 +62,9 @@ class Comparison:
     keys: tuple[int, ...]
 
     def to_row(self) -> Row:
-        """A JSON-ready record: means under the metrics' names, `_worst`, `_without_keys`, and every frame.
+        """Return a JSON-ready record: means under the metrics' names, `_worst`, `_without_keys`, and every frame.
 
-        A value that is not finite is None.
+        A value that is not finite becomes None.
         """
         used = [i for i, empty in enumerate(self.empty) if not empty]
         row: Row = aggregate([self.frames[i] for i in used])
@@ -90,9 +88,9 @@ def compare_sequences(
     options: ComparisonOptions | None = None,
     seen: Callable[[Mesh], Looked] = Visible,
 ) -> Comparison:
-    """Every metric of `decoded` against `originals`, frame by frame (two MeshSequences of equal length).
+    """Measure `decoded` against `originals`, frame by frame (two MeshSequences of equal length).
 
-    `seen` renders originals, for who has done so before.
+    `seen` prepares an original for rendering; pass a caching function to render the same originals only once.
     """
     options = options or ComparisonOptions()
     cameras: Cameras = _cameras(originals, options) if options.ssim else []
@@ -113,7 +111,7 @@ def compare_sequences(
 
 
 def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras, seen: Callable[[Mesh], Looked] = Visible) -> Row:
-    """The metrics of one frame by name; SSIM where there are cameras."""
+    """Return the metrics of one frame by name; SSIM only with cameras."""
     row = _distance_row(surface_errors(original, decoded))
     if cameras:
         ssim = ssim_normals(original, decoded, cameras, seen)
@@ -122,12 +120,12 @@ def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras, seen: Callable[[M
 
 
 def _is_nothing(row: Row) -> bool:
-    """Whether both meshes of a frame are without surface: vertices alone, or faces without area, are none."""
+    """Return whether both meshes of a frame lack surface; vertices alone and faces without area are no surface."""
     return bool(row["diagonal_m"] == row["rms_forward_m"] == 0)
 
 
 def aggregate(frames: Sequence[Row]) -> Row:
-    """Mean and worst value of every metric over frames; empty for no frames."""
+    """Return mean and worst value of every metric over frames; an empty row for no frames."""
     row: Row = {}
     for name in frames[0] if frames else ():
         values = np.array([frame[name] for frame in frames], dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Distances between two surfaces, the PSNRs and the normal errors, all from one round of closest-point queries.
+"""Distances, PSNRs and normal errors between two surfaces, from one round of closest-point queries.
 
 An original and a decoded mesh in the same unit -> SurfaceErrors. Conventions: two empty meshes are equal (distances 0,
 PSNR inf, angle 0); one empty mesh is the worst case (distances inf, PSNR 0 dB, angle 180 degrees). Distances under
@@ -17,8 +17,8 @@ from ..types import Mesh
 from .normals import WORST_ANGLE, angles
 from .surface_samples import RESOLUTION, Matches, Samples, match, sample_pair, used_surface
 
-_LEAST, _MOST = 1e-3, 1e6  # m, from the middle of two meshes: distances are asked for in m
-PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; a mean over frames counts an infinite PSNR as this
+_LEAST, _MOST = 1e-3, 1e6  # m, extents of meshes that are measured in metres; others are scaled (guess)
+PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; stands for an infinite PSNR in a mean over frames
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,13 +28,13 @@ class OneWayErrors:
     point_mse: float  # m^2, mean over the vertices of the squared distance (D1)
     plane_mse: float  # m^2, the same along the normal of the matched point (D2)
     rms: float  # m, over the area
-    hausdorff95: float  # m, 95 % of the area is at most this far away
+    hausdorff95: float  # m, distance that 95 % of the area does not exceed
     maximum: float  # m, over all samples
     angle: float  # degrees, mean over the area, between interpolated vertex normals
-    vertex_angle: float  # degrees, the same at the vertices only, where quantisation turns normals most
+    vertex_angle: float  # degrees, mean over the vertices, where quantisation rotates normals most
 
     def times(self, unit: float) -> OneWayErrors:
-        """The same of meshes that are so many times larger."""
+        """Return the errors of the same meshes scaled by `unit`."""
         squares = {"point_mse": self.point_mse * unit**2, "plane_mse": self.plane_mse * unit**2}
         lengths = {"rms": self.rms * unit, "hausdorff95": self.hausdorff95 * unit, "maximum": self.maximum * unit}
         return replace(self, **squares, **lengths)
@@ -45,19 +45,19 @@ class SurfaceErrors:
     """All distances and normal errors of one frame; PSNRs in dB, larger is better."""
 
     diagonal: float  # m, of the original frame's bounding box: the peak p of every PSNR
-    forward: OneWayErrors  # original to decoded: what was lost
-    backward: OneWayErrors  # decoded to original: what was invented
+    forward: OneWayErrors  # original to decoded: lost surface
+    backward: OneWayErrors  # decoded to original: invented surface
 
     @property
     def d2_psnr_paper(self) -> float:
-        """10 log10(p^2 / MSE) from the original vertices to the decoded surface, one way, as TSMC's authors have it."""
+        """10 log10(p^2 / MSE) from the original vertices to the decoded surface, as TSMC's authors compute it."""
         return psnr(self.forward.point_mse, self.diagonal)
 
     @property
     def d1_psnr(self) -> float:
         """10 log10(3 p^2 / MSE), point to point, the worse of both directions (MPEG PCC common test conditions).
 
-        From each vertex to the closest point of the surface, where MPEG has the nearest of the points it samples.
+        Measured from each vertex to the closest point of the surface, while MPEG takes the nearest of sampled points.
         """
         return psnr(max(self.forward.point_mse, self.backward.point_mse) / 3, self.diagonal)
 
@@ -68,9 +68,9 @@ class SurfaceErrors:
 
     @property
     def symmetric_rms(self) -> float:
-        """The larger of both directions' RMS over the area, m: what decisions inside the encoder use.
+        """The larger of both directions' RMS over the area, m; the encoder's decisions use it.
 
-        The larger, not the mean: neither lost nor invented surface can be traded for precision elsewhere.
+        It is not the mean, so that precision elsewhere cannot make up for lost or invented surface.
         """
         return max(self.forward.rms, self.backward.rms)
 
@@ -95,23 +95,23 @@ class SurfaceErrors:
         return (self.forward.vertex_angle + self.backward.vertex_angle) / 2
 
     def percent(self, distance: float) -> float:
-        """A distance in m as % of the diagonal."""
+        """Return a distance in m as % of the diagonal."""
         if distance == 0:
             return 0.0
         return 100 * distance / self.diagonal if self.diagonal > 0 else math.inf
 
 
 def surface_errors(original: Mesh, decoded: Mesh) -> SurfaceErrors:
-    """Everything that closest points tell about two meshes of one frame.
+    """Measure all distances and normal errors between two meshes of one frame.
 
-    Faces without area and vertices without faces are not surface and are ignored; so are they in the diagonal.
+    Faces without area and vertices without faces are no surface: they are ignored, also in the diagonal.
     """
     original, decoded = used_surface(original), used_surface(decoded)
     if original.is_empty or decoded.is_empty:
         both = _PERFECT if original.is_empty and decoded.is_empty else _WORST
         return SurfaceErrors(original.diagonal, both, both)
     a, b = sample_pair(original, decoded)
-    if (unit := _unit(a.mesh, b.mesh)) != 1:  # in another one, squares of the queries' float32 would be inf or 0
+    if (unit := _unit(a.mesh, b.mesh)) != 1:  # in metres, squares of the queries' float32 would be inf or 0
         smaller = surface_errors(_scaled(original, 1 / unit), _scaled(decoded, 1 / unit))
         return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))
     diagonal = original.diagonal
@@ -120,7 +120,7 @@ def surface_errors(original: Mesh, decoded: Mesh) -> SurfaceErrors:
 
 
 def _unit(a: Mesh, b: Mesh) -> float:
-    """A power of two near the size of both centered meshes; 1 where that is a size of things that are scanned."""
+    """Return a power of two near the extent of both centered meshes; 1 for the extents of usual scans, m."""
     extent = max(float(np.abs(mesh.vertices).max()) for mesh in (a, b))
     return 1.0 if _LEAST <= extent <= _MOST else 2.0 ** math.floor(math.log2(extent))
 
@@ -150,18 +150,18 @@ def _one_way(source: Samples, found: Matches) -> OneWayErrors:
 
 def _plane_squared(found: Matches, squared: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
     along = np.einsum("nd,nd->n", found.offsets, found.normals) ** 2
-    return np.where(found.normals.any(axis=1), along, squared)  # without a normal there is no plane that forgives
+    return np.where(found.normals.any(axis=1), along, squared)  # without a normal the whole distance counts
 
 
 def quantile(values: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"], share: float) -> float:
-    """The value that this share of the weights does not exceed; N > 0."""
+    """Return the value that this share of the weights does not exceed; N > 0."""
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
     return float(values[order[min(np.searchsorted(reached, share * reached[-1]), len(values) - 1)]])
 
 
 def psnr(mse: float, peak: float) -> float:
-    """10 log10(peak^2 / mse), dB; 0 for no peak or an infinite error."""
+    """Return 10 log10(peak^2 / mse), dB; 0 for a peak of 0 or an infinite error."""
     if mse <= (RESOLUTION * peak) ** 2:
         return math.inf
     if math.isinf(mse) or peak == 0:

@@ -1,8 +1,8 @@
-"""A picture to look at: original, decoded and error heat map of chosen frames, as a PNG.
+"""Comparison sheet: original, decoded mesh and error heat map of chosen frames in one PNG.
 
-Colors of the first two columns are normals (see `render`). The heat map shows, where a ray meets the original, how far
-that point is from the decoded surface; pixels that only the decoded mesh covers (surface that was invented) are
-magenta. Drawn by matplotlib's Agg, without a display.
+Two sequences -> PNG. The first two columns show normals as colors (see `render`). The heat map shows, where a ray meets
+the original, the distance of that point from the decoded surface; pixels that only the decoded mesh covers (invented
+surface) are magenta. Drawn by matplotlib's Agg, without a display.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _COLUMNS = ("original", "decoded", "error (magenta: only decoded)")
 _LEFT, _RIGHT, _TOP, _GAP = 64, 100, 32, 8  # pixels around and between the pictures
 _DPI = 100
 _INVENTED = (1.0, 0.0, 1.0)  # magenta
-_LEAST_LIMIT = 1e-3  # % or mm; under it the color bar would show rounding
+_LEAST_LIMIT = 1e-3  # % or mm; below it the color bar would show rounding (guess)
 
 
 @runtime_checkable
 class Frames(Protocol):
-    """What a sheet needs of a sequence: frames by number; any MeshSequence has that."""
+    """Frames by number, the part of a MeshSequence that a sheet uses."""
 
     def __len__(self) -> int: ...
 
@@ -43,14 +43,14 @@ class Frames(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SheetOptions:
-    """What the sheet shows."""
+    """Frames, views and scale of a sheet."""
 
-    frames: tuple[int, ...] = ()  # none given: first, middle and last
-    views: tuple[int, ...] = (0,)  # 0 front, 1 right, 2 back, 3 left; none of these where there are cameras
-    cameras: tuple[PinholeCamera, ...] = ()  # what to look from, of one size; none: around all that is shown
+    frames: tuple[int, ...] = ()  # empty: first, middle and last
+    views: tuple[int, ...] = (0,)  # 0 front, 1 right, 2 back, 3 left; unused if there are cameras
+    cameras: tuple[PinholeCamera, ...] = ()  # of one size; empty: `views` around all that is shown
     height: int = 480  # pixels of one picture
     unit: str = "percent"  # of the heat map: percent (of the diagonal) or mm
-    limit: float = 0.0  # where the color bar ends, in that unit; 0: the 99 % quantile of what is seen
+    limit: float = 0.0  # end of the color bar, in that unit; 0: the 99 % quantile of the visible errors
     up: str = "y"  # the axis that points up: y, z, -y or -z
 
     def __post_init__(self) -> None:
@@ -69,7 +69,7 @@ class SheetOptions:
 
 @dataclass(frozen=True, slots=True)
 class SheetRow:
-    """One line of the sheet."""
+    """One line of the sheet: a frame from one camera."""
 
     label: str
     original: View
@@ -78,7 +78,7 @@ class SheetRow:
 
 
 def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOptions | None = None) -> None:
-    """Writes the PNG: a line for each chosen frame and view."""
+    """Write the PNG, with a line for each chosen frame and view."""
     options = options or SheetOptions()
     rows = list(_rows(originals, decoded, options))
     figure = _draw(rows, options)
@@ -87,7 +87,7 @@ def write_sheet(originals: Frames, decoded: Frames, path: Path, options: SheetOp
 
 
 def error_at_pixels(view: View, decoded: Mesh) -> Float64[np.ndarray, " N"]:
-    """Distance of the points that a view of the original sees to the decoded surface, m; inf where there is none."""
+    """Return the distances from the visible points of the original to the decoded surface, m; inf if it is empty."""
     decoded = used_surface(decoded)
     if decoded.is_empty:
         return np.full(len(view.points), np.inf)

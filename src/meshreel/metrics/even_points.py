@@ -1,7 +1,7 @@
-"""Points spread evenly over chosen faces of a mesh: each stands for the same area, and no random numbers are needed.
+"""Points spread evenly over chosen faces of a mesh, each for the same area, without random numbers.
 
-The points walk along the faces in equal shares of area; inside a face they follow a sequence of low discrepancy (R2,
-M. Roberts 2018), folded into the triangle. The same mesh gives the same points.
+Mesh and chosen faces -> Scatter. Consecutive points are equal shares of area apart along the faces; inside a face they
+follow a low-discrepancy sequence (R2, M. Roberts 2018), folded into the triangle. The same mesh gives the same points.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _R2 = np.array([0.7548776662466927, 0.5698402909980532])  # 1 / g and 1 / g^2, w
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """N points on a mesh."""
+    """N points on a mesh, with their faces and barycentric weights."""
 
     points: Float64[np.ndarray, "N 3"]  # in the mesh's unit
     faces: Int64[np.ndarray, " N"]
@@ -31,7 +31,7 @@ class Scatter:
 
 
 def scatter(mesh: Mesh, chosen: Bool[np.ndarray, " F"], count: int) -> Scatter:
-    """`count` points on the chosen faces; none where these have no area."""
+    """Spread `count` points over the chosen faces; none if these have no area."""
     which = np.flatnonzero(chosen)
     ends = np.cumsum(face_normals(mesh)[1][which])
     area = float(ends[-1]) if len(ends) else 0.0
@@ -45,6 +45,6 @@ def scatter(mesh: Mesh, chosen: Bool[np.ndarray, " F"], count: int) -> Scatter:
 
 
 def _in_triangle(square: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, "N 3"]:
-    """Barycentric weights of points in the unit square, its far half folded onto the near one."""
+    """Return barycentric weights of points in the unit square, whose far half is folded onto the near one."""
     folded = np.where(square.sum(axis=1, keepdims=True) > 1, 1 - square, square)
     return np.column_stack([1 - folded.sum(axis=1), folded])

@@ -1,7 +1,7 @@
-"""How far surface normals turn: the error that distance PSNR does not see (57-63 dB can go with 11-17 degrees).
+"""Angles between surface normals, an error that distance PSNR does not show (57-63 dB can go with 11-17 degrees).
 
 Normals are area-weighted vertex normals, interpolated with barycentric weights; vertices at equal positions (UV seams)
-share one normal. Two meshes in -> a mean angle in degrees for each direction.
+share one normal. Mesh -> normals; pairs of normals -> angles in degrees.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ WORST_ANGLE = 180.0  # degrees; the error where one of the two meshes is empty
 
 
 def welded_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
-    """Unit vertex normals, one for each vertex of `mesh` in its order, equal where positions are exactly equal."""
+    """Return unit normals of the vertices of `mesh`, in order; vertices at exactly equal positions share one."""
     if len(mesh.vertices) == 0:
         return np.zeros((0, 3))
     representative = _first_at_position(mesh.vertices)
@@ -28,20 +28,20 @@ def welded_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
 def interpolate(
     normals: Float64[np.ndarray, "V 3"], corners: Int32[np.ndarray, "N 3"], weights: Float64[np.ndarray, "N 3"]
 ) -> Float64[np.ndarray, "N 3"]:
-    """Unit normals inside faces given by their three corners; zero where the corners' normals cancel."""
+    """Interpolate unit normals inside faces given by their corners; zero where the corners' normals cancel."""
     return unit(blend(normals, corners, weights))
 
 
 def unit(vectors: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-    """The vectors at length 1; zero stays zero."""
+    """Scale vectors to length 1; zero stays zero."""
     length = np.sqrt(np.einsum("nd,nd->n", vectors, vectors))
     return vectors / np.where(length > 0, length, 1.0)[:, None]
 
 
 def angles(a: Float64[np.ndarray, "N 3"], b: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
-    """Angle in degrees between unit vectors, 0 to 180; exact for small angles, where an arc cosine is not.
+    """Return angles in degrees between unit vectors, 0 to 180; exact for small angles, unlike an arc cosine.
 
-    180 where either is the zero vector: a surface without a direction is no match for one that has it.
+    The angle is 180 where either vector is zero: a surface without a normal matches none that has one.
     """
     apart = np.linalg.norm(a - b, axis=1)
     along = np.linalg.norm(a + b, axis=1)
@@ -50,7 +50,7 @@ def angles(a: Float64[np.ndarray, "N 3"], b: Float64[np.ndarray, "N 3"]) -> Floa
 
 
 def _first_at_position(vertices: Float64[np.ndarray, "V 3"]) -> Int64[np.ndarray, " V"] | None:
-    """For each vertex the index of one vertex that stands for its position; None where no two are at one."""
+    """Return, for each vertex, the index of one vertex at its position; None if all positions differ."""
     order = np.lexsort(vertices.T)
     ordered = vertices[order]
     new = np.ones(len(order), dtype=bool)

@@ -1,8 +1,8 @@
-"""Pictures of surface normals by ray casting: no GL, no window, no lighting.
+"""Pictures of surface normals by ray casting, without GL, window or lighting.
 
-A pixel that a mesh covers has the color (n + 1) / 2 of the interpolated vertex normal n in world axes, the same
-coloring as in the paper (section 4.1); all others are white, the default
-background of Open3D's viewer. Faces are seen from both sides, each with the mesh's own normal.
+A pixel that a mesh covers has the color (n + 1) / 2 of the interpolated vertex normal n in world axes, as in the paper
+(section 4.1); all others are white, the default background of Open3D's viewer. Faces are visible from both sides, with
+the same normal.
 """
 
 from __future__ import annotations
@@ -41,18 +41,18 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What one camera sees in one window."""
+    """Surface that one camera sees in one window."""
 
     window: Window
     covered: Bool[np.ndarray, "H W"]
     mesh: Mesh
     corners: Int32[np.ndarray, "N 3"]  # vertices of the faces that the covered pixels see, row by row
-    weights: Float64[np.ndarray, "N 3"]  # barycentric, of where their rays end
+    weights: Float64[np.ndarray, "N 3"]  # barycentric, of the points where their rays end
     normals: Float64[np.ndarray, "N 3"]
 
     @property
     def points(self) -> Float64[np.ndarray, "N 3"]:
-        """Where the rays of the covered pixels end: m, world."""
+        """End points of the covered pixels' rays in world coordinates, m."""
         return blend(self.mesh.vertices, self.corners, self.weights)
 
     @property
@@ -64,7 +64,7 @@ class View:
 
 
 def render_normals(mesh: Mesh, camera: Camera) -> Float32[np.ndarray, "H W 3"]:
-    """The whole normal-colored picture, RGB 0 to 1."""
+    """Render the whole normal-colored picture, RGB 0 to 1."""
     image = np.full((camera.height, camera.width, 3), BACKGROUND, dtype=np.float32)
     view = look(mesh, camera, window_of([mesh], camera))
     w = view.window
@@ -73,7 +73,7 @@ def render_normals(mesh: Mesh, camera: Camera) -> Float32[np.ndarray, "H W 3"]:
 
 
 def window_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Window:
-    """The pixels that can see any of the meshes, `border` pixels more on each side, inside the image."""
+    """Return the window of all pixels that can see a mesh, widened by `border` pixels and clipped to the image."""
     full = Window(0, camera.height, 0, camera.width)
     vertices = np.concatenate([m.vertices for m in meshes])
     if len(vertices) == 0:
@@ -88,7 +88,7 @@ def window_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Window:
 
 
 def look(mesh: Mesh, camera: Camera, window: Window) -> View:
-    """What the camera sees of the mesh in the window."""
+    """Return the camera's view of the mesh in the window."""
     return Visible(mesh).look(Pixels(camera, window))
 
 
@@ -103,13 +103,13 @@ class Picture(Protocol):
 
     @property
     def colors(self) -> Float32[np.ndarray, "H W 3"]:
-        """0 to 1."""
+        """Colors, 0 to 1."""
         ...
 
 
 @runtime_checkable
 class Looked(Protocol):
-    """A mesh that can be looked at."""
+    """A mesh that can be rendered repeatedly."""
 
     def look(self, pixels: Pixels) -> Picture:
         """What a camera sees of it in a window."""
@@ -117,21 +117,21 @@ class Looked(Protocol):
 
 
 class Pixels:
-    """A camera's window, and the rays through its pixels, for all that is looked at there."""
+    """Window of a camera, with the rays through its pixels, which all meshes rendered there share."""
 
     def __init__(self, camera: Camera, window: Window) -> None:
         self.camera, self.window = camera, window
 
     @cached_property
     def rays(self) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
-        """Origins and unit directions, camera frame, row by row."""
+        """Origins and unit directions of the rays in the camera frame, row by row."""
         window = self.window
         rows, columns = np.mgrid[window.top : window.bottom, window.left : window.right]
         return self.camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
 
 
 class Visible:
-    """A mesh that is looked at several times: its surface and its normals are found once."""
+    """A mesh prepared for several views: its surface and its normals are computed once."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = used_surface(mesh)
@@ -150,7 +150,7 @@ class Visible:
 
 
 def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: Camera) -> Float64[np.ndarray, "V 3"]:
-    """Camera coordinates; float64 here, so that far-away worlds are near the origin before they are float32."""
+    """Return camera coordinates in float64: positions far from the origin become small before they become float32."""
     rotation = camera.extrinsic[:3, :3]
     eye = -np.linalg.solve(rotation, camera.extrinsic[:3, 3])
     return (vertices - eye) @ rotation.T
@@ -162,7 +162,7 @@ def _cast(
     origins: Float64[np.ndarray, "N 3"],
     directions: Float64[np.ndarray, "N 3"],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which rays hit, and for those the face and the barycentric weights."""
+    """Return which rays hit and, for those, the face and the barycentric weights."""
     rays = Rays(Mesh(vertices, faces), origin=np.zeros(3))  # the eye is the origin already
     answer = rays.cast(origins, directions)
     hit = answer.faces >= 0

@@ -1,14 +1,15 @@
-"""A scene against the truth: accuracy and coverage of all, of what moves (people) and of what stands (background).
+"""Accuracy and coverage of a scene against the truth: of all surface, of moving people and of the still background.
 
-In: two meshes of one frame whose faces are told apart, and the cameras that saw it -> a row of numbers. The truth is
-known only of simulated rigs. The same row is made against the noisy input, which then stands in the truth's place.
+Two meshes of one frame with labelled faces, and the cameras that saw it -> a row of numbers. The truth is known only of
+simulated rigs. The noisy input may take the place of the truth.
 
 - Accuracy (backward: from points spread evenly over the decoded area to the reference): median distance and RMS, m;
   mean normal error, degrees (interpolated vertex normals, as everywhere); D2-PSNR, dB.
 - Coverage (forward: from the reference's area to the decoded one): RMS, m, the share within 20 mm, and D2-PSNR, dB. Of
-  a truth only what a camera can see counts: in its picture and range, not hidden, not edge-on (`SightOptions.grazing`).
-- The peak of both PSNRs is the diagonal of the whole reference scene, for its parts too. Forward is the paper's way,
-  and what is told of the noisy input; against a truth it says only how large the holes are: there, backward counts.
+  a truth only visible surface counts: in a camera's picture and range, not hidden, not edge-on
+  (`SightOptions.grazing`).
+- The peak of both PSNRs is the diagonal of the whole reference scene, for its parts too. Forward is the paper's way
+  and serves for the noisy input; against a truth it measures only the size of holes, so backward counts there.
 - SSIM of normal renders from these cameras, over pixels where either mesh shows the part (masked SSIM).
 """
 
@@ -42,11 +43,11 @@ PARTS = ("all", "people", "background")
 
 @dataclass(frozen=True, slots=True)
 class SightOptions:
-    """What counts as seen, and how finely surface is sampled."""
+    """Limits of visible surface, and density of the samples."""
 
-    people: int = 20_000  # points on what moves, of each mesh
-    background: int = 60_000  # points on what stands
-    near: float = 0.02  # m, at which surface counts as covered
+    people: int = 20_000  # points on the moving faces of each mesh
+    background: int = 60_000  # points on the still faces of each mesh
+    near: float = 0.02  # m, distance up to which surface counts as covered
     grazing: float = 65.0  # degrees between ray and normal past which depth is too coarse for surface to be expected
     slack: float = 0.005  # m that a point may lie behind what the ray meets first
 
@@ -60,7 +61,7 @@ class SightOptions:
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """A camera that stood before the scene."""
+    """A camera that saw the scene, with the range of its depths."""
 
     camera: PinholeCamera
     near: float = 0.0  # m along the optical axis: nothing nearer is measured
@@ -69,7 +70,7 @@ class Sight:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What a camera sees of a scene."""
+    """Picture of a scene from one camera, with its moving pixels."""
 
     colors: Float32[np.ndarray, "H W 3"]  # of normals, as `render` has them
     covered: Bool[np.ndarray, "H W"]
@@ -77,9 +78,9 @@ class Picture:
 
 
 class Scene:
-    """A mesh of one frame, prepared to be measured; what costs much is made when it is first needed.
+    """A mesh of one frame prepared for measurements; costly parts are computed on first use.
 
-    `dynamic` says which faces move. `complete` is for a truth: it has surface that no camera can see.
+    `dynamic` marks the moving faces. `complete` is set for a truth, which has surface that no camera can see.
     """
 
     def __init__(
@@ -97,13 +98,13 @@ class Scene:
         self.sights, self.options, self.complete = tuple(sights), options, complete
 
     def labelled(self, mesh: Mesh) -> Scene:
-        """Another mesh of the same frame: its faces move where the nearest of this scene's do. This one has faces."""
+        """Prepare another mesh of the same frame; each face takes the label of this scene's nearest face."""
         local = Mesh.of(mesh.vertices - self.origin, mesh.faces)
         return Scene(mesh, carried_labels(self.surface, self.dynamic, local), self.sights, self.options)
 
     @cached_property
     def surface(self) -> Surface:
-        """For closest points, about `origin`."""
+        """Surface for closest-point queries, about `origin`."""
         return Surface(self.mesh)
 
     @cached_property
@@ -113,7 +114,7 @@ class Scene:
 
     @cached_property
     def points(self) -> dict[str, Scatter]:
-        """Points on both parts, those of a complete scene only where a camera can see them, about `origin`."""
+        """Points on both parts, about `origin`; a complete scene has only points that a camera can see."""
         parts = (("people", self.dynamic, self.options.people), ("background", ~self.dynamic, self.options.background))
         found = {name: scatter(self.mesh, chosen, count) for name, chosen, count in parts}
         if self.complete:
@@ -122,17 +123,17 @@ class Scene:
 
     @cached_property
     def pictures(self) -> tuple[Picture, ...]:
-        """What each camera sees."""
+        """Picture from each camera."""
         return tuple(_picture(self, sight.camera) for sight in self.sights)
 
     @cached_property
     def rays(self) -> Rays:
-        """For ray casting, about `origin`."""
+        """Scene for ray casting, about `origin`."""
         return Rays(self.mesh, np.zeros(3)) if self.mesh.is_empty else Rays.of(self.surface)
 
 
 def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:
-    """Which points on a scene's own surface some camera can measure."""
+    """Return which points on a scene's surface at least one camera can measure."""
     seen = np.zeros(len(points), bool)
     normals = face_normals(scene.mesh)[0][points.faces]
     for sight in scene.sights:
@@ -152,10 +153,10 @@ def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:
 
 
 def scene_row(reference: Scene, decoded: Scene) -> Row:
-    """The metrics of one frame by name: `median_m` of all, `people_median_m`, `background_median_m`, and so on.
+    """Return the metrics of one frame by name: `median_m` of all, `people_median_m`, `background_median_m`, and so on.
 
-    Where neither mesh has anything of a part, its numbers are None. Where the decoded one lacks it, errors are
-    infinite and 180 degrees.
+    The numbers of a part that neither mesh has are None. If only the decoded mesh lacks it, errors are infinite and
+    180 degrees.
     """
     row: Row = {"diagonal_m": reference.mesh.diagonal}
     there, back = _Matched.of(decoded, reference), _Matched.of(reference, decoded)
@@ -166,7 +167,7 @@ def scene_row(reference: Scene, decoded: Scene) -> Row:
 
 
 def scene_means(rows: Sequence[Row]) -> Row:
-    """The mean of every number over frames, those that are None left out; None where all are.
+    """Return the mean of every number over frames, without those that are None; None where all are.
 
     An infinite PSNR counts as `PSNR_CEILING`.
     """
@@ -181,7 +182,7 @@ def scene_means(rows: Sequence[Row]) -> Row:
 
 @dataclass(frozen=True, slots=True)
 class _Matched:
-    """Points of one scene and what they meet on another."""
+    """Points of one scene matched with the closest points of another."""
 
     people: Bool[np.ndarray, " N"]
     weights: Float64[np.ndarray, " N"]  # m^2
@@ -205,7 +206,7 @@ class _Matched:
         return _Matched(people, weights, distances, angles(own, other))
 
     def part(self, name: str) -> _Matched:
-        """Of all, or of people or background alone."""
+        """Return the points of a part: all, people or background."""
         if name == "all":
             return self
         kept = self.people if name == "people" else ~self.people
@@ -213,7 +214,7 @@ class _Matched:
 
     @property
     def mean_square(self) -> float:
-        """m^2, over the area."""
+        """Mean squared distance over the area, m^2."""
         return float(np.average(self.distances**2, weights=self.weights))
 
 
@@ -270,7 +271,7 @@ def _ssim_row(reference: Sequence[Picture], decoded: Sequence[Picture]) -> Row:
 
 
 def _masks(a: Picture, b: Picture) -> Iterator[tuple[str, Bool[np.ndarray, "H W"]]]:
-    """Pixels of each part, but for the border that SSIM leaves out."""
+    """Yield the pixels of each part, without the border that SSIM leaves out."""
     inside = np.zeros(a.covered.shape, bool)
     inside[BORDER:-BORDER, BORDER:-BORDER] = True
     covered, people = (a.covered | b.covered) & inside, (a.dynamic | b.dynamic) & inside

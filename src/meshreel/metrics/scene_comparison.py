@@ -1,6 +1,7 @@
 """Accuracy of a decoded scene and of its noisy input, measured against the truth of a simulated rig.
 
-In: two sequences of meshes, the clean frames, their cameras -> rows of means and of frames.
+Two sequences of meshes, the clean frames and their cameras -> rows of means and of frames. `metrics.scene_accuracy`
+defines the numbers.
 """
 
 from __future__ import annotations
@@ -26,12 +27,12 @@ class TrueCamera(Protocol):
 
     @property
     def view(self) -> PinholeCamera:
-        """Its pinhole, where it really stood."""
+        """Pinhole camera at the true pose."""
         ...
 
     @property
     def depth_range(self) -> tuple[float, float]:
-        """The least and the greatest depth it measures, m."""
+        """Least and greatest depth that the camera measures, m."""
         ...
 
 
@@ -52,11 +53,11 @@ class TrueFrame(Protocol):
 
 @runtime_checkable
 class TrueFrames(Protocol):
-    """Clean frames by number, and the cameras that saw them."""
+    """Clean frames by number, with the cameras that saw them."""
 
     @property
     def cameras(self) -> Sequence[TrueCamera]:
-        """Where they really stood."""
+        """Cameras at their true poses."""
         ...
 
     def __len__(self) -> int: ...
@@ -65,12 +66,12 @@ class TrueFrames(Protocol):
 
 
 def sights(cameras: Sequence[TrueCamera]) -> tuple[Sight, ...]:
-    """A rig's cameras as metrics have them."""
+    """Return a rig's cameras as Sights."""
     return tuple(Sight(camera.view, *camera.depth_range) for camera in cameras)
 
 
 def true_scene(truth: TrueFrames, number: int, options: SightOptions = SightOptions()) -> Scene:
-    """A clean frame, prepared. Raises InputError where it is empty: nothing can be told apart by it."""
+    """Prepare a clean frame. Raises InputError if it is empty, since then it cannot label other meshes."""
     frame = truth[number]
     if frame.mesh.is_empty:
         raise InputError(f"frame {number} of the truth has no faces; simulate the rig again")
@@ -82,23 +83,24 @@ def compare_with_truth(
     decoded: Frames,
     truth: TrueFrames,
     numbers: Sequence[int],
-    tell: Callable[[int], None] = lambda _done: None,
+    progress: Callable[[int], None] = lambda _done: None,
 ) -> Row:
-    """Means over the frames `numbers`: of the decoded meshes against the truth, and of the originals (noise floor).
+    """Measure the decoded meshes and the originals (noise floor) against the truth, in the frames `numbers`.
 
-    JSON-ready; what is not finite, or is about a part that is not there, is None. `per_frame` has each of `frames`.
+    Returns a JSON-ready row of means, and of each frame under `per_frame`; numbers that are not finite, or of a missing
+    part, are None. `progress` gets the number of finished frames.
     """
     frames: list[Row] = []
     for done, number in enumerate(numbers, 1):
         clean = true_scene(truth, number)
         floor = scene_row(clean, clean.labelled(originals[number]))
         frames.append({"noise_floor": floor, "decoded": scene_row(clean, clean.labelled(decoded[number]))})
-        tell(done)
+        progress(done)
     means = {name: finite(scene_means([frame[name] for frame in frames])) for name in ("noise_floor", "decoded")}
-    told = [{name: finite(row) for name, row in frame.items()} for frame in frames]
-    return {"frames": list(numbers)} | means | {"per_frame": told}
+    rows = [{name: finite(row) for name, row in frame.items()} for frame in frames]
+    return {"frames": list(numbers)} | means | {"per_frame": rows}
 
 
 def finite(row: Row) -> Row:
-    """The row as JSON may have it."""
+    """Return the row with None for numbers that JSON cannot hold."""
     return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in row.items()}

@@ -1,15 +1,15 @@
-"""The seam between what moves and what it touches, as decoded: how far the parts gape, how far one lies on the other.
+"""Gap and overlap at the seam between decoded moving bodies and the decoded background.
 
-In: a frame's mesh, which of its faces move, and the decoded background and bodies of that frame -> a Seam; lengths in
-the unit of the meshes, m. The cell is the median length of the frame's edges, so nothing depends on scale or rotation.
+A frame's mesh, its moving faces, and the decoded background and bodies of that frame -> a Seam; lengths are in m. The
+cell is the median length of the frame's edges, so that nothing depends on scale or rotation.
 
-- The seam: the border of the faces that move, where it comes within a cell of a face that stands.
-- Gap, at a point of the seam: the width of the slit. From that point to the nearest one of the bodies, from there to
-  the nearest one of the background, and to and fro once more: the length of the last step. 0 where the parts meet or
-  cross; where they overlap it is how far one skin is from the other.
-- Overlap, at a point of the seam: how far from the seam the bodies lie on the background, on its two sides together.
-  They lie on it where its closest point is within a cell, not on its border, and faces the same way within 45 degrees.
-  No more than `reach` is found on a side.
+- Seam: the border of the moving faces, where it comes within a cell of a still face.
+- Gap, at a point of the seam: the width of the slit. From that point go to the closest point of the bodies, from there
+  to the closest point of the background, and repeat both steps: the gap is the length of the last one. It is 0 where
+  the parts meet or cross; where they overlap, it is the distance between the two surfaces.
+- Overlap, at a point of the seam: the width over which bodies lie on the background, summed over both sides of the
+  seam, at most `reach` on each. A body lies on the background where the closest point of the background is within a
+  cell, not on its border, and has a normal within 45 degrees of the body's.
 - Uncovered: the share of the frame's surface within `reach` of the seam that is farther than a cell from both parts.
 """
 
@@ -31,16 +31,16 @@ from .distance import quantile
 
 Row = dict[str, Any]
 MM = 1000.0
-_FINE = 8  # points a cell, along the seam and on the bodies
-_SAME_WAY = math.cos(math.radians(45))  # cosine between normals
+_FINE = 8  # points per cell, along the seam and on the bodies (guess)
+_SAME_WAY = math.cos(math.radians(45))  # least cosine between normals of surfaces that face the same way (guess)
 
 
 @dataclass(frozen=True, slots=True)
 class SeamOptions:
-    """What is near a seam."""
+    """Cell and reach of the measurements at a seam."""
 
     cell: float | None = None  # m; None: the median length of the frame's edges
-    reach: float = 4.0  # cells from the seam that are looked at
+    reach: float = 4.0  # cells from the seam within which surface is examined
 
     def __post_init__(self) -> None:
         if not (0 < self.reach < math.inf and (self.cell is None or 0 < self.cell < math.inf)):
@@ -49,7 +49,7 @@ class SeamOptions:
 
 @dataclass(frozen=True, slots=True)
 class Seam:
-    """The seam of one frame at N points, each of which stands for some of its length."""
+    """Seam of one frame, sampled at N points, each of which represents a part of its length."""
 
     points: Float64[np.ndarray, "N 3"]  # m
     lengths: Float64[np.ndarray, " N"]  # m
@@ -58,18 +58,18 @@ class Seam:
     uncovered: float  # share of the surface near the seam
 
     def gap(self, share: float = 0.5) -> float:
-        """The gap, m, that this share of the seam's length does not exceed."""
+        """Return the gap, m, that this share of the seam's length does not exceed."""
         return quantile(self.gaps, self.lengths, share)
 
     def overlap(self, share: float = 0.5) -> float:
-        """The overlap, m, that this share of the seam's length does not exceed."""
+        """Return the overlap, m, that this share of the seam's length does not exceed."""
         return quantile(self.overlaps, self.lengths, share)
 
 
 def measure_seam(
     frame: Mesh, moves: Bool[np.ndarray, " F"], background: Mesh, bodies: Mesh, options: SeamOptions = SeamOptions()
 ) -> Seam | None:
-    """The seam of one frame; None where nothing that moves is near anything that stands."""
+    """Measure the seam of one frame; None if no moving surface is near a still one."""
     from scipy.spatial import cKDTree
 
     if moves.shape != (len(frame.faces),):
@@ -96,7 +96,7 @@ def measure_seam(
 
 
 def seam_row(seam: Seam | None) -> Row:
-    """The numbers of a frame by name, mm; None where there is no seam."""
+    """Return the numbers of a frame by name, mm; all are None without a seam."""
     shares = {"median": 0.5, "95": 0.95}
     row: Row = {f"seam_gap_mm_{name}": seam and MM * seam.gap(share) for name, share in shares.items()}
     row |= {f"seam_overlap_mm_{name}": seam and MM * seam.overlap(share) for name, share in shares.items()}
@@ -105,7 +105,7 @@ def seam_row(seam: Seam | None) -> Row:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """The seam and the frame's surface around it."""
+    """Seam of a frame, and the frame's surface around it."""
 
     tree: Any  # of the points of the seam
     cell: float  # m
@@ -115,7 +115,7 @@ class _Place:
 
 
 def _border(part: Mesh, cell: float) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " N"]]:
-    """Points along the edges that one face has, and the length each stands for."""
+    """Return points along the border edges of a mesh, and the length that each represents."""
     a, b = part.vertices[border_edges(part)].transpose(1, 0, 2)
     lengths = np.linalg.norm(b - a, axis=1)
     counts = np.maximum(np.ceil(lengths * _FINE / cell), 1).astype(int)
@@ -125,7 +125,7 @@ def _border(part: Mesh, cell: float) -> tuple[Float64[np.ndarray, "N 3"], Float6
 
 
 def _within(mesh: Mesh, points: Float64[np.ndarray, "N 3"], reach: float) -> Bool[np.ndarray, " F"]:
-    """Faces that come within reach of one of some points, and some a little farther."""
+    """Return the faces within `reach` of one of the points, and some a little farther away."""
     from scipy.spatial import cKDTree
 
     corners = mesh.vertices[mesh.faces]
@@ -154,7 +154,7 @@ def _gaps(points: Float64[np.ndarray, "N 3"], background: Mesh, bodies: Mesh) ->
 
 
 def _overlaps(place: _Place, background: Mesh, bodies: Mesh) -> Float64[np.ndarray, " N"]:
-    """At each point of the seam the farthest that bodies lie on the background, one side and the other added."""
+    """Return the width of the overlap at each point of the seam, summed over both sides."""
     widths = np.zeros((2, len(place.tree.data)))
     bodies = part_of(bodies, _within(bodies, place.tree.data, place.reach))
     if not (bodies.is_empty or background.is_empty):
@@ -172,7 +172,7 @@ def _overlaps(place: _Place, background: Mesh, bodies: Mesh) -> Float64[np.ndarr
 
 
 def _largest_around(place: _Place, values: Float64[np.ndarray, "2 N"]) -> Float64[np.ndarray, "2 N"]:
-    """The largest value within a cell: not every point of a jagged seam is the nearest to something."""
+    """Return the largest value within a cell, since some points of a jagged seam are nearest to no sample."""
     a, b = place.tree.query_pairs(place.cell, output_type="ndarray").T
     largest = values.copy()
     for side, own in zip(largest, values, strict=True):

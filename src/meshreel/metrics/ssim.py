@@ -1,8 +1,8 @@
-"""SSIM of normal-colored renders, over the whole picture (the paper's form) and over covered pixels only.
+"""SSIM of normal-colored renderings, over the whole picture (the paper's form) and over covered pixels only.
 
-scikit-image's structural similarity: 7 x 7 uniform windows, three channels, data range 1, its 3-pixel border left out.
-The white background scores 1 and inflates the whole-picture form; the masked form is the mean over pixels that either
-mesh covers. Only the window around the meshes is rendered and filtered: outside, SSIM is 1 by definition.
+Two meshes and cameras -> NormalSsim, by scikit-image: 7 x 7 uniform windows, three channels, data range 1, its 3-pixel
+border left out. The white background scores 1 and inflates the whole-picture form; the masked form is the mean over
+pixels that either mesh covers. Only the window around the meshes is rendered: outside, SSIM is 1 by definition.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ class NormalSsim:
 def ssim_normals(
     original: Mesh, decoded: Mesh, cameras: Sequence[Camera], seen: Callable[[Mesh], Looked] = Visible
 ) -> NormalSsim:
-    """SSIM between the normal-colored renders of two meshes from every camera (paper, section 4: four views).
+    """Compute SSIM between the normal-colored renderings of two meshes (paper, section 4: four views).
 
-    `seen` renders the original, for who has done so before.
+    `seen` prepares the original for rendering; pass a caching function to render the same original only once.
     """
     pair = seen(original), Visible(decoded)
     windows = [window_of([original, decoded], camera, border=2 * _SIDE) for camera in cameras]
@@ -63,7 +63,7 @@ def _ssim_view(original: Looked, decoded: Looked, pixels: Pixels) -> tuple[float
 
 
 def ssim_map(a: Float64[np.ndarray, "H W 3"], b: Float64[np.ndarray, "H W 3"]) -> Float64[np.ndarray, "H W"]:
-    """SSIM of every pixel, the mean of the three channels."""
+    """Return the SSIM of every pixel, averaged over the three channels."""
     from skimage.metrics import structural_similarity
 
     _, full = structural_similarity(a, b, win_size=_SIDE, channel_axis=-1, data_range=1.0, full=True)

@@ -1,7 +1,7 @@
-"""Two meshes made comparable: the same origin, sample points on each surface, closest points on the other.
+"""Samples of two surfaces around the same origin, and the closest points of one surface to the samples of the other.
 
-Samples of a mesh are its vertices (first, in order) and then a quadrature of its area, so that one round of queries
-serves both the vertex-based metrics and the area-weighted ones.
+Two meshes -> Samples -> Matches. Samples of a mesh are its vertices, in order, followed by a quadrature of its area, so
+that one round of queries serves both the vertex-based metrics and the area-weighted ones.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from ..types import Mesh
 from .normals import interpolate, unit, welded_normals
 
 RESOLUTION = 2.0**-22  # of the diagonal; below it a distance is rounding of the float32 queries and counts as 0
-_ENOUGH_FACES = 12_000  # a coarser mesh is subdivided before it is sampled, so few vertices hide nothing
-_MOST_LEVELS = 6
+_ENOUGH_FACES = 12_000  # a coarser mesh is subdivided before it is sampled (guess)
+_MOST_LEVELS = 6  # of that subdivision (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Samples:
 
 @dataclass(frozen=True, slots=True)
 class Matches:
-    """What the samples of one mesh meet on the other."""
+    """Closest points of one mesh to the samples of the other."""
 
     distances: Float64[np.ndarray, " N"]  # m, to the closest point
     offsets: Float64[np.ndarray, "N 3"]  # m, from the sample to its closest point
@@ -42,13 +42,13 @@ class Matches:
 
 
 def sample_pair(original: Mesh, decoded: Mesh) -> tuple[Samples, Samples]:
-    """Samples of two meshes that are all surface (`used_surface`), moved so that the original's box is around 0."""
+    """Sample two meshes, both results of `used_surface`, moved so that the original's box is centered on 0."""
     center = box_center(original)
     return _sample(_moved(original, -center)), _sample(_moved(decoded, -center))
 
 
 def match(source: Samples, target: Samples, resolution: float) -> Matches:
-    """The closest points of the target's surface to the source's samples; distances under `resolution` (m) are 0."""
+    """Find the closest points of the target to the source's samples; distances below `resolution` (m) become 0."""
     hits = Surface(target.mesh).closest(source.points)
     offsets = hits.points - source.points
     distances = np.sqrt(np.einsum("nd,nd->n", offsets, offsets))
@@ -60,13 +60,13 @@ def match(source: Samples, target: Samples, resolution: float) -> Matches:
 
 
 def used_surface(mesh: Mesh) -> Mesh:
-    """The mesh without zero-area faces and without vertices that no face uses; possibly empty."""
+    """Remove zero-area faces and vertices that no face uses; the result may be empty."""
     areas = face_normals(mesh)[1]
     return drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[areas > 0]))
 
 
 def box_center(mesh: Mesh) -> Float64[np.ndarray, " 3"]:
-    """The middle of the bounding box, 0 for a mesh without vertices."""
+    """Return the middle of the bounding box, or 0 for a mesh without vertices."""
     if len(mesh.vertices) == 0:
         return np.zeros(3)
     return (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2

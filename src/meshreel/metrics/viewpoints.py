@@ -1,6 +1,6 @@
-"""The fixed views that renders and SSIM use, and their file (Open3D's pinhole camera JSON).
+"""Fixed views for renderings and SSIM, and their file (Open3D's pinhole camera JSON).
 
-Axes and pixels are those of `geometry.cameras`.
+A bounding box -> four cameras around it. Axes and pixels are those of `geometry.cameras`.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ..geometry.cameras import PinholeCamera, pack_cameras, pinhole_record, unpa
 from ..io.write import replacing
 from ..types import UP_AXES, Mesh, check_up
 
-_MARGIN = 1.05  # of the box, so that nothing touches the border
+_MARGIN = 1.05  # times the box, so that nothing touches the border (guess)
 
 
 @runtime_checkable
 class Camera(Protocol):
-    """What a renderer needs to know of a camera."""
+    """Interface between a renderer and a camera."""
 
     @property
     def width(self) -> int:
@@ -42,17 +42,17 @@ class Camera(Protocol):
         ...
 
     def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
-        """Origins and unit directions (N x 3 each, camera frame) through image positions (column, row)."""
+        """Return origins and unit directions (N x 3 each, camera frame) through image positions (column, row)."""
         ...
 
     def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
-        """Image positions of points in the camera frame; not finite where a point is not in front of the camera."""
+        """Return image positions of points in the camera frame; not finite for points that are not in front of it."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class OrthographicCamera:
-    """Parallel rays; what is behind the camera's plane is seen too."""
+    """Camera with parallel rays, which may start behind its plane."""
 
     width: int
     height: int
@@ -61,19 +61,19 @@ class OrthographicCamera:
     back: float = 0.0  # m, how far behind the camera's plane rays start
 
     def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
-        """Parallel rays along +z."""
+        """Return parallel rays along +z through image positions."""
         plane = (pixels - np.array([self.width, self.height]) / 2) * self.pixel
         origins = np.column_stack([plane, np.full(len(pixels), -self.back)])
         return origins, np.broadcast_to(np.array([0.0, 0.0, 1.0]), origins.shape)
 
     def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
-        """Parallel projection."""
+        """Project points of the camera frame to image positions in parallel."""
         return points[:, :2] / self.pixel + np.array([self.width, self.height]) / 2
 
 
 @dataclass(frozen=True, slots=True)
 class ViewOptions:
-    """How four views stand around a bounding box."""
+    """Size, field of view and orientation of four views around a bounding box."""
 
     width: int = 1920  # pixels
     height: int = 1080  # pixels
@@ -90,7 +90,7 @@ class ViewOptions:
 
 @dataclass(frozen=True, slots=True)
 class ParallelViewOptions:
-    """How four small parallel views stand around a bounding box, one a side: quick to draw."""
+    """Size and orientation of four small parallel views around a bounding box, which are quick to draw."""
 
     size: int = 512  # pixels, width and height
     up: str = "y"  # the axis that points up: y, z, -y or -z
@@ -108,7 +108,7 @@ class Box:
 
     @staticmethod
     def of(sequence: Iterable[Mesh]) -> Box:
-        """The box around all frames, read one at a time; a unit box around 0 where no frame has a vertex."""
+        """Return the box around all frames, read one at a time; a unit box around 0 if no frame has a vertex."""
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for mesh in sequence:
             if len(mesh.vertices):
@@ -119,7 +119,7 @@ class Box:
 
     @property
     def center(self) -> Float64[np.ndarray, " 3"]:
-        """The middle."""
+        """Middle of the box, m."""
         return (self.low + self.high) / 2
 
     @property
@@ -129,9 +129,9 @@ class Box:
 
 
 def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[PinholeCamera]:
-    """Perspective views of the box from its front, right, back and left (of the viewer), all at one distance.
+    """Return perspective views of the box from its front, right, back and left, all at the same distance.
 
-    The front is seen from +z where y is up and from -y where z is up; from -z and +y where -y and -z are. The distance
+    The viewer of the front is at +z if y is up and at -y if z is up; at -z and +y if -y and -z are up. The distance
     lets the box fit in every view.
     """
     across, height = _extent(box, options.up)
@@ -146,7 +146,7 @@ def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[Pinhole
 
 
 def parallel_views_around(box: Box, size: int = 512, up: str = "y") -> list[OrthographicCamera]:
-    """Orthographic views of the box from the same four sides, size x size pixels: small and quick."""
+    """Return orthographic views of the box from the sides of `views_around`, size x size pixels."""
     ViewOptions(size, size, up=up)
     across, height = _extent(box, up)
     pixel = _MARGIN * max(across, height) / size
@@ -157,7 +157,7 @@ def parallel_views_around(box: Box, size: int = 512, up: str = "y") -> list[Orth
 
 
 def read_cameras(path: Path) -> list[PinholeCamera]:
-    """The cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory JSON file."""
+    """Read the cameras of an Open3D PinholeCameraParameters or PinholeCameraTrajectory JSON file."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -166,13 +166,13 @@ def read_cameras(path: Path) -> list[PinholeCamera]:
 
 
 def write_cameras(path: Path, cameras: Sequence[PinholeCamera]) -> None:
-    """The cameras as an Open3D PinholeCameraTrajectory JSON file."""
+    """Write cameras as an Open3D PinholeCameraTrajectory JSON file."""
     with replacing(path) as file:
         file.write(pack_cameras(cameras))
 
 
 def camera_record(camera: PinholeCamera | OrthographicCamera) -> dict[str, Any]:
-    """The camera as Open3D's JSON has it: matrices column by column; a parallel one has its pixel's side instead."""
+    """Return the camera as Open3D's JSON record; a parallel camera has the side of a pixel instead of intrinsics."""
     if isinstance(camera, OrthographicCamera):
         return {
             "class_name": "OrthographicCamera",
@@ -184,14 +184,14 @@ def camera_record(camera: PinholeCamera | OrthographicCamera) -> dict[str, Any]:
 
 
 def _extent(box: Box, up: str) -> tuple[float, float]:
-    """The larger horizontal side and the height; never 0."""
+    """Return the larger horizontal side and the height of the box, both above 0."""
     vertical = int(np.abs(UP_AXES[up]).argmax())
     least = float(box.size.max()) * 1e-3 or 1.0
     return max(float(np.delete(box.size, vertical).max()), least), max(float(box.size[vertical]), least)
 
 
 def _axes(up: str) -> list[np.ndarray]:
-    """Per view the rows right, down, forward."""
+    """Return the rows right, down and forward of each view."""
     above = np.array(UP_AXES[up])
     front = np.array([0.0, -above[2], above[1]])
     side = np.cross(above, front)
