@@ -9,7 +9,7 @@ from typing import overload
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.match import Target
+from meshreel.analysis.fit.match import FrameSurface
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.group import continue_group
 from meshreel.encoder import layers as layered
@@ -90,12 +90,12 @@ def test_a_body_that_becomes_another_cuts_the_group_there():
 def test_a_frame_is_prepared_once_for_all_that_is_tried_with_it(monkeypatch: pytest.MonkeyPatch):
     prepared = list[Mesh]()
 
-    class Counted(Target):
+    class Counted(FrameSurface):
         def __init__(self, mesh: Mesh) -> None:
             prepared.append(mesh)
             super().__init__(mesh)
 
-    monkeypatch.setattr(layered, "Target", Counted)
+    monkeypatch.setattr(layered, "FrameSurface", Counted)
     other = Mesh.of(BALL.vertices * [1.6, 0.3, 0.8] + [0, 0.3, 0], BALL.faces)
     first = next(encode_interval([BALL, BALL, BALL, other, other], quick(group_size=5)))
     assert first.frame_count < 5 and len(prepared) == 5  # though it is cut, and tried anew

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from ..analysis.fit.match import Target
-from ..analysis.fit.surface_fit import Fit, Guides, fit_targets
+from ..analysis.fit.match import FrameSurface
+from ..analysis.fit.surface_fit import Fit, Guides, fit_surfaces
 from ..analysis.follow.correspond import KeyMotion, choose_key, from_last
 from ..analysis.follow.fused_template import fused_mesh
 from ..analysis.follow.template import base_mesh, shared_detail
@@ -78,7 +78,7 @@ def _next_group(
     ahead: Sequence[Mesh], before: Followed | None, options: EncoderOptions
 ) -> tuple[EncodedGroup, Followed | None]:
     """The group that begins with the first of these frames."""
-    targets = [Target(frame) for frame in ahead]
+    targets = [FrameSurface(frame) for frame in ahead]
     if before is not None and options.predict:
         continued = _continued(ahead, targets, before, options)
         if continued is not None:
@@ -87,7 +87,7 @@ def _next_group(
 
 
 def _continued(
-    ahead: Sequence[Mesh], targets: list[Target], before: Followed, options: EncoderOptions
+    ahead: Sequence[Mesh], targets: list[FrameSurface], before: Followed, options: EncoderOptions
 ) -> tuple[EncodedGroup, Followed | None] | None:
     """A group predicted from the one before, as long as its template fits; None where that is not long."""
     base = before.reference.base
@@ -100,7 +100,7 @@ def _continued(
         return None
     levels = before.reference.levels
     guides = Guides(before.positions, shared_detail(before.state.faces, len(before.state.base), levels))
-    fit = Fit.at(base.faces, fit_targets(base.faces, predictions, targets, options.fit, guides), targets)
+    fit = Fit.at(base.faces, fit_surfaces(base.faces, predictions, targets, options.fit, guides), targets)
     target = target_of(ahead, options.target, options.noise).distance
     count = leading(_residuals(fit, options) / target, before.residual / target, options.groups)
     if count < min(SHORTEST, len(ahead)):
@@ -108,7 +108,7 @@ def _continued(
     return _coded(ahead[:count], before.reference, fit.first(count), before, options)
 
 
-def _standing(before: Followed, targets: list[Target], options: EncoderOptions) -> Fit | None:
+def _standing(before: Followed, targets: list[FrameSurface], options: EncoderOptions) -> Fit | None:
     """The template where it was, if it leaves no more over there than it usually does: a fit would only slide."""
     faces = before.reference.base.faces
     for some in (targets[-1:], targets):  # most bodies have moved by the last frame
@@ -119,7 +119,7 @@ def _standing(before: Followed, targets: list[Target], options: EncoderOptions) 
 
 
 def _alone(
-    ahead: Sequence[Mesh], targets: list[Target], options: EncoderOptions
+    ahead: Sequence[Mesh], targets: list[FrameSurface], options: EncoderOptions
 ) -> tuple[EncodedGroup, Followed | None]:
     """A group with a key frame of its own, as long as its template fits; by Draco, the first frame that none fits."""
     count = len(ahead)
@@ -135,14 +135,16 @@ def _alone(
             return intra_only(frames, options), None
 
 
-def _key_motion(targets: list[Target], options: EncoderOptions) -> KeyMotion:
+def _key_motion(targets: list[FrameSurface], options: EncoderOptions) -> KeyMotion:
     """The way of a key frame's surface through the first of these frames: as many as some key is followed back from."""
     while (motion := choose_key(targets, options.embedded, options.keys)).count == 0:
         targets = targets[: len(targets) // 2]
     return motion
 
 
-def _keyed(frames: Sequence[Mesh], targets: list[Target], motion: KeyMotion, options: EncoderOptions) -> Keyed | None:
+def _keyed(
+    frames: Sequence[Mesh], targets: list[FrameSurface], motion: KeyMotion, options: EncoderOptions
+) -> Keyed | None:
     """The template of the motion's key and its fit to the frames; None where nothing is left of its base mesh.
 
     That fused from all frames where there is noise; else the key frame's own, or the fused one where only that fits.
@@ -156,7 +158,7 @@ def _keyed(frames: Sequence[Mesh], targets: list[Target], motion: KeyMotion, opt
     return own if fused is None else min(own, fused, key=lambda one: float(np.mean(one.fit.by_area**2)))
 
 
-def _laid(targets: list[Target], motion: KeyMotion, fuse: bool, options: EncoderOptions) -> Keyed | None:
+def _laid(targets: list[FrameSurface], motion: KeyMotion, fuse: bool, options: EncoderOptions) -> Keyed | None:
     """A base mesh of the key frame's surface, or of the fused one, laid onto the frames; None where nothing is left."""
     key = targets[motion.key].mesh
     surface = fused_mesh(motion.motion, targets, options.noise, options.fused) if fuse else key
@@ -170,10 +172,10 @@ def _laid(targets: list[Target], motion: KeyMotion, fuse: bool, options: Encoder
     detail = shared_detail(base.faces, len(base.vertices), reference.levels)
     template, rest = reference.base, None
     if fuse:
-        rest = fit_targets(faces, template.vertices[None], [Target(surface)], options.fit)[0]
+        rest = fit_surfaces(faces, template.vertices[None], [FrameSurface(surface)], options.fit)[0]
         template = Mesh(rest, faces)
     fit = replace(options.fit, key=motion.key)
-    positions = fit_targets(faces, motion.move(template), targets, fit, Guides(rest, detail))
+    positions = fit_surfaces(faces, motion.move(template), targets, fit, Guides(rest, detail))
     return Keyed(motion.key, reference, Fit.at(faces, positions, targets))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.match import Target
+from meshreel.analysis.fit.match import FrameSurface
 from meshreel.analysis.follow import correspond
 from meshreel.analysis.follow.correspond import choose_key, from_last
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
@@ -45,7 +45,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The keys that are tried."""
     keys, motion = list[int](), correspond._follow
 
-    def told(targets: list[Target], key: int, options: EmbeddedOptions) -> correspond.KeyMotion:
+    def told(targets: list[FrameSurface], key: int, options: EmbeddedOptions) -> correspond.KeyMotion:
         keys.append(key)
         return motion(targets, key, options)
 
@@ -54,7 +54,7 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 def test_of_an_even_motion_the_middle_frame_is_the_key_and_no_other_is_tried(tried: list[int]) -> None:
-    motion = choose_key([Target(mesh) for mesh in frames(5)], OPTIONS)
+    motion = choose_key([FrameSurface(mesh) for mesh in frames(5)], OPTIONS)
     assert (motion.key, motion.count, tried) == (2, 5, [2])
     template = Mesh.of(wanted(5)[2], BASE.faces)
     found = motion.move(template)
@@ -63,27 +63,27 @@ def test_of_an_even_motion_the_middle_frame_is_the_key_and_no_other_is_tried(tri
 
 
 def test_a_single_frame_keeps_the_template_as_it_is() -> None:
-    motion = choose_key([Target(BALL)], OPTIONS)
+    motion = choose_key([FrameSurface(BALL)], OPTIONS)
     assert (motion.key, motion.count) == (0, 1)
     np.testing.assert_allclose(motion.move(BASE), BASE.vertices[None], atol=1e-12)
 
 
 def test_frames_are_followed_up_to_one_that_is_lost() -> None:
     other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
-    motion = choose_key([Target(mesh) for mesh in [*frames(4), other]], OPTIONS)
+    motion = choose_key([FrameSurface(mesh) for mesh in [*frames(4), other]], OPTIONS)
     assert motion.key < motion.count == 4
     assert motion.move(BASE).shape == (4, len(BASE.vertices), 3)
 
 
 def test_from_a_key_that_is_alone_with_what_it_has_none_is_followed() -> None:
     other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
-    motion = choose_key([Target(mesh) for mesh in [other, *frames(2)]], OPTIONS, 1)
+    motion = choose_key([FrameSurface(mesh) for mesh in [other, *frames(2)]], OPTIONS, 1)
     assert (motion.key, motion.count) == (1, 0)
 
 
 def test_where_something_appears_that_the_middle_frame_has_not_another_is_the_key(tried: list[int]) -> None:
     first = frames(5)
-    targets = [Target(mesh) for mesh in (*first[:3], *map(with_speck, first[3:]))]
+    targets = [FrameSurface(mesh) for mesh in (*first[:3], *map(with_speck, first[3:]))]
     motion = choose_key(targets, OPTIONS)
     assert (motion.key, motion.count) == (3, 5) and tried[:2] == [2, 3]
     tried.clear()
@@ -92,18 +92,18 @@ def test_where_something_appears_that_the_middle_frame_has_not_another_is_the_ke
 
 def test_a_template_that_lies_on_the_frame_before_is_followed_onward() -> None:
     meshes = frames(4)
-    found = from_last(meshes[0], [Target(mesh) for mesh in meshes[1:]], OPTIONS)
+    found = from_last(meshes[0], [FrameSurface(mesh) for mesh in meshes[1:]], OPTIONS)
     assert np.linalg.norm(found - [mesh.vertices for mesh in meshes[1:]], axis=2).max() < 0.02
 
 
 def test_a_template_is_followed_onward_up_to_a_frame_that_is_lost() -> None:
     other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
     for count in (0, 2):
-        targets = [Target(mesh) for mesh in [*frames(count + 1)[1:], other, BALL]]
+        targets = [FrameSurface(mesh) for mesh in [*frames(count + 1)[1:], other, BALL]]
         assert from_last(BALL, targets, OPTIONS).shape == (count, len(BALL.vertices), 3)
 
 
 def test_the_same_frames_give_the_same_bits() -> None:
-    targets = [Target(mesh) for mesh in frames(2)]
+    targets = [FrameSurface(mesh) for mesh in frames(2)]
     first, second = (choose_key(targets, OPTIONS).move(BASE) for _ in range(2))
     np.testing.assert_array_equal(first, second)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.match import Target
+from meshreel.analysis.fit.match import FrameSurface
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage, Tracker, register
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError
@@ -162,7 +162,7 @@ def test_steps_in_both_directions_are_the_same_as_all_at_once() -> None:
     mesh = ellipsoid(3)
     frames = [Mesh(mesh.vertices @ turn(0.05 * k).T, mesh.faces) for k in range(5)]
     tracker = Tracker(frames[2], 2, SMALL)
-    residuals = [tracker.step(frame, Target(frames[frame])) for frame in (3, 4, 1, 0)]
+    residuals = [tracker.step(frame, FrameSurface(frames[frame])) for frame in (3, 4, 1, 0)]
     one, all_at_once = tracker.motion(range(5)), register(frames[2], frames, 2, SMALL)
     assert np.array_equal(one.positions, all_at_once.positions)
     assert np.array_equal(one.rotations, all_at_once.rotations)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.match import Target
+from meshreel.analysis.fit.match import FrameSurface
 from meshreel.analysis.fit.residual import residual_of
 from meshreel.analysis.follow.embedded import Motion
 from meshreel.analysis.follow.embedded_graph import area_samples, build_graph, farthest_first
@@ -52,13 +52,13 @@ def moving(key: Mesh, count: int, turn: float = 0.1) -> Motion:
     return Motion(key, graph, rotations, places, zero)
 
 
-def carried(frames: list[Mesh], motion: Motion) -> list[Target]:
+def carried(frames: list[Mesh], motion: Motion) -> list[FrameSurface]:
     """Frames given in the key's pose, moved as the motion says."""
     turns, lifts = motion.rotations[:, 0], 0.05 * np.arange(len(frames))
     meshes = (
         Mesh(f.vertices @ turn.T + (0, 0, lift), f.faces) for f, turn, lift in zip(frames, turns, lifts, strict=True)
     )
-    return [Target(mesh) for mesh in meshes]
+    return [FrameSurface(mesh) for mesh in meshes]
 
 
 def holey(count: int) -> list[Mesh]:
@@ -129,17 +129,17 @@ def test_frames_without_surface_in_common_give_the_empty_mesh() -> None:
 
 def test_a_hole_in_a_frame_is_no_residual_in_common_but_what_the_template_lacks_is() -> None:
     whole, holed = sheet(), with_hole(sheet(), 0.0, 0.0)
-    over = residual_of(whole, Target(holed))
+    over = residual_of(whole, FrameSurface(holed))
     assert over.by_area > 0.001
     assert over.common < 1e-6
-    lacking = residual_of(holed, Target(whole))
+    lacking = residual_of(holed, FrameSurface(whole))
     assert 0.001 < lacking.common <= lacking.by_area
 
 
 def test_what_has_flown_is_no_residual_in_common() -> None:
     whole = sheet()
     flown = Mesh(whole.vertices[whole.faces[0]] + (0, 0, 0.3), np.array([[0, 1, 2]], np.int32))
-    residual = residual_of(whole, Target(concatenate([whole, flown])))
+    residual = residual_of(whole, FrameSurface(concatenate([whole, flown])))
     assert residual.by_area > 0.003
     assert residual.common < 1e-6
 

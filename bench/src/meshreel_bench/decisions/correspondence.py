@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.analysis.fit.match import Target
+from meshreel.analysis.fit.match import FrameSurface
 from meshreel.analysis.fit.residual import Residual, residual_of
 from meshreel.analysis.fit.surface_fit import FitOptions, fit_frames
 from meshreel.analysis.follow.embedded import register
@@ -88,7 +88,7 @@ def embedded(frames: Sequence[Mesh], key: int, template: Mesh) -> Positions:
 def distances(stage: str, frames: Sequence[Mesh], positions: Positions, template: Mesh) -> Row:
     """Return residuals of the template at these positions; after the fit also PSNRs."""
     shown = [Mesh(places, template.faces) for places in positions]
-    found: list[Residual] = [residual_of(a, Target(b)) for a, b in zip(shown, frames, strict=True)]
+    found: list[Residual] = [residual_of(a, FrameSurface(b)) for a, b in zip(shown, frames, strict=True)]
     row: Row = {
         f"{stage}_rms": float(np.mean([each.rms for each in found])),
         f"{stage}_worst_rms": max(each.rms for each in found),

@@ -16,7 +16,7 @@ from meshreel.analysis.fit.surface_fit import fit_frames
 from meshreel.analysis.reference.centers import affinity, largest_distances
 from meshreel.analysis.reference.deform import neighbours
 from meshreel.analysis.reference.extraction import MDS
-from meshreel.analysis.reference.fuse import Group
+from meshreel.analysis.reference.fuse import Group, GroupCenters
 from meshreel.coding.group import decode_group, encode_group
 from meshreel.coding.paper import quantize
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
@@ -97,8 +97,8 @@ def pose_rows(stages: Stages) -> Iterator[Row]:
     options = preset_options("paper")
     distances = largest_distances(stages.centers)
     kin = neighbours(affinity(distances, options.reference.centers), options.reference.deform)
-    how = (options.reference.deform, options.reference.fuse)
-    group = Group(stages.frames, stages.centers.positions, distances, kin, how)
+    tracked = GroupCenters(stages.centers.positions, distances, kin)
+    group = Group(stages.frames, tracked, options.reference.deform, options.reference.fuse)
     keys = sorted(trial.key for trial in stages.reference.trials if trial.frame != MDS)
     for frame, key in [(MDS, key) for key in keys] + [(key, key) for key in keys]:
         pose = stages.spread if frame == MDS else stages.centers.positions[frame]

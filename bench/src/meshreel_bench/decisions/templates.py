@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from meshreel.analysis.fit.match import Target
-from meshreel.analysis.fit.surface_fit import Guides, fit_targets
+from meshreel.analysis.fit.match import FrameSurface
+from meshreel.analysis.fit.surface_fit import Guides, fit_surfaces
 from meshreel.analysis.follow.correspond import choose_key
 from meshreel.analysis.follow.template import shared_detail
 from meshreel.coding.layers.coder import LayerCodingOptions, encode_layers
@@ -41,14 +41,14 @@ CHOICES: dict[str, dict[str, Any]] = {
 def measure(sources: Sources) -> Iterator[Row]:
     """Yield a row for each point."""
     best, frames = preset_options("best"), CASE.frames(sources.data)
-    targets = [Target(frame) for frame in frames]
+    targets = [FrameSurface(frame) for frame in frames]
     course = choose_key(targets, best.embedded)
     for vertices, levels in TEMPLATES:
         reference = code_on_lattice(decimate(frames[course.key], vertices), LATTICE * best.layers.step, levels)
         base, faces = reference.mesh, reference.base.faces
         shared = shared_detail(base.faces, len(base.vertices), levels)
         fit = replace(best.fit, key=course.key)
-        positions = fit_targets(faces, course.move(reference.base), targets, fit, Guides(None, shared))
+        positions = fit_surfaces(faces, course.move(reference.base), targets, fit, Guides(None, shared))
         name = f"{vertices} vertices, {levels} levels"
         tried: dict[str, dict[str, Any]] = {"": {}} | (CHOICES if (vertices, levels) == TRIED else {})
         for choice, changes in tried.items():

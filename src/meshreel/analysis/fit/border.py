@@ -1,8 +1,8 @@
-"""Rows that lay the open borders of a template onto those of a frame, where the two run side by side.
+"""Rows that pull the open borders of a template to those of a frame where the two run side by side.
 
-Point-to-plane rows say nothing across a border: without these a template that is a little too small (or too large) at a
-rim (soles cut off at the floor, sleeves, the edge of what a camera saw) stays so, and those few vertices carry most of
-the error: 3.5 dB on a captured dancer.
+In: border samples of both. Out: Rows. Point-to-plane rows leave the position across a border free: without these, a
+template that is too small or too large at a rim (soles cut off at the floor, sleeves, the edge of a camera's view)
+stays so, and those few vertices carry most of the error: 3.5 dB on a captured dancer.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ...geometry.topology import border_mask, face_normals, unique_edges
 from ...types import Mesh
 from .rows import Rows, no_rows
 
-SAMPLES = 8  # per border edge: the rows leave sliding along the border free, so a fine search is not needed
+SAMPLES = 8  # per border edge: a guess; sliding along the border is free, so a finer search gains nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,21 +33,21 @@ class Border:
 
 @dataclass(frozen=True, slots=True)
 class BorderSides:
-    """The half-edges of a mesh that no second face shares: the face, and the corner that each starts from."""
+    """Border half-edges of a mesh, which no second face shares: the face of each, and the corner where it starts."""
 
     faces: Int64[np.ndarray, " E"]
     sides: Int64[np.ndarray, " E"]
 
 
 def border_sides(faces: np.ndarray) -> BorderSides:
-    """The border half-edges of a connectivity."""
+    """Find the border half-edges of some faces."""
     edges, of_faces = unique_edges(faces)
     at, sides = np.nonzero(border_mask(edges, of_faces)[of_faces])
     return BorderSides(at, sides)
 
 
 def sample_border(mesh: Mesh, edges: BorderSides) -> Border:
-    """Evenly spaced points along each border edge, in order."""
+    """Place `SAMPLES` evenly spaced points on each border edge, in order."""
     share = np.tile((np.arange(SAMPLES) + 0.5) / SAMPLES, len(edges.faces))
     faces, sides = np.repeat(edges.faces, SAMPLES), np.repeat(edges.sides, SAMPLES)
     corners = np.zeros((len(faces), 3))
@@ -63,23 +63,26 @@ def sample_border(mesh: Mesh, edges: BorderSides) -> Border:
     return Border(points, faces, corners, normals.repeat(SAMPLES, axis=0), outward.repeat(SAMPLES, axis=0))
 
 
-def match_borders(template: Border, target: Border, gate: float, agreement: float) -> Rows:
-    """Rows on the template's border samples towards the target's border, both ways; none where either has no border."""
-    if len(template.points) == 0 or len(target.points) == 0:
+def match_borders(template: Border, frame: Border, gate: float, agreement: float) -> Rows:
+    """Match the border samples of a template and a frame, both ways; no rows if either has no border.
+
+    Pairs farther apart than `gate`, or whose normals or outward directions disagree, do not count.
+    """
+    if len(template.points) == 0 or len(frame.points) == 0:
         return no_rows()
-    ahead = cKDTree(target.points).query(template.points)[1]
-    back = cKDTree(template.points).query(target.points)[1]
+    ahead = cKDTree(frame.points).query(template.points)[1]
+    back = cKDTree(template.points).query(frame.points)[1]
     mine = np.concatenate([np.arange(len(ahead)), back])
     other = np.concatenate([ahead, np.arange(len(back))])
-    gaps = template.points[mine] - target.points[other]
-    agree = np.einsum("nd,nd->n", template.outward[mine], target.outward[other]) > agreement
-    agree &= np.einsum("nd,nd->n", template.normals[mine], target.normals[other]) > agreement
+    gaps = template.points[mine] - frame.points[other]
+    agree = np.einsum("nd,nd->n", template.outward[mine], frame.outward[other]) > agreement
+    agree &= np.einsum("nd,nd->n", template.normals[mine], frame.normals[other]) > agreement
     distance = np.linalg.norm(gaps, axis=1) / gate
     keep = agree & (distance < 1)
-    weights = np.exp(-2 * distance[keep] ** 2) / SAMPLES  # about one row a template edge and direction
+    weights = np.exp(-2 * distance[keep] ** 2) / SAMPLES  # about one row per template edge and direction
     weights *= np.where(np.arange(len(mine)) < len(ahead), 1.0, len(ahead) / len(back))[keep]
     mine, other = np.tile(mine[keep], 2), np.tile(other[keep], 2)
     half = len(mine) // 2
-    directions = np.concatenate([target.outward[other[:half]], target.normals[other[:half]]])
-    values = np.einsum("nd,nd->n", directions, target.points[other])
+    directions = np.concatenate([frame.outward[other[:half]], frame.normals[other[:half]]])
+    values = np.einsum("nd,nd->n", directions, frame.points[other])
     return Rows(template.faces[mine], template.corners[mine], directions, values, np.tile(weights, 2))

@@ -1,6 +1,6 @@
-"""Preconditioned conjugate gradients for the normal equations of a fit, which are applied and not assembled.
+"""Preconditioned conjugate gradients for normal equations that are applied rather than assembled.
 
-In: two products with a symmetric positive definite matrix (its own, and about its inverse), a right-hand side. Out: x.
+In: products with a symmetric positive definite matrix and with an approximate inverse, a right-hand side. Out: x.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ Product = Callable[[Array], Array]
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """When the iterations end: at whichever comes first."""
+    """Limits of the iteration, which ends at whichever is reached first."""
 
     iterations: int
     tolerance: float  # residual relative to the first, in the norm of the preconditioner
 
 
 def conjugate_gradients(multiply: Product, precondition: Product, right: Array, limits: Limits) -> Array:
-    """x of multiply(x) = right, begun at 0; the last x where a residual stops being a number."""
+    """Solve multiply(x) = right from x = 0; return the last x if the residual becomes NaN."""
     x, r = np.zeros_like(right), right.copy()
     z = precondition(r)
     p, rz = z.copy(), float(np.vdot(r, z))

@@ -1,6 +1,6 @@
-"""How well a fitted template lies on a frame: symmetric distance, its 95 % quantile, normal error (docs: metrics).
+"""Measure how well a fitted template lies on a frame: symmetric distance, 95 % quantile, normal error (docs: metrics).
 
-The encoder's own measure (it decides keys and cuts); both directions, since one way does not see left-over surface.
+The encoder decides keys and cuts by it. Both directions count, since either alone misses surface that the other lacks.
 """
 
 from __future__ import annotations
@@ -13,44 +13,44 @@ from jaxtyping import Float64
 from ...geometry.closest_points import Surface
 from ...geometry.topology import vertex_areas, vertex_normals
 from ...types import Mesh
-from .match import ON_BORDER, Target, interpolated, interpolated_scalar
+from .match import ON_BORDER, FrameSurface, interpolated, interpolated_scalar
 
-BITS = 0.01  # of a noisy frame's area, that may have flown
+BITS = 0.01  # share of a noisy frame's area that may be stray surface: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """Distances in units of the sequence's diagonal; infinite where there is nothing to compare."""
+    """Residual of one fitted frame, in units of the sequence's diagonal; infinite for an empty frame."""
 
     to_fit: float  # RMS over the frame's vertices to the fitted surface
     to_frame: float  # RMS over the template's vertices to the frame's surface
-    quantile: float  # 95 % of all these distances are less; the worse direction
+    quantile: float  # 95 % quantile of these distances, the larger of both directions
     normals: float  # degrees, mean angle to the normal at the closest point; mean of both directions
-    by_area: float  # RMS over the area, the worse direction: few vertices may span much of a surface that is left over
-    common: float  # the same, where both have surface: without holes of the frame, and the farthest of it (`BITS`)
+    by_area: float  # RMS over the area, the larger of both directions: few vertices may span much surface
+    common: float  # RMS over the area where both have surface: without the frame's holes and its farthest `BITS`
 
     @property
     def rms(self) -> float:
-        """Symmetric RMS distance: the worse of the two directions."""
+        """Symmetric RMS distance: the larger of the two directions."""
         return max(self.to_fit, self.to_frame)
 
 
 NOTHING = Residual(np.inf, np.inf, np.inf, np.inf, np.inf, np.inf)
 
 
-def residual_of(fitted: Mesh, target: Target) -> Residual:
-    """The residual of one fitted frame."""
+def residual_of(fitted: Mesh, frame: FrameSurface) -> Residual:
+    """Measure the residual of one fitted frame."""
     surface, normals = Surface(fitted), vertex_normals(fitted)
-    ahead, back = surface.closest(target.mesh.vertices), target.surface.closest(fitted.vertices)
-    to_fit = np.linalg.norm(ahead.points - target.mesh.vertices, axis=1)
+    ahead, back = surface.closest(frame.mesh.vertices), frame.surface.closest(fitted.vertices)
+    to_fit = np.linalg.norm(ahead.points - frame.mesh.vertices, axis=1)
     to_frame = np.linalg.norm(back.points - fitted.vertices, axis=1)
     angles = (
-        _mean_angle(target.normals, interpolated(normals, fitted.faces, ahead))
-        + _mean_angle(normals, target.normals_at(back))
+        _mean_angle(frame.normals, interpolated(normals, fitted.faces, ahead))
+        + _mean_angle(normals, frame.normals_at(back))
     ) / 2
     quantile = max(float(np.quantile(to_fit, 0.95)), float(np.quantile(to_frame, 0.95)))
-    own, areas = vertex_areas(target.mesh), vertex_areas(fitted)
-    beside = interpolated_scalar(target.inside, target.mesh.faces, back) > ON_BORDER
+    own, areas = vertex_areas(frame.mesh), vertex_areas(fitted)
+    beside = interpolated_scalar(frame.inside, frame.mesh.faces, back) > ON_BORDER
     by_area = max(_rms(to_fit, own), _rms(to_frame, areas))
     common = max(_rms(to_fit, _without_farthest(to_fit, own)), _rms(to_frame * beside, areas))
     return Residual(_rms(to_fit), _rms(to_frame), quantile, angles, by_area, common)
@@ -59,7 +59,7 @@ def residual_of(fitted: Mesh, target: Target) -> Residual:
 def _without_farthest(
     distances: Float64[np.ndarray, " N"], areas: Float64[np.ndarray, " N"]
 ) -> Float64[np.ndarray, " N"]:
-    """The areas, zero for the farthest `BITS` of them."""
+    """Return the areas with zeros for the farthest `BITS` of their sum."""
     order = np.argsort(-distances, kind="stable")
     kept = areas.copy()
     kept[order[np.cumsum(areas[order]) <= BITS * areas.sum()]] = 0

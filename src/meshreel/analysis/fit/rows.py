@@ -1,4 +1,4 @@
-"""The equations of a fit, as values: what the matching makes and the solver takes."""
+"""Weighted linear equations of a fit, made by matching and solved in `system`."""
 
 from __future__ import annotations
 
@@ -29,5 +29,5 @@ class Rows:
 
 
 def no_rows() -> Rows:
-    """Rows that ask for nothing."""
+    """Return zero rows."""
     return Rows(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))

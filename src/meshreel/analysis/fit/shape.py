@@ -1,7 +1,7 @@
-"""What the template should look like where the data do not say: the shape of the key frame, turned as the body turns.
+"""Shape priors of a fit: the rest shape rotated as the body turns, and the strongest components of all trajectories.
 
-Laplacian coordinates of the rest shape, rotated per vertex (as-rigid-as-possible), the faces that no longer look like
-the rest shape, and the strongest components of all trajectories.
+In: a template's rest shape and its positions. Out: Laplacian coordinates rotated per vertex (as-rigid-as-possible),
+vertices at faces that differ from the rest shape, trajectories rebuilt from few components.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from ...geometry.topology import face_normals
 from ...types import Mesh
 from .system import Template
 
-SPREAD = 3  # times that rotations are averaged over the one-ring: a folded ring has none of its own
-FOLDED = 0.0  # cosine between a face's normal and its turned rest normal below which it is doubtful
-COLLAPSED = 0.1  # share of its rest area
+SPREAD = 3  # averagings of rotations over the one-ring, since a folded ring determines no rotation: a guess
+FOLDED = 0.0  # a face is doubtful if the cosine between its normal and its rotated rest normal is less: a guess
+COLLAPSED = 0.1  # or if its area is less than this share of its rest area: a guess
 
 
 def turned_laplacian(
     template: Template, rest: Float64[np.ndarray, "V 3"], now: Float64[np.ndarray, "V 3"]
 ) -> tuple[Float64[np.ndarray, "V 3"], Float64[np.ndarray, "V 3 3"]]:
-    """The Laplacian coordinates of `rest`, turned as each neighborhood turns to `now`; and these rotations."""
+    """Rotate the Laplacian coordinates of `rest` as each neighborhood rotates to `now`; also return the rotations."""
     turns = _rotations(template, rest, now)
     return np.einsum("vij,vj->vi", turns, template.laplacian @ rest), turns
 
@@ -32,7 +32,7 @@ def doubtful(
     turns: Float64[np.ndarray, "V 3 3"],
     now: Float64[np.ndarray, "V 3"],
 ) -> Bool[np.ndarray, " V"]:
-    """The vertices at and next to faces that fold over or collapse against the turned rest shape."""
+    """Return True for vertices at or next to faces that fold over or collapse against the rotated rest shape."""
     faces = template.faces
     before, area = face_normals(Mesh(rest, faces.astype(np.int32)))
     after, left = face_normals(Mesh(now, faces.astype(np.int32)))
@@ -46,7 +46,7 @@ def doubtful(
 
 
 def strongest_components(positions: Float64[np.ndarray, "T V 3"], key: int, count: int) -> Float64[np.ndarray, "T V 3"]:
-    """The trajectories relative to the key frame, rebuilt from their `count` strongest components (eqs. 8-9)."""
+    """Rebuild the trajectories relative to the key frame from their `count` strongest components (eqs. 8-9)."""
     frames, vertices, _ = positions.shape
     field = (positions - positions[key]).transpose(1, 0, 2).reshape(vertices, 3 * frames)
     mean = field.mean(axis=0)
@@ -59,7 +59,7 @@ def strongest_components(positions: Float64[np.ndarray, "T V 3"], key: int, coun
 def _rotations(
     template: Template, before: Float64[np.ndarray, "V 3"], after: Float64[np.ndarray, "V 3"]
 ) -> Float64[np.ndarray, "V 3 3"]:
-    """The rotation of each vertex's neighborhood (Kabsch), from covariances averaged over SPREAD rings."""
+    """Fit a rotation to each vertex's neighborhood (Kabsch), from covariances averaged over SPREAD rings."""
     i, j = template.edges.T
     outer = ((before[j] - before[i])[:, :, None] * (after[j] - after[i])[:, None, :]).reshape(-1, 9)
     both = np.concatenate([i, j])

@@ -1,4 +1,4 @@
-"""The sparse least-squares problem of one fitting round: normal equations and conjugate gradients.
+"""Solve the sparse least-squares problem of one fitting round by its normal equations and conjugate gradients.
 
 In: rows n . (c0 x0 + c1 x1 + c2 x2) = value on the faces of a template, a shape, a place. Out: a step (V x 3).
 Point-to-plane rows couple x, y and z, so the matrix has 3 x 3 blocks on the one-ring; it is solved, not factorised:
@@ -21,7 +21,7 @@ from .rows import Rows, no_rows
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What stands against the rows: a shape (Laplacian coordinates), how stiff it is, and a place to stay near."""
+    """Priors of a fitting round: Laplacian coordinates with their stiffness, and positions to stay near."""
 
     shape: Float64[np.ndarray, "V 3"]
     stiffness: Float64[np.ndarray, " V"]  # row weights
@@ -30,7 +30,7 @@ class Problem:
 
 
 class Template:
-    """What the fit needs of a connectivity, once: its Laplacian, one face per vertex, and the block pattern."""
+    """Connectivity prepared for fitting: its Laplacian, one face per vertex, and the pattern of the matrix blocks."""
 
     def __init__(self, faces: Int32[np.ndarray, "F 3"], count: int) -> None:
         self.faces = faces.astype(np.int64)
@@ -41,7 +41,7 @@ class Template:
         self._place_blocks()
         corner = np.full(count, -1)
         corner[self.faces.reshape(-1)[::-1]] = np.arange(3 * len(faces))[::-1]
-        self.corner = corner  # 3 * face + k of the first corner at each vertex; -1 where no face uses it
+        self.corner = corner  # 3 * face + k of the first corner at each vertex; -1 for a vertex that no face uses
 
     def _place_blocks(self) -> None:
         rows, columns = np.repeat(self.faces, 3, axis=1).reshape(-1), np.tile(self.faces, (1, 3)).reshape(-1)
@@ -54,7 +54,7 @@ class Template:
     def normal_equations(
         self, rows: Rows, at: Float64[np.ndarray, "V 3"]
     ) -> tuple[sparse.bsr_array, Float64[np.ndarray, "V 3"]]:
-        """Matrix and right-hand side of the offsets from `at` that the rows ask for."""
+        """Return matrix and right-hand side of the least-squares problem of the rows, for offsets from `at`."""
         f, c, n = self.faces[rows.faces], rows.corners, rows.normals
         miss = rows.values - np.einsum("nk,nkd,nd->n", c, at[f], n)
         outer = (rows.weights[:, None, None] * n[:, :, None] * n[:, None, :]).reshape(-1, 1, 9)
@@ -77,7 +77,7 @@ def solve(
     problem: Problem,
     limits: Limits,
 ) -> Float64[np.ndarray, "V 3"]:
-    """The step from `at` that fits the rows, keeps the shape and stays near its place."""
+    """Compute the step from `at` that fits the rows, keeps the shape and stays near its place."""
     matrix, right = template.normal_equations(no_rows() if rows is None else rows, at)
     laplacian, squared = template.laplacian, problem.stiffness**2
     smooth = laplacian.T @ (sparse.diags_array(squared) @ laplacian)
@@ -90,7 +90,7 @@ def solve(
 def _solved(
     matrix: sparse.bsr_array, smooth: sparse.csr_array, right: Float64[np.ndarray, "V 3"], limits: Limits
 ) -> Float64[np.ndarray, "V 3"]:
-    """x of (matrix + smooth on each axis) x = right; preconditioned by the blocks of the vertices."""
+    """Solve (matrix + smooth on each axis) x = right, preconditioned by the blocks of the vertices."""
     count = len(right)
     rows = np.repeat(np.arange(count), np.diff(matrix.indptr))
     on_diagonal = matrix.indices == rows

@@ -1,7 +1,7 @@
-"""Which frame is the key of a group, how far its surface is followed, and where a template is in these frames.
+"""Choose the key frame of a group, the number of frames through which it is tracked, and its motion (decisions 11, 15).
 
-In: the frames of a group to be, prepared for matching. Out: the key, the number of frames that follow, and the motion
-(docs/decisions/0011-correspondence). A key is judged by what the embedded deformation leaves over, before any fit.
+In: the next frames, prepared for matching. Out: the key, the number of tracked frames, and the motion. A key is judged
+by the residuals of the embedded deformation, before any surface fit.
 """
 
 from __future__ import annotations
@@ -14,33 +14,33 @@ from jaxtyping import Float64
 
 from ...geometry.topology import vertex_normals
 from ...types import Mesh
-from ..fit.match import Target
+from ..fit.match import FrameSurface
 from .embedded import EmbeddedOptions, Motion, Tracker
 
-PLACES = (0.5, 0.7, 0.85, 0.25, 0.0)  # of the keys, in parts of the group; tried until one is not in doubt
+PLACES = (0.5, 0.7, 0.85, 0.25, 0.0)  # places of the keys to try, in shares of the group: guesses (decision 15)
 
 
 @dataclass(frozen=True, slots=True)
 class KeyMotion:
-    """How the key frame's surface moves through the frames that follow it."""
+    """Motion of a key frame's surface through the frames of a group."""
 
     key: int
-    count: int  # frames, from the first, that are followed
+    count: int  # number of frames, from the first, through which the surface is tracked
     motion: Motion  # through all frames
 
     def move(self, template: Mesh) -> Float64[np.ndarray, "T V 3"]:
-        """The positions, in the frames that are followed, of a template that lies on the key frame."""
+        """Move a template that lies on the key frame to each of the tracked frames."""
         return self.motion.move(template.vertices, vertex_normals(template))[: self.count]
 
 
-def choose_key(targets: Sequence[Target], options: EmbeddedOptions, most: int = len(PLACES)) -> KeyMotion:
-    """The motion that is followed for longest; of equally long ones that which leaves least over.
+def choose_key(surfaces: Sequence[FrameSurface], options: EmbeddedOptions, most: int = len(PLACES)) -> KeyMotion:
+    """Return the motion that is tracked through most frames, and of equally long ones that with the least residuals.
 
-    At most so many keys are tried.
+    At most `most` keys are tried, none after one whose residuals are small and even.
     """
     motions = list[KeyMotion]()
-    for key in dict.fromkeys(int(place * len(targets)) for place in PLACES[:most]):
-        motions.append(_follow(targets, key, options))
+    for key in dict.fromkeys(int(place * len(surfaces)) for place in PLACES[:most]):
+        motions.append(_follow(surfaces, key, options))
         residuals = motions[-1].motion.residuals
         usual = max(float(np.median(residuals)), options.settled)
         if residuals.max() <= min(options.rekeyed, options.uneven * usual):
@@ -48,12 +48,14 @@ def choose_key(targets: Sequence[Target], options: EmbeddedOptions, most: int = 
     return max(motions, key=lambda motion: (motion.count, -float(np.sum(motion.motion.residuals[: motion.count] ** 2))))
 
 
-def from_last(template: Mesh, targets: Sequence[Target], options: EmbeddedOptions) -> Float64[np.ndarray, "T V 3"]:
-    """The positions of a template as it lies on the frame before, in those of these frames that are followed."""
+def from_last(
+    template: Mesh, surfaces: Sequence[FrameSurface], options: EmbeddedOptions
+) -> Float64[np.ndarray, "T V 3"]:
+    """Track a template that lies on the previous frame; return its positions in the frames before it is lost."""
     tracker = Tracker(template, -1, options)
     count = 0
-    for target in targets:
-        if tracker.step(count, target) > options.lost:
+    for surface in surfaces:
+        if tracker.step(count, surface) > options.lost:
             break
         count += 1
     if count == 0:
@@ -61,11 +63,11 @@ def from_last(template: Mesh, targets: Sequence[Target], options: EmbeddedOption
     return tracker.motion(range(count)).move(template.vertices, vertex_normals(template))
 
 
-def _follow(targets: Sequence[Target], key: int, options: EmbeddedOptions) -> KeyMotion:
-    tracker = Tracker(targets[key].mesh, key, options)
-    for frame in [*range(key + 1, len(targets)), *reversed(range(key))]:
-        tracker.step(frame, targets[frame])
-    motion = tracker.motion(range(len(targets)))
+def _follow(surfaces: Sequence[FrameSurface], key: int, options: EmbeddedOptions) -> KeyMotion:
+    tracker = Tracker(surfaces[key].mesh, key, options)
+    for frame in [*range(key + 1, len(surfaces)), *reversed(range(key))]:
+        tracker.step(frame, surfaces[frame])
+    motion = tracker.motion(range(len(surfaces)))
     lost = np.flatnonzero(motion.residuals > options.lost)
-    count = int(lost[0]) if len(lost) else len(targets)
+    count = int(lost[0]) if len(lost) else len(surfaces)
     return KeyMotion(key, count if count > key else 0, motion)

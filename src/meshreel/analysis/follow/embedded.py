@@ -1,9 +1,9 @@
-"""Embedded deformation: a key frame's mesh followed through the frames around it, outward, frame by frame.
+"""Embedded deformation: track a key frame's mesh outward through the frames around it (Sumner et al. 2007).
 
-In: the key frame's clean mesh, then any neighbour frame of any connectivity. Out: where its points are in each frame.
-A graph of nodes on the mesh is moved by point-to-plane ICP, few nodes first, as rigid as can be, from the neighbour
+In: the key frame's clean mesh, then neighbour frames of any connectivity. Out: its positions in each frame. A graph of
+nodes on the mesh is moved by point-to-plane ICP, few nodes first, as rigidly as possible, starting from the neighbour
 frame's result with extrapolated velocity. Coordinates are normalised: the sequence's diagonal is 1.
-In place of the paper's volume tracking (section 3.1) where docs/decisions/0011-correspondence.md says so.
+It replaces the paper's volume tracking (section 3.1) in preset `best` (docs/decisions/0011-correspondence.md).
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from ...geometry.closest_points import Surface
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
 from ..fit.conjugate_gradients import Limits
-from ..fit.match import Target
+from ..fit.match import FrameSurface
 from .embedded_graph import DeformationGraph, area_samples, build_graph, farthest_first
-from .embedded_match import NORMAL_REACH, SampledTarget
-from .embedded_solve import GraphSolver, Planes, Pose, Rest, moved, rotation, turned, unmoved
+from .embedded_match import NORMAL_REACH, SampledSurface
+from .embedded_solve import GraphSolver, Planes, Pose, RestGraph, moved, rotation, turned, unmoved
 
-BACK_ROUNDS = 2  # which nodes move a point is known only where it comes from: the first round guesses
-UNUSUAL = 1.25  # times the median residual so far: tried again
+BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
+UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far (decision 15)
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Rounds of one graph; one entry per round in `gates` and `rigidity`."""
+    """Rounds with one deformation graph; one entry per round in `gates` and `rigidity`."""
 
     nodes: int
-    gates: tuple[float, ...]  # pairs farther apart do not count; of the diagonal
-    rigidity: tuple[float, ...]  # squared row weight of an edge against the data of a node
+    gates: tuple[float, ...]  # largest distances of pairs, in diagonals
+    rigidity: tuple[float, ...]  # squared row weights of an edge relative to the data of a node
 
     def __post_init__(self) -> None:
         if self.nodes < 1:
@@ -47,22 +47,22 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class EmbeddedOptions:
-    """How the key mesh follows a frame; lengths in units of the sequence's bounding-box diagonal."""
+    """Options of embedded deformation; lengths in units of the sequence's bounding-box diagonal (decisions 11, 15)."""
 
     coarse: Stage = Stage(200, (0.1, 0.08, 0.06, 0.06, 0.045, 0.03, 0.024), (10.0, 3.0, 3.0, 1.0, 0.5, 0.2, 0.1))
     fine: Stage = Stage(900, (0.024, 0.018, 0.012, 0.012), (0.3, 0.1, 0.1, 0.05))
     samples: int = 4000  # points of the key mesh, and of a frame, that are matched
     neighbours: int = 4  # nodes that move a point
-    agreement: float = 0.3  # least cosine between the normals of a pair
-    torn: tuple[float, float] = (0.5, 0.15)  # share of its length by which an edge misses that then counts a quarter
-    doubt: float = 0.0005  # a residual above it, if unusual, is tried again: from another start, with edges that tear
-    rekeyed: float = 0.0015  # a residual above it makes another frame be tried as the key
-    lost: float = 0.004  # a residual above it leaves the frame where no surface fit finds back
-    settled: float = 0.0005  # a median residual below it counts as this much: about what noise leaves
-    uneven: float = 1.8  # times the median residual above which something has appeared that the key has not
-    damping: float = 0.01  # squared row weight of a node's step against its data
-    iterations: int = 60  # of the conjugate gradients, at most, a round
-    tolerance: float = 1e-2  # their relative residual
+    agreement: float = 0.3  # smallest cosine between the normals of a pair
+    torn: tuple[float, float] = (0.5, 0.15)  # an edge off by this share of its length counts a quarter; try, retry
+    doubt: float = 0.0005  # a frame with a larger, unusual residual is retried: other starts, edges that tear sooner
+    rekeyed: float = 0.0015  # another key is tried if a residual is larger
+    lost: float = 0.004  # a frame with a larger residual is lost: no surface fit would recover it
+    settled: float = 0.0005  # smaller median residuals count as this much, about the effect of noise
+    uneven: float = 1.8  # another key is tried if a residual is larger than this many times the median
+    damping: float = 0.01  # squared row weight of a node's step relative to its data
+    iterations: int = 60  # largest number of conjugate-gradient iterations per round
+    tolerance: float = 1e-2  # relative residual at which they stop
 
     def __post_init__(self) -> None:
         if self.coarse.nodes > self.fine.nodes:
@@ -85,7 +85,7 @@ class EmbeddedOptions:
 
 
 class Tracker:
-    """Follows a key frame's mesh outward, one frame at a time, in either direction."""
+    """Tracker of a key frame's mesh: registers one frame at a time, outward from the key in either direction."""
 
     def __init__(self, key_mesh: Mesh, key: int, options: EmbeddedOptions | None = None) -> None:
         self.options, self.key = options or EmbeddedOptions(), key
@@ -104,67 +104,67 @@ class Tracker:
         self._poses = {key: Pose.at(self._graph.nodes)}
         self._residuals = {key: 0.0}
 
-    def step(self, frame: int, mesh: Mesh | Target) -> float:
-        """Registers a frame, from the nearest one between it and the key that is known; its residual.
+    def step(self, frame: int, mesh: Mesh | FrameSurface) -> float:
+        """Register a frame, starting from the nearest registered frame between it and the key; return its residual.
 
-        Infinite for an empty frame, which gets its neighbour's pose. A frame may be registered again.
+        An empty frame gets its neighbour's pose and an infinite residual. A frame may be registered again.
         """
         if frame == self.key:
             raise InputError(f"frame {frame} is the key: it needs no registration; step to another")
-        target = mesh if isinstance(mesh, Target) else None if mesh.is_empty else Target(mesh)
-        if target is not None and not np.isfinite(target.mesh.vertices).all():
+        surface = mesh if isinstance(mesh, FrameSurface) else None if mesh.is_empty else FrameSurface(mesh)
+        if surface is not None and not np.isfinite(surface.mesh.vertices).all():
             raise InputError(f"frame {frame} has coordinates that are not finite; repair it first")
         pose, residual = self._poses[self._known(frame)], np.inf
-        if target is not None:
-            pose, residual = self._follow(frame, target)
+        if surface is not None:
+            pose, residual = self._follow(frame, surface)
         self._poses[frame], self._residuals[frame] = pose, residual
         return residual
 
     def residual(self, frame: int) -> float:
-        """Symmetric RMS distance of the moved key mesh and a registered frame: the worse of both directions."""
+        """Return the RMS distance of the moved key mesh and a registered frame: the larger of both directions."""
         return self._residuals[frame]
 
     def motion(self, frames: Sequence[int]) -> Motion:
-        """The motion through some registered frames, in the order asked for."""
+        """Return the motion through some registered frames, in the given order."""
         rotations = np.stack([self._poses[frame].rotations for frame in frames])
         positions = np.stack([self._poses[frame].positions for frame in frames])
         residuals = np.array([self._residuals[frame] for frame in frames])
         return Motion(self.mesh, self._graph, rotations, positions, residuals, self.options.neighbours)
 
-    def _rest(self, graph: DeformationGraph) -> Rest:
+    def _rest(self, graph: DeformationGraph) -> RestGraph:
         points, normals = self.mesh.vertices[self._samples], vertex_normals(self.mesh)[self._samples]
         binding = graph.bind(points, graph.cells[self._samples], self.options.neighbours)
-        return Rest(graph.nodes, graph.edges, points, normals, binding)
+        return RestGraph(graph.nodes, graph.edges, points, normals, binding)
 
     def _known(self, frame: int) -> int:
-        """The registered frame from which this one is begun: the nearest between it and the key."""
+        """Return the registered frame, between a frame and the key, that is nearest to it and not empty."""
         low, high = sorted((frame, self.key))
         return min((f for f in self._followed() if low <= f <= high and f != frame), key=lambda f: abs(f - frame))
 
     def _followed(self) -> list[int]:
-        """The frames that have a pose of their own: the key, and all that were not empty."""
+        """Return the registered frames with a measured pose: the key, and all that are not empty."""
         return [frame for frame, residual in self._residuals.items() if residual < np.inf]
 
-    def _follow(self, frame: int, target: Target) -> tuple[Pose, float]:
-        """The best of some ways to go on, by residual: where the first is good enough, no other is tried."""
+    def _follow(self, frame: int, surface: FrameSurface) -> tuple[Pose, float]:
+        """Register a frame from several starts until one is good enough; return the best pose and its residual."""
         o, last = self.options, self._known(frame)
-        there = SampledTarget(target, o.samples, o.agreement)
+        there = SampledSurface(surface, o.samples, o.agreement)
         usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # noise is not failure
         starts = self._starts(frame, there)
         best = self._poses[last], np.inf
         tries = [(starts[0], o.torn[0]), (starts[0], o.torn[1]), *((start, o.torn[0]) for start in starts[1:])]
         for start, torn in tries:
             pose = self._rounds(self._fine, self._carried(start, there, torn), there, o.fine, torn)
-            residual = self._measure(pose, target)
+            residual = self._measure(pose, surface)
             if residual < best[1]:
                 best = pose, residual
             if residual < max(o.doubt, UNUSUAL * float(usual)):
                 return best
-        stay = self._poses[last], self._measure(self._poses[last], target)
+        stay = self._poses[last], self._measure(self._poses[last], surface)
         return best if best[1] < stay[1] else stay
 
-    def _starts(self, frame: int, target: SampledTarget) -> list[Pose]:
-        """The neighbour's pose, and that moved on as it moved before; the one that is nearer to the frame first."""
+    def _starts(self, frame: int, surface: SampledSurface) -> list[Pose]:
+        """Return the neighbour's pose and its extrapolation, the one that matches the frame better first."""
         last = self._known(frame)
         side = 1 if frame > last else -1
         before = [f for f in self._followed() if (last - f) * side > 0]
@@ -174,23 +174,23 @@ class Tracker:
         ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
         gate = self.options.coarse.gates[-1]
         poses = [ahead, self._poses[last]]
-        return sorted(poses, key=lambda pose: -_planes(self._fine.rest, pose, target, gate).weights.sum())
+        return sorted(poses, key=lambda pose: -_planes(self._fine.rest, pose, surface, gate).weights.sum())
 
-    def _carried(self, pose: Pose, target: SampledTarget, torn: float) -> Pose:
-        """The pose carried by a few nodes whose rest is that pose: what is known of the detail stays."""
+    def _carried(self, pose: Pose, surface: SampledSurface, torn: float) -> Pose:
+        """Move a pose by a coarse graph whose rest is that pose, so that its detail stays."""
         few, fine = self._few, self._fine.rest
         here = Pose(pose.rotations[: len(few.nodes)], pose.positions[: len(few.nodes)])
         points, normals = moved(fine.points, fine.nodes, fine.binding, pose), turned(fine.normals, fine.binding, pose)
-        rest = Rest(here.positions, few.edges, points, normals, few.binding)
+        rest = RestGraph(here.positions, few.edges, points, normals, few.binding)
         solver = GraphSolver(rest, GraphSolver(few).holds(here, torn))
-        carried = self._rounds(solver, Pose.at(here.positions), target, self.options.coarse, torn)
+        carried = self._rounds(solver, Pose.at(here.positions), surface, self.options.coarse, torn)
         positions = moved(pose.positions, here.positions, self._nodes_by_few, carried)
         return Pose(rotation(self._nodes_by_few, carried) @ pose.rotations, positions)
 
-    def _rounds(self, solver: GraphSolver, pose: Pose, target: SampledTarget, stage: Stage, torn: float) -> Pose:
+    def _rounds(self, solver: GraphSolver, pose: Pose, surface: SampledSurface, stage: Stage, torn: float) -> Pose:
         o = self.options
         for gate, rigidity in zip(stage.gates, stage.rigidity, strict=True):
-            planes = _planes(solver.rest, pose, target, gate)
+            planes = _planes(solver.rest, pose, surface, gate)
             stiffness = rigidity * solver.holds(pose, torn)
             following = solver.step(pose, planes, stiffness, o.damping, Limits(o.iterations, o.tolerance))
             if not following.is_finite:
@@ -198,17 +198,17 @@ class Tracker:
             pose = following
         return pose
 
-    def _measure(self, pose: Pose, target: Target) -> float:
-        """Root mean square distance over samples of both surfaces; the larger of both directions."""
+    def _measure(self, pose: Pose, surface: FrameSurface) -> float:
+        """Return the RMS distance over samples of both surfaces; the larger of both directions."""
         mesh = Mesh(moved(self.mesh.vertices, self._graph.nodes, self._all, pose), self.mesh.faces)
-        theirs = target.mesh.vertices[area_samples(target.mesh, self.options.samples)]
-        gaps = (_gaps(target.surface, mesh.vertices[self._samples]), _gaps(Surface(mesh), theirs))
+        theirs = surface.mesh.vertices[area_samples(surface.mesh, self.options.samples)]
+        gaps = (_gaps(surface.surface, mesh.vertices[self._samples]), _gaps(Surface(mesh), theirs))
         return float(np.sqrt(max(np.mean(gap) for gap in gaps)))
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """Where points of the key mesh are in T frames."""
+    """Motion of the key mesh through T frames."""
 
     mesh: Mesh  # the key frame's
     graph: DeformationGraph
@@ -220,7 +220,7 @@ class Motion:
     def move(
         self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None
     ) -> Float64[np.ndarray, "T P 3"]:
-        """Points on or near the key mesh, in each frame; their normals keep them off a near sheet that faces away."""
+        """Move points on or near the key mesh to each frame; normals keep them off a near sheet that faces away."""
         own = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
         asked = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
         vertices = cKDTree(own[:, : asked.shape[1]]).query(asked)[1].reshape(-1)
@@ -229,9 +229,9 @@ class Motion:
         return np.stack([moved(points, self.graph.nodes, binding, pose) for pose in poses])
 
     def back(self, frame: int, mesh: Mesh) -> Mesh:
-        """A mesh that lies on or near a frame, moved to where it would be in the key frame: the inverse of `move`.
+        """Move a mesh on or near a frame to the pose of the key frame, by the inverse of `move`.
 
-        Faces in which a point has no way back are left out.
+        Faces with a vertex at which the motion has no inverse are left out.
         """
         pose = Pose(self.rotations[frame], self.positions[frame])
         own = self.graph.bind(self.mesh.vertices, self.graph.cells, self.neighbours)
@@ -248,7 +248,7 @@ class Motion:
 
 
 def register(key_mesh: Mesh, frames: Sequence[Mesh], key: int, options: EmbeddedOptions | None = None) -> Motion:
-    """The motion of the key frame's mesh through all frames, outward from the key."""
+    """Track the key frame's mesh through all frames, outward from the key. Raises InputError for an invalid key."""
     if not 0 <= key < len(frames):
         raise InputError(f"key {key} is not one of {len(frames)} frames: give 0 to {len(frames) - 1}")
     tracker = Tracker(key_mesh, key, options)
@@ -257,19 +257,19 @@ def register(key_mesh: Mesh, frames: Sequence[Mesh], key: int, options: Embedded
     return tracker.motion(range(len(frames)))
 
 
-def _planes(rest: Rest, pose: Pose, target: SampledTarget, gate: float) -> Planes:
+def _planes(rest: RestGraph, pose: Pose, surface: SampledSurface, gate: float) -> Planes:
     points, normals = moved(rest.points, rest.nodes, rest.binding, pose), turned(rest.normals, rest.binding, pose)
-    return target.planes(points, normals, gate)
+    return surface.planes(points, normals, gate)
 
 
 def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:
-    """The pose that goes on from `last` by `ratio` times the step from `first`."""
+    """Continue from pose `last` by `ratio` times the step from `first` to it."""
     turn = Rotation.from_matrix(last.rotations @ first.rotations.transpose(0, 2, 1)).as_rotvec()
     rotations = Rotation.from_rotvec(ratio * turn).as_matrix() @ last.rotations
     return Pose(rotations, last.positions + ratio * (last.positions - first.positions))
 
 
 def _gaps(surface: Surface, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
-    """Squared distances."""
+    """Return squared distances of points to a surface."""
     offsets = surface.closest(points).points - points
     return np.einsum("nd,nd->n", offsets, offsets)

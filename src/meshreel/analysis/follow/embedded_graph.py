@@ -1,7 +1,7 @@
-"""A graph of nodes on a mesh, and which of them move a point: nearest along the surface, not through space.
+"""Build a graph of nodes on a mesh, and bind points to the nodes that are nearest along the surface.
 
-In: the key frame's mesh. Out: nodes (farthest-point samples), the edges between cells that touch, bindings of points.
-A hand near a hip shares no node with it: candidates are the nodes within two steps of the point's own cell.
+In: the key frame's mesh. Out: nodes (farthest-point samples), edges between cells that touch, bindings of points.
+A hand near a hip shares no node with it: only nodes within two edges of a point's cell may move it.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from scipy.spatial import cKDTree
 from ...geometry.topology import components, face_normals, unique_edges, vertex_normals
 from ...types import Mesh
 
-TURN = 0.01  # distance that a difference of 1 between unit normals counts as: both sides of a thin part get nodes
-SEEDED = 0.25  # share of the nodes that may go to the components' first ones
+TURN = 0.01  # diagonals, weight of a difference of unit normals, so that both sides of a thin part get nodes: a guess
+SEEDED = 0.25  # largest share of the nodes that are the first of their component: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """The nodes that move each point, and their shares."""
+    """Nodes that move each point, with their weights."""
 
     indices: Int64[np.ndarray, "P k"]
     weights: Float64[np.ndarray, "P k"]  # rows sum to 1
@@ -31,15 +31,15 @@ class Binding:
 
 @dataclass(frozen=True, slots=True)
 class DeformationGraph:
-    """Nodes on a mesh; every vertex of it belongs to the cell of the node that is nearest along the surface."""
+    """Nodes on a mesh, with edges; every vertex belongs to the cell of the node that is nearest along the surface."""
 
     nodes: Float64[np.ndarray, "N 3"]
     edges: Int64[np.ndarray, "E 2"]  # both directions of each pair of touching cells
     cells: Int64[np.ndarray, " V"]
-    hood: Int64[np.ndarray, "N h"]  # itself and the nodes at most two edges away, then -1
+    hood: Int64[np.ndarray, "N h"]  # each node and those at most two edges away, padded with -1
 
     def bind(self, points: Float64[np.ndarray, "P 3"], cells: Int64[np.ndarray, " P"], count: int) -> Binding:
-        """Each point's `count` nearest nodes of its cell's hood, with shares that fall to 0 at the one after them."""
+        """Bind each point to the `count` nearest nodes of its cell's hood; weights fall to 0 at the next nearest."""
         hood = self.hood[cells]
         away = np.linalg.norm(self.nodes[hood] - points[:, None], axis=2)
         away[hood < 0] = np.inf
@@ -55,7 +55,7 @@ class DeformationGraph:
 
 
 def area_samples(mesh: Mesh, count: int) -> Int64[np.ndarray, " S"]:
-    """About `count` vertices, evenly over the area, in order: the same for the same mesh."""
+    """Choose about `count` vertices, spread evenly over the area; ascending, the same for the same mesh."""
     if len(mesh.vertices) <= count:
         return np.arange(len(mesh.vertices))
     _, areas = face_normals(mesh)
@@ -66,9 +66,9 @@ def area_samples(mesh: Mesh, count: int) -> Int64[np.ndarray, " S"]:
 
 
 def farthest_first(mesh: Mesh, candidates: Int64[np.ndarray, " S"], count: int) -> Int64[np.ndarray, " N"]:
-    """`count` of the candidate vertices, each the farthest from those before: any beginning of it is spread evenly.
+    """Choose `count` candidate vertices one by one, each the farthest from the earlier ones; every prefix is even.
 
-    The distance is of position and normal; every component (the largest, if there are many) gets its first one early.
+    Distances are of positions and normals. The first choices are one vertex of each component, the largest ones first.
     """
     labels = components(mesh.faces, len(mesh.vertices))[candidates]
     _, first, sizes = np.unique(labels, return_index=True, return_counts=True)
@@ -85,7 +85,7 @@ def farthest_first(mesh: Mesh, candidates: Int64[np.ndarray, " S"], count: int) 
 
 
 def build_graph(mesh: Mesh, nodes: Int64[np.ndarray, " N"]) -> DeformationGraph:
-    """The graph whose nodes are these vertices of the mesh."""
+    """Build the graph whose nodes are the given vertices of the mesh."""
     edges, _ = unique_edges(mesh.faces)
     cells = _cells(mesh, edges, nodes)
     i, j = cells[edges].T
@@ -96,7 +96,7 @@ def build_graph(mesh: Mesh, nodes: Int64[np.ndarray, " N"]) -> DeformationGraph:
 
 
 def _cells(mesh: Mesh, edges: Int64[np.ndarray, "E 2"], nodes: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, " V"]:
-    """The node nearest along the edges to each vertex; by air where no path leads to any."""
+    """Return the node nearest to each vertex along the edges; the nearest in space where no path leads to one."""
     size = len(mesh.vertices)
     lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
     roads = sparse.csr_array((np.maximum(lengths, 1e-12), (edges[:, 0], edges[:, 1])), shape=(size, size))

@@ -1,6 +1,7 @@
-"""Pairs of a moved key mesh's samples and a frame's surface, both ways, as point-to-plane rows.
+"""Match samples of a moved key mesh and a frame's surface, both ways, as point-to-plane rows.
 
-A pair counts by a Gaussian of its distance, and not at all past the gate, where the normals disagree or on a border.
+In: samples with normals, a prepared frame. Out: Planes. A pair is weighted by a Gaussian of its distance; its weight is
+zero past the gate, where normals disagree and on borders.
 """
 
 from __future__ import annotations
@@ -9,32 +10,32 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
-from ..fit.match import Target
+from ..fit.match import FrameSurface
 from .embedded_graph import area_samples
 from .embedded_solve import Planes
 
-NORMAL_REACH = 0.01  # in a search, distance that a difference of 1 between unit normals counts as
+NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
 
 
-class SampledTarget:
-    """A frame that the key mesh is matched with: its surface, and samples of it for the way back."""
+class SampledSurface:
+    """A prepared frame with samples of its surface, to which a key mesh is matched."""
 
-    def __init__(self, target: Target, samples: int, agreement: float) -> None:
-        self._target, self._agreement = target, agreement
-        chosen = area_samples(target.mesh, samples)
-        chosen = chosen[target.inside[chosen] > 0]
-        self._points, self._normals = target.mesh.vertices[chosen], target.normals[chosen]
-        self._spacing = float(np.sqrt(target.surface.areas.sum() / samples))
+    def __init__(self, frame: FrameSurface, samples: int, agreement: float) -> None:
+        self._frame, self._agreement = frame, agreement
+        chosen = area_samples(frame.mesh, samples)
+        chosen = chosen[frame.inside[chosen] > 0]
+        self._points, self._normals = frame.mesh.vertices[chosen], frame.normals[chosen]
+        self._spacing = float(np.sqrt(frame.surface.areas.sum() / samples))
 
     def planes(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
-        """Rows that pull the samples to the frame's surface, and the frame's samples' planes to the samples."""
+        """Return rows that pull samples of the key mesh to the frame's surface and to planes at the frame's samples."""
         return self._towards(points, normals, gate) + self._back(points, normals, gate)
 
     def _towards(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:
-        target = self._target
-        hits = target.surface.closest(points)
-        planes = target.normals_at(hits)
-        inside = np.einsum("nk,nk->n", hits.barycentric, target.inside[target.mesh.faces[hits.faces]])
+        frame = self._frame
+        hits = frame.surface.closest(points)
+        planes = frame.normals_at(hits)
+        inside = np.einsum("nk,nk->n", hits.barycentric, frame.inside[frame.mesh.faces[hits.faces]])
         weights = inside * self._weights(np.linalg.norm(points - hits.points, axis=1) / gate, planes, normals)
         return _kept(np.arange(len(points)), planes, hits.points, weights)
 
@@ -43,7 +44,7 @@ class SampledTarget:
         found = tree.query(np.concatenate([self._points, NORMAL_REACH * self._normals], axis=1))[1]
         offsets = points[found] - self._points
         along = np.abs(np.einsum("nd,nd->n", offsets, self._normals))
-        beyond = np.linalg.norm(offsets, axis=1) - self._spacing  # samples are that far apart wherever they lie
+        beyond = np.linalg.norm(offsets, axis=1) - self._spacing  # samples are that far from each other anyway
         weights = self._weights(np.maximum(along, beyond) / gate, self._normals, normals[found])
         return _kept(found, self._normals, self._points, weights)
 
@@ -53,7 +54,7 @@ class SampledTarget:
         planes: Float64[np.ndarray, "N 3"],
         normals: Float64[np.ndarray, "N 3"],
     ) -> Float64[np.ndarray, " N"]:
-        """Distances are in gates; sigma is half a gate."""
+        """Return Gaussian weights of pairs by their distances, in gates; sigma is half a gate."""
         agree = np.einsum("nd,nd->n", planes, normals) > self._agreement
         return np.where(agree & (distance < 1), np.exp(-2 * distance**2), 0.0)
 

@@ -1,4 +1,4 @@
-"""Gauss-Newton steps of an embedded deformation: point-to-plane rows against as-rigid-as-possible rows.
+"""Gauss-Newton steps of an embedded deformation with point-to-plane rows and as-rigid-as-possible rows.
 
 In: a deformation graph at rest (nodes, edges, bound samples), a pose of its nodes, planes. Out: the next pose. A point
 p bound to nodes j goes to sum w_j (R_j (p - g_j) + t_j) (Sumner et al. 2007). The normal equations are not assembled:
@@ -17,27 +17,27 @@ from scipy.spatial.transform import Rotation
 from ..fit.conjugate_gradients import Limits, conjugate_gradients
 from .embedded_graph import Binding
 
-Blocks = Float64[np.ndarray, "B 6 6"]  # of the nodes, on the diagonal of the normal equations
-LARGEST_TURN = 0.5  # rad, of a node in one step
-FLATTEST = 0.1  # determinant of a blend of rotations below which it says nothing: they turn against each other
-STILL = 1e-4  # squared row weight of a turn times its lever: fixes what neither data nor neighbours do
+Blocks = Float64[np.ndarray, "B 6 6"]  # diagonal blocks of the normal equations, one for each node
+LARGEST_TURN = 0.5  # rad, largest rotation of a node in one step: a guess
+FLATTEST = 0.1  # a blend of rotations with a smaller determinant has no usable inverse: a guess
+STILL = 1e-4  # squared row weight of a rotation times its lever, for nodes without data or neighbours: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where the nodes are and how they are turned, relative to their rest."""
+    """Positions of the nodes, and their rotations relative to rest."""
 
     rotations: Float64[np.ndarray, "N 3 3"]
     positions: Float64[np.ndarray, "N 3"]
 
     @staticmethod
     def at(nodes: Float64[np.ndarray, "N 3"]) -> Pose:
-        """The nodes in their own places, not turned."""
+        """Return the pose of nodes at rest."""
         return Pose(np.tile(np.eye(3), (len(nodes), 1, 1)), nodes.copy())
 
     @property
     def is_finite(self) -> bool:
-        """False where a solve blew up."""
+        """Whether all numbers are finite; False after a solve has diverged."""
         return bool(np.isfinite(self.rotations).all() and np.isfinite(self.positions).all())
 
 
@@ -62,7 +62,7 @@ class Planes:
 def moved(
     points: Float64[np.ndarray, "P 3"], nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose
 ) -> Float64[np.ndarray, "P 3"]:
-    """Bound points, which lie in the rest of the nodes, in a pose of the nodes."""
+    """Move bound points from the rest of the nodes to a pose."""
     blended = _affine(nodes, binding, pose)
     return np.einsum("pij,pj->pi", blended[:, :, :3], points) + blended[:, :, 3]
 
@@ -70,7 +70,7 @@ def moved(
 def unmoved(
     points: Float64[np.ndarray, "P 3"], nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose
 ) -> tuple[Float64[np.ndarray, "P 3"], Bool[np.ndarray, " P"]]:
-    """Where bound points that lie in a pose of the nodes are at rest; False where the nodes' blend has no inverse."""
+    """Move bound points from a pose back to rest; also return False for points whose motion has no inverse."""
     blended = _affine(nodes, binding, pose)
     linear, offsets = blended[:, :, :3].copy(), points - blended[:, :, 3]
     known = np.abs(np.linalg.det(linear)) > FLATTEST
@@ -79,14 +79,14 @@ def unmoved(
 
 
 def _affine(nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 4"]:
-    """The blend of the nodes' motions at each bound point."""
+    """Blend the nodes' motions at each bound point."""
     offsets = pose.positions - np.einsum("nij,nj->ni", pose.rotations, nodes)
     affine = np.concatenate([pose.rotations, offsets[:, :, None]], axis=2).reshape(-1, 12)
     return _blend(affine, binding).reshape(-1, 3, 4)
 
 
 def turned(vectors: Float64[np.ndarray, "P 3"], binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3"]:
-    """Unit vectors (normals) of bound points, turned with their nodes."""
+    """Rotate unit vectors (normals) of bound points with their nodes."""
     blended = _blend(pose.rotations.reshape(-1, 9), binding).reshape(-1, 3, 3)
     result = np.einsum("pij,pj->pi", blended, vectors)
     length = np.linalg.norm(result, axis=1, keepdims=True)
@@ -94,7 +94,7 @@ def turned(vectors: Float64[np.ndarray, "P 3"], binding: Binding, pose: Pose) ->
 
 
 def rotation(binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 3"]:
-    """The rotation of each bound point: the nearest one to the blend of its nodes'."""
+    """Return the rotation nearest to the blend of the nodes' rotations at each bound point."""
     u, _, vt = np.linalg.svd(_blend(pose.rotations.reshape(-1, 9), binding).reshape(-1, 3, 3))
     u[:, :, 2] *= np.where(np.linalg.det(u @ vt) < 0, -1.0, 1.0)[:, None]
     return u @ vt
@@ -108,8 +108,8 @@ def _blend(rows: Float64[np.ndarray, "N n"], binding: Binding) -> Float64[np.nda
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
-    """Nodes in a rest pose, the edges that keep them rigid, and the samples that are bound to them."""
+class RestGraph:
+    """Deformation graph at rest: nodes, the edges that keep them rigid, and the samples bound to them."""
 
     nodes: Float64[np.ndarray, "N 3"]
     edges: Int64[np.ndarray, "E 2"]
@@ -119,9 +119,9 @@ class Rest:
 
 
 class GraphSolver:
-    """Solves for the pose of a deformation graph; `held` is how much its edges count before anything is known."""
+    """Solver for the pose of a deformation graph; `held` are initial weights of its edges, 1 by default."""
 
-    def __init__(self, rest: Rest, held: Float64[np.ndarray, " E"] | None = None) -> None:
+    def __init__(self, rest: RestGraph, held: Float64[np.ndarray, " E"] | None = None) -> None:
         self.rest = rest
         i, j = rest.edges.T
         self._held = np.ones(len(i)) if held is None else held
@@ -141,7 +141,7 @@ class GraphSolver:
         place: float,
         limits: Limits,
     ) -> Pose:
-        """The pose after one Gauss-Newton step.
+        """Return the pose after one Gauss-Newton step.
 
         `rigidity` and `place` (towards this pose) are squared row weights in units of the mean data weight of a node.
         """
@@ -163,7 +163,7 @@ class GraphSolver:
         return Pose(Rotation.from_rotvec(turn).as_matrix() @ pose.rotations, pose.positions + x[:, 3:])
 
     def holds(self, pose: Pose, torn: float) -> Float64[np.ndarray, " E"]:
-        """How much each edge still counts: 1 where it is as at rest, a quarter where it misses `torn` of its length."""
+        """Return the weight of each edge: 1 for one as at rest, a quarter for one off by `torn` of its length."""
         i, j = self.rest.edges.T
         gap = np.einsum("eij,ej->ei", pose.rotations[i], self._arms) + pose.positions[i] - pose.positions[j]
         share = np.einsum("ed,ed->e", gap, gap) / self._lengths
@@ -188,7 +188,7 @@ class GraphSolver:
     def _rigid_rows(
         self, pose: Pose, root: Float64[np.ndarray, " E"]
     ) -> tuple[sparse.csr_array, Float64[np.ndarray, " E3"], Blocks]:
-        """Rows of turn x e + step_i - step_j, per axis two turns and two steps."""
+        """Return rows of turn x e + step_i - step_j, with two turns and two steps per axis."""
         i, j = self.rest.edges.T
         e = np.einsum("eij,ej->ei", pose.rotations[i], self._arms)
         miss = -root[:, None] * (e + pose.positions[i] - pose.positions[j])
@@ -205,7 +205,7 @@ class GraphSolver:
 
 
 def _outer_sums(vectors: Float64[np.ndarray, "M 6"], nodes: Int64[np.ndarray, " M"], count: int) -> Blocks:
-    """The sum of v v^T over the vectors of each node."""
+    """Sum v v^T over the vectors of each node."""
     gather = sparse.csr_array((np.ones(len(nodes)), nodes, np.arange(len(nodes) + 1)), (len(nodes), count))
     return (gather.T @ (vectors[:, :, None] * vectors[:, None, :]).reshape(-1, 36)).reshape(-1, 6, 6)
 
@@ -234,7 +234,7 @@ def _solved(
     right: Float64[np.ndarray, " M"],
     limits: Limits,
 ) -> Float64[np.ndarray, " M"]:
-    """x of (rows^T rows + prior) x = right; preconditioned by the inverse of the nodes' blocks of that matrix."""
+    """Solve (rows^T rows + prior) x = right, preconditioned by the inverse of the nodes' blocks of that matrix."""
     back, inverse = sparse.csr_array(rows.T), np.linalg.inv(blocks)
     return conjugate_gradients(
         lambda x: back @ (rows @ x) + prior * x,

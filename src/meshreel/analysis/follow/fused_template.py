@@ -1,8 +1,8 @@
-"""One surface fused from all frames that a key frame is followed through (paper, section 3.3.2).
+"""Fuse one template from all frames through which a key frame is tracked (paper, section 3.3.2; decision 16).
 
-In: the motion of the key frame's mesh, and the frames. Out: a mesh in the key's pose of what enough of them have: noise
-averages out, holes that come and go are closed, borders that stay open stay where they usually are.
-Every frame is carried back to the key by the inverse of the blended motion; screened Poisson goes through all points.
+In: the motion of the key frame's mesh, and the frames. Out: a mesh in the key's pose of the surface that enough frames
+have: noise averages out, temporary holes are closed, and lasting borders stay where they usually are. Every frame is
+moved back to the key by the inverse of the blended motion; screened Poisson reconstruction uses all points.
 """
 
 from __future__ import annotations
@@ -17,59 +17,63 @@ from ...errors import InputError
 from ...geometry.poisson import PoissonOptions, drop_small, reconstruct
 from ...geometry.topology import clean, edge_lengths, vertex_normals
 from ...types import Mesh
-from ..fit.match import ON_BORDER, Target, interpolated_scalar
+from ..fit.match import ON_BORDER, FrameSurface, interpolated_scalar
 from .embedded import Motion
 
-SHALLOWEST, DEEPEST = 4, 10  # octree levels
-ROOM = 1.1  # Poisson's octree is so much wider than the points
+SHALLOWEST, DEEPEST = 4, 10  # limits of the octree's depth: guesses
+ROOM = 1.1  # width of Poisson's octree, in widths of the points
 
 
 @dataclass(frozen=True, slots=True)
 class FusedOptions:
-    """How frames become one surface; lengths are in cells of the reconstruction."""
+    """Options of the fusion of frames into a template (values: decision 16)."""
 
-    noise: float = 1.0  # RMS distances that a cell is wide at least: less resolves noise
-    spacing: float = 0.5  # median edge lengths of the frames that it is wide at least: less resolves nothing
-    reach: float = 1.5  # cells to a frame's surface within which the frame agrees
-    agree: float = 0.18  # share of the frames that must agree, and two of them at least
+    noise: float = 1.0  # smallest width of a cell, in RMS noise: finer cells resolve noise
+    spacing: float = 0.5  # smallest width of a cell, in median edge lengths of the frames: finer cells resolve nothing
+    reach: float = 1.5  # cells: a frame agrees with surface up to this distance from its own
+    agree: float = 0.18  # smallest share of the frames that must agree, and at least two of them
     smallest: float = 0.02  # connected bits with less than this share of the largest one's faces are dropped
 
     def __post_init__(self) -> None:
         if min(self.noise, self.spacing) < 0 or self.noise + self.spacing == 0 or not self.reach > 0:
             raise InputError(
                 f"fusion noise {self.noise:g}, spacing {self.spacing:g}, reach {self.reach:g}: "
-                "give >= 0, >= 0, one of them above 0, and > 0"
+                "give >= 0, >= 0, one of them > 0, and > 0"
             )
         if not 0 < self.agree <= 1 or not 0 <= self.smallest < 1:
             raise InputError(f"agree {self.agree:g}, smallest {self.smallest:g}: give shares in (0, 1] and [0, 1)")
 
 
-def fused_mesh(motion: Motion, targets: Sequence[Target], noise: float, options: FusedOptions = FusedOptions()) -> Mesh:
-    """The surface that the first frames of a motion, one a target, have in common, in the key's pose.
+def fused_mesh(
+    motion: Motion, frames: Sequence[FrameSurface], noise: float, options: FusedOptions = FusedOptions()
+) -> Mesh:
+    """Fuse the surface that the first `len(frames)` frames of a motion have in common, in the key's pose.
 
-    `noise` is the RMS distance of the frames from the truth. The empty mesh where too little agrees.
+    `noise` is the RMS distance of the frames from the truth. The mesh is empty if too little agrees.
     """
-    carried = [Target(motion.back(at, target.mesh)) for at, target in enumerate(targets)]
+    carried = [FrameSurface(motion.back(at, frame.mesh)) for at, frame in enumerate(frames)]
     points = np.concatenate([one.mesh.vertices for one in carried])
-    cell = max(options.noise * noise, options.spacing * _spacing(targets))
+    cell = max(options.noise * noise, options.spacing * _spacing(frames))
     if len(points) < 10 or cell == 0:
         return Mesh.empty()
     extent = ROOM * float(np.ptp(points, axis=0).max())
     depth = int(np.clip(np.floor(np.log2(extent / cell)), SHALLOWEST, DEEPEST))
     reach = options.reach * max(cell, extent / 2**depth)
-    fewest = max(min(2, len(targets)), int(np.ceil(options.agree * len(targets))))
-    most = max(len(target.mesh.vertices) for target in targets)
+    fewest = max(min(2, len(frames)), int(np.ceil(options.agree * len(frames))))
+    most = max(len(frame.mesh.vertices) for frame in frames)
     poisson = PoissonOptions(depth=depth, reach=reach, vertices=max(most, 4), smallest=options.smallest)
-    surface = reconstruct(points, np.concatenate([one.normals for one in carried]), poisson)  # all: each has one vote
+    surface = reconstruct(
+        points, np.concatenate([one.normals for one in carried]), poisson
+    )  # all points: each has one vote
     if surface.is_empty:
         return surface
     sure = _agreeing(surface, carried, reach) >= fewest
-    believed = sure[surface.faces].sum(axis=1) >= 2  # neither all nor any: borders would recede or grow by half a face
+    believed = sure[surface.faces].sum(axis=1) >= 2  # with all or any, borders would recede or grow by half a face
     return drop_small(clean(Mesh(surface.vertices, surface.faces[believed])), options.smallest)
 
 
-def _agreeing(surface: Mesh, frames: Sequence[Target], reach: float) -> Int64[np.ndarray, " V"]:
-    """How many frames have surface at each vertex: within reach, facing the same way, and not past a border."""
+def _agreeing(surface: Mesh, frames: Sequence[FrameSurface], reach: float) -> Int64[np.ndarray, " V"]:
+    """Count the frames that have surface at each vertex: within reach, facing the same way, and not past a border."""
     normals = vertex_normals(surface)
     count = np.zeros(len(surface.vertices), np.int64)
     for frame in frames:
@@ -80,6 +84,6 @@ def _agreeing(surface: Mesh, frames: Sequence[Target], reach: float) -> Int64[np
     return count
 
 
-def _spacing(targets: Sequence[Target]) -> float:
-    """The median length of the frames' edges."""
-    return float(np.median([np.median(edge_lengths(target.mesh)) for target in targets]))
+def _spacing(frames: Sequence[FrameSurface]) -> float:
+    """Return the median over the frames of their median edge length."""
+    return float(np.median([np.median(edge_lengths(frame.mesh)) for frame in frames]))

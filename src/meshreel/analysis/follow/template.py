@@ -1,6 +1,7 @@
-"""The template of a group of layers: a coarse base mesh of its key frame, and detail that all frames share.
+"""Make the template of a group in form `layers`: a coarse base mesh of its key frame, and detail that all frames share.
 
-In: a key frame; fitted positions of the subdivided base. Out: the base; positions whose detail does not change.
+In: a key frame; fitted positions of the subdivided base. Out: the base; positions whose detail is constant
+(docs/decisions/0014-template.md).
 """
 
 from __future__ import annotations
@@ -17,17 +18,17 @@ from ...geometry.decimate import BOUNDARY_WEIGHT, decimate
 from ...geometry.subdivision import heights, levels_of, refine
 from ...types import Mesh
 
-FEWEST = 40  # vertices of a base mesh: below, a body has no limbs
+FEWEST = 40  # smallest number of vertices of a base mesh, enough for a body's limbs: a guess
 DECAY = 1.2  # the error of quadric decimation falls with this power of the number of vertices (measured on bodies)
-CURVATURE = 52  # of midpoints, 64ths: about what the coder has; what is left of the bend is detail
-ROUNDS = 2  # of the search for the number of vertices
+CURVATURE = 52  # 64ths, lift of midpoints, between the coder's 48 and 58 (decision 14)
+ROUNDS = 2  # rounds of the search for the number of vertices: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class TemplateOptions:
-    """How fine the template of a group is."""
+    """Options of the template of a group (decision 14)."""
 
-    error: float = 1.1e-3  # RMS distance of the key frame's vertices to the base mesh to aim at, of the diagonal
+    error: float = 1.1e-3  # desired RMS distance of the key frame's vertices to the base mesh, in diagonals
     levels: int = 2  # midpoint subdivisions of the base
     border: float = BOUNDARY_WEIGHT  # weight of open borders in the decimation
 
@@ -40,7 +41,7 @@ class TemplateOptions:
 
 
 def base_mesh(key: Mesh, options: TemplateOptions) -> Mesh:
-    """The key frame decimated until its error is about what the options ask for."""
+    """Decimate the key frame until its error is about `options.error`."""
     most = len(key.vertices)
     count = min(max(most // 20, FEWEST), most)
     for left in reversed(range(ROUNDS + 1)):
@@ -57,9 +58,9 @@ def base_mesh(key: Mesh, options: TemplateOptions) -> Mesh:
 def shared_detail(
     faces: Int32[np.ndarray, "F 3"], count: int, levels: int
 ) -> Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]:
-    """What makes fitted positions coherent: `count` base vertices stay, the detail becomes its median over time.
+    """Return a function that makes fitted positions coherent by replacing their detail with its median over time.
 
-    Detail is what the coder sees: scalars along the normals of the coarser level.
+    The `count` base vertices stay. Detail is defined as in the coder: scalars along the normals of the coarser level.
     """
     hierarchy = levels_of(faces, count, levels)
 

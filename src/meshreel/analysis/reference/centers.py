@@ -1,9 +1,9 @@
-"""Reference centers: one pose for all frames of a group, in which nothing touches (paper, section 3.3.1, eqs. 5-6).
+"""Compute reference centers: one pose for a group in which no bodies touch (paper, section 3.3.1, eqs. 5-6).
 
-In: tracked centers. Out: their largest distances, the pose that keeps those distances best (SMACOF from a
-classical start), and the affinity of each pair.
+In: tracked centers. Out: the largest distances between them over all frames, the pose that keeps these distances best
+(SMACOF from a classical start), and the affinity of each pair.
 
-Differs from the paper: distances do not tell left from right, so a real frame's pose settles the reflection.
+Differs from the paper: distances determine a pose only up to reflection, so a real frame's pose decides the reflection.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ...types import Centers
 
 @dataclass(frozen=True, slots=True)
 class ReferenceCenterOptions:
-    """How eqs. 5 and 6 are solved."""
+    """Options of the solution of eqs. 5 and 6; the values are guesses."""
 
-    max_rounds: int = 80  # SMACOF rounds at most
-    tolerance: float = 2e-4  # stop where a round lowers the stress by less than this share
-    reach: float = 2.0  # affinity is 1/2 at this many typical distances between nearest centers (eq. 6's sigma)
-    seed: int = 0  # of the eigenvector iteration's start
+    max_rounds: int = 80  # largest number of SMACOF rounds
+    tolerance: float = 2e-4  # stop when a round lowers the stress by less than this share
+    reach: float = 2.0  # affinity is 1/2 at this many median distances to the nearest center (eq. 6's sigma)
+    seed: int = 0  # seed of the eigenvector iteration's start
 
     def __post_init__(self) -> None:
         if self.max_rounds < 0:
@@ -38,17 +38,17 @@ class ReferenceCenterOptions:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceCenters:
-    """The pose found and how well it keeps the distances."""
+    """Pose that keeps the largest distances best, with its stress."""
 
-    positions: Float64[np.ndarray, "K 3"]  # in the frame of the pose it was aligned to
+    positions: Float64[np.ndarray, "K 3"]  # aligned to a real frame's pose
     stress: float  # eq. 5; 0 is perfect
     rounds: int  # SMACOF rounds done
 
 
 def largest_distances(centers: Centers) -> Float32[np.ndarray, "K K"]:
-    """The largest distance of each pair of centers over all frames (eq. 5's d), in units of the centers.
+    """Return the largest distance of each pair of centers over all frames (eq. 5's d), in units of the centers.
 
-    Two K x K arrays in float32 at a time, whatever the number of frames.
+    Takes the memory of two K x K arrays in float32, whatever the number of frames.
     """
     largest = np.zeros((centers.positions.shape[1],) * 2, np.float32)
     for pose in centers.positions:
@@ -61,8 +61,8 @@ def largest_distances(centers: Centers) -> Float32[np.ndarray, "K K"]:
 def reference_centers(
     distances: Float32[np.ndarray, "K K"], pose: Float64[np.ndarray, "K 3"], options: ReferenceCenterOptions
 ) -> ReferenceCenters:
-    """The pose of least stress (eq. 5), turned, shifted and, where needed, mirrored to agree with a frame's `pose`."""
-    if len(distances) < 4 or not distances.any():  # three points or fewer, or all at one place: no shape is open
+    """Find the pose of least stress (eq. 5), rotated, shifted and mirrored to agree best with a frame's `pose`."""
+    if len(distances) < 4 or not distances.any():  # up to three points, or all in one place: there is nothing to find
         return ReferenceCenters(pose.copy(), _stress(distances, pose), 0)
     positions, rounds = _smacof(distances, _classical(distances, options), options)
     positions = _orient(positions, pose, distances)
@@ -70,29 +70,29 @@ def reference_centers(
 
 
 def affinity(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOptions) -> Float32[np.ndarray, "K K"]:
-    """How strongly each pair of centers is connected, 1 for a center and itself (eq. 6).
+    """Return the affinity of each pair of centers, 1 for a center with itself (eq. 6).
 
-    Sigma follows from the spacing of the centers, so that it needs no unit and no number of bodies.
+    Sigma follows from the spacing of the centers, so that it depends neither on the unit nor on the number of bodies.
     """
     sigma = np.sqrt(np.log(2)) / max(options.reach * center_spacing(distances), np.finfo(np.float32).tiny)
     return np.exp(-np.square(np.float32(sigma) * distances))  # eq. 6
 
 
 def center_spacing(distances: Float32[np.ndarray, "K K"]) -> float:
-    """The typical (median) distance from a center to its nearest other one."""
+    """Return the median distance from a center to the nearest other one."""
     if len(distances) < 2:
         return 0.0
     return float(np.median(np.partition(distances, 1, axis=1)[:, 1]))
 
 
 def _classical(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOptions) -> Float64[np.ndarray, "K 3"]:
-    """Torgerson's classical scaling: the three strongest axes of the doubly centered squared distances."""
+    """Scale classically (Torgerson): project on the three strongest axes of the doubly centered squared distances."""
     from scipy.sparse.linalg import eigsh
 
     gram = -0.5 * np.square(distances)
     gram -= gram.mean(axis=0, keepdims=True)
     gram -= gram.mean(axis=1, keepdims=True)
-    if len(gram) <= 8:  # the iteration wants more than a handful of rows
+    if len(gram) <= 8:  # `eigsh` needs more rows than vectors
         values, vectors = np.linalg.eigh(gram.astype(np.float64))
         values, vectors = values[-3:], vectors[:, -3:]
     else:
@@ -104,9 +104,10 @@ def _classical(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOp
 def _smacof(
     distances: Float32[np.ndarray, "K K"], start: Float64[np.ndarray, "K 3"], options: ReferenceCenterOptions
 ) -> tuple[Float64[np.ndarray, "K 3"], int]:
-    """Majorisation with doubled steps: a step that does not lower the stress is taken back to the safe half.
+    """Minimise stress by majorisation with doubled steps; return the positions and the number of rounds.
 
-    One round costs one distance matrix. All in float32: positions are near the origin.
+    A doubled step that raises the stress is replaced by the plain one. A round computes one distance matrix, or two.
+    Everything is float32, which suffices because positions are near the origin.
     """
     x = (start - start.mean(axis=0)).astype(np.float32)
     guttman, stress = _guttman(distances, x)
@@ -128,7 +129,7 @@ def _smacof(
 def _guttman(
     distances: Float32[np.ndarray, "K K"], x: Float32[np.ndarray, "K 3"]
 ) -> tuple[Float32[np.ndarray, "K 3"], float]:
-    """The Guttman transform of x and the raw stress of x."""
+    """Return the Guttman transform of x and the raw stress of x."""
     current = np.sqrt(_squared_distances(x))
     np.maximum(current, np.float32(1e-12), out=current)
     ratio = distances / current
@@ -142,9 +143,9 @@ def _guttman(
 def _orient(
     positions: Float64[np.ndarray, "K 3"], pose: Float64[np.ndarray, "K 3"], distances: Float32[np.ndarray, "K K"]
 ) -> Float64[np.ndarray, "K 3"]:
-    """Positions aligned to a real pose, mirrored where most small neighbourhoods are inside out.
+    """Align positions to a real pose, mirrored if most small neighbourhoods are inside out.
 
-    A limb may lie elsewhere than in the frame, so the global fit may prefer the mirror image; neighbourhoods do not.
+    A limb may be elsewhere than in the frame, so a global fit may prefer the mirror image; neighbourhoods do not.
     """
     count = min(12, len(pose))
     near = np.argpartition(distances, count - 1, axis=1)[:, :count]
@@ -160,7 +161,7 @@ def _orient(
 
 
 def _stress(distances: Float32[np.ndarray, "K K"], positions: Float64[np.ndarray, "K 3"]) -> float:
-    """Kruskal's stress (eq. 5); both sums run over each pair twice, which cancels."""
+    """Return Kruskal's stress (eq. 5); both of its sums count every pair twice, which cancels."""
     current = np.sqrt(_squared_distances(positions))
     np.fill_diagonal(current, 0)
     norm = float(np.linalg.norm(distances))

@@ -1,10 +1,10 @@
-"""Center-affinity deformation: points follow the centers that belong to them (paper, section 3.3.2, eq. 7).
+"""Deform points from one pose of the centers to another by center affinity (paper, section 3.3.2, eq. 7).
 
-In: points in one pose of the centers. Out: the same points in another pose; the way back swaps the poses.
+In: points in one pose of the centers. Out: the same points in another pose; the inverse swaps the poses.
 
-Differs from the paper: where bodies touch, a vertex's nearest center (eq. 7) may be the other body's. So centers in
-front of the surface count as farther, and a vertex whose center is a stranger to its mesh neighbours' centers takes
-another of its few nearest.
+Differs from the paper: where bodies touch, a vertex's nearest center (eq. 7) may belong to the other body. So centers
+in front of the surface count as farther, and a vertex whose center has little affinity to the centers of its mesh
+neighbours takes another of its nearest centers.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from ...geometry.rigid import apply, blend, fit_rigid, from_rigid, rotate
 from ...geometry.topology import unique_edges, vertex_normals
 from ...types import Mesh
 
-FRONT = 4.0  # a center in front of the surface counts as this many times as far
+FRONT = 4.0  # factor on the distance by which a center lies in front of the surface: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class DeformOptions:
-    """Which centers move a point, and how their say falls off."""
+    """Options of the choice of the centers that move a point, and of their weights; guesses except `neighbours`."""
 
-    neighbours: int = 8  # centers per neighbourhood (the paper's K_nbr), itself included
-    falloff: float = 1.0  # a center's say falls to 1/e at this many center spacings beyond the point's nearest one
-    guard_choices: int = 6  # nearest centers a vertex may take instead of a stranger; 1 is the paper's rule alone
-    guard_rounds: int = 2  # passes of that guard over the mesh
+    neighbours: int = 8  # centers per neighbourhood (the paper's K_nbr), including the center itself
+    falloff: float = 1.0  # a weight falls to 1/e at this many center spacings beyond the point's nearest center
+    guard_choices: int = 6  # nearest centers that a vertex may take in place of an unrelated one; 1: the paper's rule
+    guard_rounds: int = 2  # passes over the mesh that replace unrelated centers
 
     def __post_init__(self) -> None:
         if self.neighbours < 1:
@@ -42,7 +42,7 @@ class DeformOptions:
 
 @dataclass(frozen=True, slots=True)
 class Neighbours:
-    """The neighbourhood of each center, by affinity, itself first."""
+    """Neighbourhoods of the centers, each sorted by decreasing affinity and beginning with the center itself."""
 
     indices: Int64[np.ndarray, "K n"]
     affinities: Float64[np.ndarray, "K n"]  # eq. 6
@@ -51,7 +51,7 @@ class Neighbours:
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """Which centers move each point, and with what share: it holds for any target pose."""
+    """Centers that move each point, with their weights; valid for any target pose."""
 
     nearest: Int64[np.ndarray, " V"]  # k1, eq. 7
     weights: Float64[np.ndarray, "V n"]  # of the neighbours of k1; rows sum to 1
@@ -64,16 +64,16 @@ def deform(
     neighbours: Neighbours,
     options: DeformOptions,
 ) -> Float64[np.ndarray, "V 3"]:
-    """The mesh's vertices, which lie in the source pose, moved to the target pose (eq. 7)."""
+    """Move the vertices of a mesh from the source pose to the target pose (eq. 7)."""
     binding = bind(mesh, source, neighbours, options)
     return move(mesh.vertices, binding, center_motions(source, target, neighbours), neighbours)
 
 
 def neighbours(affinity: Float32[np.ndarray, "K K"], options: DeformOptions) -> Neighbours:
-    """The top K_nbr centers by affinity to each center, itself first, then falling."""
+    """Return the K_nbr centers with the largest affinity to each center, itself first, then in decreasing order."""
     count = min(options.neighbours, len(affinity))
     distance = 1 - affinity
-    np.fill_diagonal(distance, -1)  # a twin at the same place may not push a center out of its own neighbourhood
+    np.fill_diagonal(distance, -1)  # a center comes first even if another one is at the same place
     some = np.argpartition(distance, count - 1, axis=1)[:, :count]
     order = np.argsort(np.take_along_axis(distance, some, axis=1), axis=1, kind="stable")
     indices = np.take_along_axis(some, order, axis=1).astype(np.int64)
@@ -83,13 +83,13 @@ def neighbours(affinity: Float32[np.ndarray, "K K"], options: DeformOptions) -> 
 def center_motions(
     source: Float64[np.ndarray, "K 3"], target: Float64[np.ndarray, "K 3"], neighbours: Neighbours
 ) -> Float64[np.ndarray, "K 8"]:
-    """Each center's motion between two poses, fitted to its neighbourhood by affinity (weighted Kabsch)."""
+    """Fit each center's rigid motion between two poses to its neighbourhood, weighted by affinity (weighted Kabsch)."""
     rotations, translations = fit_rigid(source[neighbours.indices], target[neighbours.indices], neighbours.affinities)
     return from_rigid(rotations, translations)
 
 
 def bind(mesh: Mesh, source: Float64[np.ndarray, "K 3"], neighbours: Neighbours, options: DeformOptions) -> Binding:
-    """The centers that move each vertex of a mesh that lies in the source pose, and their shares."""
+    """Choose the centers that move each vertex of a mesh in the source pose, with their weights."""
     from scipy.spatial import cKDTree
 
     choices = min(options.guard_choices, len(source))
@@ -110,7 +110,7 @@ def move(
     motions: Float64[np.ndarray, "K 8"],
     neighbours: Neighbours,
 ) -> Float64[np.ndarray, "V 3"]:
-    """Bound points moved by the blend of their centers' motions."""
+    """Move bound points by the blend of their centers' motions."""
     return apply(blended(binding, motions, neighbours), points)
 
 
@@ -120,14 +120,14 @@ def move_normals(
     motions: Float64[np.ndarray, "K 8"],
     neighbours: Neighbours,
 ) -> Float64[np.ndarray, "V 3"]:
-    """Normals of bound points, turned as their points are."""
+    """Rotate the normals of bound points as `move` rotates the points."""
     return rotate(blended(binding, motions, neighbours), normals)
 
 
 def blended(
     binding: Binding, motions: Float64[np.ndarray, "K 8"], neighbours: Neighbours
 ) -> Float64[np.ndarray, "V 8"]:
-    """One unit dual quaternion for each bound point."""
+    """Blend the motions of each point's centers into one unit dual quaternion per point."""
     rows = neighbours.indices[binding.nearest]
     return blend(motions[rows], binding.weights)
 
@@ -138,9 +138,9 @@ def _behind_first(
     reach: Float64[np.ndarray, "V n"],
     source: Float64[np.ndarray, "K 3"],
 ) -> Int64[np.ndarray, "V n"]:
-    """Each vertex's nearest centers, sorted anew by distance plus what they stand in front of the surface.
+    """Sort each vertex's nearest centers by distance, with centers in front of the surface counted as farther.
 
-    A body's own centers are inside it, so behind its surface.
+    The centers of a body are inside it, so behind its surface.
     """
     offset = source[near] - mesh.vertices[:, None]
     front = np.maximum(np.einsum("vnd,vd->vn", offset, vertex_normals(mesh)), 0)
@@ -151,7 +151,7 @@ def _behind_first(
 def _guard(
     mesh: Mesh, near: Int64[np.ndarray, "V n"], nearest: Int64[np.ndarray, " V"], neighbours: Neighbours
 ) -> Int64[np.ndarray, " V"]:
-    """k1 of each vertex, replaced where its affinity to the mesh neighbours' k1 is under half of what it could be."""
+    """Replace k1 of a vertex if its affinity to the mesh neighbours' k1 is under half of the largest possible."""
     edges, _ = unique_edges(mesh.faces)
     to, other = np.concatenate([edges, edges[:, ::-1]]).T
     kin = np.zeros(near.shape)
@@ -171,10 +171,10 @@ def _weights(
     neighbours: Neighbours,
     options: DeformOptions,
 ) -> Float64[np.ndarray, "V n"]:
-    """Shares that fall off with the distance to the point (in this pose) and with the affinity to k1."""
+    """Return weights that fall off with the distance to the point (in this pose) and with the affinity to k1."""
     rows = neighbours.indices[nearest]
     square = np.sum(np.square(points[:, None] - source[rows]), axis=2)
-    square -= square.min(axis=1, keepdims=True)  # far from all centers the nearest ones still decide
+    square -= square.min(axis=1, keepdims=True)  # keeps weights from vanishing far from all centers
     width = options.falloff * _spacing(source, neighbours)
     weights = neighbours.affinities[nearest] * np.exp(-square / max(width**2, np.finfo(float).tiny))
     return weights / weights.sum(axis=1, keepdims=True)

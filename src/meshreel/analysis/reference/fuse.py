@@ -1,9 +1,9 @@
-"""All frames of a group as one surface in one pose of the centers (paper, section 3.3.2).
+"""Fuse all frames of a group into one surface in one pose of the centers (paper, section 3.3.2).
 
 In: frames, centers, a pose, a key frame. Out: the dense points of the frames deformed to the pose, and their mesh.
 
-Differs from the paper: the key frame's points come first, and other frames add what it lacks; faces that tear on the
-way, or join parts that are apart in some frame, are cut; surface far from all points is not invented.
+Differs from the paper: the key frame's points come first, and other frames add what it lacks; faces that tear in the
+deformation, or join parts that are separate in some frame, are cut; no surface is made far from all points.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from ...types import Mesh
 from .centers import center_spacing
 from .deform import Binding, DeformOptions, Neighbours, bind, center_motions, move, move_normals
 
-Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # of geometry.topology.unique_edges
+Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # result of geometry.topology.unique_edges
 
-SPARSE_ROUNDS = 4  # midpoint rounds at most for large faces
+SPARSE_ROUNDS = 4  # largest number of midpoint rounds for large faces: a guess
 
 
 @dataclass(frozen=True, slots=True)
 class FuseOptions:
-    """How the frames' points become one surface; lengths in mean edges of the frames' meshes."""
+    """Options of the fusion of the frames' points; lengths in mean edges of the frames' meshes; guesses."""
 
     subdivisions: int = 1  # midpoint rounds that make each frame's points dense
-    cover: float = 0.3  # a frame adds points where those before it have less than this share of its surface
+    cover: float = 0.3  # a frame adds points where earlier ones have less than this share of its surface
     cell: float = 0.75  # points are averaged in cells of this size
-    reach: float = 1.5  # no surface farther than this from every point
-    torn: float = 3.0  # a length that grows beyond this factor, plus half a center spacing, tears
+    reach: float = 1.5  # surface farther than this from every point is removed
+    torn: float = 3.0  # an edge that grows to more than this factor, plus half a center spacing, tears
     smallest: float = 0.01  # connected bits with less than this share of the largest one's faces are dropped
-    hole: float = 0.08  # holes with a shorter perimeter are closed, as share of the mesh's diagonal: cuts leave them
+    hole: float = 0.08  # holes with a shorter perimeter, which cuts leave, are closed; share of the mesh's diagonal
     poisson: PoissonOptions = field(default_factory=PoissonOptions)
 
     def __post_init__(self) -> None:
@@ -51,21 +51,24 @@ class FuseOptions:
             raise InputError(f"cell {self.cell}, reach {self.reach}, torn {self.torn}: give > 0, > 0 and > 1")
 
 
-class Group:
-    """Frames with what holds in every pose: their centers' neighbourhoods, bindings, and the faces that part."""
+@dataclass(frozen=True, slots=True)
+class GroupCenters:
+    """Centers of some frames of a group, with the largest distances and the neighbourhoods over all its frames."""
 
-    def __init__(
-        self,
-        frames: Sequence[Mesh],
-        positions: Float64[np.ndarray, "T K 3"],
-        distances: Float32[np.ndarray, "K K"],
-        kin: Neighbours,
-        options: tuple[DeformOptions, FuseOptions],
-    ) -> None:
-        """Non-empty frames, their centers, and of all frames of the group the largest distances and neighbours."""
+    positions: Float64[np.ndarray, "T K 3"]
+    distances: Float32[np.ndarray, "K K"]  # eq. 5's d
+    kin: Neighbours
+
+
+class Group:
+    """Frames with data that hold in every pose: neighbourhoods of centers, bindings, faces that join separate parts."""
+
+    def __init__(self, frames: Sequence[Mesh], centers: GroupCenters, deform: DeformOptions, fuse: FuseOptions) -> None:
+        """Bind non-empty frames to their centers."""
+        positions, kin = centers.positions, centers.kin
         self.frames, self.positions, self.kin = frames, positions, kin
-        self.deform, self.fuse = options
-        self.distances, self.spacing = distances, center_spacing(distances)
+        self.deform, self.fuse = deform, fuse
+        self.distances, self.spacing = centers.distances, center_spacing(centers.distances)
         self.edges = [unique_edges(frame.faces) for frame in frames]
         self.edge = float(
             np.mean([_lengths(f.vertices, e).mean() for f, (e, _) in zip(frames, self.edges, strict=True)])
@@ -75,7 +78,7 @@ class Group:
         self.parting = [self._parting(*each) for each in zip(self.edges, self.bindings, positions, strict=True)]
 
     def sent(self, mesh: Mesh, pose: Float64[np.ndarray, "K 3"]) -> Float64[np.ndarray, "T V 3"]:
-        """The vertices of a mesh in this pose, deformed to each frame."""
+        """Deform the vertices of a mesh in this pose to each frame."""
         binding = bind(mesh, pose, self.kin, self.deform)
         motions = (center_motions(pose, target, self.kin) for target in self.positions)
         return np.stack([move(mesh.vertices, binding, each, self.kin) for each in motions])
@@ -83,9 +86,9 @@ class Group:
     def cloud(
         self, pose: Float64[np.ndarray, "K 3"], key: int, subdivisions: int
     ) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
-        """Points and outward normals of the surface in a pose: the key frame's, and what only others have.
+        """Return points and outward normals of the surface in a pose: the key frame's, then those of surface it lacks.
 
-        Where tracking drifts, frames disagree by more than their detail: all points at once would be many layers.
+        Where tracking drifts, frames disagree by more than their detail: all points together would form many sheets.
         """
         covered = np.zeros(len(pose))
         points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
@@ -102,7 +105,7 @@ class Group:
         return thin_out(np.concatenate(points), np.concatenate(normals), self.fuse.cell * self.edge)
 
     def fused(self, pose: Float64[np.ndarray, "K 3"], key: int, depth: int, vertices: int) -> Mesh:
-        """One mesh in a pose with about this many vertices, nothing far from data, no face that tears in a frame."""
+        """Make one mesh in a pose with about `vertices` vertices, no surface far from points, no face that tears."""
         poisson, final = self.fuse.poisson, depth >= self.fuse.poisson.depth
         options = replace(
             poisson,
@@ -125,7 +128,7 @@ class Group:
     def _moved(
         self, t: int, pose: Float64[np.ndarray, "K 3"]
     ) -> tuple[Float64[np.ndarray, "V 3"], Float64[np.ndarray, "V 3"], Int32[np.ndarray, "F 3"]]:
-        """A frame's vertices and normals in a pose, and those of its faces that came there whole."""
+        """Return a frame's vertices and normals in a pose, and those of its faces that do not tear on the way."""
         frame, binding = self.frames[t], self.bindings[t]
         motions = center_motions(self.positions[t], pose, self.kin)
         points = move(frame.vertices, binding, motions, self.kin)
@@ -136,7 +139,7 @@ class Group:
         return points, move_normals(self.normals[t], binding, motions, self.kin), faces
 
     def _parting(self, edges: Edges, binding: Binding, pose: Float64[np.ndarray, "K 3"]) -> Bool[np.ndarray, " F"]:
-        """Faces that join centers which are far more apart in some frame than in this pose."""
+        """Return the faces that join centers which are much farther from each other in some frame than in this pose."""
         i, j = binding.nearest[edges[0]].T
         now = np.linalg.norm(pose[i] - pose[j], axis=1)
         return (self.distances[i, j] > self.fuse.torn * now + self.spacing / 2)[edges[1]].any(axis=1)
@@ -144,18 +147,18 @@ class Group:
     def _torn(
         self, here: Float64[np.ndarray, "V 3"], there: Float64[np.ndarray, "V 3"], edges: Edges
     ) -> Bool[np.ndarray, " F"]:
-        """Faces with an edge that is far longer in one pose than in the other."""
+        """Return the faces with an edge that is much longer in one pose than in the other."""
         one, two = _lengths(here, edges[0]), _lengths(there, edges[0])
         far = np.maximum(one, two) > self.fuse.torn * np.minimum(one, two) + self.spacing / 2
         return far[edges[1]].any(axis=1)
 
     def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:
-        """What the neighbourhood of each center has: from frame to frame surface changes hands between neighbours."""
+        """Sum amounts over each center's neighbourhood: surface passes between neighbours from frame to frame."""
         return np.sum(amounts[self.kin.indices] * self.kin.affinities, axis=1)
 
 
 def _large(faces: Int32[np.ndarray, "F 3"], count: int, share: float) -> Bool[np.ndarray, " F"]:
-    """Faces of connected bits that are not tiny: a patch on the wrong body's centers is torn all round."""
+    """Return the faces of connected pieces that are not tiny: a patch bound to the wrong body's centers is cut off."""
     if len(faces) == 0:
         return np.zeros(0, bool)
     label = components(faces, count)[faces[:, 0]]
@@ -170,9 +173,9 @@ def _dense(
     subdivisions: int,
     longest: float,
 ) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
-    """The points of these faces with their normals, and of midpoint rounds: the first for all, then where too sparse.
+    """Return points and normals of some faces and their midpoints: `subdivisions` rounds for all, more for large faces.
 
-    A flat sole may have few, large triangles: without points inside them it would pass for far from data.
+    A flat sole may have few, large triangles: without points inside, it would count as far from the data.
     """
     found, turned = [], []
     for round_ in range(max(subdivisions, SPARSE_ROUNDS) + 1):

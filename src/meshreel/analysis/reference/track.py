@@ -1,8 +1,9 @@
-"""Volume tracking: centers that follow the volume through frames of any connectivity (paper, section 3.1).
+"""Track the volume of bodies by centers, through frames of any connectivity (paper, section 3.1).
 
-Frames in, center trajectories out. Frame 0: Lloyd's relaxation. Later frames: extrapolation, then descent on even
-spread + rigidity towards the frame before. Neighbours are those that were never far and never moved differently.
-Differs from its sources: one energy for both wishes, so that convergence is seen and steps are accelerated.
+In: frames. Out: center trajectories. Frame 0: Lloyd's relaxation. Later frames: extrapolation, then descent on an
+energy of even spread and rigidity. Neighbours were never far from each other and never moved differently.
+
+Differs from its sources: one energy has both terms, so that convergence can be measured and steps accelerated.
 """
 
 from __future__ import annotations
@@ -18,31 +19,31 @@ from ...errors import InputError
 from ...geometry.inside import Samples, interior_samples
 from ...types import Centers, Mesh
 
-LEAST_AFFINITY = 1e-3
-FEWEST_NEIGHBOURS = 4  # always kept: fewer do not fix a rotation
-FEWEST_CENTERS = 4  # of a body
+LEAST_AFFINITY = 1e-3  # weaker neighbours are dropped: a guess
+FEWEST_NEIGHBOURS = 4  # always kept, since fewer do not determine a rotation
+FEWEST_CENTERS = 4  # of a body, for the same reason
 
 
 @dataclass(frozen=True, slots=True)
 class TrackOptions:
-    """How centers are spread and followed; lengths in units of the sequence's bounding-box diagonal."""
+    """Options of volume tracking; lengths in units of the sequence's bounding-box diagonal; values are guesses."""
 
-    centers: int = 2000  # K, of all bodies together
-    samples: int = 45_000  # points that stand for the volume of a frame
+    centers: int = 2000  # K, over all bodies
+    samples: int = 45_000  # points that represent the volume of a frame
     reach: float = 0.058  # distance that halves an affinity
-    agreement: float = 0.003  # difference of motion (RMS, a frame) that halves an affinity
-    neighbours: int = 16  # at most, of a center
+    agreement: float = 0.003  # difference of motion (RMS, per frame) that halves an affinity
+    neighbours: int = 16  # largest number of neighbours of a center
     spread: float = 1.0  # weight of the even spread (Lloyd)
     rigidity: float = 3.0  # weight of the rigid term
-    tolerance: float = 1e-5  # a frame is done when a round can lower the energy by no more than this share
-    rounds: int = 300  # at most, a frame
+    tolerance: float = 1e-5  # stop when a round can lower the energy by no more than this share
+    rounds: int = 300  # largest number of rounds per frame
     seed: int = 0
 
     def __post_init__(self) -> None:
         if self.centers < 1:
             raise InputError(f"centers is {self.centers}; give at least 1")
         if self.samples < 4 * self.centers:
-            raise InputError(f"samples is {self.samples}; give at least 4 a center, {4 * self.centers}")
+            raise InputError(f"samples is {self.samples}; give at least 4 per center, {4 * self.centers}")
         if self.neighbours < FEWEST_NEIGHBOURS:
             raise InputError(f"neighbours is {self.neighbours}; give at least {FEWEST_NEIGHBOURS}")
         for name in ("reach", "agreement", "spread", "rigidity", "tolerance"):
@@ -56,11 +57,10 @@ class TrackOptions:
 
 
 def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:
-    """Trajectories of about `options.centers` volume centers through normalised frames, each with faces.
+    """Track about `options.centers` volume centers through normalised frames, none of which may be empty.
 
-    Fewer where there are fewer samples, more where there are so many bodies that each gets its least.
-
-    Bodies are the connected components of the first frame, without specks; each gets centers by its volume.
+    Bodies are the connected components of the first frame, without specks; each gets centers in proportion to its
+    volume, at least four, at most one per sample. Raises InputError for an empty frame.
     """
     if len(frames) == 0:
         raise InputError("no frames to track; give at least one")
@@ -80,7 +80,7 @@ def track_centers(frames: Sequence[Mesh], options: TrackOptions) -> Centers:
 def _samples(frames: Sequence[Mesh], t: int, options: TrackOptions) -> Samples:
     frame = frames[t]
     if frame.is_empty:
-        raise InputError(f"frame {t} is empty; code it on its own and track the frames around it")
+        raise InputError(f"frame {t} is empty; code it separately and track the frames around it")
     if not np.isfinite(frame.vertices).all():
         raise InputError(f"frame {t} has coordinates that are not finite; repair it first")
     return interior_samples(frame, options.samples, np.random.default_rng((options.seed, t)))
@@ -89,7 +89,7 @@ def _samples(frames: Sequence[Mesh], t: int, options: TrackOptions) -> Samples:
 def _spread_over_bodies(
     samples: Samples, options: TrackOptions
 ) -> tuple[Float64[np.ndarray, "K 3"], Int32[np.ndarray, " K"], Int32[np.ndarray, " N"]]:
-    """Centers of the first frame, the body of each, and the center that owns each sample."""
+    """Return the centers of the first frame, the body of each center, and the center that owns each sample."""
     generator = np.random.default_rng((options.seed, 0, 1))
     owners = np.zeros(len(samples.points), np.int32)
     places: list[Float64[np.ndarray, "K 3"]] = []
@@ -106,16 +106,16 @@ def _spread_over_bodies(
 
 
 def _shares(sizes: Int64[np.ndarray, " B"], centers: int) -> Int64[np.ndarray, " B"]:
-    """Centers of each body: by volume, a few at least, never more than it has samples."""
+    """Return the number of centers of each body: by volume, at least `FEWEST_CENTERS`, at most its samples."""
     counts = np.maximum(np.floor(centers * sizes / sizes.sum()).astype(np.int64), FEWEST_CENTERS)
-    counts[0] = max(counts[0] + centers - counts.sum(), FEWEST_CENTERS)  # the largest body takes what rounding left
+    counts[0] = max(counts[0] + centers - counts.sum(), FEWEST_CENTERS)  # the largest body takes the remainder
     return np.minimum(counts, sizes)
 
 
 def _follow(
     track: list[Float64[np.ndarray, "K 3"]], samples: Samples, graph: _Affinities, options: TrackOptions
 ) -> tuple[Float64[np.ndarray, "K 3"], Float64[np.ndarray, "K 3 3"], Int32[np.ndarray, " N"]]:
-    """Centers in the next frame, the rotation of each on the way there, and the owner of each sample."""
+    """Return the centers in the next frame, the rotation of each on the way there, and the owner of each sample."""
     centers = 2 * track[-1] - track[-2] if len(track) > 1 else track[-1].copy()
     rotations = np.zeros((len(centers), 9))
     owners = np.zeros(len(samples.points), np.int32)
@@ -128,7 +128,7 @@ def _follow(
 
 
 class _Affinities:
-    """Which centers hold each other: pairs near in the first frame, weakened by all that came after."""
+    """Affinities of pairs of centers that are near in the first frame; distance and different motion weaken them."""
 
     def __init__(
         self, centers: Float64[np.ndarray, "K 3"], bodies: Int32[np.ndarray, " K"], options: TrackOptions
@@ -157,7 +157,9 @@ class _Affinities:
         points: Float64[np.ndarray, "N 3"],
         owners: Int32[np.ndarray, " N"],
     ) -> None:
-        """Takes in one step: distances now, and how differently the motions send what a center owned before."""
+        """Weaken affinities by one step: by the distances after it, and by how differently two centers' motions move
+        the samples that one of them owned before it.
+        """
         means, covariances = _moments(points, owners, before)
         shifts = now - np.einsum("kij,kj->ki", rotations, before)
         difference = np.empty(len(self._i))
@@ -168,7 +170,7 @@ class _Affinities:
         self._distance = np.maximum(self._distance, _squared(now[self._i] - now[self._j]))
 
     def lists(self) -> tuple[Int32[np.ndarray, " K1"], Int32[np.ndarray, " P"], Float64[np.ndarray, " P"]]:
-        """Neighbour lists (offsets, indices, affinities): the strongest of each center."""
+        """Return neighbour lists (offsets, indices, affinities) with the strongest neighbours of each center."""
         o = self._options
         halvings = self._distance / o.reach**2 + self._difference / o.agreement**2
         affinity = np.maximum(np.exp2(-halvings), 1e-6)
@@ -190,7 +192,7 @@ def _squared(differences: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N
 def _moments(
     points: Float64[np.ndarray, "N 3"], owners: Int32[np.ndarray, " N"], centers: Float64[np.ndarray, "K 3"]
 ) -> tuple[Float64[np.ndarray, "K 3"], Float64[np.ndarray, "K 3 3"]]:
-    """Mean and covariance of the samples that each center owns; a center that owns none stands for itself."""
+    """Return mean and covariance of the samples that each center owns; of the center itself if it owns none."""
     count = len(centers)
     size = np.maximum(np.bincount(owners, minlength=count), 1)
     local = points - centers[owners]
