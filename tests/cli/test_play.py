@@ -64,7 +64,7 @@ def test_play_serves_page_player_and_ranges_until_it_is_stopped(started, number,
 @needs_signals
 def test_serve_shows_what_is_in_the_folder_now(started, tmp_path):
     process, address = started("serve", str(tmp_path))
-    assert "No .reel file is here" in fetch(address).decode()
+    assert "This folder has no .reel files" in fetch(address).decode()
     (tmp_path / "new.reel").write_bytes(FILE.read_bytes())
     assert "new" in fetch(address).decode()
     process.send_signal(signal.SIGINT)

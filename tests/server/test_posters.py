@@ -43,7 +43,7 @@ def test_without_a_renderer_there_is_a_plain_tile_that_is_not_kept(client, monke
 
 def test_no_more_posters_are_kept_than_said(folder, monkeypatch):
     monkeypatch.setattr(posters, "_picture", lambda *_: b"picture")
-    monkeypatch.setattr(posters, "MOST_KEPT", 2)
+    monkeypatch.setattr(posters, "MOST_POSTERS", 2)
     kept = posters.Posters()
     for tag in "abcd":
         kept.of(folder / "walk.reel", tag)

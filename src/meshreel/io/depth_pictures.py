@@ -1,6 +1,6 @@
-"""Depth pictures: 16-bit grayscale PNG, as depth cameras are recorded; 0 is no measurement.
+"""Depth pictures: 16-bit grayscale PNG, the usual recording of depth cameras; 0 means no measurement.
 
-In -> out: a file <-> heights x widths of integers in the camera's depth unit.
+In -> out: a file <-> an array H x W of integers in the depth unit of the camera.
 """
 
 from __future__ import annotations
@@ -14,18 +14,18 @@ from jaxtyping import UInt16
 from ..errors import InputError
 from .write import replacing
 
-_DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow give 16 bits a pixel
+_DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits per pixel
 
 
 def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
-    """The depths of a 16-bit grayscale PNG. Raises InputError where it cannot be read or has fewer bits."""
+    """Read a 16-bit grayscale PNG. Raises InputError if it cannot be read or has fewer bits."""
     from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(path) as image:
             if image.mode not in _DEEP:
-                told = "8 bits a pixel" if image.mode in ("L", "P", "1") else f"mode {image.mode}"
-                raise InputError(f"{path}: a depth picture of {told}; store depth as 16-bit grayscale PNG")
+                kind = "8 bits a pixel" if image.mode in ("L", "P", "1") else f"mode {image.mode}"
+                raise InputError(f"{path}: a depth picture of {kind}; store depth as 16-bit grayscale PNG")
             return np.array(image, dtype=np.uint16)
     except UnidentifiedImageError:
         raise InputError(f"{path}: is no picture; store depth as 16-bit grayscale PNG") from None
@@ -35,7 +35,7 @@ def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
 
 
 def write_depth(depth: UInt16[np.ndarray, "H W"], path: Path) -> None:
-    """The depths as a 16-bit grayscale PNG."""
+    """Write depths as a 16-bit grayscale PNG."""
     from PIL import Image
 
     packed = io.BytesIO()
@@ -45,7 +45,7 @@ def write_depth(depth: UInt16[np.ndarray, "H W"], path: Path) -> None:
 
 
 def picture_size(path: Path) -> tuple[int, int]:
-    """Width and height of any picture, pixels. Raises InputError where it cannot be read."""
+    """Return width and height of a picture, pixels. Raises InputError if it cannot be read."""
     from PIL import Image
 
     try:

@@ -1,6 +1,6 @@
-"""Names of files: which are the frames of a sequence, in what order, and which are text at all.
+"""File names: the frame files of a sequence and their order, patterns, and names that are no text.
 
-In: a folder, a glob pattern, a file or a list of files. Out: paths in the order of their frame numbers, and remarks.
+In: a folder, a glob pattern, a file or a list of files. Out: paths in the order of their frame numbers, and warnings.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _LAST = re.compile(r"(\d+)(?!.*\d)")
 
 
 def is_text(name: str) -> bool:
-    """Whether a name is Unicode text. Linux knows names that are bytes of no encoding: lone surrogates in Python."""
+    """Return whether a name is Unicode text. Linux allows names that are not; Python has lone surrogates for them."""
     try:
         name.encode()
     except UnicodeEncodeError:
@@ -28,18 +28,18 @@ def is_text(name: str) -> bool:
 
 
 def is_pattern(name: str) -> bool:
-    """Whether a name may stand for several files."""
+    """Return whether a name contains wildcards."""
     return _MAGIC.search(name) is not None
 
 
 def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    """The frame files of a source and remarks about their order. A list keeps its own order."""
+    """Return the frame files of a source and warnings about their order. A list keeps its order."""
     if not isinstance(source, str | Path):
         return tuple(Path(path) for path in source), ()
     path = Path(source)
     try:
         is_folder = path.is_dir()
-    except OSError as error:  # a name too long, a folder above it that may not be entered
+    except OSError as error:  # a name that is too long, or a folder without permission
         raise InputError(f"{source}: cannot be read ({error.strerror}); check the path and its rights") from None
     if is_folder:
         return _ordered(path, _of_one_kind(path))
@@ -54,7 +54,7 @@ def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, 
 
 
 def last_number(name: str) -> int | None:
-    """The last whole number in a name; None where there is none."""
+    """Return the last whole number in a name, None without one."""
     found = _LAST.search(name)
     return None if found is None else int(found[1])
 
@@ -88,7 +88,7 @@ def _of_one_kind(folder: Path) -> list[Path]:
 
 
 def _ordered(root: Path, paths: list[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    """The paths by frame number: the last number that varies in names that are otherwise alike."""
+    """Sort paths by frame number, the last number that differs between names of one pattern."""
     names = {path: path.relative_to(root).with_suffix("").as_posix() for path in sorted(paths)}
     if len(paths) == 1:
         return tuple(paths), ()

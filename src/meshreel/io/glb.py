@@ -1,4 +1,4 @@
-"""GLB (binary glTF 2): every triangle mesh of the scene, placed by its nodes, through trimesh."""
+"""Parser of GLB (binary glTF 2), based on trimesh. In: bytes. Out: all triangle meshes, placed by their nodes."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy as np
 from .polygons import Dropped, Polygons, Unreadable
 
 _DROPS = {"NORMAL": "normals", "TEXCOORD": "texture coordinates", "COLOR": "colors", "JOINTS": "skinning"}
-_DENSEST = 64  # values a byte: no mesh compression comes near
+_DENSEST = 64  # values per byte (guess): no mesh compression comes near
 
 
 def parse_glb(data: bytes) -> Polygons:
-    """The surface of a GLB scene at rest, vertices in the world frame. What is hidden at rest is left out."""
+    """Return the surface of a GLB scene at rest in world coordinates, without nodes that are hidden at rest."""
     tree = _json_chunk(data)
     if not tree.get("meshes"):
         return _joined([], _dropped(tree))
@@ -24,15 +24,15 @@ def parse_glb(data: bytes) -> Polygons:
     try:
         scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
         placed = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
-        # A scale of 0 hides what an animation shows later.
+        # A scale of 0 hides a node until an animation shows it.
         parts = [part for part in placed if isinstance(part[1], trimesh.Trimesh) and part[0][:3, :3].any()]
         return _joined(parts, _dropped(tree))
-    except Exception as error:  # whatever a foreign parser raises, the file is what is wrong
+    except Exception as error:  # a foreign parser may raise anything for a damaged file
         raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
 
 
 def _json_chunk(data: bytes) -> dict[str, Any]:
-    """The scene description; the container's own lengths must fit the file."""
+    """Return the scene description, after a check of the lengths that the container announces."""
     head = np.frombuffer(data[:20].ljust(20, b"\0"), dtype="<u4")
     magic, version, total, length = data[:4], int(head[1]), int(head[2]), int(head[3])
     if magic != b"glTF" or version != 2:
@@ -63,7 +63,7 @@ def _dropped(tree: dict[str, Any]) -> Dropped:
 
 
 def _joined(parts: list[tuple[np.ndarray, Any]], dropped: Dropped) -> Polygons:
-    """The parts as one surface. A node that is only moved keeps every bit of its vertices before the sum."""
+    """Return all parts as one surface; nodes without rotation or scale are added without a matrix product."""
     vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
     for matrix, part in parts:
         local = np.asarray(part.vertices, dtype=np.float64)

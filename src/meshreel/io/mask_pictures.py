@@ -1,7 +1,7 @@
-"""Pictures of views and masks of them: 8-bit PNG, a folder a view.
+"""Mask pictures: 8-bit PNG of object numbers, one folder for each view; and the pictures that masks are made from.
 
-In -> out: a file <-> object numbers, 0 for what stands still (DAVIS and most mask tools store them so, as gray or as
-palette indices); a folder -> its files by view and by frame.
+In -> out: a file <-> object numbers, 0 for what stands still (stored as gray or as palette indices, as DAVIS and most
+mask tools do); a folder -> its files by view and by frame.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from ..errors import InputError
 from .file_names import last_number
 from .write import replacing
 
-_MODES = ("L", "P", "1")  # of the library that reads them: gray, palette, black and white
+_MODES = ("L", "P", "1")  # of Pillow: gray, palette, black and white
 _LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
 
 
 def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
-    """The object numbers of an 8-bit gray or palette PNG. Raises InputError where it cannot be read or is another."""
+    """Read object numbers from an 8-bit gray or palette PNG. Raises InputError for other or unreadable files."""
     from PIL import Image, UnidentifiedImageError
 
     try:
@@ -38,7 +38,7 @@ def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
 
 
 def is_mask(path: Path) -> bool:
-    """True for a file that could be a mask, by its header; False for pictures in colors, and for what is neither."""
+    """Return True if the header of a file is that of a mask, False for color pictures and other files."""
     from PIL import Image
 
     try:
@@ -49,7 +49,7 @@ def is_mask(path: Path) -> bool:
 
 
 def write_picture(picture: UInt8[np.ndarray, "H W *C"], path: Path) -> None:
-    """A gray (H x W) or colored (H x W x 3) picture as PNG."""
+    """Write a gray (H x W) or color (H x W x 3) picture as PNG."""
     from PIL import Image
 
     packed = io.BytesIO()
@@ -59,9 +59,9 @@ def write_picture(picture: UInt8[np.ndarray, "H W *C"], path: Path) -> None:
 
 
 def find_masks(folder: Path, views: int, frames: int) -> list[list[Path]]:
-    """The files of the masks, view by view, frame by frame; views and frames are the last numbers of their names.
+    """Return the files of the masks by view and frame, whose numbers are the last ones in their names.
 
-    Raises InputError where a view or a frame has none, or two.
+    Raises InputError if a view or a frame has no mask, or two.
     """
     places = _numbered(folder, (path for path in _listed(folder) if path.is_dir()), "view")
     found = []

@@ -1,6 +1,7 @@
-"""One mesh file, of any format we read, as a checked Mesh.
+"""Reader of one mesh file of any supported format.
 
-In: a path. Out: the mesh and, in words, what the file has besides geometry. What is wrong with it is an InputError.
+In: a path. Out: a checked mesh, and the names of other data in the file, which are dropped. Raises InputError for files
+that cannot be used.
 """
 
 from __future__ import annotations
@@ -28,21 +29,21 @@ _PARSERS: dict[str, Callable[[bytes], Polygons]] = {
     ".off": parse_off,
 }
 EXTENSIONS = tuple(_PARSERS)
-FARTHEST = 1e12  # of a coordinate: beyond it float64 has no tenth of a millimetre, and squares of squares overflow
+FARTHEST = 1e12  # m, largest coordinate: beyond it the spacing of float64 exceeds 0.1 mm
 
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """A mesh from a file, and what was in the file besides."""
+    """A mesh from a file, and the kinds of data in the file that are dropped."""
 
     mesh: Mesh
     dropped: Dropped
 
 
 def read_mesh(path: Path, where: str | None = None) -> Loaded:
-    """The mesh in a file; vertices and faces as they stand, polygons cut into triangles.
+    """Read the mesh in a file, with its vertices and faces in the order of the file and polygons cut into triangles.
 
-    No faces is legal: an empty frame (its loose vertices are dropped and named). `where` begins every error's text.
+    A file without faces is an empty frame; its vertices are dropped and named. `where` begins each error message.
     """
     where = where or str(path)
     parse = _PARSERS.get(path.suffix.lower())
@@ -66,7 +67,7 @@ def read_mesh(path: Path, where: str | None = None) -> Loaded:
 
 
 def checked(polygons: Polygons) -> Loaded:
-    """The mesh of polygons whose every number is legal; raises Unreadable for the first that is not."""
+    """Return the mesh of polygons after checking every number. Raises Unreadable for the first illegal one."""
     vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
     bad = np.flatnonzero(~(np.abs(vertices) <= FARTHEST).all(axis=1))  # NaN is not <= anything
     if len(bad):

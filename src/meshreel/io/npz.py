@@ -1,6 +1,6 @@
-"""An .npz of one body: `vertices` T x V x 3 and `faces` F x 3, read a frame at a time.
+"""Reader of .npz files with `vertices` (T x V x 3) and `faces` (F x 3), one frame at a time.
 
-Stored or deflated, the stream is read forward: memory holds one frame; going back starts the stream again.
+In: a path. Out: frames by number. The stream is read forward, with one frame in memory; going back restarts it.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from ..errors import InputError
 from .meshes import Loaded, checked
 from .polygons import Polygons, Unreadable
 
-_DAMAGED = (  # what NumPy and zipfile raise; RuntimeError: it is encrypted
+_DAMAGED = (  # errors of NumPy and zipfile for damaged files; RuntimeError for encrypted ones
     *(OSError, ValueError, EOFError, SyntaxError, tokenize.TokenError, RecursionError),
     *(zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError),
 )
 
 
 class Archive:
-    """The frames of an .npz file."""
+    """Frames of an .npz file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -36,7 +36,7 @@ class Archive:
                 if not {"vertices.npy", "faces.npy"} <= set(archive.namelist()):
                     raise InputError(f"{path}: has {', '.join(names) or 'nothing'}; save it as 'vertices' and 'faces'")
                 self._shape, self._dtype, self._begin = _head(archive, "vertices")
-                _head(archive, "faces")  # refuses more than there is before it is allocated
+                _head(archive, "faces")  # refuses an array larger than the file before it is allocated
                 faces = np.load(path, allow_pickle=False)["faces"]
         except _DAMAGED as error:
             raise InputError(f"{path}: cannot be read as .npz ({error}); write it again with numpy.savez") from None
@@ -48,18 +48,18 @@ class Archive:
         self._sizes: Int64[np.ndarray, " P"] = np.full(len(faces), faces.shape[1], dtype=np.int64)
 
     def __reduce__(self) -> tuple[type[Archive], tuple[Path]]:
-        """Another process opens the file itself."""
+        """Pickle the path: another process opens the file for itself."""
         return Archive, (self.path,)
 
     def __len__(self) -> int:
         return int(self._shape[0])
 
     def name(self, index: int) -> str:
-        """What an error calls a frame."""
+        """Return the name of a frame in error messages."""
         return f"{self.path}[{index}]"
 
     def load(self, index: int, where: str) -> Loaded:
-        """One frame, checked."""
+        """Read and check one frame."""
         try:
             return checked(Polygons(self._vertices(index), self._corners, self._sizes))
         except Unreadable as error:
@@ -79,7 +79,7 @@ class Archive:
 
 
 def _head(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtype, int]:
-    """Shape, dtype and first byte of an array in the archive, without reading it."""
+    """Return shape, dtype and first byte of an array in the archive without reading it."""
     member = f"{name}.npy"
     with archive.open(member) as stream:
         version = np.lib.format.read_magic(stream)

@@ -1,6 +1,6 @@
-"""Wavefront OBJ: vertices and polygons, an order of magnitude faster than a loop over lines.
+"""Parser of Wavefront OBJ without a Python loop over lines, which would take ten times as long.
 
-In: a file's bytes. Out: Polygons; `v/vt/vn` corners, negative indices, continued lines and any newline are understood.
+In: the bytes of a file. Out: Polygons. Reads `v/vt/vn` corners, negative indices, continued lines and any newline.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _DROPS = {"vt": "texture coordinates", "vn": "normals", "usemtl": "materials", "
 
 
 def parse_obj(data: bytes) -> Polygons:
-    """The surface that an OBJ file describes."""
+    """Return the surface of an OBJ file."""
     if b"\\" in data:
         data = re.sub(rb"\\\r?\n", b" ", data)
     lines = Lines.of(data)
@@ -49,7 +49,7 @@ def _vertices(lines: Lines, chosen: Int64[np.ndarray, " V"]) -> tuple[Float64[np
 def _faces(
     lines: Lines, chosen: Int64[np.ndarray, " P"], defined: Int64[np.ndarray, " P"], count: int
 ) -> tuple[Int64[np.ndarray, " C"], Int64[np.ndarray, " P"]]:
-    """Corners from 0 and polygon sizes; `defined` vertices stand before each face line, `count` in the file."""
+    """Return corners (from 0) and polygon sizes; `defined` vertices precede each face line, `count` are in the file."""
     block = lines.block(chosen, skip=1)
     if (block == ord("/")).any():
         block = np.frombuffer(re.sub(rb"/[^ \t\n]*", b"", block.tobytes()), dtype=np.uint8)
@@ -70,9 +70,9 @@ def _faces(
 
 
 def _others(lines: Lines, first: np.ndarray, second: np.ndarray, other: np.ndarray) -> Dropped:
-    """What the remaining lines hold besides geometry; refuses statements that no OBJ has."""
+    """Return the data in the other lines that is dropped. Raises Unreadable for unknown statements."""
     dropped = set()
-    for mark in ("t", "n"):  # these may be as many as the vertices: no Python loop over them
+    for mark in ("t", "n"):  # no Python loop: there may be one for each vertex
         found = other & (first == ord("v")) & (second == ord(mark))
         dropped |= {_DROPS["v" + mark]} if found.any() else set()
         other = other & ~found

@@ -1,4 +1,4 @@
-"""OFF and its variants (COFF, NOFF, STOFF ...): vertices and polygons in text."""
+"""Parser of text OFF and its variants (COFF, NOFF, STOFF ...). In: the bytes of a file. Out: Polygons."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _DROPS = {"ST": "texture coordinates", "C": "vertex colors", "N": "normals"}
 
 
 def parse_off(data: bytes) -> Polygons:
-    """The surface that an OFF file describes."""
+    """Return the surface of an OFF file."""
     found = re.match(rb"\s*(?:#[^\n]*\n\s*)*(ST)?(C)?(N)?OFF\b", data)
     if found is None:
         raise Unreadable(f"OFF header expected, found {data[:12]!r}")

@@ -1,4 +1,4 @@
-"""PLY in its three encodings: vertices and polygons, whatever other properties and elements stand beside them."""
+"""Parser of PLY, text and binary, with any other properties and elements. In: the bytes of a file. Out: Polygons."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _TYPES = {
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
-_DIGITS = 18  # of a number of rows: more is damage, and fits no machine's integers
+_DIGITS = 18  # of a number of rows; longer ones do not fit 64-bit integers
 _INDICES = ("vertex_indices", "vertex_index")
 _DROPS = {
     "normals": {"nx", "ny", "nz"},
@@ -48,7 +48,7 @@ class _Element:
 
 
 def parse_ply(data: bytes) -> Polygons:
-    """The surface that a PLY file describes."""
+    """Return the surface of a PLY file."""
     found = re.search(rb"end_header[ \t]*(\r\n|\n|\r)", data)
     if not re.match(rb"ply\s", data) or found is None:
         raise Unreadable("PLY header does not run from 'ply' to 'end_header' (truncated?)")
@@ -110,14 +110,14 @@ Columns = dict[str, np.ndarray]
 
 
 class _Text:
-    """The body of an ASCII file; elements are read in their order."""
+    """Body of an ASCII file; elements must be read in their order."""
 
     def __init__(self, data: bytes) -> None:
         self._lines = Lines.of(data, comment=b"\0")  # PLY has comments in its header only
         self._filled = np.flatnonzero(self._lines.ends > self._lines.starts)
 
     def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
-        """The element's single values by name, and the wanted list's items (flat) and lengths."""
+        """Return the single values of an element by name, and the items (flat) and lengths of the list `wanted`."""
         chosen, self._filled = self._filled[: element.rows], self._filled[element.rows :]
         if len(chosen) < element.rows:
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but has {len(chosen)} (truncated?)")
@@ -143,13 +143,13 @@ class _Text:
 
 
 class _Binary:
-    """The body of a binary file; elements are read in their order."""
+    """Body of a binary file; elements must be read in their order."""
 
     def __init__(self, data: bytes) -> None:
         self._data, self._at = data, 0
 
     def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
-        """The element's single values by name, and the wanted list's items (flat) and lengths."""
+        """Return the single values of an element by name, and the items (flat) and lengths of the list `wanted`."""
         if self._at + element.least_bytes > len(self._data):
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but the file is too short (truncated?)")
         if element.rows == 0 or not element.properties:
@@ -177,7 +177,7 @@ class _Binary:
         return lengths
 
     def _length(self, field: _Property, at: int) -> tuple[int, int]:
-        """How many items the field has in the row at hand, and where they begin."""
+        """Return the number of items of a field in the row at `at`, and where they begin."""
         if field.count is None:
             return 1, at
         end = at + field.count.itemsize
@@ -185,7 +185,7 @@ class _Binary:
         return int.from_bytes(self._data[at:end], order), end  # type: ignore[arg-type]
 
     def _uneven_rows(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
-        """Rows of different lengths: one after another, because each tells where the next begins."""
+        """Read rows of different lengths one by one: where a row begins depends on the row before."""
         begins, sizes, dtype = list[int](), list[int](), np.dtype("<i4")
         if wanted is None and element.name == "vertex":
             raise Unreadable("PLY vertices with lists of different lengths are not read")
@@ -217,7 +217,7 @@ def _even_rows(element: _Element, rows: np.ndarray, wanted: str | None) -> tuple
 
 
 def _ranges(begins: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """begin, begin + 1, ... of each range, one range after another."""
+    """Return begin, begin + 1, ... of each range, one range after the other."""
     return np.repeat(begins - (np.cumsum(lengths) - lengths), lengths) + np.arange(int(lengths.sum()))
 
 

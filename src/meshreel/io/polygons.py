@@ -1,6 +1,6 @@
-"""Polygons as a file has them, and their triangles.
+"""Polygons of a mesh file, and their triangulation.
 
-In: vertices and the corners of every polygon in turn. Out: faces F x 3 in the file's order, orientation kept.
+In: vertices and the corners of all polygons. Out: faces F x 3 in the order of the file, with their orientation.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int64
 
-Dropped = frozenset[str]  # what a file has besides geometry, in words
+Dropped = frozenset[str]  # names of data in a file other than geometry
 
 
 class Unreadable(ValueError):
-    """A file's content is not what its format allows; the caller adds the file, the frame and the remedy."""
+    """The content of a file breaks the rules of its format; the caller adds file, frame and remedy to the message."""
 
 
 @dataclass(frozen=True, slots=True)
 class Polygons:
-    """What a file says about its surface, before anything is checked."""
+    """Surface of a file before any check."""
 
     vertices: Float64[np.ndarray, "V 3"]  # m
     corners: Int64[np.ndarray, " C"]  # vertex of each corner of each polygon, from 0
@@ -28,9 +28,9 @@ class Polygons:
 
 
 def triangulate(polygons: Polygons) -> Int64[np.ndarray, "F 3"]:
-    """The polygons cut into triangles: quads along the diagonal that does not fold, others as fans or by ear clipping.
+    """Cut polygons into triangles: quads along a diagonal that does not fold, others as fans or by ear clipping.
 
-    Indices and sizes must have been checked.
+    The caller must have checked indices and sizes.
     """
     vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
     if (sizes == 3).all():
@@ -46,7 +46,7 @@ def triangulate(polygons: Polygons) -> Int64[np.ndarray, "F 3"]:
 
 
 def _cut(vertices: Float64[np.ndarray, "V 3"], polygons: Int64[np.ndarray, "P N"]) -> Int64[np.ndarray, "P N-2 3"]:
-    """Triangles of polygons that have N corners each."""
+    """Return the triangles of polygons with N corners each."""
     fans = _fans(polygons)
     folded = _folds(vertices, polygons, fans)
     if polygons.shape[1] == 4:
@@ -69,22 +69,22 @@ def _folds(
     polygons: Int64[np.ndarray, "P N"],
     fans: Int64[np.ndarray, "P N-2 3"],
 ) -> np.ndarray:
-    """Where a triangle of the fan looks away from its polygon, bool P."""
+    """Return which polygons have a triangle of the fan that faces away from the polygon, bool P."""
     normals = _newell(vertices[polygons])
     a, b, c = (vertices[fans[:, :, k]] for k in range(3))
     return (np.einsum("pnd,pd->pn", np.cross(b - a, c - a), normals) < 0).any(axis=1)
 
 
 def _newell(points: Float64[np.ndarray, "P N 3"]) -> Float64[np.ndarray, "P 3"]:
-    """Twice the vector area of each polygon; about its first corner, so that far coordinates lose nothing."""
+    """Return twice the vector area of each polygon, relative to its first corner for precision far from the origin."""
     local = points - points[:, :1]
     return np.cross(local, np.roll(local, -1, axis=1)).sum(axis=1)
 
 
 def _clip_ears(points: Float64[np.ndarray, "N 3"], names: Int64[np.ndarray, " N"]) -> Int64[np.ndarray, "N-2 3"]:
-    """Triangles of one concave polygon; what no ear can be cut from becomes a fan."""
+    """Return the triangles of one concave polygon; a rest without an ear becomes a fan."""
     normal = _newell(points[None])[0]
-    drop = int(np.argmax(np.abs(normal)))  # project along the largest axis, orientation kept
+    drop = int(np.argmax(np.abs(normal)))  # projection along the largest axis keeps the orientation
     flat = np.delete(points - points[0], drop, axis=1) * np.array([1.0, -1.0 if drop == 1 else 1.0])
     flat = flat if normal[drop] > 0 else flat * np.array([1.0, -1.0])
     ring, faces = list(range(len(names))), []

@@ -1,4 +1,4 @@
-"""STL, binary and text: a soup of triangles, three vertices each; weld it to get a surface."""
+"""Parser of STL, binary and text. In: the bytes of a file. Out: separate triangles, to be welded to a surface."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 
 
 def parse_stl(data: bytes) -> Polygons:
-    """The triangles of an STL file; its normals follow from the corners and are no loss."""
+    """Return the triangles of an STL file. Normals are not reported as dropped: they follow from the corners."""
     body = data[_HEADER + _COUNT :]
     count = int.from_bytes(data[_HEADER : _HEADER + _COUNT], "little")
     if len(body) == count * _FACET.itemsize and len(data) >= _HEADER + _COUNT:

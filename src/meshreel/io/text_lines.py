@@ -1,6 +1,7 @@
-"""Numbers of a text file, line by line, without a Python loop over the lines.
+"""Lines of numbers in text files, parsed without a Python loop over the lines.
 
-In: a file's bytes. Out: flat values and how many of them each line has; junk raises with its line number.
+In: the bytes of a file. Out: flat values and their count in each line. Raises Unreadable with the line number of a word
+that is no number.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ _IS_BLANK = np.isin(np.arange(256), list(b" \t\n\v\f"))
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Where each line of a text begins and ends."""
+    """Text and the positions of its lines."""
 
     text: np.ndarray  # uint8, every line ended by a newline
     starts: Int64[np.ndarray, " L"]
@@ -26,7 +27,7 @@ class Lines:
 
     @staticmethod
     def of(data: bytes, comment: bytes = b"#") -> Lines:
-        """The lines of a text in any newline convention, without comments and leading blanks; numbering is kept."""
+        """Return the lines of a text with any newlines, without comments and leading blanks; line numbers stay."""
         if b"\r" in data:
             data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if comment in data:
@@ -41,16 +42,16 @@ class Lines:
         return len(self.starts)
 
     def line(self, number: int | np.integer) -> str:
-        """One line as text, shortened so that it fits in a message."""
+        """Return one line, shortened for an error message."""
         shown = self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
         return shown if len(shown) <= 60 else shown[:57] + "..."
 
     def block(self, chosen: Int64[np.ndarray, " N"], skip: int = 0) -> np.ndarray:
-        """The chosen lines' bytes with their newlines, the first `skip` bytes of each blanked; uint8."""
+        """Return the bytes (uint8) of the chosen lines with newlines, the first `skip` bytes of each blanked."""
         if len(chosen) == 0:
             return np.zeros(0, dtype=np.uint8)
         starts, sizes = self.starts[chosen], self.ends[chosen] + 1 - self.starts[chosen]
-        if chosen[-1] - chosen[0] == len(chosen) - 1:  # one run of lines, as nearly always: no mask over the text
+        if chosen[-1] - chosen[0] == len(chosen) - 1:  # consecutive lines, as nearly always, need no mask over the text
             block = self.text[starts[0] : starts[-1] + sizes[-1]].copy()
         else:
             wanted = np.zeros(len(self), dtype=bool)
@@ -64,7 +65,7 @@ class Lines:
     def values(
         self, chosen: Int64[np.ndarray, " N"], block: np.ndarray
     ) -> tuple[Float64[np.ndarray, " M"], Int64[np.ndarray, " N"]]:
-        """All numbers of a block of the chosen lines, and how many each line has."""
+        """Return all numbers in a block of the chosen lines, and the count in each line."""
         counts = count_words(block)
         try:
             values = np.fromstring(block.tobytes(), dtype=np.float64, sep=" ")
@@ -86,7 +87,7 @@ class Lines:
 
 
 def count_words(block: np.ndarray) -> Int64[np.ndarray, " N"]:
-    """How many words each line of a block (uint8, newline-ended lines) has."""
+    """Return the number of words in each line of a block (uint8, each line with its newline)."""
     if len(block) == 0:
         return np.zeros(0, dtype=np.int64)
     blank = _IS_BLANK[block]
@@ -97,7 +98,7 @@ def count_words(block: np.ndarray) -> Int64[np.ndarray, " N"]:
 
 
 def whole(values: np.ndarray, what: str) -> Int64[np.ndarray, "..."]:
-    """The values as integers; refuses fractions, NaN and what no index can be."""
+    """Return the values as integers. Raises Unreadable for fractions, NaN, and magnitudes of 2^53 or more."""
     with np.errstate(invalid="ignore"):
         bad = np.flatnonzero(~((np.abs(values) < 2**53) & (values == np.floor(values))))
     if len(bad):

@@ -1,6 +1,6 @@
-"""Meshes to PLY, OBJ and GLB files, whole or not at all.
+"""Writer of PLY, OBJ and GLB files, which appear complete or not at all.
 
-In: a mesh and a path whose extension picks the format. Out: a file that `open_sequence` reads back.
+In: a mesh and a path, whose extension selects the format. Out: a file that `open_sequence` can read.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from jaxtyping import UInt8
 from ..errors import InputError
 from ..types import Mesh
 
-_TOLERANCE = 1e-6  # of the diagonal: what rounding a coordinate may cost
+_TOLERANCE = 1e-6  # of the diagonal: largest rounding error of a float32 coordinate (guess)
 
 
 def left_over(folder: Path, names: Iterable[str], pattern: str = "frame_*") -> tuple[str, ...]:
-    """A line where a folder, which need not be there, holds other frames than those that are to be written into it."""
+    """Return a warning if a folder, which need not exist, holds frame files other than `names`."""
     others = {path.name for path in folder.glob(pattern)} - set(names)
     if not others:
         return ()
-    return (f"{folder} holds {len(others)} other frame files, as {min(others)}; they are not of this run",)
+    return (f"{folder} holds {len(others)} other frame files, as {min(others)}; they are of another run",)
 
 
 def frame_names(count: int, extension: str) -> list[str]:
-    """The names of the files of so many frames: frame_00000.ply and so on."""
+    """Return file names for `count` frames: frame_00000.ply and so on."""
     digits = max(5, len(str(count - 1)))
     return [f"frame_{number:0{digits}}.{extension}" for number in range(count)]
 
 
 def make_folder(path: Path) -> None:
-    """Makes a folder, and those above it, where it is not there. Raises InputError where it cannot be made."""
+    """Create a folder and its parents if missing. Raises InputError if it cannot be created."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -44,7 +44,7 @@ def make_folder(path: Path) -> None:
 
 
 def write_mesh(mesh: Mesh, path: Path) -> None:
-    """Write the mesh to a .ply, .obj or .glb file; the name appears once every byte is on the disk."""
+    """Write a mesh to a .ply, .obj or .glb file, which appears when it is complete."""
     pack = _FORMATS.get(path.suffix.lower())
     if pack is None:
         raise InputError(f"{path}: {path.suffix or 'no'} extension is not one of {', '.join(_FORMATS)}; choose one")
@@ -53,9 +53,9 @@ def write_mesh(mesh: Mesh, path: Path) -> None:
 
 
 def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> None:
-    """Write the mesh to a .ply file whose faces have these colors (red, green, blue).
+    """Write a mesh to a .ply file with these colors (red, green, blue) of faces.
 
-    Colors are those of vertices, which most viewers show; vertices between faces of different colors are there twice.
+    The file has colors of vertices, which most viewers show: a vertex between faces of several colors is duplicated.
     """
     code = colors.astype(np.int64) @ (65536, 256, 1)
     corners = np.stack([mesh.faces.reshape(-1), np.repeat(code, 3)], axis=1)
@@ -68,8 +68,8 @@ def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> N
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A file that takes its final name at the end of the block; on any failure nothing is left behind."""
-    temporary = path.with_name(f".{uuid.uuid4().hex}.part")  # its own: two may write one name
+    """Open a file that takes its final name at the end of the block; after a failure, nothing is left behind."""
+    temporary = path.with_name(f".{uuid.uuid4().hex}.part")  # unique: two processes may write one name
     try:
         with temporary.open("wb") as file:
             yield file
@@ -102,11 +102,11 @@ def _pack_obj(mesh: Mesh) -> bytes:
     vertex = "v %.9g %.9g %.9g\n" if _fits_float32(mesh) else "v %.17g %.17g %.17g\n"
     vertices = "".join(vertex % tuple(row) for row in mesh.vertices.tolist())
     faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + 1).tolist())
-    return ("# meshreel\n" + vertices + faces).encode()  # not empty where the frame is: readers take that for damage
+    return ("# meshreel\n" + vertices + faces).encode()  # a comment, because readers take an empty file for damage
 
 
 def _pack_glb(mesh: Mesh) -> bytes:
-    """Vertices are float32 about an origin that the node holds in full, so that far coordinates keep their digits."""
+    """Pack vertices as float32 relative to the translation of the node, so that far coordinates keep their digits."""
     if mesh.is_empty:
         return _glb({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{}]}, b"")
     origin = np.zeros(3) if _fits_float32(mesh) else np.round(mesh.vertices.mean(axis=0))
@@ -133,7 +133,7 @@ def _pack_glb(mesh: Mesh) -> bytes:
 
 
 def _glb(tree: dict[str, object], binary: bytes) -> bytes:
-    """The container: header, JSON chunk, binary chunk; chunks are padded to 4 bytes."""
+    """Return the container: header, JSON chunk, binary chunk; chunks are padded to 4 bytes."""
     text = json.dumps(tree, separators=(",", ":")).encode()
     chunks = _chunk(b"JSON", text + b" " * (-len(text) % 4))
     chunks += _chunk(b"BIN\0", binary) if binary else b""

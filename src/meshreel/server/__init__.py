@@ -1,4 +1,4 @@
-"""The web server of the player: `meshreel play` and `meshreel serve`. In: .reel files. Out: HTTP.
+"""Web server of the player for `meshreel play` and `meshreel serve`. In: .reel files. Out: HTTP.
 
-Needs the extra `play` (starlette, uvicorn, trustme), and for posters the extra `encode`.
+Needs the extra `play` (starlette, uvicorn, trustme), and the extra `encode` for posters.
 """

@@ -1,6 +1,6 @@
-"""The server as an ASGI application. In: a library of files and the folder of the built player. Out: answers.
+"""ASGI application of the server. In: a library of files and the folder of the built player. Out: HTTP responses.
 
-Files go out in pieces, whole or by range, with an ETag and as they are: a .reel file does not get smaller.
+Files are sent whole or by range, with an ETag and without compression, which would not make a .reel file smaller.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .library import Library, as_text
 from .pages import PLAIN, POLICY, STYLE, gallery_page, player_page
 from .posters import Posters, poster_tag
 
-# Fixed here: the system's own list may have others (Windows: that of its registry), or none.
+# Not from the system, whose list may be wrong (on Windows, it is in the registry) or missing.
 TYPES = {
     ".css": "text/css",
     ".html": "text/html",
@@ -40,26 +40,26 @@ TYPES = {
     ".txt": "text/plain",
     ".wasm": "application/wasm",
 }
-BYTES = "application/octet-stream"  # .reel files, and what is not known
+BYTES = "application/octet-stream"  # .reel files and unknown types
 EXPOSED = ("Accept-Ranges", "Content-Length", "Content-Range", "ETag")
 SAFE = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
-FRESH = SAFE | {"Cache-Control": "no-cache"}  # may be kept, but is asked for each time
+FRESH = SAFE | {"Cache-Control": "no-cache"}  # browsers may keep it, but must revalidate it
 PAGE = FRESH | {"Content-Security-Policy": POLICY}
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 
 
 def built_player() -> Path:
-    """The folder of the player that comes with the package."""
+    """Return the folder of the player in the package."""
     return Path(__file__).parents[1] / "player"
 
 
 def make_app(
     library: Library, player: Path | None = None, cors: Sequence[str] = (), hosts: Sequence[str] = ("*",)
 ) -> Starlette:
-    """Serves a library to who asks for one of `hosts`; `cors` are the origins whose pages may read, "*" for all.
+    """Return the application for a library: it answers requests for `hosts`, and pages of the origins `cors` may read.
 
-    `/` plays the file where there is one alone, else it is a gallery; `/watch/NAME` plays a file, `/files/NAME` is it.
-    Raises InputError where an origin is none.
+    "*" allows all of them. `/` plays the file of a library with `only` one, otherwise it is a gallery; `/watch/NAME`
+    plays a file and `/files/NAME` sends it. Raises InputError for a malformed origin.
     """
     pages = _Pages(library)
     routes = [
@@ -86,14 +86,14 @@ def _cors(origins: Sequence[str]) -> list[Middleware]:
             allow_origins=[origin.lower() for origin in origins],
             allow_methods=("GET", "HEAD"),
             allow_headers=("Range", "If-Range", "If-None-Match"),
-            allow_private_network=True,  # a page on the web may ask a server in the local network
+            allow_private_network=True,  # pages on the web may request files from the local network
             expose_headers=EXPOSED,
         )
     ]
 
 
 class _Static(StaticFiles):
-    """Files of a folder, with types of our own; a new build is seen at once."""
+    """Files of a folder, with the types above and revalidation, so that a new build shows at once."""
 
     def file_response(
         self,
@@ -111,7 +111,7 @@ class _Static(StaticFiles):
 
 
 class _ReelFiles(_Static):
-    """The files of a library, and no others of its folder."""
+    """The files of a library, and no others in its folder."""
 
     def __init__(self, library: Library) -> None:
         super().__init__(directory=library.folder, check_dir=False)
@@ -121,7 +121,7 @@ class _ReelFiles(_Static):
         found = self._library.path_of(path.replace(os.sep, "/"))
         if found is None:
             return "", None
-        try:  # now: once an answer has begun it can only break off
+        try:  # here, because a response that has begun cannot become an error
             with found.open("rb") as file:
                 return str(found), os.fstat(file.fileno())
         except PermissionError as error:
@@ -133,13 +133,13 @@ class _Pages:
         self._library = library
 
     async def home(self, _: Request) -> Response:
-        """The one file, or all."""
+        """Return the player of the only file, or the gallery."""
         if self._library.only is not None:
             return HTMLResponse(player_page(self._library.only), headers=PAGE)
         return HTMLResponse(await run_in_threadpool(self._gallery), headers=PAGE)
 
     async def watch(self, request: Request) -> Response:
-        """One file."""
+        """Return the page that plays one file."""
         name = request.path_params["name"]
         if await run_in_threadpool(self._library.path_of, name) is None:
             raise HTTPException(404, f"there is no file {name}")
@@ -153,10 +153,10 @@ class _Pages:
 class _PosterRoute:
     def __init__(self, library: Library) -> None:
         self._library, self._posters = library, Posters()
-        self._one = anyio.CapacityLimiter(1)  # drawn one by one, in a thread that no file waits for
+        self._one = anyio.CapacityLimiter(1)  # posters are drawn one at a time, in a thread of their own
 
     async def poster(self, request: Request) -> Response:
-        """A file's poster, or a plain tile where there is nothing to show."""
+        """Return the poster of a file, or a plain tile if it has none."""
         path = await run_in_threadpool(self._library.path_of, request.path_params["name"])
         if path is None:
             raise HTTPException(404, "there is no such file")
@@ -171,11 +171,11 @@ class _PosterRoute:
 
 
 def _plain() -> Response:
-    """Without a tag, and not to be kept: with the renderer installed there may be a poster."""
+    """Return the plain tile, not to be cached: once the renderer is installed, there may be a poster."""
     return Response(PLAIN, media_type="image/svg+xml", headers=SAFE | {"Cache-Control": "no-store"})
 
 
 async def _gone(_: Request, error: Exception) -> Response:
-    """A file that went away, or cannot be read, after it was found."""
+    """Answer for a file that was found, but then disappeared or cannot be read."""
     assert isinstance(error, OSError)
     return PlainTextResponse(f"cannot be read: {error.strerror or type(error).__name__}", 404)

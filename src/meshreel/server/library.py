@@ -1,6 +1,6 @@
-"""The .reel files that are served: a folder and all below it, or one file. Looked at anew with each request.
+"""Library of served .reel files: those in a folder and its subfolders, or one file. It is read again on each request.
 
-In: a folder. Out: names with slashes, and what each file is: length, rate, or why it cannot be read.
+In: a folder. Out: names with slashes, and for each file its length and rate, or why it cannot be read.
 """
 
 from __future__ import annotations
@@ -15,41 +15,41 @@ from ..errors import InputError, MeshreelError
 from ..io.file_names import is_text
 
 SUFFIX = ".reel"
-HIDDEN = "."  # what such names begin with
+HIDDEN = "."  # first character of hidden names
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What a gallery tells of a file; where it cannot be read, the numbers are 0 and `error` says why."""
+    """Facts of a file for the gallery; for a file that cannot be read, numbers are 0 and `error` says why."""
 
-    name: str  # from the folder, with slashes
+    name: str  # relative to the folder, with slashes
     size: int = 0  # bytes
     frames: int = 0
-    duration: float = 0.0  # s, the last frame's own time included
+    duration: float = 0.0  # s, including the last frame
     error: str = ""
 
     @property
     def mbps(self) -> float:
-        """Rate of the whole file over its duration."""
+        """Size of the file over its duration, Mbit/s."""
         return self.size * 8e-6 / self.duration if self.duration else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Library:
-    """A folder's files, or `only` that one of them."""
+    """The .reel files of a folder, or `only` one of them."""
 
     folder: Path
     only: str | None = None
 
     @staticmethod
     def of_file(file: Path) -> Library:
-        """That of one file alone, whatever its suffix. Raises InputError where no address can have its name."""
+        """Return the library of one file with any suffix. Raises InputError if no URL can contain its name."""
         if not is_text(file.name):
             raise InputError(f"{file}: its name is no Unicode text, which no address can have: rename it")
         return Library(file.parent, file.name)
 
     def names(self) -> list[str]:
-        """The files that are there now, sorted; none that is hidden, or that a link leads out of the folder to."""
+        """Return the files that exist now, sorted, without hidden files and links to outside of the folder."""
         if self.only is not None:
             return [self.only]
         found: list[str] = []
@@ -60,9 +60,9 @@ class Library:
         return sorted(filter(self.path_of, found), key=lambda name: (name.lower(), name))
 
     def path_of(self, name: str) -> Path | None:
-        """The file of a name; None where it is none of this library's, whatever the name says."""
+        """Return the path of a name, None if the name is not that of a file in this library."""
         if self.only is not None:
-            path = self.folder / self.only  # that one was named by the user, wherever a link leads
+            path = self.folder / self.only  # named by the user, so that links may lead anywhere
             return path if name == self.only and path.is_file() else None
         if not _is_plain(name):
             return None
@@ -78,7 +78,7 @@ class Library:
             return None
 
     def entry(self, name: str) -> Entry:
-        """What a file is; damage and absence are told, not raised."""
+        """Return the facts of a file; damage and absence are part of them and not raised."""
         if not is_text(name):
             return Entry(as_text(name), error="the name is no Unicode text, which no address can have: rename the file")
         path = self.path_of(name)
@@ -88,19 +88,21 @@ class Library:
             with FileSource(path) as source:
                 reader = ReelReader(source)
         except (MeshreelError, OSError) as error:
-            return Entry(name, error=str(error).removeprefix(f"{path}: "))  # who reads it need not know our folders
+            return Entry(
+                name, error=str(error).removeprefix(f"{path}: ")
+            )  # viewers need not know the folders of the server
         lost, whole = len(reader.missing), len(reader.chunks)
         cut = f"{lost} of {whole} chunks are missing: the file is truncated" if lost else ""
         return Entry(name, reader.size, reader.frame_count, reader.duration, cut)
 
 
 def as_text(name: str) -> str:
-    """What a page can show of a name, whether it is text or not."""
+    """Return a name as a page can show it, with question marks for bytes that are no text."""
     return name.encode("utf-8", "replace").decode()
 
 
 def _is_plain(name: str) -> bool:
-    """Whether a name from an address leads downwards only: no "..", no hidden part, no drive, nothing absolute."""
+    """Return whether a name from a URL is relative, without "..", hidden parts and drives, and ends in .reel."""
     if not name.lower().endswith(SUFFIX) or "\\" in name or (os.name == "nt" and ":" in name):
         return False
     return not any(part == "" or part.startswith(HIDDEN) for part in name.split("/"))

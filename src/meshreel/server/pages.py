@@ -1,6 +1,6 @@
-"""The pages: one that plays a file, and a gallery. In: names and entries. Out: HTML; every name is escaped.
+"""HTML pages: the player of one file, and the gallery. In: names and entries. Out: HTML, with names escaped.
 
-Scripts and styles are files of their own, so that the content security policy can refuse all others.
+Scripts and styles are separate files, so that the content security policy can refuse inline ones.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from .library import Entry
 
-# The player's files are beside the page; its worker and its wasm are its own. Any site may embed the page in a frame.
+# The player loads its own files, worker and wasm only. Any site may embed the page in a frame.
 POLICY = (
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self' blob:; "
     "connect-src 'self' blob: data:; img-src 'self' blob: data:; style-src 'self'; base-uri 'none'; form-action 'none'"
@@ -39,7 +39,7 @@ a { display: block; color: inherit; text-decoration: none; }
 a:focus-visible { outline: 3px solid #2563eb; outline-offset: -3px; }
 a:hover .name { text-decoration: underline; }
 img, .blank { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: contain; background: #e2e5ea; }
-.told { padding: 10px 12px 12px; }
+.facts-box { padding: 10px 12px 12px; }
 .name { font-weight: 600; overflow-wrap: anywhere; }
 .facts { color: #4a5160; font-size: 14px; }
 .error { color: #a4161a; font-size: 14px; overflow-wrap: anywhere; }
@@ -52,14 +52,14 @@ img, .blank { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: cont
 }
 """
 
-# Stands where there is no poster: a play mark.
+# A play mark, shown for files without a poster.
 PLAIN = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 360"><path d="M210 140v80l70-40z" fill="#8a92a0"/></svg>'
 )
 
 
 def player_page(name: str) -> str:
-    """Plays one file over the whole window; what else the address asks for, the player's own script reads."""
+    """Return the page that plays one file in the whole window; its script reads the other parameters of the URL."""
     source = escape(f"/files/{quote(name)}")
     head = _HEAD.format(title=escape(f"{name} · meshreel"), style="/player/page.css")
     return (
@@ -70,10 +70,10 @@ def player_page(name: str) -> str:
 
 
 def gallery_page(title: str, entries: Sequence[Entry]) -> str:
-    """A tile for each file."""
+    """Return the gallery, with a tile for each file."""
     head = _HEAD.format(title=escape(f"{title} · meshreel"), style="/style.css")
     tiles = "".join(map(_tile, entries))
-    body = f"<ul>\n{tiles}</ul>" if entries else "<p>No .reel file is here.</p>"
+    body = f"<ul>\n{tiles}</ul>" if entries else "<p>This folder has no .reel files.</p>"
     return f"{head}</head>\n<body>\n<main>\n<h1>{escape(title)}</h1>\n{body}\n</main>\n</body>\n</html>\n"
 
 
@@ -81,12 +81,12 @@ def _tile(entry: Entry) -> str:
     name = escape(entry.name.removesuffix(".reel"))
     address = quote(entry.name)
     facts = f"{entry.mbps:.3g} Mbps, {entry.duration:.1f} s, {entry.frames} frames, {_size(entry.size)}"
-    told = f'<div class="facts">{facts}</div>' if entry.frames else ""
-    told += f'<div class="error">{escape(entry.error)}</div>' if entry.error else ""
+    lines = f'<div class="facts">{facts}</div>' if entry.frames else ""
+    lines += f'<div class="error">{escape(entry.error)}</div>' if entry.error else ""
     poster = (
         f'<img src="/posters/{address}.png" alt="" loading="lazy">' if entry.frames else '<div class="blank"></div>'
     )
-    inside = f'{poster}<div class="told"><div class="name">{name}</div>{told}</div>'
+    inside = f'{poster}<div class="facts-box"><div class="name">{name}</div>{lines}</div>'
     return f'<li><a href="/watch/{address}">{inside}</a></li>\n' if entry.frames else f"<li>{inside}</li>\n"
 
 

@@ -1,4 +1,4 @@
-"""Posters: the first frame of a file that has a surface, as a PNG of its normals. In: a path. Out: bytes, kept."""
+"""Posters: a PNG of the normals of the first frame with a surface. In: the path of a file. Out: cached bytes."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from ..types import Mesh
 
 WIDTH, HEIGHT = 480, 360  # pixels
 FIELD = 30.0  # degrees, vertical
-MOST_KEPT = 256
-LOOKED_AT = 30  # frames, for one with a surface
+MOST_POSTERS = 256  # in memory (guess)
+LOOKED_AT = 30  # frames that are searched for a surface (guess)
 
 
 def poster_tag(path: Path) -> str | None:
-    """The ETag of a file's poster: another one when the file changes, or what draws. None where no file is there."""
+    """Return the ETag of a poster, which changes with the file and the version of meshreel; None without a file."""
     try:
         found = path.stat()
     except OSError:
@@ -31,14 +31,14 @@ def poster_tag(path: Path) -> str | None:
 
 
 class Posters:
-    """Kept until the file changes. Threads may share it; it does not keep two from drawing the same."""
+    """Cache of posters, one for each version of a file. Threads may share it; two may draw the same poster."""
 
     def __init__(self) -> None:
         self._known: OrderedDict[tuple[Path, str], bytes | None] = OrderedDict()
         self._lock = threading.Lock()
 
     def of(self, path: Path, tag: str) -> bytes | None:
-        """The PNG; None where nothing can be shown: a damaged or empty file, or no renderer (the extra `encode`)."""
+        """Return a PNG, None for damaged and empty files and without the renderer (extra `encode`)."""
         version = (path, tag)
         with self._lock:
             if version in self._known:
@@ -47,7 +47,7 @@ class Posters:
         picture = _poster(path)
         with self._lock:
             self._known[version] = picture
-            while len(self._known) > MOST_KEPT:
+            while len(self._known) > MOST_POSTERS:
                 self._known.popitem(last=False)
         return picture
 
@@ -62,13 +62,13 @@ def _poster(path: Path) -> bytes | None:
 
 
 def _first(video: Video) -> Mesh | None:
-    """The first of some frames that has a surface."""
+    """Return the first frame with a surface, None if the first LOOKED_AT have none."""
     frames = (video[index] for index in range(min(len(video), LOOKED_AT)))
     return next((mesh for mesh in frames if not mesh.is_empty), None)
 
 
 def _picture(mesh: Mesh, up: str) -> bytes:
-    """A PNG, upright, clear where nothing is; from the front, where no other side shows clearly more than it."""
+    """Return an upright PNG with a transparent background, from the front unless another side shows twice as much."""
     from PIL import Image
 
     from ..geometry.raycast import Rays

@@ -1,4 +1,4 @@
-"""Runs the server until it is interrupted. In: an application, a host, a port. Out: nothing; addresses are told."""
+"""Server loop until an interrupt. In: an application, a host and a port. Out: its addresses, by a callback."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ from ..errors import InputError
 
 LOCAL = ("localhost", "127.0.0.1", "::1")
 EVERYWHERE = ("0.0.0.0", "::")
-PATIENCE = 1  # s, for answers that are under way when the server is stopped
-UNKNOWN = "meshreel, for one run of its server"  # who signs
-VALID = timedelta(days=365)  # of a certificate; browsers refuse those that hold for many years
+PATIENCE = 1  # s for responses in progress when the server stops (guess)
+UNKNOWN = "meshreel, for one run of its server"  # organization that signs the certificate
+VALID = timedelta(days=365)  # validity of the certificate; Apple's systems refuse more than 825 days
 
 
 @dataclass(frozen=True, slots=True)
 class ServerOptions:
-    """Where the server listens."""
+    """Address and encryption of the server."""
 
     host: str = LOCAL[1]
-    """The address to listen on; 0.0.0.0: all of this machine, for a headset in the same network."""
+    """Address to listen on; 0.0.0.0 for all addresses of this machine, as for a headset in the same network."""
     port: int = 0
-    """The port; 0: any that is free."""
+    """Port; 0 for any free one."""
     https: Annotated[bool, Parameter(negative="")] = False
-    """Encrypt, with a certificate made for this run: headsets enter VR from other machines only so."""
+    """Encrypt with a certificate made for this run: headsets enter VR only from https pages of other machines."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.port <= 65_535:
-            raise InputError(f"--port {self.port}: give a number in 0 .. 65535, or none for any that is free")
+            raise InputError(f"--port {self.port}: give a number in 0 .. 65535, or 0 for any free port")
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """The names that a browser may know the server by; those of this machine alone where nobody else can ask.
+        """Host names that requests may have: only local ones if the server listens to this machine alone.
 
-        A page of another site, whose name is made to lead here, so reads nothing (DNS rebinding).
+        So a page of another site, whose name is made to resolve to this machine, reads nothing (DNS rebinding).
         """
         return tuple(map(_bracketed, LOCAL)) if self.host in LOCAL else ("*",)
 
 
-def run(app: Starlette, options: ServerOptions, told: Callable[[list[str]], None]) -> None:
-    """Serves until SIGINT or SIGTERM. `told` hears the addresses as soon as they answer.
+def run(app: Starlette, options: ServerOptions, announce: Callable[[list[str]], None]) -> None:
+    """Serve until SIGINT or SIGTERM. `announce` gets the addresses as soon as the server listens.
 
-    Raises InputError where the host is not known or the port is taken.
+    Raises InputError if the host is unknown or the port is taken.
     """
     logging.getLogger("uvicorn.error").addFilter(_is_news)
     with _listening(options) as listener:
@@ -67,19 +67,19 @@ def run(app: Starlette, options: ServerOptions, told: Callable[[list[str]], None
             timeout_graceful_shutdown=PATIENCE,
             ssl_context_factory=(lambda *_: encryption) if encryption else None,
         )
-        told(addresses(options, listener.getsockname()[1]))
+        announce(addresses(options, listener.getsockname()[1]))
         uvicorn.Server(config).run(sockets=[listener])
 
 
 def addresses(options: ServerOptions, port: int) -> list[str]:
-    """What to type into a browser: here, and, where the server listens to all, on other machines."""
+    """Return the URLs of the server on this machine and, if it listens to all addresses, on others."""
     scheme = "https" if options.https else "http"
     hosts = ["localhost", *_own_addresses()] if options.host in EVERYWHERE else [options.host]
     return [f"{scheme}://{_bracketed(host)}:{port}/" for host in hosts]
 
 
 def _bracketed(host: str) -> str:
-    """As an address has it: one of version 6 in brackets."""
+    """Return a host as URLs contain it: IPv6 addresses in brackets."""
     return f"[{host}]" if ":" in host else host
 
 
@@ -88,20 +88,20 @@ def _listening(options: ServerOptions) -> Iterator[socket.socket]:
     place = f"{options.host}:{options.port}"
     try:
         found = socket.getaddrinfo(options.host, options.port, type=socket.SOCK_STREAM)[0]
-    except (OSError, UnicodeError) as error:  # UnicodeError: a name that is too long, or has empty parts
+    except (OSError, UnicodeError) as error:  # UnicodeError: a name that is too long or has empty parts
         raise InputError(f"cannot listen on {place}: {error}; give another --host, 0.0.0.0 for all") from error
     both = options.host == "::" and socket.has_dualstack_ipv6()
     try:
         listener = socket.create_server(found[4], family=found[0], dualstack_ipv6=both)
     except OSError as error:
-        remedy = "give another --port, or none for any that is free" if options.port else "give another --host"
+        remedy = "give another --port, or 0 for any free port" if options.port else "give another --host"
         raise InputError(f"cannot listen on {place}: {error.strerror or error}; {remedy}") from error
     with listener:
         yield listener
 
 
 def _encryption(address: str) -> ssl.SSLContext:
-    """TLS by a certificate that nobody else has signed, for the address and for this machine's own; it is not kept."""
+    """Return a TLS context with a self-signed certificate for the address and those of this machine; it is not kept."""
     import trustme
 
     names = [name for name in dict.fromkeys([*LOCAL, *_own_addresses(), address]) if name not in EVERYWHERE]
@@ -116,11 +116,11 @@ def _encryption(address: str) -> ssl.SSLContext:
 
 
 def _own_addresses() -> list[str]:
-    """This machine's own addresses of version 4, as far as its name and its routes tell."""
+    """Return the IPv4 addresses of this machine that its host name and its routes reveal."""
     found: dict[str, None] = {}
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect(("192.0.2.1", 9))  # sends nothing: asks which address would be used
+            probe.connect(("192.0.2.1", 9))  # sends nothing; the socket then knows the local address
             found[probe.getsockname()[0]] = None
     except OSError:
         pass
@@ -133,6 +133,6 @@ def _own_addresses() -> list[str]:
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Whether a line of the log tells a fault: that answers under way end with the server is none."""
+    """Return whether a log record reports an error other than responses that end with the server."""
     cancelled = record.exc_info is not None and isinstance(record.exc_info[1], asyncio.CancelledError)
     return not cancelled and "timeout graceful shutdown exceeded" not in record.getMessage()
