@@ -83,6 +83,19 @@ def test_the_readme_names_the_size_of_its_moving_picture() -> None:
     assert said in " ".join(RUN[0].read_text(encoding="utf-8").split())
 
 
+def test_the_readme_says_the_headline_of_the_results() -> None:
+    found = json.loads((ROOT / "docs" / "results" / "headline.json").read_text(encoding="utf-8"))
+    person, times = found["person"], found["times_larger_at_equal_d2"]
+    text = " ".join(RUN[0].read_text(encoding="utf-8").split())
+    assert f"person of {person['triangles']:,} triangles for {person['seconds']:g} s: {person['kilobytes']} kB" in text
+    shown = re.findall(r"\| ([^|]+) \| ([\d.]+) \|", text)
+    assert {name.strip(): float(number) for name, number in shown} == {
+        "Draco, every frame": times["Draco"]["median"],
+        "Draco, every frame decimated": times["Draco, decimated"]["median"],
+        "TVMC*": times["TVMC*"]["median"],
+    }
+
+
 def _run_page(page: Path, folder: Path, *arguments: str) -> str:
     """What the page prints."""
     command = [sys.executable, str(ROOT / "tests" / "run_page.py"), str(page), *arguments]
