@@ -1,4 +1,4 @@
-"""The validator of Khronos for glTF files, where Node and the npm package are there."""
+"""Khronos's validator for glTF files, if Node and its npm package are installed."""
 
 from __future__ import annotations
 

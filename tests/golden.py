@@ -1,4 +1,4 @@
-"""A decoded frame as the golden records have it: counts, digests of all bits, and first vertices to look at."""
+"""Golden record of a decoded frame: counts, digests of all bits, and the first vertices for a reader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An animated GLB as a viewer would show it at a time: written from the glTF 2.0 specification, not from the writer."""
+"""Independent player of animated GLB files, written from the glTF 2.0 specification."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A USD file as a viewer would show it at a time: read by USD itself."""
+"""Player of USD files for the tests, built on USD itself."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs the Python of a documentation page, in order, in the current folder: `python run_page.py PAGE [small]`.
+"""Run the Python of a documentation page, in order, in the current folder: `python run_page.py PAGE [small]`.
 
 A process of its own, so that it runs as for a user, without the tests' type checks. `small` is for pages that have no
 meshes of their own: it makes a folder `scan`, and everything in the preset is small.

@@ -1,4 +1,4 @@
-"""What README and tutorial show is true: their Python runs, their commands parse, and what they link to exists."""
+"""README, tutorial and docs are true: their Python runs, their commands parse, and their links exist."""
 
 from __future__ import annotations
 

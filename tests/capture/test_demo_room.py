@@ -1,4 +1,4 @@
-"""The demo's room: people who are closed and move, a room that does not, cameras that see both."""
+"""The demo's room: people are closed and move, the room stands still, and cameras see both."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_two_people_move_and_both_are_closed(number: int) -> None:
     assert all(volume(body) > 0.015 for body in bodies)  # m^3; they look outwards
 
 
-def test_what_does_not_move_is_the_same_in_every_frame_and_open() -> None:
+def test_still_surface_is_the_same_in_every_frame_and_open() -> None:
     room = furnished_room(COARSE)
     first, last = room[0], room[-1]
     still = part(first.mesh, ~first.dynamic)

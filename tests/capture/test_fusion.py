@@ -1,4 +1,4 @@
-"""Fusion on exact depths: the surface is where it is, once, the same each time, and without fragments."""
+"""Fusion of exact depths gives the true surface, once, reproducibly and without fragments."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def test_a_ball_seen_from_all_sides_is_a_closed_ball_of_its_size():
     assert (outward > 0).mean() > 0.99  # counter-clockwise from outside
 
 
-def test_the_wall_stands_where_it_is_with_the_shadow_of_the_ball():
+def test_the_wall_is_at_its_place_with_the_shadow_of_the_ball():
     mesh = fuse_depths(views(AROUND[:1]), FINE)
     wall = mesh.vertices[mesh.vertices[:, 2] > 1]
     assert len(wall) and np.abs(wall[:, 2] - WALL).max() < 0.005
     assert np.linalg.norm(wall[:, :2], axis=1).min() > RADIUS  # nothing was seen behind the ball
 
 
-def test_another_camera_carves_away_what_one_has_flying():
+def test_another_camera_carves_away_flying_pixels():
     depth = measured(AROUND[0])
     depth[44:52, 8:16] = 1500  # a piece that is not there, beside the ball
     beside, everything = camera("beside", 20), replace(FINE, fragment=0.0)
@@ -54,14 +54,14 @@ def test_another_camera_carves_away_what_one_has_flying():
     assert piece(alone) > 100 and piece(both) == 0
 
 
-def test_the_order_of_cameras_and_the_run_do_not_change_the_mesh():
+def test_neither_the_order_of_cameras_nor_a_second_run_changes_the_mesh():
     first, again = fuse_depths(views(AROUND), FINE), fuse_depths(views(AROUND), FINE)
     assert np.array_equal(first.vertices, again.vertices) and np.array_equal(first.faces, again.faces)
     turned = fuse_depths(views(AROUND[::-1]), FINE)
     assert np.abs(turned.vertices - first.vertices).max() < 1e-4 and np.array_equal(turned.faces, first.faces)
 
 
-def test_what_is_out_of_range_or_not_measured_is_no_surface():
+def test_depths_out_of_range_or_missing_are_no_surface():
     near = camera(depth_range=(0.2, 2.5))
     mesh = fuse_depths([(near, measured(near))], FINE)
     assert mesh.vertices[:, 2].max() < 0.6  # the wall is 3.2 m away
@@ -88,7 +88,7 @@ def test_options_out_of_range_are_refused(wrong):
 
 
 @pytest.mark.parametrize("side", [-50.0, 50.0])
-def test_a_slanted_wall_is_where_it_is(side):
+def test_a_slanted_wall_is_fused_at_its_place(side):
     slanted = camera(side=side, size=192)
     mesh = fuse_depths([(slanted, measured(slanted, ball=(0.0, 50.0, 0.0)))], FusionOptions(voxel=0.02))
     seen = mesh.vertices[np.abs(mesh.vertices[:, :2]).max(axis=1) < 0.5]

@@ -1,4 +1,4 @@
-"""The demo's people: closed, on their surface, touching and parting, new connectivity every frame."""
+"""The demo's people are closed, touch and part, and have new connectivity in every frame."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_every_frame_is_a_closed_surface_that_looks_outwards(number: int) -> Non
     assert face_normals(mesh)[1].min() > 0
 
 
-def test_people_are_apart_in_touch_and_apart_again() -> None:
+def test_people_are_apart_then_touch_then_are_apart_again() -> None:
     sequence = soft_bodies(SoftBodiesOptions(frames=30, begin=0.95, spacing=0.05))
     shown = [sequence[k] for k in (0, 7, 14, 29)]  # 7: hands alone; 14: a hand on the shoulder, too
     assert [int(components(m.faces, len(m.vertices)).max()) + 1 for m in shown] == [2, 1, 1, 2]
@@ -50,7 +50,7 @@ def test_a_frame_is_the_same_whenever_it_is_made_and_unlike_its_neighbors() -> N
     assert not np.array_equal(one[4].faces, one[5].faces)
 
 
-def test_a_third_person_and_a_frame_rate_can_be_asked_for() -> None:
+def test_a_third_person_and_a_frame_rate_can_be_chosen() -> None:
     sequence = soft_bodies(SoftBodiesOptions(frames=2, frame_rate=15.0, people=3, spacing=0.06))
     assert (len(list(sequence)), sequence.frame_rate) == (2, 15.0)
     assert components(sequence[0].faces, len(sequence[0].vertices)).max() == 2
@@ -62,7 +62,7 @@ def test_impossible_options_are_refused(options: dict) -> None:
         SoftBodiesOptions(**options)
 
 
-def test_spheres_move_as_they_say() -> None:
+def test_spheres_move_as_documented() -> None:
     slid = sliding_sphere(4, step=0.1)
     assert np.allclose(slid[3].vertices - slid[0].vertices, [0.3, 0, 0])
     assert volume(slid[0]) == pytest.approx(4 * np.pi / 3, rel=0.03)

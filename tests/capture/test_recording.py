@@ -1,4 +1,4 @@
-"""A recording fuses each frame once, keeps it while there is room, and knows what its cameras measured."""
+"""A recording fuses each frame once, keeps it while the disk has room, and gives its depth pictures."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_a_frame_is_fused_once_and_is_the_same_again(recording, monkeypatch):
     assert np.array_equal(first.vertices, again.vertices) and np.array_equal(first.faces, again.faces)
 
 
-def test_what_is_kept_goes_with_the_recording():
+def test_kept_meshes_are_deleted_with_the_recording():
     kept = Kept()
     kept.put(3, TRIANGLE)
     folder = next(iter(kept._files.values())).parent
@@ -39,7 +39,7 @@ def test_what_is_kept_goes_with_the_recording():
     assert not folder.exists()
 
 
-def test_where_there_is_no_room_frames_are_made_again(recording, monkeypatch):
+def test_on_a_full_disk_frames_are_fused_again(recording, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
@@ -48,13 +48,13 @@ def test_where_there_is_no_room_frames_are_made_again(recording, monkeypatch):
     assert np.array_equal(first.vertices, again.vertices) and not recording._kept._files
 
 
-def test_who_reads_each_frame_once_has_nothing_kept(tmp_path, monkeypatch):
+def test_without_keep_no_frame_is_stored(tmp_path, monkeypatch):
     folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0)])
     monkeypatch.setattr("meshreel.capture.recording.Kept", None)
     assert not open_recording(folder, keep=False)[0][0].is_empty
 
 
-def test_it_knows_what_each_camera_measured_and_which_has_nothing(tmp_path):
+def test_depth_pictures_are_given_per_camera_and_none_for_a_missing_one(tmp_path):
     folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)])
     (folder / "right" / "depth" / "depth_00001.png").unlink()
     found, _ = open_recording(folder)

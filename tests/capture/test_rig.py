@@ -1,4 +1,4 @@
-"""Rigs on disk: what is written is read, and what is wrong is named."""
+"""Rigs on disk: a written rig is read back, and errors name what is wrong."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def folder(tmp_path):
     return record(tmp_path / "rig", [camera(), camera("side", 90)], STILL)
 
 
-def test_what_is_written_is_read(folder):
+def test_a_written_rig_is_read_back(folder):
     rig = read_rig(folder)
     assert rig.frames == [0, 1, 2] and rig.frame_rate == 15 and rig.missing() == []
     for found, wanted in zip(rig.cameras, (camera(), camera("side", 90)), strict=True):
@@ -52,7 +52,7 @@ def turned(*rows):
         ([turned([0, 0, 1], [-1, 0, 0], [0, -1, 0])], "y"),  # on its side
     ],
 )
-def test_up_is_what_cameras_have_up(tmp_path, cameras, up):
+def test_the_up_axis_is_the_one_that_points_up_in_the_pictures(tmp_path, cameras, up):
     named = [replace(each, name=str(number)) for number, each in enumerate(cameras)]
     assert read_rig(record(tmp_path / "rig", named, STILL)).up == up
 
@@ -67,7 +67,7 @@ def test_a_folder_with_one_camera_is_a_rig(tmp_path):
     assert rig.frames == [639] and rig.frame_rate == 8 and rig.cameras[0].name == tmp_path.name
 
 
-def test_frames_that_one_camera_lacks_are_told_and_fused_without(folder):
+def test_frames_that_one_camera_lacks_are_reported_and_fused_without_it(folder):
     (folder / "side" / "depth" / "depth_00001.png").unlink()
     rig = read_rig(folder)
     assert [len(rig.depths(frame)) for frame in rig.frames] == [2, 1, 2]
@@ -126,7 +126,7 @@ def test_a_rig_that_is_wrong_is_refused_with_the_reason(folder, change, words):
         read_rig(folder)
 
 
-def test_keys_that_mean_nothing_are_told_with_what_may_be_meant(folder):
+def test_unknown_keys_are_reported_with_a_suggestion(folder):
     changed(folder, lambda rig: rig["cameras"][1].update(depth_unit=0.01, serial="x"))
     _, warnings = open_recording(folder)
     assert warnings == [
@@ -140,7 +140,7 @@ def test_a_description_may_begin_with_a_byte_order_mark(folder):
     assert len(read_rig(folder).cameras) == 2
 
 
-def test_frames_that_no_camera_has_are_told_where_the_row_is_uneven(folder):
+def test_frames_that_no_camera_has_are_reported(folder):
     for name in ("front", "side"):
         for number in (3, 4, 6):
             write_depth(measured(camera()), folder / name / "depth" / f"depth_{number:05}.png")
@@ -153,7 +153,7 @@ def test_frames_that_no_camera_has_are_told_where_the_row_is_uneven(folder):
     assert read_rig(folder).missing() == []  # every second number: another way to count
 
 
-def test_a_folder_without_a_rig_or_with_none_that_can_be_read_is_told(tmp_path):
+def test_a_folder_without_a_readable_rig_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"neither rig\.json nor camera\.json"):
         read_rig(tmp_path)
     (tmp_path / "rig.json").write_text("[1")
@@ -185,7 +185,7 @@ def test_names_must_number_frames(folder, name, words):
         read_rig(folder)
 
 
-def test_a_camera_without_pictures_is_told(folder):
+def test_a_camera_without_pictures_is_refused(folder):
     for path in (folder / "side" / "depth").iterdir():
         path.unlink()
     with pytest.raises(InputError, match="camera side has no depth pictures"):
@@ -202,7 +202,7 @@ def test_a_camera_without_pictures_is_told(folder):
         (lambda path: write_depth(np.ones((8, 9), np.uint16), path), "9 x 8 pixels where camera front has 96 x 96"),
     ],
 )
-def test_pictures_that_are_no_depth_are_refused(folder, made, words):
+def test_pictures_that_hold_no_depth_are_refused(folder, made, words):
     made(folder / "front" / "depth" / "depth_00001.png")
     with pytest.raises(InputError, match=words):
         read_rig(folder).depths(1)
@@ -215,7 +215,7 @@ def bomb(path):
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk + path.read_bytes()[33:])
 
 
-def test_a_picture_that_says_it_is_enormous_is_refused(folder):
+def test_a_picture_that_claims_an_enormous_size_is_refused(folder):
     bomb(folder / "front" / "depth" / "depth_00001.png")
     with pytest.raises(InputError, match="cannot be read"):
         read_rig(folder).depths(1)
@@ -227,7 +227,7 @@ def test_depth_pictures_keep_every_bit(tmp_path):
     assert np.array_equal(read_depth(tmp_path / "1.png"), depth)
 
 
-def test_a_recording_gives_frames_and_says_what_is_blind(folder):
+def test_a_recording_gives_frames_and_reports_blind_cameras(folder):
     blank = np.zeros((96, 96), np.uint16)
     for number in range(3):
         write_depth(blank, folder / "side" / "depth" / f"depth_{number:05}.png")
@@ -237,7 +237,7 @@ def test_a_recording_gives_frames_and_says_what_is_blind(folder):
     assert len(list(recording)) == 3
 
 
-def test_a_camera_that_moves_is_found_by_what_it_sees(tmp_path):
+def test_a_moving_camera_is_detected_in_its_depths(tmp_path):
     walking = [(0.3 * number - 1, 0.0, 0.0) for number in range(6)]
     recording, _ = open_recording(
         record(tmp_path / "still", [camera()], walking)
@@ -250,7 +250,7 @@ def test_a_camera_that_moves_is_found_by_what_it_sees(tmp_path):
         open_recording(moving)
 
 
-def test_a_view_of_a_camera_sees_points_half_a_pixel_from_their_numbers():
+def test_the_view_of_a_camera_has_pixel_centers_at_halves():
     one = camera("side", 30.0)
     points = np.random.default_rng(0).uniform(-0.3, 0.3, (20, 3))
     local = points @ one.extrinsic[:3, :3].T + one.extrinsic[:3, 3]

@@ -1,4 +1,4 @@
-"""Simulated rigs: depth that is exact without a sensor's errors, errors as asked for, a truth that labels carry."""
+"""Simulated rigs: exact depth without sensor errors, errors of the chosen size, and a truth with labels."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_without_errors_depth_is_that_of_the_surface(tmp_path):
 
 
 @pytest.mark.parametrize("correlation", [0.0, 3.0])
-def test_noise_is_as_large_as_asked_for_and_grows_with_depth(tmp_path, correlation):
+def test_noise_has_the_chosen_size_and_grows_with_depth(tmp_path, correlation):
     still = SceneFrame.of([PLATE], [])
     exact = seen(tmp_path / "exact", EXACT, frames=[still])[0].astype(float)
     noisy = seen(tmp_path / "noisy", replace(EXACT, noise=1.0, correlation=correlation), frames=[still] * 8)
@@ -50,7 +50,7 @@ def test_noise_is_as_large_as_asked_for_and_grows_with_depth(tmp_path, correlati
     assert (alike > 0.8) if correlation else (abs(alike) < 0.05)
 
 
-def test_holes_flying_pixels_and_grazing_angles(tmp_path):
+def test_holes_flying_pixels_and_grazing_angles_are_simulated(tmp_path):
     [exact] = seen(tmp_path / "exact", EXACT)
     [holes] = seen(tmp_path / "holes", replace(EXACT, holes=0.1))
     assert abs((holes == 0).mean() - 0.1) < 0.02
@@ -112,6 +112,6 @@ def test_cameras_in_the_corners_look_down_at_the_middle(up):
 @pytest.mark.parametrize(
     "wrong", [{"noise": -1.0}, {"grazing": 0.0}, {"holes": 1.5}, {"jump": 0.0}, {"pose_error": (0.0, float("nan"))}]
 )
-def test_sensors_that_cannot_be_are_refused(wrong):
+def test_impossible_sensors_are_refused(wrong):
     with pytest.raises(InputError, match="sensor with"):
         SensorOptions(**wrong)

@@ -1,4 +1,4 @@
-"""The truth of a simulated rig read back, and told where a part of it is missing, damaged or does not fit."""
+"""The truth of a simulated rig is read back; missing, damaged or inconsistent parts are refused."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def folder(written, tmp_path):
     return shutil.copytree(written, tmp_path / "truth")
 
 
-def test_what_was_simulated_is_read_back(written):
+def test_a_simulated_truth_is_read_back(written):
     truth = read_truth(written)
     assert len(truth) == 2 and truth.frame_rate == 24.0
     assert [one.name for one in truth.cameras] == ["front", "side"]
@@ -44,7 +44,7 @@ def test_what_was_simulated_is_read_back(written):
         truth[2]
 
 
-def test_what_is_missing_is_told(folder):
+def test_a_missing_part_is_named(folder):
     (folder / "frame_00001.ply").unlink()
     with pytest.raises(InputError, match="1 clean meshes and labels of 2 frames, unlike in frame_00001"):
         read_truth(folder)
@@ -57,7 +57,7 @@ def test_what_is_missing_is_told(folder):
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\x03\x04", b"no archive", None])
-def test_labels_that_cannot_be_read_are_told(folder, data):
+def test_unreadable_labels_are_refused(folder, data):
     (folder / LABELS).unlink()
     if data is not None:
         (folder / LABELS).write_bytes(data)
@@ -65,7 +65,7 @@ def test_labels_that_cannot_be_read_are_told(folder, data):
         read_truth(folder)
 
 
-def test_every_truncation_of_the_labels_is_told(folder):
+def test_every_truncation_of_the_labels_is_refused(folder):
     whole = (folder / LABELS).read_bytes()
     for size in range(0, len(whole), 37):
         (folder / LABELS).write_bytes(whole[:size])
@@ -80,7 +80,7 @@ def test_labels_as_objects_are_not_unpickled(folder):
 
 
 @pytest.mark.parametrize("bits", [np.zeros(1, np.uint8), np.zeros(10_000, np.uint8), np.zeros(25, np.int64)])
-def test_labels_of_another_mesh_are_told_with_the_frame(folder, bits):
+def test_labels_of_another_mesh_are_refused_with_the_frame(folder, bits):
     np.savez(folder / LABELS, frame_00000=bits, frame_00001=np.packbits(FRAMES[1].dynamic))
     truth = read_truth(folder)
     assert truth[1].dynamic.sum() == FRAMES[1].dynamic.sum()
@@ -88,7 +88,7 @@ def test_labels_of_another_mesh_are_told_with_the_frame(folder, bits):
         truth[0]
 
 
-def test_a_damaged_clean_mesh_is_told(folder):
+def test_a_damaged_clean_mesh_is_refused(folder):
     (folder / "frame_00000.ply").write_bytes(b"ply\n")
     with pytest.raises(InputError, match="frame_00000"):
         read_truth(folder)[0]

@@ -1,4 +1,4 @@
-"""Hostile files: FormatError and nothing else, before memory is spent; what is not damaged stays readable."""
+"""Hostile files: FormatError and nothing else, before memory is spent; undamaged chunks stay readable."""
 
 from __future__ import annotations
 

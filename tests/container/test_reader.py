@@ -1,4 +1,4 @@
-"""What was written is read again, by the byte ranges that are needed and no others."""
+"""A written file is read back by the necessary byte ranges and no others."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_frame_is_found_in_its_group(frame, number):
 
 
 @pytest.mark.parametrize("frame", [-1, FRAMES])
-def test_a_frame_that_is_not_there_is_an_index_error(frame):
+def test_a_frame_out_of_range_is_an_index_error(frame):
     reader = ReelReader(BytesSource(small_file()))
     with pytest.raises(IndexError, match="frames 0 to 17"):
         reader.chunk_of_frame(frame)
@@ -86,7 +86,7 @@ def test_the_first_layers_are_a_prefix_of_the_chunk():
     assert reader.read_chunk(1, 2) == PAYLOADS[1][:30]
 
 
-def test_a_chunk_costs_one_request_of_its_own_bytes():
+def test_a_chunk_costs_one_request_of_exactly_its_bytes():
     source = CountingSource(small_file())
     assert isinstance(source, Source)
     reader = ReelReader(source)
@@ -97,7 +97,7 @@ def test_a_chunk_costs_one_request_of_its_own_bytes():
     assert source.ranges[1:] == [(reader.chunks[3].offset, len(PAYLOADS[3])), (chunk.offset, 30)]
 
 
-def test_a_long_head_costs_one_more_request():
+def test_a_long_head_costs_a_second_request():
     header = replace(HEADER, metadata=json.dumps({"note": "x" * FIRST_REQUEST}))
     source = CountingSource(small_file(header))
     reader = ReelReader(source)
@@ -139,7 +139,7 @@ def test_a_frame_is_shown_with_the_newest_state_that_a_group_of_it_names():
     assert [sequence.static_of_frame(frame) is None for frame in (0, 10)] == [False, True]
 
 
-def test_a_group_is_predicted_from_one_of_its_track():
+def test_a_group_is_predicted_from_a_group_of_its_track():
     reader = ReelReader(BytesSource(SCENE))
     before = [reader.group_before(chunk) for chunk in reader.groups]
     assert [chunk and chunk.number for chunk in before] == [None, None, None, 1, 4, None, 5]
@@ -154,7 +154,7 @@ def test_where_there_are_several_tracks_a_chunk_names_its_own():
     ]
 
 
-def test_as_many_tracks_as_are_allowed_are_found_at_once():
+def test_the_largest_number_of_tracks_is_read_quickly():
     file = io.BytesIO()
     with ReelWriter(file, HEADER) as writer:
         for first in range(0, 100, 10):

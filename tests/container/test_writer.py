@@ -112,7 +112,7 @@ def test_a_file_object_that_is_full_is_an_input_error():
         writer.add_group(0, 10, EMPTY)
 
 
-def test_a_chunk_that_failed_to_be_written_spoils_the_file_even_if_nobody_minds(tmp_path, monkeypatch):
+def test_a_chunk_that_failed_to_be_written_spoils_the_file_even_if_the_error_is_caught(tmp_path, monkeypatch):
     class HalfFull(io.BytesIO):
         def write(self, data: bytes) -> int:
             super().write(data[: len(data) // 2])
@@ -126,7 +126,7 @@ def test_a_chunk_that_failed_to_be_written_spoils_the_file_even_if_nobody_minds(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_target_that_cannot_be_is_refused_before_any_work(tmp_path):
+def test_an_impossible_target_is_refused_before_any_work(tmp_path):
     for path in (tmp_path, tmp_path / "none" / "out.reel"):
         with pytest.raises(InputError, match="cannot be written"), ReelWriter(path, HEADER):
             raise AssertionError("the block must not run")
@@ -175,7 +175,7 @@ def test_a_file_without_frames_is_an_input_error(tmp_path):
         ({"payload": b"\x05" + bytes(9)}, "a group of form PATCH"),
     ],
 )
-def test_a_group_that_cannot_be_is_refused_and_the_file_goes_on(arguments, message):
+def test_an_impossible_group_is_refused_and_the_file_stays_usable(arguments, message):
     file = io.BytesIO()
     good = {"first_frame": 10, "frame_count": 5, "payload": b"\x03" + bytes(9), "layers": (4, 10), "depends_on": (0,)}
     with ReelWriter(file, HEADER) as writer:
@@ -187,7 +187,7 @@ def test_a_group_that_cannot_be_is_refused_and_the_file_goes_on(arguments, messa
     assert ReelReader(BytesSource(file.getvalue())).frame_count == 15
 
 
-def test_a_group_may_depend_on_the_one_before_it_and_on_no_other():
+def test_a_group_may_depend_on_the_previous_group_and_on_no_other():
     file = io.BytesIO()
     with ReelWriter(file, HEADER) as writer:
         assert writer.last_of(0) is None
@@ -243,7 +243,7 @@ def test_a_file_whose_tracks_differ_in_length_is_an_input_error(tmp_path):
         (PATCH, (-1,), "IndexEntry.depends_on"),
     ],
 )
-def test_a_background_that_cannot_be_is_refused_and_the_file_goes_on(payload, depends_on, message):
+def test_an_impossible_background_is_refused_and_the_file_stays_usable(payload, depends_on, message):
     file = io.BytesIO()
     with ReelWriter(file, HEADER) as writer:
         writer.add_static(STATIC)

@@ -1,4 +1,4 @@
-"""What a head must satisfy beyond its bytes: each guard trips."""
+"""Laws of a head beyond its layout: each guard trips."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SECOND = replace(GROUP, track=1)
 PATCH = replace(STATIC, form=Form.PATCH, depends_on=(0,))
 
 
-def test_what_the_encoder_writes_passes():
+def test_written_heads_pass():
     check_header(HEADER, 10)
     check_header(replace(HEADER, intervals=(1, 2)), 3)
     check_index(Index((STATIC, replace(GROUP, depends_on=(0,)))))
@@ -116,7 +116,7 @@ def test_a_background_that_leads_to_no_mesh_is_refused(chunks, message):
         check_index(Index((*chunks, GROUP)))
 
 
-def test_as_many_tracks_and_changes_as_are_allowed_pass_and_one_more_is_refused():
+def test_the_largest_numbers_of_tracks_and_patches_pass_and_larger_ones_are_refused():
     tracks = [replace(GROUP, track=number) for number in range(MOST_TRACKS + 1)]
     check_index(Index(tuple(tracks[:-1])))
     with pytest.raises(FormatError, match=f"track {MOST_TRACKS} after {MOST_TRACKS}"):

@@ -46,7 +46,7 @@ def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     assert subprocess.run(command, env=environment).returncode == 0
 
 
-def test_offsets_stand_as_long_as_they_are_fixed():
+def test_offsets_are_shown_while_they_are_fixed():
     rows = table(IndexEntry).splitlines()[2:]
     assert [row.split("|")[1].strip() for row in rows] == ["0", "1", "2", "4", "", ""]
 

@@ -1,4 +1,4 @@
-"""FORMAT.md tells the truth: its Python decodes what the encoder writes."""
+"""FORMAT.md is true: its Python decodes what the encoder writes."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def test_the_document_decodes_integers_of_every_length(decoder: dict[str, Any]) 
 
 
 @pytest.mark.parametrize("rule", AnchorRule)
-def test_the_document_finds_the_anchors(decoder: dict[str, Any], rule: AnchorRule) -> None:
+def test_the_document_chooses_the_same_anchors(decoder: dict[str, Any], rule: AnchorRule) -> None:
     base = body()
     for count in (0, 1, 2, 5, 40, len(base.vertices)):
         told = decoder["anchors"](rule, count, [tuple(face) for face in base.faces.tolist()], len(base.vertices))

@@ -1,4 +1,4 @@
-"""The player's reader of records: what it declares, and that it is the layout's own."""
+"""The player's reader of records declares all fields and matches the layout."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CORE = Path(__file__).resolve().parents[2] / "web" / "player-core" / "src"
 TEXT = typescript(RECORDS + PAYLOADS)
 
 
-def test_the_module_of_the_player_is_the_one_of_this_layout():
+def test_the_players_module_is_generated_from_this_layout():
     assert (CORE / "format" / "layout.gen.ts").read_text(encoding="utf-8") == TEXT
 
 
@@ -24,7 +24,7 @@ def test_every_record_has_its_fields_in_their_order():
         assert [name.lower() for name in names] == [field.name.replace("_", "") for field in record_fields(record)]
 
 
-def test_a_record_stands_behind_those_that_it_is_made_of():
+def test_a_record_follows_the_records_that_are_its_fields():
     for name in re.findall(r"nested\(\(\) => (\w+)\)", TEXT):
         assert 0 <= TEXT.index(f"export const {name}:") < TEXT.index(f"nested(() => {name})")
 

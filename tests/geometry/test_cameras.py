@@ -83,7 +83,7 @@ def put(place: str, number: int, value: float):
         (put("intrinsic", 0, 1e300), r"over 1e\+09"),
     ],
 )
-def test_a_camera_that_none_can_have_is_refused_with_its_number(change, words):
+def test_an_impossible_camera_is_refused_with_its_number(change, words):
     record = json.loads(pack_cameras([PinholeCamera(64, 48, np.eye(3), np.eye(4))] * 2))
     change(record["parameters"][1])
     with pytest.raises(InputError, match=f"these: .*camera number 1: .*{words}.*mend it"):

@@ -1,4 +1,4 @@
-"""Connected pieces by SciPy are those of the decoder's side, label by label."""
+"""Connected components by SciPy have the labels of the decoder's implementation."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def test_labels_are_those_of_components(faces):
     assert np.array_equal(connected_faces(array, 20), label[array[:, 0]])
 
 
-def test_nothing_has_no_labels():
+def test_an_empty_mesh_has_no_labels():
     assert len(connected(np.zeros((0, 3), np.int32), 0)) == len(connected_faces(np.zeros((0, 3), np.int32), 0)) == 0
     assert connected(np.zeros((0, 3), np.int32), 3).tolist() == [0, 1, 2]
 
 
-def test_faces_that_are_there_many_times_still_connect():
+def test_repeated_faces_still_connect_vertices():
     assert connected(np.array([[0, 1, 2]] * 256, np.int32), 4).tolist() == [0, 0, 0, 1]

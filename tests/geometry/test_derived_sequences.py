@@ -1,4 +1,4 @@
-"""Sequences made of others: some frames, and all of them forth and back."""
+"""Derived sequences: chosen frames, and all frames forth and back."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small holes are closed, large ones stay open, and what was closed is not touched."""
+"""Small holes are closed, large ones stay open, and closed meshes are unchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Interior samples: even, inside, by body; and what happens to open, flat and dirty meshes."""
+"""Interior samples are even, inside and labelled by body, also for open, flat and dirty meshes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def samples_of(mesh: Mesh, count: int = 8000) -> Samples:
     return interior_samples(mesh, count, np.random.default_rng(1))
 
 
-def test_a_sphere_gets_about_the_count_asked_for_and_only_points_inside() -> None:
+def test_a_sphere_gets_about_the_requested_count_and_only_points_inside() -> None:
     samples = samples_of(sphere())
     assert 7000 < len(samples.points) < 9000
     assert np.linalg.norm(samples.points, axis=1).max() < 0.301
@@ -100,7 +100,7 @@ def test_a_flat_sheet_is_sampled_on_its_surface() -> None:
     np.testing.assert_allclose(samples.points[:, :2].mean(axis=0), 0.25, atol=0.005)
 
 
-def test_a_sheet_beside_a_solid_becomes_a_body_of_its_own() -> None:
+def test_a_sheet_beside_a_solid_becomes_a_separate_body() -> None:
     samples = samples_of(together(sphere(0.2, (0, 0, 0.5)), sheet()))
     assert samples.bodies.max() == 1
     assert np.abs(samples.points[samples.bodies == 1, 2]).max() < 1e-3
@@ -118,7 +118,7 @@ def test_the_same_generator_gives_the_same_samples() -> None:
     assert a.points.tobytes() == b.points.tobytes()
 
 
-def test_winding_tells_inside_from_outside_and_takes_no_queries() -> None:
+def test_winding_separates_inside_from_outside_and_accepts_an_empty_query() -> None:
     queries = np.array([[0, 0, 0], [0.29, 0, 0], [0.31, 0, 0], [5.0, 5, 5]])
     assert winding_inside(sphere(), queries).tolist() == [True, True, False, False]
     assert winding_inside(sphere(), np.zeros((0, 3))).shape == (0,)

@@ -28,7 +28,7 @@ def test_points_of_a_ball_give_the_ball_facing_outward() -> None:
     assert (outward > 0).mean() > 0.999
 
 
-def test_a_coarse_tree_does_not_flood_the_terminal_and_what_else_is_said_is_heard(capfd, monkeypatch) -> None:
+def test_leaf_warnings_are_filtered_and_other_messages_are_shown(capfd, monkeypatch) -> None:
     n = directions(300)
     monkeypatch.setattr("meshreel.geometry.poisson.decimate", lambda mesh, _: (mesh, os.write(2, b"after\n"))[0])
     reconstruct(0.3 * n, n, PoissonOptions(depth=4, reach=0.1))  # the library warns about its leaves
@@ -56,7 +56,7 @@ def test_too_few_points_give_the_empty_mesh() -> None:
     assert reconstruct(np.zeros((3, 3)), np.zeros((3, 3)), OPTIONS).is_empty
 
 
-def test_small_bits_are_dropped() -> None:
+def test_small_components_are_dropped() -> None:
     n = directions(5000)
     points = np.concatenate([0.3 * n, 0.02 * n[:60] + 0.5])
     whole = reconstruct(

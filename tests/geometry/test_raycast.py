@@ -1,4 +1,4 @@
-"""Rays meet what arithmetic says they meet."""
+"""Rays hit the faces, at the depths, that analytic geometry predicts."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_wall_has_one_depth_and_every_pixel_sees_the_face_that_it_should():
     assert (pixels >= low - 1e-3).all() and (pixels <= high + 1e-3).all()
 
 
-def test_what_nothing_stands_in_the_way_of_is_a_miss():
+def test_a_ray_that_meets_no_face_is_a_miss():
     ball = moved(sphere(0.5), (0, 0, 3))
     seen = Rays(ball).look(camera())
     assert np.array_equal(seen.faces == -1, np.isinf(seen.depth))
@@ -94,7 +94,7 @@ def test_a_view_sees_what_its_rays_meet():
     assert np.allclose(depth[same & (seen.faces >= 0)], seen.depth[same & (seen.faces >= 0)], atol=1e-5)
 
 
-def test_what_was_built_for_closest_points_serves_rays():
+def test_rays_reuse_a_surface_built_for_closest_points():
     ball = moved(sphere(0.5), (0, 0, 3))
     surface = Surface(ball)
     rays, alone = Rays.of(surface), Rays(ball, origin=np.zeros(3))

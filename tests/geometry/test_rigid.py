@@ -36,7 +36,7 @@ def test_a_fit_to_a_mirror_image_is_still_a_rotation() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
-def test_points_on_a_line_or_a_single_one_leave_the_open_part_unturned(count: int) -> None:
+def test_points_on_a_line_or_a_single_point_give_the_smallest_rotation(count: int) -> None:
     line = np.arange(count)[None, :, None] * np.array([1.0, 2, 3])
     rotations, translations = rigid.fit_rigid(line, line + 0.5, np.ones((1, count)))
     np.testing.assert_allclose(rotations[0], np.eye(3), atol=1e-9)

@@ -1,4 +1,4 @@
-"""Connectivity: the laws that decoder and encoder both stand on."""
+"""Laws of connectivity on which decoder and encoder rely."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_cleaning_leaves_each_face_with_an_area_once_and_no_loose_vertex() -> No
     np.testing.assert_array_equal(again.faces, mesh.faces)
 
 
-def test_vertices_that_no_face_uses_go_and_the_others_keep_their_order() -> None:
+def test_unreferenced_vertices_are_removed_and_the_others_keep_their_order() -> None:
     mesh = drop_unreferenced(Mesh.of(np.arange(18.0).reshape(6, 3), [[5, 1, 3]]))
     assert mesh.vertices[:, 0].tolist() == [3, 9, 15] and mesh.faces.tolist() == [[2, 0, 1]]
 
@@ -150,7 +150,7 @@ def test_meshes_that_are_concatenated_keep_their_vertices_and_faces_in_order():
     assert both.vertices.dtype == np.float64 and both.faces.dtype == np.int32
 
 
-def test_one_mesh_among_empty_ones_is_itself():
+def test_one_mesh_among_empty_ones_is_returned_itself():
     one, nothing = Mesh.of(np.eye(3), [[0, 1, 2]]), Mesh.empty()
     assert concatenate([nothing, one, Mesh.empty()]) is one
     assert concatenate([nothing, Mesh.empty()]) is nothing

@@ -31,14 +31,14 @@ def test_the_surface_is_where_the_distance_is_zero_and_faces_outwards():
     assert (outwards > 0).all() and abs(areas.sum() - np.pi) < 0.02 * np.pi
 
 
-def test_axes_are_where_they_belong():
+def test_array_axes_map_to_world_axes():
     for axis in range(3):
         mesh = extract(grid_of(lambda points, axis=axis: points[..., axis] - 0.13), 0.5)
         np.testing.assert_allclose(mesh.vertices[:, axis], 0.13, atol=1e-6)
         assert (face_normals(mesh)[0][:, axis] > 0.99).all()
 
 
-def test_what_is_not_known_has_no_surface_and_the_border_stays_open():
+def test_unknown_voxels_have_no_surface_and_the_border_stays_open():
     mesh = extract(grid_of(ball, lambda points: 1.0 * (points[..., 0] > 0)), 0.5)
     assert not mesh.is_empty and mesh.vertices[:, 0].min() >= VOXEL - 1e-6
     assert extract(grid_of(ball), 1.5).is_empty

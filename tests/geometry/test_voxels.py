@@ -1,4 +1,4 @@
-"""Cells and their keys: laws, and no face or cell that is left out."""
+"""Laws of cells and their keys; no face and no crossed cell is left out."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_keys_and_cells_invert_each_other(cells):
 
 @settings(deadline=None)
 @given(CELLS)
-def test_keys_are_in_the_order_of_their_places(cells):
+def test_keys_are_ordered_by_position(cells):
     assert [*map(tuple, Lattice(np.zeros(3), 1.0).cells(np.sort(keys_of(cells))).tolist())] == sorted(cells)
 
 
@@ -51,7 +51,7 @@ def test_a_lattice_near_a_mesh_has_room_for_kilometres_around_it(place, size):
     assert np.abs(away).max() <= size * 0.5001
 
 
-def test_near_the_origin_a_lattice_has_it_as_its_own():
+def test_a_lattice_near_the_origin_starts_at_the_origin():
     for mesh in (sphere(1.0, 1), shifted(sphere(1.0, 1), (20, -20, 3)), Mesh.empty()):
         assert not Lattice.near(mesh, 0.02).origin.any()
     stray = Mesh.of([[1e9, 0, 0], *sphere(1.0, 1).vertices], sphere(1.0, 1).faces + 1)
@@ -66,7 +66,7 @@ def test_points_beyond_all_keys_are_at_the_border():
 
 @settings(deadline=None)
 @given(NEAR, st.tuples(*[st.integers(-3, 3)] * 3))
-def test_cells_are_moved_as_far_as_is_said(cells, offset):
+def test_moved_cells_differ_by_the_offset(cells, offset):
     lattice = Lattice(np.zeros(3), 1.0)
     found = lattice.cells(moved(keys_of(cells), np.array(offset)))
     assert np.array_equal(found, np.array(cells, np.int64).reshape(-1, 3) + offset)
@@ -80,7 +80,7 @@ def test_distinct_keys_are_those_of_unique(keys):
 
 @settings(deadline=None)
 @given(NEAR, st.integers(0, 2))
-def test_around_cells_are_all_no_farther_than_so_many_and_no_others(cells, reach):
+def test_around_gives_exactly_the_cells_within_reach(cells, reach):
     steps = list(itertools.product(range(-reach, reach + 1), repeat=3))
     wanted = {(x + i, y + j, z + k) for x, y, z in cells for i, j, k in steps}
     assert np.array_equal(around(distinct(keys_of(cells)), reach), np.sort(keys_of(sorted(wanted))))
@@ -125,11 +125,11 @@ def test_no_cell_that_a_surface_goes_through_the_middle_of_is_missed():
 
 
 @pytest.mark.parametrize("mesh", [Mesh.empty(), Mesh.of(np.zeros((3, 3)), np.zeros((0, 3)))])
-def test_no_faces_have_no_points(mesh):
+def test_an_empty_mesh_has_no_points(mesh):
     points, faces = spread(mesh, 1.0)
     assert points.shape == (0, 3) and faces.shape == (0,)
 
 
-def test_a_face_without_area_has_its_point():
+def test_a_face_without_area_has_a_point():
     points, faces = spread(Mesh.of(np.ones((3, 3)), [[0, 1, 2]]), 0.1)
     assert points.tolist() == [[1, 1, 1]] and faces.tolist() == [0]

@@ -41,7 +41,7 @@ def test_published_examples_are_met_as_far_as_cubic_and_pchip_agree(pair: tuple[
 
 @settings(max_examples=30, deadline=None)
 @given(st.floats(0.1, 10), st.lists(st.floats(0.1, 3), min_size=2, max_size=6))
-def test_a_constant_factor_of_rate_is_the_answer(factor: float, steps: list[float]):
+def test_a_constant_factor_of_rate_is_the_bd_rate(factor: float, steps: list[float]):
     qualities = list(50 + np.cumsum(steps))
     rates = list(np.exp(np.cumsum(steps)))
     result = bd_rate(Curve("a", rates, qualities), Curve("b", [factor * r for r in rates], qualities))
@@ -74,7 +74,7 @@ def test_without_common_quality_there_is_no_number_and_a_reason():
     assert touching.percent is None
 
 
-def test_who_is_better_at_the_least_rate_than_the_anchor_ever_is_has_a_bound():
+def test_a_test_whose_cheapest_point_beats_the_whole_anchor_has_a_bound():
     anchor, test = _curve("a", [1, 4], [50, 56]), _curve("b", [0.5, 2], [60, 63])
     result = bd_bound(anchor, test)
     assert result.at_most and (result.low, result.high) == (50, 56)
@@ -124,14 +124,14 @@ def test_a_gain_ends_where_the_curves_cross():
     assert found.reached and found.quality == pytest.approx(55, abs=0.01) and found.where == "the curves cross"
 
 
-def test_a_gain_that_goes_on_says_whose_points_end_first():
+def test_a_gain_that_lasts_names_the_curve_that_ends_first():
     anchor = _curve("a", [1, 4], [50, 60])
     short, long = gain_end(anchor, _curve("b", [0.5, 1], [50, 57])), gain_end(anchor, _curve("b", [0.5, 3], [50, 70]))
     assert (short.quality, short.reached, long.quality, long.reached) == (57, False, 60, False)
     assert "the codec's best point" in short.where and "the anchors' best point" in long.where
 
 
-def test_no_gain_and_no_overlap_have_no_end():
+def test_without_gain_or_overlap_there_is_no_end():
     anchor = _curve("a", [1, 4], [50, 60])
     for other in (_curve("b", [2, 8], [50, 60]), _curve("b", [1, 2], [70, 80]), _curve("b", [], [])):
         assert gain_end(anchor, other).quality is None and "no gain" in gain_end(anchor, other).where

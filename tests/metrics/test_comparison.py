@@ -42,7 +42,7 @@ def test_aggregates_are_the_mean_and_the_worst_of_the_frames():
     assert row["frames_compared"] == 3 and "ssim" not in row
 
 
-def test_parallel_views_are_used_and_printed_where_they_are_asked_for():
+def test_parallel_views_are_used_and_recorded_on_request():
     comparison = compare_sequences(ORIGINALS, DECODED, ComparisonOptions(views=ParallelViewOptions(64)))
     cameras = parallel_views_around(Box.of(ORIGINALS), 64)
     expected = np.mean([ssim_normals(a, b, cameras).masked for a, b in zip(ORIGINALS, DECODED, strict=True)])
@@ -91,7 +91,7 @@ def test_a_row_is_strict_json_even_where_values_are_infinite():
     assert json.loads(json.dumps(row, allow_nan=False)) == row
 
 
-def test_frames_empty_on_both_sides_say_nothing_and_missing_ones_count():
+def test_frames_empty_on_both_sides_are_left_out_and_missing_ones_count():
     empty = Mesh.empty()
     row = compare_sequences(MeshList((BODY, empty)), MeshList((DECODED[0], empty)), QUICK).to_row()
     assert row["d2_psnr_paper"] == pytest.approx(surface_errors(BODY, DECODED[0]).d2_psnr_paper)

@@ -82,7 +82,7 @@ def test_bad_sheet_options_are_refused(options: dict):
         SheetOptions(**options)
 
 
-def test_frames_that_are_not_there_are_refused(tmp_path: Path):
+def test_missing_frames_are_refused(tmp_path: Path):
     one, two = MeshList((BODY,)), MeshList((BODY, BODY))
     with pytest.raises(InputError, match="0 to 0"):
         write_sheet(one, one, tmp_path / "sheet.png", SheetOptions(frames=(1,)))

@@ -1,4 +1,4 @@
-"""Points spread over a mesh: on its surface, in equal shares of area, the same each time."""
+"""Points spread over a mesh lie on its surface, in equal shares of area, and are the same each time."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ def test_a_missing_normal_is_the_worst_angle():
     assert angles(np.zeros((1, 3)), np.array([[0.0, 0, 1]]))[0] == 180
 
 
-def test_a_tilted_plane_is_off_by_its_tilt():
+def test_the_error_of_a_tilted_plane_is_its_tilt():
     flat = plane()
     turn = np.radians(12)
     rotation = np.array([[1, 0, 0], [0, np.cos(turn), -np.sin(turn)], [0, np.sin(turn), np.cos(turn)]])
@@ -30,7 +30,7 @@ def test_a_tilted_plane_is_off_by_its_tilt():
     assert errors.vertex_angle == pytest.approx(12, abs=1e-3)
 
 
-def test_a_flipped_mesh_is_off_by_half_a_turn():
+def test_the_error_of_a_flipped_mesh_is_180_degrees():
     body = sphere()
     assert surface_errors(body, Mesh.of(body.vertices, body.faces[:, ::-1])).angle == pytest.approx(180, abs=0.1)
 

@@ -32,7 +32,7 @@ def test_colors_are_normals_in_world_axes_and_the_background_is_white():
     assert covered.sum() == pytest.approx(64**2 / 1.05**2, rel=0.05)
 
 
-def test_the_nearest_surface_is_seen_and_left_is_left():
+def test_the_nearest_surface_is_seen_and_the_picture_is_not_mirrored():
     red = Mesh.of([[-1, -1, 1], [0, -1, 1], [0, 1, 1], [-1, 1, 1]], [[0, 1, 2], [0, 2, 3]])  # in front, on the left
     image = render_normals(
         Mesh.of(
@@ -45,7 +45,7 @@ def test_the_nearest_surface_is_seen_and_left_is_left():
     assert np.allclose(image[32, 48], [0.5, 0.5, 0])
 
 
-def test_a_window_changes_nothing_that_is_seen():
+def test_a_window_shows_the_same_pixels_as_the_whole_picture():
     body = noisy(moved(sphere(levels=3), (0.4, 0.1, 0)), 0.02)
     for camera in views_around(Box(np.full(3, -2.0), np.full(3, 2.0)), SMALL):
         full = look(body, camera, Window(0, 120, 0, 160))

@@ -1,4 +1,4 @@
-"""A scene against the truth, on scenes whose answers are known: a ball that moves before a wall that stands."""
+"""Accuracy and coverage on scenes with known answers: a ball that moves in front of a still wall."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_the_truth_itself_has_no_error():
 
 
 @pytest.mark.parametrize("offset", [(0.0, 0.0, 0.0), FAR])
-def test_a_ball_that_is_too_large_is_known_by_its_radius_wherever_the_scene_is(offset):
+def test_the_error_of_a_ball_that_is_too_large_is_the_difference_of_radii(offset):
     clean = truth(offset)
     found = row(clean, ball=sphere(BALL + 0.01))
     assert found["people_median_m"] == pytest.approx(0.01, rel=0.03)
@@ -67,7 +67,7 @@ def test_a_ball_that_is_too_large_is_known_by_its_radius_wherever_the_scene_is(o
     assert found["people_normal_error_deg"] < 0.5
 
 
-def test_the_whole_is_its_parts_by_area():
+def test_the_mean_square_of_all_is_that_of_the_parts_weighted_by_area():
     found = row(truth(), ball=sphere(BALL + 0.01))
     ball, wall = 4 * math.pi * (BALL + 0.01) ** 2, 16.0
     expected = math.sqrt(0.01**2 * ball / (ball + wall))
@@ -75,7 +75,7 @@ def test_the_whole_is_its_parts_by_area():
     assert found["median_m"] < 1e-5  # more than half of it is wall
 
 
-def test_noise_is_told_as_distance_and_normals_and_pictures():
+def test_noise_shows_in_distances_normals_and_pictures():
     clean = truth()
     little, much = (row(clean, wall=noisy(moved(plane(4.0, 40), (-2, -2, -WALL)), sigma)) for sigma in (0.002, 0.01))
     for name, sign in (("background_median_m", 1), ("background_normal_error_deg", 1), ("background_ssim_masked", -1)):
@@ -119,7 +119,7 @@ def test_people_are_the_faces_whose_nearest_clean_face_moves():
     assert np.array_equal(clean.labelled(mesh).dynamic, dynamic)
 
 
-def test_a_part_that_is_missing_is_infinitely_wrong_and_one_that_nobody_has_says_nothing():
+def test_a_part_missing_only_in_the_decoded_mesh_is_infinitely_wrong_and_one_missing_in_both_is_none():
     clean = truth()
     found = row(clean, ball=Mesh.empty())
     assert found["people_median_m"] == math.inf and found["people_normal_error_deg"] == 180
@@ -130,13 +130,13 @@ def test_a_part_that_is_missing_is_infinitely_wrong_and_one_that_nobody_has_says
     assert nothing["median_m"] == nothing["coverage_rms_m"] == math.inf and nothing["d2_psnr_backward"] == 0
 
 
-def test_means_leave_out_what_says_nothing_and_bound_what_is_lossless():
+def test_means_leave_out_none_and_cap_infinite_psnrs():
     rows = [{"a_m": 1.0, "d2_psnr_forward": math.inf, "b": None}, {"a_m": None, "d2_psnr_forward": 60.0, "b": None}]
     assert scene_means(rows) == {"a_m": 1.0, "d2_psnr_forward": (PSNR_CEILING + 60) / 2, "b": None}
     assert scene_means([]) == {}
 
 
-def test_what_makes_no_sense_is_refused():
+def test_impossible_options_and_labels_are_refused():
     mesh, dynamic = parts()
     with pytest.raises(InputError, match="labels for"):
         Scene(mesh, dynamic[:-1], [])

@@ -1,4 +1,4 @@
-"""Seams whose gap and overlap are known: a box on a floor, cut with a slit, or so that one part lies on the other."""
+"""Seams with known gap and overlap: a box on a floor, cut with a slit or so that the parts overlap."""
 
 from __future__ import annotations
 
@@ -76,34 +76,34 @@ def test_parts_that_meet_have_neither_gap_nor_overlap():
 
 
 @pytest.mark.parametrize("gap", [0.005, 0.013, 0.03])
-def test_a_slit_under_the_box_is_as_high_as_it_is(gap):
+def test_the_gap_of_a_slit_under_the_box_is_its_height(gap):
     seam = seam_of(floor(), box(bottom=gap))
     assert seam.gap() == pytest.approx(gap, abs=1e-6) and seam.gap(0.95) == pytest.approx(gap, abs=1e-3)
     assert seam.overlap(0.95) < 1e-6
 
 
 @pytest.mark.parametrize("gap", [0.007, 0.025])
-def test_a_slit_in_the_floor_is_as_wide_as_it_is_and_so_is_one_in_both(gap):
+def test_the_gap_of_a_slit_in_the_floor_or_in_both_parts_is_its_width(gap):
     seam = seam_of(floor(HALF + gap), box())
     assert seam.gap() == pytest.approx(gap, abs=1e-6)
     both = seam_of(floor(HALF + gap), box(bottom=0.01))
     assert both.gap() == pytest.approx(np.hypot(gap, 0.01), abs=1e-6)
 
 
-def test_where_the_background_goes_on_under_the_box_a_slit_is_its_height():
+def test_over_a_floor_without_a_hole_the_gap_is_the_height_of_the_slit():
     assert seam_of(floor(0), box(bottom=0.015)).gap() == pytest.approx(0.015, abs=1e-6)
     crossing = seam_of(floor(0), box(bottom=-0.01))
     assert crossing.gap() < 1e-6 and crossing.overlap(0.95) == 0  # walls are upright: no double skin
 
 
 @pytest.mark.parametrize("width", [0.01, 0.03, 0.06])
-def test_a_ring_of_floor_that_the_body_kept_lies_on_the_floor_as_wide_as_it_is(width):
+def test_the_overlap_of_a_body_with_a_ring_of_floor_is_the_width_of_the_ring(width):
     seam = seam_of(floor(), concatenate([box(), ring(width)]))
     assert seam.overlap() == pytest.approx(width, abs=CELL / 8) and seam.gap() < 1e-6
     assert seam_of(floor(HALF + width), concatenate([box(), ring(width)])).overlap(0.95) < 1e-6
 
 
-def test_a_floor_that_runs_under_what_moves_lies_there_as_wide_as_it_is():
+def test_the_overlap_of_a_floor_that_continues_under_the_body_is_its_width():
     mesh = concatenate([patch((-0.5, 0), (-0.5, 0.5)), patch((0, 0.5), (-0.5, 0.5))])
     moves = np.arange(len(mesh.faces)) >= len(mesh.faces) // 2
     still, moving = patch((-0.5, 0.03), (-0.5, 0.5)), patch((-0.02, 0.5), (-0.5, 0.5), 0.004)
@@ -114,7 +114,7 @@ def test_a_floor_that_runs_under_what_moves_lies_there_as_wide_as_it_is():
     assert measure_seam(mesh, moves, still, upside_down, FRAME).overlap(0.95) == 0
 
 
-def test_what_neither_part_has_is_uncovered():
+def test_surface_in_neither_part_is_uncovered():
     seam = seam_of(floor(HALF + 3 * CELL), box())
     assert seam.uncovered == pytest.approx(1 / 8, rel=0.2)  # one of four cells of floor, four of wall
     assert seam_of(floor(HALF + CELL), box()).uncovered == 0
@@ -140,7 +140,7 @@ def test_noise_of_the_frame_and_of_the_parts_hardly_matters():
     assert seam.gap() == pytest.approx(0.02, abs=0.002) and seam.overlap() == 0
 
 
-def test_without_a_seam_there_is_none():
+def test_a_frame_without_a_border_between_moving_and_still_faces_has_no_seam():
     far = moved(box(), (0, 0, 1.0))
     assert measure_seam(*scene(floor(0), far), floor(0), far) is None
     mesh, moves = scene()
@@ -154,7 +154,7 @@ def test_without_a_seam_there_is_none():
     assert set(seam_row(None).values()) == {None}
 
 
-def test_a_part_that_was_lost_leaves_an_endless_gap():
+def test_a_lost_part_leaves_an_infinite_gap():
     for still, moving in ((Mesh.empty(), box()), (floor(), Mesh.empty())):
         seam = seam_of(still, moving)
         assert np.isinf(seam.gap()) and seam.overlap() == 0 and 0 < seam.uncovered < 1
@@ -169,7 +169,7 @@ def test_a_row_is_in_millimetres():
     }
 
 
-def test_what_makes_no_sense_is_refused():
+def test_impossible_options_and_labels_are_refused():
     mesh, moves = scene()
     with pytest.raises(InputError, match="give one a face"):
         measure_seam(mesh, moves[1:], floor(), box())

@@ -74,7 +74,7 @@ def test_a_larger_background_flatters_the_whole_form_and_not_the_masked_one():
     assert wide.masked == pytest.approx(tight.masked, abs=0.02)
 
 
-def test_normals_are_found_once_for_all_views(monkeypatch):
+def test_normals_are_computed_once_for_all_views(monkeypatch):
     own, found = render.welded_normals, []
     monkeypatch.setattr(render, "welded_normals", lambda mesh: found.append(mesh) or own(mesh))
     body = sphere(levels=2)
@@ -82,7 +82,7 @@ def test_normals_are_found_once_for_all_views(monkeypatch):
     assert len(found) == 2 and len(_views(body)) == 4
 
 
-def test_empty_frames():
+def test_empty_frames_score_one_on_both_sides_and_less_on_one_side():
     body, nothing = sphere(), Mesh.empty()
     cameras = _views(body)
     assert ssim_normals(nothing, nothing, cameras).masked == ssim_normals(nothing, nothing, cameras).whole == 1

@@ -38,7 +38,7 @@ def test_the_whole_box_is_in_every_view(up: str, size: tuple[float, ...]):
         assert np.allclose(rotation @ rotation.T, np.eye(3)) and np.linalg.det(rotation) == pytest.approx(1)
 
 
-def test_the_views_are_front_right_back_left_with_up_upwards():
+def test_the_views_are_front_right_back_left_and_upright():
     box = Box(np.full(3, -1.0), np.full(3, 1.0))
     front, right, back, left = views_around(box)
     for camera, side in ((front, [0, 0, 1]), (right, [1, 0, 0]), (back, [0, 0, -1]), (left, [-1, 0, 0])):
@@ -49,7 +49,7 @@ def test_the_views_are_front_right_back_left_with_up_upwards():
 
 
 @pytest.mark.parametrize(("up", "side"), [("z", (0, -1, 0)), ("-y", (0, 0, -1)), ("-z", (0, 1, 0))])
-def test_what_is_up_is_up_in_the_pictures_and_the_front_is_its_own(up: str, side: tuple[int, ...]):
+def test_the_up_axis_is_up_in_the_pictures_and_decides_the_front(up: str, side: tuple[int, ...]):
     front = views_around(Box(np.full(3, -1.0), np.full(3, 1.0)), ViewOptions(up=up))[0]
     eye = -front.extrinsic[:3, :3].T @ front.extrinsic[:3, 3]
     assert np.allclose(eye / np.linalg.norm(eye), side)
@@ -77,7 +77,7 @@ def test_the_box_is_around_all_frames_and_ignores_empty_ones():
     assert np.allclose(Box.of(MeshList((Mesh.empty(),))).size, 1)
 
 
-def test_a_camera_file_comes_back_and_is_what_open3d_reads(tmp_path: Path):
+def test_a_camera_file_is_read_back_by_us_and_by_open3d(tmp_path: Path):
     o3d = pytest.importorskip("open3d")
     cameras = views_around(Box(np.array([1.0, 2, 3]), np.array([2.0, 4, 4])), ViewOptions(640, 480))
     path = tmp_path / "views.json"
