@@ -29,7 +29,7 @@ Graph graph_of(const int32_t* faces, int64_t face_count, int64_t vertices) {
     return g;
 }
 
-// Hops to the nearest source, brought up to date for one more source: only vertices that come closer are visited.
+// Updates the hops to the nearest source for a new source: only vertices that come closer are visited.
 void add_source(const Graph& g, int32_t source, std::vector<int32_t>& hops, std::vector<int32_t>& queue) {
     queue.assign(1, source);
     hops[source] = 0;

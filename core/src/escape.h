@@ -34,7 +34,7 @@ uint64_t code_escape(Coder& coder, EscapeModels& models, uint64_t value) {
 
 inline bool fits(int64_t value) { return value >= INT32_MIN && value <= INT32_MAX; }
 
-// A coded bit costs at least -log2(65520 / 65536) = 1 / 2840 bit: a stream can say no more than this many symbols.
+// A coded bit costs at least -log2(65520 / 65536) = 1 / 2840 bit, which bounds the number of symbols in a stream.
 inline bool is_plausible(uint64_t count, size_t size) { return count / 22800 <= size + 3; }
 
 }  // namespace meshreel

@@ -12,7 +12,7 @@
 namespace meshreel {
 namespace {
 
-constexpr size_t kBlock = 64;  // places after which the ratio is learned anew
+constexpr size_t kBlock = 64;  // places between two updates of the ratio (guess)
 
 constexpr ClassTable<5> kClassOf;  // of five times the expected magnitude: it is a fifth of a whole number
 
@@ -54,7 +54,7 @@ public:
         for (size_t k = 0; k < places; ++k) base[k] = 3 * static_cast<uint32_t>(past[k] * ratio_ >> 16);
         for (size_t v = first; v < first + places; ++v) classes_[v] = class_of(v);
     }
-    // The past says where a column is large; how large against the past is learned, with a memory of 400 places.
+    // The past predicts where a column is large; the ratio to the past is learned, with a memory of 400 places.
     void end_block(size_t places) {
         if (places < kBlock) return;
         ratio_ = ((seen_ << 16) + 1024 * kFirstRatio) / (expected_ + 1024);
@@ -73,7 +73,7 @@ public:
         for (size_t k = starts_[v], end = starts_[v + 1]; k < end; ++k) {
             const size_t follower = static_cast<size_t>(followers_[k]);
             sums_[follower] += known;
-            classes_[follower] = class_of(follower);  // beyond the block it says nothing yet
+            classes_[follower] = class_of(follower);  // beyond the block it is not final
         }
     }
 
@@ -99,11 +99,11 @@ private:
     std::vector<uint32_t> sums_;    // of the magnitudes at the neighbours of each place, as far as they are known
     std::vector<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16
     std::vector<uint32_t> past_;
-    std::vector<uint32_t> bases_;  // what the past says, three fifths of it
+    std::vector<uint32_t> bases_;  // three fifths of what the past predicts
     std::vector<uint8_t> now_, classes_;
     std::vector<size_t> starts_;  // of the places that have each place as a neighbour
     std::vector<int32_t> followers_;
-    uint32_t trust_ = 5;  // fifths: in a first column all of what the neighbours say, then two
+    uint32_t trust_ = 5;  // fifths: the weight of the neighbours, all of it in a first column, then two
     uint64_t seen_ = 0, expected_ = 0, ratio_ = kFirstRatio;
 };
 

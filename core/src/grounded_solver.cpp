@@ -7,7 +7,7 @@
 namespace meshreel {
 namespace {
 
-constexpr int64_t kMostAnchors = 32;  // of a component: each costs as much as a column more
+constexpr int64_t kMostAnchors = 32;  // of a component; each costs as much as a further column (decision 21)
 
 }  // namespace
 
@@ -37,7 +37,7 @@ GroundedSolver::Outcome GroundedSolver::compute(const SparseRows& rows, const st
     return Outcome::kReady;
 }
 
-// Connected components, in the order of their first vertices; `ground` tells for now that there are edges.
+// Connected components, in the order of their first vertices; `ground` marks for now that there are edges.
 void GroundedSolver::label(const SparseRows& rows) {
     const int32_t n = static_cast<int32_t>(rows.starts.size()) - 1;
     component_of_.assign(n, -1);

@@ -19,8 +19,8 @@ namespace {
 
 constexpr int64_t kMostNear = 24;   // a vertex with more neighbours stays: what is left costs no more than linear time
 constexpr size_t kLeastShare = 16;  // a round that removes less than this part of the linked vertices is the last
-constexpr double kSlope = 0.2;      // how far slopes are drawn to zero
-constexpr double kBlunt = 0.1;      // of the mean squared distance: bounds the pull of a near vertex
+constexpr double kSlope = 0.2;      // how far slopes are drawn to zero (guess)
+constexpr double kBlunt = 0.1;      // of the mean squared distance: bounds the pull of a near vertex (guess)
 
 struct Removal {
     int32_t vertex;

@@ -13,7 +13,7 @@ using Sparse = Eigen::SparseMatrix<double>;  // by columns, 32-bit indices
 
 namespace {
 
-constexpr double kLoading = 1e-6;
+constexpr double kLoading = 1e-6;  // added to a diagonal of about 1 (guess)
 
 // (L*)^T by columns: column i is row i of L*, so both Gram matrices are plain sparse products.
 Sparse transposed_system(const mr_laplacian& system) {

@@ -8,7 +8,7 @@
 namespace meshreel {
 
 constexpr int kClasses = 15;
-constexpr int kClamp = 255;                 // larger magnitudes say no more about the scale
+constexpr int kClamp = 255;                 // larger magnitudes count as this one
 constexpr uint64_t kFirstRatio = 1u << 11;  // a column about as large as the one before
 
 // Where a class begins, in sixteenths of a step.

@@ -24,7 +24,8 @@ constexpr std::array<uint32_t, kSlowMemory + 1> learning_rates() {
 }
 inline constexpr auto kRates = learning_rates();
 
-struct Model {  // slow and fast apart: a compiler that makes one vector of them waits for memory on its way back
+struct Model {  // slow and fast are not neighbours: a compiler that makes one vector of them waits for memory on its
+                // way back
     uint32_t slow = 1u << 31;         // probability of a 1, in units of 2^-32
     uint32_t probability = 1u << 15;  // the mean of both, in units of 2^-16, never 0 or 1
     uint32_t fast = 1u << 31;
@@ -147,7 +148,7 @@ public:
         fill();
         return false;
     }
-    bool raw_bit(bool) {  // no branch: nobody can foretell it
+    bool raw_bit(bool) {  // no branch: the bit is random, so a branch would be mispredicted
         const uint32_t half = range_ >> 1;
         const uint32_t low = code_ >= half;
         code_ -= half & (0u - low);

@@ -50,8 +50,8 @@ inline Matrix product(const Matrix& a, const Matrix& b) {
     return m;
 }
 
-// Turns `r` towards the rotation nearest to `s` (maximal trace of r^T s). Directions in which s says nothing keep r: so
-// a degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice.
+// Turns `r` towards the rotation nearest to `s` (maximal trace of r^T s). Directions that s does not determine keep r:
+// so a degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice.
 inline void follow(Matrix& r, const Matrix& s, int steps) {
     for (int step = 0; step < steps; ++step) {
         Vec torque{0, 0, 0};

@@ -10,7 +10,7 @@
 namespace meshreel {
 namespace {
 
-constexpr int kSweeps = 3;  // over the columns of a vertex; more change nothing
+constexpr int kSweeps = 3;  // over the columns of a vertex; more sweeps change nothing
 
 double dot(const double* a, const double* b, size_t count) {
     double sum = 0.0;

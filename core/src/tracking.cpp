@@ -96,7 +96,7 @@ private:
     std::vector<Vec> sorted_;
 };
 
-// Who owns which sample, kept up to date while centers move: a sample is searched again only when its owner could have
+// The owner of each sample, updated while centers move: a sample is searched again only when its owner could have
 // lost it.
 class Ownership {
 public:

@@ -15,8 +15,8 @@
 namespace meshreel {
 
 constexpr int kSigns = 48;       // predicted sign x how strongly predicted x magnitude (1, 2, more)
-constexpr size_t kNearest = 32;  // neighbours looked at, the last in order
-constexpr size_t kHistory = 6;   // earlier columns that predict
+constexpr size_t kNearest = 32;  // neighbours that count, the last in order (guess)
+constexpr size_t kHistory = 6;   // earlier columns that predict (guess)
 constexpr size_t kTaps = kHistory + 2;
 
 constexpr ClassTable<1> kClassOf;
@@ -162,7 +162,7 @@ public:
 private:
     uint32_t scaled(uint32_t past) const { return static_cast<uint32_t>((static_cast<uint64_t>(past) * ratio_) >> 16); }
 
-    // The past says where a column is large; how large against the past is learned, with a memory of 400 vertices.
+    // The past predicts where a column is large; the ratio to the past is learned, with a memory of 400 vertices.
     void rescale() {
         age_ = 0;
         ratio_ = ((seen_ << 16) + 1024 * kFirstRatio) / (expected_ + 1024);

@@ -1,4 +1,4 @@
-// What a host of the wasm build needs besides the C ABI: memory to put arguments in.
+// Memory for the arguments that a host of the wasm build passes.
 #include <cstdlib>
 
 extern "C" {

@@ -48,7 +48,7 @@ export class Player extends PlaybackTarget implements Playback {
   #seeking = false;
   #canPlay = false;
   #hasStalled = false; // since it last ran
-  #isStallNew = false; // and was not told
+  #isStallNew = false; // and was not reported
   #stalls = 0;
   #bytes = 0; // that came from the source
   #toldBytes = 0;
@@ -164,7 +164,7 @@ export class Player extends PlaybackTarget implements Playback {
 
   async play(): Promise<void> {
     if (this.#error !== null) throw this.#error;
-    this.load().catch(() => {}); // told by the event, and by the promise below
+    this.load().catch(() => {}); // reported by the event, and by the promise below
     if (this.#ended && this.#clock) this.#seek(this.#clock, 0);
     if (this.#paused) {
       this.#paused = false;
@@ -242,7 +242,7 @@ export class Player extends PlaybackTarget implements Playback {
       this.#wake();
     } catch (error) {
       this.#fail(error);
-      if (this.#error !== null) throw this.#error; // else it was disposed of, and nobody waits
+      if (this.#error !== null) throw this.#error; // else it was disposed of, and the promise has no reader
     }
   }
 
@@ -285,7 +285,7 @@ export class Player extends PlaybackTarget implements Playback {
     else if (clock.isRunning) this.#tell("timeupdate");
   }
 
-  /** The frame at the play head is at hand: tells what has waited for it, and plays where enough follows. */
+  /** The frame at the play head is at hand: report it, and play where enough follows. */
   #goOn(session: Session, clock: Clock): void {
     if (!this.#canPlay) {
       this.#canPlay = true;

@@ -79,7 +79,7 @@ export class Session {
     return this.#adaptive.level;
   }
 
-  /** Plans anew and sets fetching and decoding to work; what is not wanted any more is cancelled and released. */
+  /** Makes a new plan and starts fetching and decoding; chunks that are no longer wanted are cancelled and released. */
   pump(aim: Aim): void {
     this.#speed = aim.speed;
     this.#checkSize();
@@ -133,7 +133,7 @@ export class Session {
     return (this.decoding.msPerFrame * framesPerMs) / workers;
   }
 
-  /** Bits a second of content of the whole stream, with so many layers beyond the first. */
+  /** Bits a second of content of the whole stream, with `layers` layers beyond the first. */
   rateAt(layers: number): number {
     let rate = this.#rates.get(layers);
     if (rate === undefined) {
@@ -173,7 +173,7 @@ export class Session {
     this.#events.changed(); // to plan with it
   }
 
-  /** A source that sends everything anyhow sends it no sooner where less is asked for. */
+  /** A source that sends everything in any case sends nothing sooner where less is asked for. */
   get #bandwidth(): number {
     return this.#source.isSelective ? this.#source.bandwidth : 0;
   }

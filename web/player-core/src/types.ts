@@ -34,7 +34,7 @@ export interface PackedGroup extends PackedVertices {
   readonly textureHeight: number;
   /** Corners of the triangles that every frame shows. */
   readonly faces: Uint32Array;
-  /** Corners of those that single frames show besides: frame t has extra[extraStarts[t]] up to extra[extraStarts[t + 1]]. */
+  /** Corners of the additional faces of single frames: frame t has extra[extraStarts[t]] up to extra[extraStarts[t + 1]]. */
   readonly extra: Uint32Array;
   readonly extraStarts: Uint32Array; // T + 1 numbers
   readonly layers: number; // layers beyond the first that it was decoded from
@@ -70,7 +70,7 @@ export interface Shown {
   readonly background: PackedStatic | null;
 }
 
-/** What a head tells before any chunk is there. */
+/** What is known from the head, before any chunk is there. */
 export interface Info {
   readonly frameCount: number;
   readonly frameRate: number; // 1/s
@@ -83,7 +83,7 @@ export interface Info {
   readonly metadata: Readonly<Record<string, unknown>>;
 }
 
-/** Layers beyond the first that are played; "auto": as many as network and workers bear. */
+/** Layers beyond the first that are played; "auto": the most that network and workers can sustain. */
 export type Layers = number | "auto";
 
 /** What `Playback.playbackRate` may be. */
@@ -140,7 +140,7 @@ export interface Playback extends EventTarget {
   layers: Layers;
   play(): Promise<void>;
   pause(): void;
-  /** Pauses and shows the frame so many further; negative goes back. */
+  /** Pauses and moves by a number of frames; a negative one goes back. */
   step(frames: number): void;
   /** To be called once a displayed picture, with a clock's milliseconds. Null where nothing can be shown yet. */
   update(now: number): Shown | null;

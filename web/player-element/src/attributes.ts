@@ -74,7 +74,7 @@ export function parseMode(text: string | null): Mode {
   return readMode(text ?? "") ?? "shaded";
 }
 
-/** The axis that points up whatever the file says; null where nobody says. */
+/** The axis that points up, in place of the one in the file; null where none is given. */
 export function parseUp(text: string | null): Up | null {
   return readUp(text ?? "");
 }

@@ -4,13 +4,13 @@ import { Bench, formatReport } from "@meshreel/player-three/bench"; // not all o
 import type { BenchReport } from "@meshreel/player-three/bench";
 import type { MeshreelPlayer } from "./index.ts";
 
-const CALIBRATION = 60; // pictures of an idle page, which tell the display's rate
+const CALIBRATION = 60; // pictures of an idle page, from which the display's rate follows
 const SEEKS = 12;
 const APART = (Math.sqrt(5) - 1) / 2; // of the recording from seek to seek, wrapped: far from all places before
 
 /**
  * Plays in a loop, then seeks; the report is shown below the player and given back. To be called before the recording is opened, so that
- * what is decoded at once counts too. Where a headset is entered or left, pictures are counted anew.
+ * what is decoded at once counts too. Where a headset is entered or left, counting starts again.
  */
 export async function runBench(player: MeshreelPlayer, seconds: number): Promise<BenchReport> {
   const text = document.createElement("pre");
@@ -44,7 +44,7 @@ function told(player: MeshreelPlayer, ...types: readonly string[]): Promise<void
   });
 }
 
-/** Collects pictures for so many seconds; false where these were not all on the page, or not all in the headset. */
+/** Collects pictures for a number of seconds; false where these were not all on the page, or not all in the headset. */
 async function passed(player: MeshreelPlayer, seconds: number, bench: Bench): Promise<boolean> {
   bench.restart();
   const timer = new Promise<boolean>((done) => setTimeout(() => done(true), 1000 * seconds));
@@ -72,7 +72,7 @@ function reportOf(bench: Bench, player: MeshreelPlayer, pageRate: number): Bench
   return bench.report({ gpuBytes, triangles, userAgent: navigator.userAgent, gpu: nameOfGpu(), recording: player.currentSrc, ...place });
 }
 
-/** As the browser tells it; not all do. */
+/** As the browser reports it; not all browsers do. */
 function nameOfGpu(): string {
   const gl = document.createElement("canvas").getContext("webgl2");
   const names = gl?.getExtension("WEBGL_debug_renderer_info");

@@ -36,7 +36,7 @@ function hasFiles(event: DragEvent): boolean {
   return event.dataTransfer?.types.includes("Files") ?? false;
 }
 
-/** The first .reel of several files; else the first, whose error then tells what it is. */
+/** The first .reel of several files; else the first, whose error then names what it is. */
 export function chosenFile<F extends { readonly name: string }>(files: readonly F[]): F | undefined {
   return files.find((file) => file.name.toLowerCase().endsWith(".reel")) ?? files[0];
 }

@@ -160,7 +160,7 @@ export class MeshreelPlayer extends Reflected {
     if (!this.#playback || !this.#view) return null;
     return { ...this.#playback.stats, ...this.#view.stage.stats, fps: this.#view.fps, frameMs: this.#view.frameMs, drawn: this.#view.drawn };
   }
-  /** Pauses and shows the frame so many further; negative goes back. */
+  /** Pauses and moves by a number of frames; a negative one goes back. */
   step(frames: number): void {
     this.#wished = false;
     this.#playback?.step(frames);
@@ -174,7 +174,7 @@ export class MeshreelPlayer extends Reflected {
   override focus(options?: FocusOptions): void {
     this.#controls.picture.focus(options);
   }
-  /** Turns the camera about what it looks at, in radians to the right and up, and brings it so many times closer. TypeError where they are no numbers. */
+  /** Turns the camera about what it looks at, in radians to the right and up, and divides its distance by `closer`. TypeError where they are no numbers. */
   orbit(right: number, up: number, closer = 1): void {
     if (![right, up, closer].every(Number.isFinite) || closer <= 0) throw new TypeError(`orbit(${right}, ${up}, ${closer}): finite numbers are needed, the last above 0`);
     this.#view?.stage.orbit(right, up, closer);
@@ -184,7 +184,7 @@ export class MeshreelPlayer extends Reflected {
     if (!this.#view) throw new DOMException("there is no picture yet", "InvalidStateError");
     return this.#view.picture();
   }
-  /** Opens once more what failed, where it stopped. */
+  /** Opens a source that failed again, and continues where it stopped. */
   retry(): void {
     this.#startAt = this.currentTime;
     this.#open(this.#wished);
@@ -247,7 +247,7 @@ export class MeshreelPlayer extends Reflected {
     this.dispatchEvent(new Event("loadstart"));
     view.show(playback);
     const plays = wished || (this.autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches);
-    if (plays) this.#play(playback).catch(() => undefined); // its error event tells
+    if (plays) this.#play(playback).catch(() => undefined); // reported by the error event
   }
 
   #play(playback: Playback): Promise<void> {
@@ -258,7 +258,7 @@ export class MeshreelPlayer extends Reflected {
   #close(): void {
     if (this.#playback === null) return;
     this.#view?.show(null);
-    this.#playback.dispose(); // tells what to release
+    this.#playback.dispose(); // reports what to release
     this.#passing.abort();
     this.#playback = null;
     this.#waiting = this.#playable = this.#wished = false;

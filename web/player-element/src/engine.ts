@@ -41,7 +41,7 @@ export class RealEngine implements Engine {
     // Workers that could not be started are not tried again by their pool: whoever tries again gets new ones.
     player.addEventListener("error", () => this.#forget(shared));
     Object.assign(player, { layers, interpolate, loop, playbackRate });
-    player.load().catch(() => undefined); // its error event tells
+    player.load().catch(() => undefined); // reported by the error event
     return player;
   }
 
@@ -67,7 +67,7 @@ export class RealEngine implements Engine {
   }
 }
 
-/** A player that tells when it no longer needs the pool. */
+/** A player that reports when it no longer needs the pool. */
 class PooledPlayer extends Player {
   leave: (() => void) | null = null;
 
@@ -86,7 +86,7 @@ export function openWorker(module: URL): WorkerLike {
   if (module.origin === location.origin) return new Worker(module, { type: "module" }) as WorkerLike;
   const address = URL.createObjectURL(new Blob([`import ${JSON.stringify(module.href)};`], { type: "text/javascript" }));
   const worker = new Worker(address, { type: "module" });
-  // The address is needed until the worker has read it, and a worker does not tell when; it answers its first message after that.
+  // The address is needed until the worker has read it, and a worker does not report when; it answers its first message after that.
   worker.addEventListener("message", () => URL.revokeObjectURL(address), { once: true });
   return worker as WorkerLike;
 }

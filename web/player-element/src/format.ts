@@ -1,6 +1,6 @@
 // Numbers as people read them. All functions take numbers from streams, so none may throw.
 
-const SHORT = 60; // s; a longer recording's time is told in whole seconds
+const SHORT = 60; // s; a longer recording's time is shown in whole seconds
 
 /** Digits behind the point of a recording's times: two of a short one whose frames come faster than tenths, so that each has its own. */
 export function timeDigits(duration: number, frameRate: number): number {
@@ -19,7 +19,7 @@ export function formatTime(seconds: number, digits = 0): string {
   return hours > 0 ? `${hours}:${String(minutes).padStart(2, "0")}:${text}` : `${minutes}:${text}`;
 }
 
-/** "1 minute 5 seconds", for those who hear it. */
+/** "1 minute 5 seconds", for screen readers. */
 export function speakTime(seconds: number): string {
   const safe = Number.isFinite(seconds) ? Math.max(0, seconds) : 0;
   const minutes = Math.floor((safe + 0.05) / 60);

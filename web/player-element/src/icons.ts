@@ -24,7 +24,7 @@ export type IconName = keyof typeof PATHS;
 
 const SVG = "http://www.w3.org/2000/svg";
 
-/** An icon in the colour of the text around it; hidden from those who hear, its button has a name. */
+/** An icon in the colour of the text around it; hidden from screen readers, its button has a name. */
 export function icon(name: IconName): SVGSVGElement {
   const svg = document.createElementNS(SVG, "svg");
   svg.setAttribute("viewBox", "0 0 24 24");

@@ -1,4 +1,4 @@
-// What a viewer is told when something fails: plain words, what can be done, and the exact error below.
+// Messages for viewers when something fails: plain words, the remedy, and the exact error below.
 
 import { FormatError, SourceError, type FormatErrorKind, type SourceErrorKind } from "@meshreel/player-core/errors";
 import { GraphicsError } from "./stage.ts";

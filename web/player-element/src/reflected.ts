@@ -34,7 +34,7 @@ export class Reflected extends Element {
     return new Error(wrong);
   }
 
-  /** A whole address; as it was written where it is none, which opening it then tells. */
+  /** A whole address; as it was written where it is none, which opening it then reports. */
   get src(): string {
     const text = this.getAttribute("src");
     return text !== null && URL.canParse(text, document.baseURI) ? new URL(text, document.baseURI).href : (text ?? "");
@@ -50,7 +50,7 @@ export class Reflected extends Element {
     this.setAttribute("poster", value);
   }
 
-  /** "none" waits with fetching until somebody plays. */
+  /** "none" fetches nothing before playback is asked for. */
   get preload(): "auto" | "none" {
     return this.getAttribute("preload") === "none" ? "none" : "auto";
   }
@@ -118,7 +118,7 @@ export class Reflected extends Element {
     this.setAttribute("mode", value);
   }
 
-  /** The recording's axis that points up; null where the file is to tell. */
+  /** The recording's axis that points up; null for the one that the file names. */
   get up(): Up | null {
     return parse.parseUp(this.getAttribute("up"));
   }

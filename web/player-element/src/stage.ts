@@ -9,7 +9,7 @@ import type { Up } from "./upright.ts";
 export interface PictureStats {
   readonly triangles: number; // of the last picture
   readonly gpuBytes: number; // of buffers and textures
-  readonly headsetRate: number; // Hz of the headset that shows it; 0 on a page, and where the headset does not tell
+  readonly headsetRate: number; // Hz of the headset that shows it; 0 on a page, and where the headset does not report it
 }
 
 /**
@@ -34,7 +34,7 @@ export interface Stage extends EventTarget {
   /** All in CSS pixels; the lowest `covered` of them lie under the bar, and what is looked at is put into the middle of the others. */
   resize(width: number, height: number, pixelRatio: number, covered: number): void;
   fit(): void;
-  /** Turns the camera by radians, and brings it so many times closer. */
+  /** Turns the camera by radians, and divides its distance by `closer`. */
   orbit(right: number, up: number, closer: number): void;
   /** Draws, and gives what it drew as a PNG: what was drawn before is gone with the picture that showed it. */
   picture(shown: Shown | null): Promise<Blob>;

@@ -36,7 +36,7 @@ export class ThreeStage extends EventTarget implements Stage {
   #mode: Mode = "shaded";
   #background = "";
   #free = 1; // of the picture's height: what the bar leaves
-  #isFit = true; // nobody has moved the camera: it fits again when the picture's size changes
+  #isFit = true; // the camera was not moved by hand: it fits again when the picture's size changes
   #session: VrSession | null = null;
 
   constructor(canvas: HTMLCanvasElement) {

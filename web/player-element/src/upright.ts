@@ -1,4 +1,4 @@
-// Standing a recording on its feet: its file tells which of its axes points up, the picture's is y.
+// Turns a recording upright: its file names the axis that points up, in the picture that is y.
 
 import type { Box, Info } from "@meshreel/player-core/types";
 
@@ -6,7 +6,7 @@ export type Up = "y" | "z" | "-y" | "-z";
 
 const TURNS: Readonly<Record<Up, number>> = { y: 0, z: -Math.PI / 2, "-y": Math.PI, "-z": Math.PI / 2 };
 
-/** Radians about x that bring what points up to y: the axis that is given, else the one that a file tells, else y. */
+/** Radians about x that turn the up axis to y: the axis that is given, else the one that the file names, else y. */
 export function turnOf(metadata: Info["metadata"], given: Up | null = null): number {
   const up = given ?? metadata.up;
   return typeof up === "string" && Object.hasOwn(TURNS, up) ? TURNS[up as Up] : 0;

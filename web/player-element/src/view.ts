@@ -33,7 +33,7 @@ export class View {
   #sight: IntersectionObserver;
 
   /**
-   * A canvas in `box`, over whose lower end `cover` lies. `report` is told `drawn` after each picture, and all that the stage tells.
+   * A canvas in `box`, over whose lower end `cover` lies. `report` gets `drawn` after each picture, and every event of the stage.
    * Throws where there is no WebGL 2.
    */
   constructor(engine: Engine, box: HTMLElement, cover: HTMLElement, report: (event: Event) => void) {
@@ -194,7 +194,7 @@ export class View {
   }
 }
 
-/** Whether the next picture may differ though nobody does anything: it plays, seeks, or has shown nothing yet. */
+/** True where the next picture may differ without input: the player plays, seeks, or has shown nothing yet. */
 export function goesOn(playback: Playback, shown: Shown | null): boolean {
   if (playback.info?.frameCount === 0) return false;
   return playback.seeking || !(playback.paused || playback.ended) || shown === null;

@@ -12,7 +12,7 @@ export interface BenchExtra {
   readonly triangles: number; // of a picture
   readonly userAgent: string;
   readonly place?: string; // where it was drawn, such as "page, 1280 x 720" or "VR"
-  /** Hz, where it is known. Else the shortest intervals tell: a display that is never kept up with is not seen. */
+  /** Hz, where it is known. Else it follows from the shortest intervals: a display that is always too fast goes unnoticed. */
   readonly displayRate?: number;
   readonly gpu?: string;
   readonly recording?: string;
@@ -24,7 +24,7 @@ export interface BenchReport extends Omit<BenchExtra, "displayRate"> {
   readonly displayRate: number | null; // Hz
   readonly scriptMs: Spread; // JavaScript of the main thread, a picture
   readonly intervalMs: Spread; // from picture to picture
-  readonly dropped: number; // pictures that the display could have shown besides
+  readonly dropped: number; // further pictures that the display could have shown
   readonly groups: number; // decoded
   readonly decodeMs: Spread; // a group
   readonly decodeLoad: number | null; // decoding time over playing time; above 1 is too slow
@@ -69,7 +69,7 @@ export class Bench {
     this.#began = NaN;
   }
 
-  /** Pictures are collected anew from now on. What was decoded stays: a short recording is not decoded again. */
+  /** Restarts the collection of pictures. What was decoded stays: a short recording is not decoded again. */
   restart(): void {
     this.#script.clear();
     this.#intervals.clear();
@@ -77,12 +77,12 @@ export class Bench {
     this.interrupt();
   }
 
-  /** A seek took so many milliseconds. */
+  /** Records the duration of a seek, ms. */
   sought(ms: number): void {
     this.#seeking.add(ms);
   }
 
-  /** A group of so many seconds of playing time was decoded in so many milliseconds. */
+  /** Records a decoded group: its playing time, s, and the time that decoding took, ms. */
   decoded(ms: number, seconds: number): void {
     this.#decoding.add(ms);
     this.#decodeMs += ms;
@@ -132,7 +132,7 @@ export function formatReport(report: BenchReport): string {
   return ["meshreel bench (median / 95 %)", ...lines.map(([name, value]) => `${name}: ${value}`)].join("\n");
 }
 
-/** Numbers of which the last so many are kept. */
+/** The last numbers of a sequence, up to a fixed count. */
 class Ring {
   readonly #values: Float64Array;
   #count = 0; // added, those that are no longer kept included

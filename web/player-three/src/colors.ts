@@ -3,7 +3,7 @@
 /** Three numbers: a colour, or a place. */
 export type Vector = readonly [number, number, number];
 
-/** Okabe and Ito's palette, which people with any colour vision can tell apart, less its black. */
+/** Okabe and Ito's palette, which are distinct for people with any colour vision, without its black. */
 const PALETTE = [0xe69f00, 0x56b4e9, 0x009e73, 0xf0e442, 0x0072b2, 0xd55e00, 0xcc79a7] as const;
 const CLAY = rgb(0xdcd8d0);
 const HUE_SHARE = 0.3; // of a track's own colour in its clay

@@ -48,7 +48,7 @@ export interface Paint {
   readonly color: Vector;
 }
 
-/** A material that draws what `uniforms` say; its own values change with them, it need not be told. */
+/** A material whose values are `uniforms`: changes of them take effect at once. */
 export function surfaceMaterial(feed: Feed, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
   return new RawShaderMaterial({
     name: `meshreel ${feed}`,

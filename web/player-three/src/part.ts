@@ -85,7 +85,7 @@ export function setUpload(uniforms: PartUniforms, upload: Upload): void {
   uniforms.movingCount.value = upload.packed.vertexCount;
 }
 
-/** Sets the frame, and the range of what single frames show besides; true where this frame shows any. */
+/** Sets the frame, and the range of the extra faces of single frames; returns true where this frame has any. */
 export function setFrame(uniforms: PartUniforms, extra: BufferGeometry | null, group: PackedGroup, frame: number, blend: number): boolean {
   const { frameCount, vertexCount, extraStarts } = group;
   const t = localFrame(group, frame);

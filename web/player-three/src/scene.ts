@@ -39,7 +39,7 @@ export class ReelScene extends Group {
     return bytes;
   }
 
-  /** Triangles of what `show` was last told. */
+  /** Triangles of the last picture given to `show`. */
   get triangles(): number {
     return this.#triangles;
   }

@@ -175,7 +175,7 @@ void main() {
 `;
 }
 
-/** Tells a pixel where something was drawn from one that was cleared: those are 0 or 1. */
+/** Marks a pixel where something was drawn; cleared ones are 0 or 1. */
 export const DRAWN = 7;
 
 /** The bits of the position as float32, and DRAWN. */

@@ -4,11 +4,11 @@ import { Vector3 } from "three";
 import { copyPose, makePose, SCALES } from "./pose.ts";
 import type { Pose } from "./pose.ts";
 
-const LEAST_SPAN = 0.02; // m between hands, below which a distance tells nothing
-const LEAST_LEVEL_SPAN = 0.05; // m, seen from above, below which a direction tells nothing
+const LEAST_SPAN = 0.02; // m between hands, below which their distance is noise (guess)
+const LEAST_LEVEL_SPAN = 0.05; // m, seen from above, below which their direction is noise (guess)
 
 /**
- * Follows the hands from where they took hold. Everything is told from there, not from the last picture, so that nothing drifts
+ * Follows the hands from where they took hold. Everything is measured from there, not from the last picture, so that nothing drifts
  * and a scale at its limit comes back as the hands do.
  */
 export class Grab {
@@ -29,7 +29,7 @@ export class Grab {
     else if (right !== null) pose.position.copy(this.#taken.position).add(right).sub(this.#takenRight);
   }
 
-  /** Whoever holds takes hold anew: the pose was changed by something else. */
+  /** Restarts the grip of hands that hold: the pose was changed by something else. */
   release(): void {
     this.#holdsLeft = this.#holdsRight = false;
   }

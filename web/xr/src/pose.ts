@@ -54,7 +54,7 @@ export function place(box: Box, viewer: Viewer, pose: Pose): void {
 export function setViewer(viewer: Viewer, position: DOMPointReadOnly, orientation: DOMPointReadOnly): void {
   const rotation = new Quaternion(orientation.x, orientation.y, orientation.z, orientation.w);
   const forward = new Vector3(0, 0, -1).applyQuaternion(rotation);
-  const steep = Math.hypot(forward.x, forward.z) < 0.2; // up or down: then the top of the head tells the way
+  const steep = Math.hypot(forward.x, forward.z) < 0.2; // up or down: then the top of the head gives the direction
   const told = steep ? new Vector3(0, -Math.sign(forward.y), 0).applyQuaternion(rotation) : forward;
   viewer.x = position.x;
   viewer.z = position.z;

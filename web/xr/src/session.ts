@@ -84,7 +84,7 @@ export class VrSession {
     this.#hands = [0, 1].map((index) => new Hand(renderer.xr, index, room, handActions));
   }
 
-  /** Pictures a second of the headset; 0 where it does not tell. */
+  /** Pictures a second of the headset; 0 where it does not report it. */
   get rate(): number {
     return this.#session.frameRate ?? 0;
   }

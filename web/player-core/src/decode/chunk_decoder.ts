@@ -18,7 +18,7 @@ export class MissingState extends Error {
   override name = "MissingState";
 }
 
-/** Values by file and chunk, at most so many. */
+/** Values by file and chunk, up to a number of them. */
 class Kept<T> {
   private readonly values = new Map<string, T>();
 

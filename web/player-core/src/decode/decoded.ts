@@ -1,4 +1,4 @@
-// A group of frames as decoded: vertices and faces that all frames have, and what single frames have besides.
+// A group of frames as decoded: vertices and faces that all frames share, and the additions of single frames.
 
 import { EMPTY, concatenate } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
@@ -10,7 +10,7 @@ export interface DecodedGroup {
   readonly faces: Int32Array;
   /** T x faces, 1 where a frame is shown without one; null where all frames have all. */
   readonly dropped: Uint8Array | null;
-  /** For each frame what it is shown with besides; null where none has any. */
+  /** The additional mesh of each frame; null where no frame has one. */
   readonly patches: readonly Mesh[] | null;
 }
 

@@ -21,7 +21,7 @@ export function framesOf(data: Uint8Array): number {
   return readHead(data)[0].frames;
 }
 
-/** V x T x 3 displacements, of at most so many components, for which `data` may end behind theirs. */
+/** V x T x 3 displacements from at most `components` components; `data` may end behind these. */
 export function decodeDisplacements(core: Core, data: Uint8Array, base: Mesh, components: number | null): Float64Array {
   const [head, offset] = readHead(data);
   const count = Math.min(components ?? head.components.length, head.components.length);

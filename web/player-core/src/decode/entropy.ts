@@ -6,7 +6,7 @@ import type { Neighbours } from "../wasm/entropy.ts";
 import { subdivide } from "../wasm/layers.ts";
 import type { Core } from "../wasm/memory.ts";
 
-const SYMBOLS_PER_BYTE = 22_800; // no stream says more
+const SYMBOLS_PER_BYTE = 22_800; // bound: a coded bit costs at least 1 / 2840 bit (coding/entropy.py)
 
 /** The `count` values; FormatError where `data` is not exactly their stream. */
 export function decodeIntegers(core: Core, data: Uint8Array, count: number): Int32Array {

@@ -29,7 +29,7 @@ export interface Continued {
   readonly state: LayersState | null;
 }
 
-/** How a group is decoded, besides its payload. */
+/** What decoding a group needs in addition to its payload. */
 export interface GroupContext {
   readonly frameCount: number; // as the index has it
   readonly layers: number | null; // layers beyond the first, at most; null: all

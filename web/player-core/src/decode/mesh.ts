@@ -10,8 +10,8 @@ import { CoreStopped } from "../wasm/memory.ts";
 import type { Core } from "../wasm/memory.ts";
 
 const EDGEBREAKER = 1;
-const MOST_PER_BYTE = 20_000; // vertices or faces
-const MAX_FACES = 64_000_000;
+const MOST_PER_BYTE = 20_000; // vertices or faces; as in coding/mesh.py
+const MAX_FACES = 64_000_000; // as in coding/mesh.py
 
 /** The mesh of Draco bytes, its vertices exact multiples of `step`. FormatError where the bytes are damaged. */
 export function decodeMesh(draco: DecoderModule, data: Uint8Array, step: number): Mesh {

@@ -13,7 +13,7 @@ import type { Bounds } from "../wasm/packing.ts";
 const TEXTURE_WIDTH = 2048; // that every WebGL 2 has
 const MOST_ROWS = 16384; // that nearly every one has; 33 million vertices
 
-/** What a group is, besides its texels. */
+/** A group without its texels. */
 export type GroupShape = Pick<
   PackedGroup,
   "frameCount" | "vertexCount" | "textureWidth" | "textureHeight" | "faces" | "extra" | "extraStarts" | "texels" | "box"

@@ -15,10 +15,10 @@ const MOST_CELLS = 1 << 20; // of the lattice, over all frames
 
 export interface Patches {
   readonly dropped: Uint8Array | null; // frames x faces
-  readonly meshes: readonly Mesh[]; // what each frame is shown with besides
+  readonly meshes: readonly Mesh[]; // the additional mesh of each frame
 }
 
-/** The patches of a group of so many frames, whose finest level has so many faces. FormatError where damaged. */
+/** Decode the patches of a group: `frames` frames, `faces` faces on its finest level. FormatError where damaged. */
 export function decodePatches(core: Core, draco: DecoderModule, record: LayersPatches, frames: number, faces: number): Patches {
   if (record.stepLevel >= LEVELS) throw new FormatError(`patches: step level ${record.stepLevel}, there are ${LEVELS}`);
   if (record.runs > 2 * faces + frames * (faces + 1) + 2) throw new FormatError(`patches: ${record.runs} runs over ${frames} frames of ${faces} faces`);
@@ -44,7 +44,7 @@ function decodeRuns(runs: Int32Array, frames: number, faces: number): Uint8Array
   return dropped;
 }
 
-/** So many bits from the first runs, and how many runs that were. FormatError where no run ends with the bits. */
+/** `count` bits from the first runs, and the number of these runs. FormatError where no run ends with the bits. */
 export function fillRuns(runs: Int32Array, count: number): [Uint8Array, number] {
   const bits = new Uint8Array(count);
   let end = 0;

@@ -1,4 +1,4 @@
-// The decoding worker: speaks protocol.ts. An error of one job is told and the next one is decoded; a core that has stopped is started
+// The decoding worker: speaks protocol.ts. An error of one job is reported and the next one is decoded; a core that has stopped is started
 // again.
 
 import { ChunkDecoder, MissingState, buffersOf } from "./chunk_decoder.ts";
@@ -12,7 +12,7 @@ export interface Scope {
   onmessage: ((event: MessageEvent<ToWorker>) => void) | null;
 }
 
-/** Makes a scope answer. Messages are worked off in their order; a start that fails is told as the failure of job -1. */
+/** Installs the message handler of a scope. Messages are handled in order; a start that fails is reported as the failure of job -1. */
 export function serve(scope: Scope): void {
   const worker = new Served(scope);
   let last: Promise<void> = Promise.resolve();

@@ -61,7 +61,7 @@ class IndexChecks {
     });
   }
 
-  /** How many patches lead to a STATIC chunk: none to a mesh, one more than to what it changes to a patch. */
+  /** How many patches lead to a STATIC chunk: none to a mesh, and to a patch one more than to the chunk that it changes. */
   private changesOf(entry: IndexEntry, name: string): number {
     const isPatch = entry.form === Form.PATCH;
     require((isPatch || entry.form === Form.DRACO) && entry.track === 0, `${name}: a static chunk of form ${entry.form}, track ${entry.track}`);

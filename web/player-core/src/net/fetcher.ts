@@ -21,9 +21,9 @@ export interface FetcherEvents {
   failed(error: unknown): void; // a source gave up
 }
 
-const JOIN = 1024; // bytes that are not wanted cost less than one request more
-const URGENT_REQUESTS = 4; // at a time: what the frame at the play head needs may lie apart
-const REQUESTS = 6; // at a time, as many as a browser opens connections
+const JOIN = 1024; // bytes; fetching unwanted ones costs less than a further request (guess)
+const URGENT_REQUESTS = 4; // at a time: the chunks of the frame at the play head may be scattered
+const REQUESTS = 6; // at a time: the number of connections that browsers open to a host
 const BATCH = [1 << 16, 1 << 22] as const; // bytes of a request, at least and at most; in between, those of one second
 const OVERLAP = 0.1; // s before a request has ended, the next one is made: at once they would only delay each other
 

@@ -15,7 +15,7 @@ export class Lost extends Error {
   }
 }
 
-/** What a server has told of the file so far. */
+/** What is known of the file from the answers so far. */
 export interface Known {
   readonly url: string;
   size: number | null;

@@ -78,7 +78,7 @@ export class Answer {
     this.#signals = this.#signals.filter((other) => other !== signal);
   }
 
-  /** Ends it, read or not: a body that nobody reads would hold a connection. */
+  /** Ends it, read or not: an unread body would hold a connection. */
   close(): void {
     clearTimeout(this.#timer);
     for (const signal of this.#signals) signal.removeEventListener("abort", this.#abort);

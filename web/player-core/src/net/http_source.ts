@@ -126,7 +126,7 @@ export class HttpSource implements Source {
         take(bytes, at);
         at += bytes.length;
       }
-      // Shorter than announced is a cut. Where nothing was announced the file may end here, and a 416 will tell.
+      // Shorter than announced is a cut. Where nothing was announced the file may end here; a 416 shows it.
       if (at === from || (at < to && answer.response.headers.has("Content-Range"))) {
         throw new Lost(`the answer ended after ${at - from} of ${to - from} bytes`);
       }

@@ -6,10 +6,10 @@ import { SourceError } from "../errors.ts";
 /** Takes bytes as they come: `bytes` lie at `offset` of the file. The array is its own to keep. */
 export type Take = (bytes: Uint8Array, offset: number) => void;
 
-/** What a source tells besides its bytes. */
+/** Receives warnings and progress of a source. */
 export interface SourceWatch {
   warn(error: Error): void; // it goes on: the network is tried again
-  progress(bytes: number): void; // so many more have come
+  progress(bytes: number): void; // that arrived since the last call
 }
 
 /** A file to be read in ranges. Errors are SourceErrors; a read that is aborted rejects with the signal's reason. */
@@ -23,7 +23,7 @@ export interface Source {
   watch: SourceWatch | null;
   /** Gives bytes from `offset` on, in their order, in pieces as they arrive; fewer than `length` only where the file ends. */
   read(offset: number, length: number, take: Take, signal?: AbortSignal): Promise<void>;
-  /** Tells the file's size as its head has it. */
+  /** Announces the file's size, as its head has it. */
   expect(size: number): void;
   close(): void;
 }

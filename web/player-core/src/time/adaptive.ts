@@ -17,12 +17,12 @@ export interface Conditions {
   readonly isWaiting: boolean; // for bytes or workers, though it should play
 }
 
-const OUTLOOK = 10; // s of content that its rate is averaged over
-const SCARCE = 1; // s at hand: the next group must come soon
+const OUTLOOK = 10; // s of content that the rate is averaged over (guess)
+const SCARCE = 1; // s at hand: the next group must come soon (guess)
 const AMPLE = 2; // s at hand: enough to try one layer more (guess)
-const PLENTY = 6; // s at hand: enough to use nearly all of the bandwidth
-const BEARABLE = 0.8; // load that a level may make
-const HOLD_MS = 2000; // between a change and a rise
+const PLENTY = 6; // s at hand: enough to use nearly all of the bandwidth (guess)
+const BEARABLE = 0.8; // load that a number of layers may cause (guess)
+const HOLD_MS = 2000; // between a change and a rise (guess)
 const PENALTY_MS = [15_000, 120_000] as const; // after decoding fell behind, first and at most, doubled each time
 
 export class Adaptive {
@@ -54,7 +54,7 @@ export class Adaptive {
     return this.level;
   }
 
-  /** Bits a second of content at each level, over the groups that come next; anew where `time` is in another second. */
+  /** Bits a second of content at each level, over the groups that come next; recomputed where `time` is in another second. */
   rates(time: number): readonly number[] {
     const second = Math.floor(time);
     if (second !== this.#ratesAt) this.#rates = this.#ratesOf(second);

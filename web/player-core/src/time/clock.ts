@@ -1,9 +1,9 @@
 // Content time from display time.
 
 const LONGEST_STEP = 0.5; // s of display time; where nothing was displayed for longer, time stood still
-const ROUNDING = 1e-6; // s; a time that is so little short of a frame's own is that frame's
+const ROUNDING = 1e-6; // s; a time that is less than this short of a frame's own is that frame's
 
-/** When each frame is shown, s from the first. No table: a head of some kilobytes may tell of millions of frames. */
+/** When each frame is shown, s from the first. No table: a head of some kilobytes may announce millions of frames. */
 export class Timeline {
   readonly frameCount: number;
   readonly duration: number; // s

@@ -1,4 +1,4 @@
-// Decoding workers: as many as there are cores to spare, one job at a time in each.
+// Decoding workers, one for each spare core, with one job at a time.
 
 import type { DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
 import type { Packed } from "../types.ts";

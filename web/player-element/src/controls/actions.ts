@@ -83,7 +83,7 @@ async function toggleVr(player: MeshreelPlayer, surface: Surface): Promise<void>
   } else surface.tell("No headset was found");
 }
 
-/** Saves the picture as a file; its name tells recording and frame. */
+/** Saves the picture as a file named after recording and frame. */
 export async function saveScreenshot(player: MeshreelPlayer, surface: Surface): Promise<void> {
   try {
     const address = URL.createObjectURL(await player.screenshot());

@@ -1,4 +1,4 @@
-// Whether somebody uses the player just now, and taps on the picture (which are no drags of the camera).
+// Detects whether the player is in use, and taps on the picture, which are no drags of the camera.
 
 const IDLE_AFTER = 2500; // ms
 const TAP_TIME = 350; // ms
@@ -9,7 +9,7 @@ export interface Tap {
   readonly double: boolean;
 }
 
-/** Calls `idle(true)` when nobody moved for a while, `idle(false)` when somebody does. */
+/** Calls `idle(true)` after a while without input, `idle(false)` at the next input. */
 export class Activity {
   #timer = 0;
   #idle: (idle: boolean) => void;

@@ -17,7 +17,7 @@ export function speedChoices(current: number): readonly Choice[] {
   return speeds.map((speed) => ({ value: String(speed), text: formatSpeed(speed) }));
 }
 
-/** Auto, then levels from full to base; of many levels some, evenly apart, and the one that is set. */
+/** Auto, then levels from full to base; of many levels a few, evenly spaced, and the one that is set. */
 export function layersChoices(mostLayers: number, current: Layers): readonly Choice[] {
   const levels = new Set<number>();
   const count = Math.min(mostLayers + 1, MOST_LEVELS);

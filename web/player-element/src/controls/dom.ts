@@ -26,7 +26,7 @@ export interface Look {
   readonly enabled?: boolean;
 }
 
-/** A button with an icon and a name, drawn anew from `look` at each refresh. */
+/** A button with an icon and a name, drawn again from `look` at each refresh. */
 export class Button {
   readonly element: HTMLButtonElement;
   #icon: SVGSVGElement;

@@ -107,7 +107,7 @@ const WARNING_TIME = 8000; // ms
 const TELLING_TIME = 1600; // ms
 const MOST_TOASTS = 3;
 
-/** Short messages that go away by themselves; those who hear are told them too. */
+/** Short messages that disappear after a while; screen readers announce them. */
 export class Toasts {
   readonly element = make("div", { class: "toasts", part: "toasts", role: "status", "aria-live": "polite" });
 

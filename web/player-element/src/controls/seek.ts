@@ -62,7 +62,7 @@ export class SeekBar {
   #drop(): void {
     this.#follow();
     this.#scrubbing = false;
-    if (this.#resume) this.#player.play().catch(() => undefined); // its error event tells
+    if (this.#resume) this.#player.play().catch(() => undefined); // reported by the error event
     this.#resume = false;
     this.refresh();
   }
