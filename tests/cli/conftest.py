@@ -1,4 +1,4 @@
-"""What the commands' tests share: small inputs, and a way to run a command and see all it says."""
+"""Fixtures of the tests of commands: small inputs, and a function that runs a command and returns its output."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def test_frames_of_other_options_are_not_mixed(rig, tmp_path, capsys):
     assert "without a capture.json" in capsys.readouterr().err
 
 
-def test_what_is_missing_is_told_once_and_errors_take_one_line(rig, tmp_path, capsys):
+def test_what_is_missing_is_reported_once_and_errors_take_one_line(rig, tmp_path, capsys):
     (rig / "side" / "depth" / "depth_00002.png").unlink()
     assert main(["capture", str(rig), "-o", str(tmp_path / "frames"), "--voxel", "0.05"]) == 0
     assert capsys.readouterr().err.count("camera side lacks 1 of 3 frames") == 1
@@ -84,7 +84,7 @@ def test_a_recording_that_was_made_again_is_not_mixed_with_the_one_before(rig, t
     assert "(pictures[1] " in capsys.readouterr().err
 
 
-def test_pictures_of_noise_alone_give_frames_without_a_surface_which_are_told(rig, tmp_path, capsys):
+def test_pictures_of_noise_alone_give_frames_without_a_surface_which_are_reported(rig, tmp_path, capsys):
     random = np.random.default_rng(0)
     for path in rig.rglob("depth_*.png"):
         write_depth(random.integers(0, 65_535, (96, 96)).astype(np.uint16), path)

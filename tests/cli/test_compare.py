@@ -73,7 +73,7 @@ def test_without_key_frames_the_table_has_no_column_for_them(run, decoded, tmp_p
     assert "without key frames" not in run("compare", decoded, bare, "--no-ssim").out
 
 
-def test_the_table_has_a_line_a_metric_and_tells_the_views(run, balls):
+def test_the_table_has_a_line_a_metric_and_shows_the_views(run, balls):
     said = run("compare", balls, balls, *SMALL)
     assert said.code == 0 and said.err == ""
     for name in (
@@ -113,17 +113,17 @@ def test_welded_and_split_vertices_are_the_same_surface(run, tmp_path):
     assert "welded" in said.err and "b" in said.err
 
 
-def test_lengths_that_differ_are_told_with_the_remedy(run, balls):
+def test_lengths_that_differ_are_reported_with_the_remedy(run, balls):
     assert failed(run("compare", balls, FILE), "3 frames", "10", "--frames")
 
 
-def test_a_damaged_file_is_told_by_its_name_and_the_frames(run, decoded, tmp_path):
+def test_a_damaged_file_is_reported_by_its_name_and_the_frames(run, decoded, tmp_path):
     (tmp_path / "a.reel").write_bytes(FILE.read_bytes()[:-1])
     said = run("compare", decoded, tmp_path / "a.reel", "--no-ssim")
     assert failed(said, f"{tmp_path / 'a.reel'}: chunk 3 (frames 9 to 9): truncated", "copy the file again")
 
 
-def test_missing_things_are_told(run, balls, tmp_path):
+def test_missing_things_are_reported(run, balls, tmp_path):
     assert failed(run("compare", tmp_path / "none", FILE), "none")
     assert failed(run("compare", balls, tmp_path / "none.reel"), "none.reel")
     assert failed(run("compare", balls, tmp_path / "none"), "none")
@@ -201,7 +201,7 @@ def test_the_truth_takes_the_frames_of_the_originals(run, rig):
     assert row["noise_floor"]["people_median_m"] < 1e-6 and row["frames"] == [0, 1]
 
 
-def test_a_truth_that_does_not_fit_is_told(run, rig, balls, tmp_path):
+def test_a_truth_that_does_not_fit_is_reported(run, rig, balls, tmp_path):
     assert failed(run("compare", rig / "two", rig / "two", "--truth", rig / "truth"), "truth of 3 frames", "have 2")
     assert failed(run("compare", balls, balls, "--truth", tmp_path), "rig.json")
     assert failed(run("compare", balls, balls, "--truth", rig / "truth", "--truth-every", "0"), "--truth-every 0")

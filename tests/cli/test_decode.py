@@ -74,7 +74,7 @@ def test_of_a_scene_all_or_what_moves_or_what_does_not(run, tmp_path, only):
         assert np.abs(mesh.vertices[mesh.faces] - wanted.vertices[wanted.faces]).max() < 1e-5
 
 
-def test_a_part_that_a_file_does_not_have_is_told_before_anything_is_written(run, tmp_path):
+def test_a_part_that_a_file_does_not_have_is_reported_before_anything_is_written(run, tmp_path):
     folder = tmp_path / "out"
     assert failed(run("decode", FILE, "-o", folder, "--only", "background"), "mixed.reel", "no background")
     empty = GOLDEN / "empty.reel"
@@ -109,12 +109,12 @@ def test_damage_of_a_body_leaves_the_frames_without_it_and_the_background(run, t
         (lambda _: b"", ("not a .reel",)),
     ],
 )
-def test_a_file_that_is_no_whole_reel_is_told(run, tmp_path, spoil, words):
+def test_a_file_that_is_no_whole_reel_is_reported(run, tmp_path, spoil, words):
     (tmp_path / "a.reel").write_bytes(spoil(FILE.read_bytes()))
     assert failed(run("decode", tmp_path / "a.reel", "-o", tmp_path / "out"), *words)
 
 
-def test_a_missing_file_and_a_folder_that_cannot_be_are_told(run, tmp_path):
+def test_a_missing_file_and_a_folder_that_cannot_be_are_reported(run, tmp_path):
     assert failed(run("decode", tmp_path / "none.reel", "-o", tmp_path), "none.reel")
     assert failed(run("decode", tmp_path, "-o", tmp_path / "out"), str(tmp_path))
     (tmp_path / "taken").write_text("")

@@ -28,7 +28,7 @@ def coarse(monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("coarse")
-def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_tells_its_numbers(run, tmp_path):
+def test_the_demo_leaves_a_rig_a_file_and_a_picture_and_shows_its_numbers(run, tmp_path):
     said = run("demo", "-o", tmp_path / "demo", "--frames", "6", "--json")
     assert said.code == 0, said.err
     row = said.row
@@ -95,7 +95,7 @@ def test_a_command_is_shown_as_this_program_was_called(tmp_path, monkeypatch):
         assert called_as() == shown
 
 
-def test_values_that_cannot_be_are_told(run, tmp_path):
+def test_impossible_values_are_errors(run, tmp_path):
     assert failed(run("demo", "-o", tmp_path / "d", "--frames", "0"), "frames", "0")
     assert failed(run("demo", "-o", tmp_path / "d", "--quality", "-1"), "quality", "-1")
     assert failed(run("demo", "-o", tmp_path / "d", "--jobs", "0"), "jobs", "0")

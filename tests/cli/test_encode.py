@@ -1,4 +1,4 @@
-"""`meshreel encode`: everything it takes, and one line for everything it does not."""
+"""`meshreel encode`: accepted inputs and options, and a one-line error for all others."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_groups_are_predicted_between_the_frames_that_the_key_interval_asks_for(
 
 
 @pytest.mark.usefixtures("quick_presets")
-def test_a_target_is_met_and_the_quality_that_met_it_told(run, balls, tmp_path):
+def test_a_target_is_met_and_its_quality_reported(run, balls, tmp_path):
     out = tmp_path / "a.reel"
     first = run("encode", balls, "-o", out, "--frames", ":1", "--quality", "45", "--json").row
     said = run("encode", balls, "-o", out, "--frames", ":1", "--target-mbps", first["mbps"], "--json")
@@ -91,7 +91,7 @@ def test_a_target_is_met_and_the_quality_that_met_it_told(run, balls, tmp_path):
 
 
 @pytest.mark.usefixtures("quick_presets")
-def test_the_quality_that_a_target_took_and_the_psnr_that_was_reached_are_told(run, balls, tmp_path):
+def test_the_quality_and_the_psnr_of_a_target_are_reported(run, balls, tmp_path):
     out = tmp_path / "a.reel"
     first = run("encode", balls, "-o", out, "--frames", ":1", "--quality", "45.67891", "--json").row
     recorded = run("info", out, "--json").row["metadata"]
@@ -143,7 +143,7 @@ def test_quads_and_polygons_are_triangulated(run, tmp_path):
     assert len(meshreel.open(tmp_path / "a.reel")[0].faces) == 3
 
 
-def test_a_missing_input_and_an_empty_folder_are_told(run, tmp_path):
+def test_a_missing_input_and_an_empty_folder_are_reported(run, tmp_path):
     out = tmp_path / "a.reel"
     assert failed(run("encode", tmp_path / "none", "-o", out), "none", "no such file")
     assert failed(run("encode", tmp_path, "-o", out), "0 mesh files")
@@ -161,7 +161,7 @@ def test_a_missing_input_and_an_empty_folder_are_told(run, tmp_path):
         ("", ("0 bytes",)),
     ],
 )
-def test_a_frame_that_cannot_be_used_is_told_with_file_and_number(run, tmp_path, text, words):
+def test_a_frame_that_cannot_be_used_is_reported_with_file_and_number(run, tmp_path, text, words):
     obj(tmp_path, "f0.obj", TRIANGLE + "f 1 2 3\n")
     obj(tmp_path, "f1.obj", text)
     said = run("encode", tmp_path, "-o", tmp_path / "a.reel")
@@ -197,14 +197,14 @@ def test_a_frame_that_cannot_be_used_is_told_with_file_and_number(run, tmp_path,
         ([], ["output"]),
     ],
 )
-def test_an_option_that_cannot_be_is_told_before_anything_is_read(run, balls, tmp_path, arguments, words, monkeypatch):
+def test_an_impossible_option_is_an_error_before_anything_is_read(run, balls, tmp_path, arguments, words, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert failed(run("encode", balls, *arguments), *words)
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.usefixtures("quick_presets")
-def test_a_folder_that_is_not_there_or_is_the_target_is_told(run, balls, tmp_path):
+def test_a_folder_that_is_not_there_or_is_the_target_is_reported(run, balls, tmp_path):
     assert failed(run("encode", balls, "-o", tmp_path / "none" / "a.reel", "--frames", ":1"), "a.reel")
     (tmp_path / "b.reel").mkdir()
     assert failed(run("encode", balls, "-o", tmp_path / "b.reel", "--frames", ":1"), "b.reel")
@@ -224,7 +224,7 @@ def test_debug_shows_the_traceback(run, tmp_path):
         run("encode", tmp_path / "none", "-o", tmp_path / "a.reel", "--debug")
 
 
-def test_frames_whose_faces_have_no_area_are_told(run, tmp_path):
+def test_frames_whose_faces_have_no_area_are_reported(run, tmp_path):
     obj(tmp_path, "f0.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n")
     said = run("encode", tmp_path, "-o", tmp_path / "a.reel")
     assert said.code == 0 and "1 group of form empty" in said.out
@@ -239,7 +239,7 @@ def test_any_name_that_a_file_may_have_can_be_the_output(run, tmp_path):
     assert out.exists()
 
 
-def test_a_size_that_no_header_holds_is_told_before_anything_is_coded(run, tmp_path, monkeypatch):
+def test_a_size_that_no_header_holds_is_reported_before_anything_is_coded(run, tmp_path, monkeypatch):
     monkeypatch.setattr("meshreel.encoder.sequence.encode_interval", lambda *_: pytest.fail("coded"))
     obj(tmp_path, "f0.obj", TRIANGLE.replace("1", "1e12") + "f 1 2 3\n")
     assert failed(run("encode", tmp_path, "-o", tmp_path / "a.reel", "--scale", "1e9"), "Header.scale")

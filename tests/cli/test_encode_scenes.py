@@ -1,4 +1,4 @@
-"""`meshreel encode` of scenes: what is told of their parts, who says what moves, rigs, and what is refused."""
+"""`meshreel encode` of scenes: reports, masks, rigs, and errors."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def quick_bodies(monkeypatch):
     monkeypatch.setattr("meshreel.encoder.layers.encode_interval", frame_by_frame)
 
 
-def test_a_scene_is_told_by_its_parts_and_info_agrees(run, scan, tmp_path):
+def test_a_scene_is_reported_by_its_contents_and_info_agrees(run, scan, tmp_path):
     out = tmp_path / "a.reel"
     row = run("encode", scan, "-o", out, *FRAMES, "--background-refresh", "0.2", "--json").row
     parts = row["scene"]["bytes_by_content"]
@@ -91,14 +91,14 @@ def test_a_scene_of_which_nothing_is_to_be_taken_apart_has_one_part(run, scan, t
     assert run("info", tmp_path / "a.reel", "--json").row["background"] == []
 
 
-def test_a_background_that_leaves_nothing_of_the_rate_is_told_at_once(run, scan, tmp_path):
+def test_a_background_that_leaves_nothing_of_the_rate_is_reported_at_once(run, scan, tmp_path):
     out = tmp_path / "a.reel"
     said = run("encode", scan, "-o", out, *FRAMES, "--target-mbps", "0.0001")
     assert failed(said, "a.reel: the background alone takes", "the target is 0.0001 Mbps", "over 0.4 s")
     assert not out.exists()
 
 
-def test_a_refresh_of_what_is_not_there_is_told(run, balls, tmp_path):
+def test_a_refresh_of_what_is_not_there_is_reported(run, balls, tmp_path):
     said = run("encode", balls, "-o", tmp_path / "a.reel", "--frames", ":1", "--background-refresh", "1")
     assert said.code == 0 and "--background-refresh does nothing" in said.err
 
@@ -116,7 +116,7 @@ def test_a_rig_is_fused_on_the_fly_at_its_own_rate(run, rig, tmp_path):
     assert failed(run("encode", rig, "-o", out, "--frames", "3:"), "leave 0")
 
 
-def test_a_file_tells_which_axis_points_up(run, rig, tmp_path):
+def test_a_file_names_the_axis_that_points_up(run, rig, tmp_path):
     """That of the rig's cameras, also of meshes that `capture` made; or that given; y is not told."""
     out, scan = tmp_path / "a.reel", tmp_path / "scan"
     assert run("capture", rig, "-o", scan, "--voxel", "0.06", "--frames", ":1").code == 0
@@ -155,7 +155,7 @@ def test_a_camera_that_moves_is_refused(run, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["rig"]
 
 
-def test_depth_that_is_all_zero_is_told_and_gives_empty_frames(run, rig, tmp_path):
+def test_depth_that_is_all_zero_is_reported_and_gives_empty_frames(run, rig, tmp_path):
     for picture in rig.glob("*/depth/*.png"):
         write_depth(np.zeros((96, 96), np.uint16), picture)
     said = run("encode", rig, "-o", tmp_path / "a.reel")
@@ -184,7 +184,7 @@ def test_depth_of_eight_bits_is_refused(run, rig, tmp_path):
         (["--sam3", "none", "--masks", "masks"], ["--masks masks", "one of both"]),
     ],
 )
-def test_what_cannot_be_is_told_before_anything_is_written(run, scan, tmp_path, arguments, words, monkeypatch):
+def test_impossible_flags_are_errors_before_anything_is_written(run, scan, tmp_path, arguments, words, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "masks").mkdir()
     assert failed(run("encode", scan, "-o", "a.reel", *arguments), *words)

@@ -24,7 +24,7 @@ def has_usd():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_name_tells_the_format(run, tmp_path, kind):
+def test_the_extension_selects_the_format(run, tmp_path, kind):
     target = tmp_path / f"a.{kind.upper()}"
     row = run("export", FILE, "-o", target, "--json").row
     assert row.pop("bytes") == target.stat().st_size
@@ -55,7 +55,7 @@ def test_flags_reach_the_file(run, tmp_path):
     assert len(mesh.vertices) == len(meshreel.open(SCENE).at(1).parts(3)["track 0"].vertices)
 
 
-def test_what_does_not_agree_is_told(run, tmp_path):
+def test_flags_that_contradict_each_other_are_errors(run, tmp_path):
     assert failed(run("export", FILE), "no format", "--glb")
     assert failed(run("export", FILE, "--glb", "--usd"), "--glb and --usd")
     assert failed(run("export", FILE, "--glb", "-o", tmp_path / "a.usdc"), "a.usdc", ".glb")
@@ -97,7 +97,7 @@ def test_a_file_in_which_nothing_is_to_be_seen_is_a_warning(run, tmp_path):
         (lambda _: b"", ("not a .reel",)),
     ],
 )
-def test_a_file_that_is_no_whole_reel_is_told_and_nothing_is_written(run, tmp_path, spoil, words, kind):
+def test_a_file_that_is_no_whole_reel_is_reported_and_nothing_is_written(run, tmp_path, spoil, words, kind):
     (tmp_path / "a.reel").write_bytes(spoil(FILE.read_bytes()))
     said = run("export", tmp_path / "a.reel", "-o", tmp_path / f"a.{kind}")
     assert failed(said, str(tmp_path / "a.reel"), *words)

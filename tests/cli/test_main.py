@@ -33,7 +33,7 @@ def test_version_is_the_packages(run):
     assert run("--version").out.strip() == meshreel.__version__
 
 
-def test_an_unknown_command_is_told(run):
+def test_an_unknown_command_is_reported(run):
     assert failed(run("encod"), "encod")
 
 
@@ -94,7 +94,7 @@ def test_a_module_run_exits_with_the_code(tmp_path):
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_that_an_import_made_an_error_of_is_still_told_as_a_signal(run, monkeypatch, number, code):
+def test_a_signal_that_an_import_made_an_error_of_is_still_reported_as_a_signal(run, monkeypatch, number, code):
     def importing(*_):
         try:
             signal.raise_signal(number)

@@ -72,7 +72,7 @@ def test_serve_shows_what_is_in_the_folder_now(started, tmp_path):
     assert process.returncode == 0
 
 
-def test_what_cannot_be_played_is_told_before_anything_is_served(run, tmp_path):
+def test_what_cannot_be_played_is_reported_before_anything_is_served(run, tmp_path):
     damaged = tmp_path / "damaged.reel"
     damaged.write_bytes(b"nothing")
     assert failed(run("play", damaged, "--no-browser"), "damaged.reel", "not a .reel file")
@@ -81,7 +81,7 @@ def test_what_cannot_be_played_is_told_before_anything_is_served(run, tmp_path):
     assert failed(run("play", FILE, "--no-browser", "--port", "99999"), "--port 99999")
 
 
-def test_without_the_extra_its_name_is_told():
+def test_without_the_extra_the_error_names_it():
     hidden = "import sys; sys.modules['uvicorn'] = None; from meshreel.cli import main; main()"
     command = [sys.executable, "-c", hidden, "play", str(FILE), "--no-browser"]
     said = subprocess.run(command, capture_output=True, text=True)
@@ -118,7 +118,7 @@ def test_a_browser_that_stays_open_holds_nothing_up(run, monkeypatch):
 
 
 @pytest.mark.usefixtures("told_once")
-def test_where_no_browser_is_found_the_address_is_told_again(monkeypatch):
+def test_where_no_browser_is_found_the_address_is_reported_again(monkeypatch):
     notes: list[str] = []
     heard = threading.Event()
     monkeypatch.setattr("webbrowser.open", lambda _: False)
@@ -127,5 +127,5 @@ def test_where_no_browser_is_found_the_address_is_told_again(monkeypatch):
     assert heard.wait(60) and notes == ["no browser was found: open http://127.0.0.1:1/"]
 
 
-def test_an_origin_with_a_path_is_told(run, tmp_path):
+def test_an_origin_with_a_path_is_reported(run, tmp_path):
     assert failed(run("serve", tmp_path, "--cors", "https://example.org/"), "--cors 'https://example.org/'")

@@ -1,4 +1,4 @@
-"""`meshreel segment`: labels that numpy reads in a line, pictures to look at, and what other tools make masks of."""
+"""`meshreel segment`: labels as NumPy files, previews, and pictures for tools that make masks."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_masks_move_the_faces_that_they_show(run, scan, painted, tmp_path):
         assert moving[ROOM_FACES:].mean() > 0.95 and moving[:ROOM_FACES].mean() < 0.01
 
 
-def test_masks_of_more_frames_than_are_read_are_told(run, scan, painted, tmp_path):
+def test_masks_of_more_frames_than_are_read_are_reported(run, scan, painted, tmp_path):
     said = run("segment", scan, "-o", tmp_path / "out", "--masks", painted, "--frames", "1:3", "--previews", "0")
     assert said.code == 0 and "has masks for 2 more frames than the 2 of the sequence" in said.err
 
@@ -88,7 +88,7 @@ def test_masks_that_were_painted_in_place_are_not_replaced_by_pictures(run, scan
     assert mask.read_bytes() == before
 
 
-def test_what_is_left_of_a_run_before_is_told(run, scan, tmp_path):
+def test_what_is_left_of_a_run_before_is_reported(run, scan, tmp_path):
     out = tmp_path / "out"
     assert run("segment", scan, "-o", out, "--previews", "2").err == ""
     assert run("segment", scan, "-o", out, "--previews", "2").err == ""  # the same again
@@ -119,7 +119,9 @@ def test_a_rig_is_an_input(run, rig, tmp_path):
     assert said.code == 0 and "camera left lacks 1 of 3 frames" in said.err
 
 
-def test_masks_that_are_missing_or_of_another_size_are_told_before_anything_is_written(run, scan, painted, tmp_path):
+def test_masks_that_are_missing_or_of_another_size_are_reported_before_anything_is_written(
+    run, scan, painted, tmp_path
+):
     masks, out = tmp_path / "masks", tmp_path / "out"
     shutil.copytree(painted, masks)
     lost = masks / "view03" / "frame_00002.png"
@@ -152,7 +154,7 @@ def test_masks_that_are_missing_or_of_another_size_are_told_before_anything_is_w
         (["--up", "x"], ["x"]),
     ],
 )
-def test_flags_that_cannot_be_are_told(run, scan, tmp_path, arguments, words, monkeypatch):
+def test_impossible_flags_are_errors(run, scan, tmp_path, arguments, words, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.json").write_text("{}")
     (tmp_path / "weights").mkdir()
@@ -165,7 +167,7 @@ def test_the_help_says_how_labels_are_read(run):
     assert 'np.load(file)["moving"]' in told and "--masks" in told and "--empty-prompts" not in told
 
 
-def test_frames_without_a_surface_have_no_views_and_are_told(run, tmp_path):
+def test_frames_without_a_surface_have_no_views_and_are_reported(run, tmp_path):
     for number in range(2):
         (tmp_path / f"frame_{number}.obj").write_text("v 0 0 0\n")
     assert failed(run("segment", tmp_path, "-o", tmp_path / "out"), "has a surface; give a frame with faces")

@@ -1,4 +1,4 @@
-"""Scenes: a frame is its background and its moving bodies, each decoded on its own and no more often than it must."""
+"""Scenes: a frame is its background and its moving bodies, each decoded separately and only when needed."""
 
 from __future__ import annotations
 

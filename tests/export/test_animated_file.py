@@ -1,4 +1,4 @@
-"""Exported files show, at each frame's time, what the decoder gives; and in between what moves has moved on."""
+"""Exported files show the decoded mesh at the time of each frame, and motion between frames."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_fewer_layers_are_exported_as_they_decode(tmp_path, layers):
         assert_shows(shown, parts_of(video, frame), video[frame].diagonal)
 
 
-def test_what_points_up_is_what_the_file_tells(tmp_path):
+def test_what_points_up_is_what_the_file_shows(tmp_path):
     path, options = tmp_path / "a.reel", quick("best")
     views = replace(options.segment.views, up="-z")
     encode(MeshList((sphere(),)), path, replace(options, segment=replace(options.segment, views=views)))
@@ -251,7 +251,7 @@ def test_the_axis_that_points_up_does_so_in_the_file(tmp_path, up, axis, extensi
 
 
 @pytest.mark.parametrize("name", ["laplacian", "scene", "mixed"])
-def test_who_does_not_play_sees_the_first_frame(tmp_path, name):
+def test_viewers_that_do_not_animate_show_the_first_frame(tmp_path, name):
     video = meshreel.open(GOLDEN / f"{name}.reel")
     export(video, tmp_path / "a.glb")
     assert_shows(seen(PlayedGlb(tmp_path / "a.glb").shown(None)), parts_of(video, 0), video[0].diagonal)
@@ -275,7 +275,7 @@ def test_a_file_of_one_frame_shows_it(tmp_path, extension):
 
 @pytest.mark.parametrize("extension", ["glb", "usdc", "usdz"])
 @pytest.mark.parametrize("path", FILES, ids=names)
-def test_damage_is_told_with_its_chunk_and_leaves_what_was_there(tmp_path, path, extension):
+def test_damage_is_reported_with_its_chunk_and_leaves_what_was_there(tmp_path, path, extension):
     target = tmp_path / f"a.{extension}"
     for chunk, damaged in _damaged(path):
         target.write_bytes(b"of a run before")
@@ -294,7 +294,7 @@ def _damaged(path: Path) -> Iterator[tuple[int, bytes]]:
     yield chunks[-1].number, data[:-1]
 
 
-def test_a_target_that_cannot_be_is_told_at_once(tmp_path):
+def test_an_impossible_target_is_an_error_at_once(tmp_path):
     video = meshreel.open(GOLDEN / "mixed.reel")
     for target, words in (
         (tmp_path / "a.fbx", ".fbx extension"),

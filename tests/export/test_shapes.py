@@ -1,4 +1,4 @@
-"""What animated files cannot hold is refused in one line, and nothing is left behind."""
+"""Shapes that animated files cannot hold are one-line errors that leave no file."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_the_file_appears_at_the_end_alone(write, tmp_path):
 
 
 @pytest.mark.parametrize("far", [1e39, -1e300, np.inf, np.nan])
-def test_a_vertex_that_is_too_far_is_told(write, tmp_path, far):
+def test_a_vertex_that_is_too_far_is_reported(write, tmp_path, far):
     with pytest.raises(InputError, match="part, name: a vertex"), write(animation()) as writer:
         writer.add(shape(vertices=np.where(TRIANGLE == 1, far, TRIANGLE)))
     assert list(tmp_path.iterdir()) == []
@@ -65,7 +65,7 @@ def test_what_fails_in_the_block_leaves_nothing(write, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_is_not_there_is_told(tmp_path):
+def test_a_folder_that_is_not_there_is_reported(tmp_path):
     pytest.importorskip("pxr")
     for kind, writer in WRITERS.items():
         target = tmp_path / "none" / f"a.{kind}"
@@ -74,7 +74,7 @@ def test_a_folder_that_is_not_there_is_told(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="names are Unicode on this system")
-def test_a_folder_whose_name_is_no_text_is_told_where_usd_cannot_take_it(tmp_path):
+def test_a_folder_whose_name_is_no_text_is_reported_where_usd_cannot_take_it(tmp_path):
     pytest.importorskip("pxr")
     folder = tmp_path / os.fsdecode(b"caf\xe9")
     folder.mkdir()
@@ -85,7 +85,7 @@ def test_a_folder_whose_name_is_no_text_is_told_where_usd_cannot_take_it(tmp_pat
     assert [path.name for path in folder.iterdir()] == ["a.glb"]
 
 
-def test_a_glb_that_would_be_too_long_is_told_before_it_is(tmp_path, monkeypatch):
+def test_a_glb_that_would_be_too_long_is_reported_before_it_is(tmp_path, monkeypatch):
     with animated_glb(tmp_path / "a.glb", animation()) as writer:
         writer.add(shape())
     size = (tmp_path / "a.glb").stat().st_size
@@ -100,7 +100,7 @@ def test_a_glb_that_would_be_too_long_is_told_before_it_is(tmp_path, monkeypatch
     assert [path.name for path in tmp_path.iterdir()] == ["a.glb"]
 
 
-def test_a_usdz_that_would_be_too_long_is_told(tmp_path, monkeypatch):
+def test_a_usdz_that_would_be_too_long_is_reported(tmp_path, monkeypatch):
     pytest.importorskip("pxr")
     monkeypatch.setattr("meshreel.export.animated_usd._MOST_PACKED", 100)
     told = pytest.raises(InputError, match=r"a.usdz: more than the 100 bytes")
@@ -109,7 +109,7 @@ def test_a_usdz_that_would_be_too_long_is_told(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_times_that_float32_cannot_tell_apart_are_told(tmp_path):
+def test_times_that_float32_cannot_distinguish_are_reported(tmp_path):
     times = np.array([0.0, 100.0, 100.000001])
     with pytest.raises(InputError, match=r"frame 1 .* 100 s"), animated_glb(tmp_path / "a.glb", Animation(times, 10)):
         pytest.fail("opened")

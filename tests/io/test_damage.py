@@ -1,4 +1,4 @@
-"""Files that are damaged or were made to hurt: each is an InputError that names the file."""
+"""Damaged and hostile mesh files: each is an InputError that names the file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Masks: object numbers come back from any PNG that holds them, and what is missing is told with its remedy."""
+"""Masks: object numbers from all kinds of PNG, and errors for missing files."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_views_and_frames_are_found_by_the_last_numbers_of_their_names(tmp_path:
     assert [[path.relative_to(tmp_path).as_posix() for path in files] for files in found] == [names[:11], names[11:]]
 
 
-def test_what_is_missing_or_there_twice_is_told(tmp_path: Path):
+def test_what_is_missing_or_there_twice_is_reported(tmp_path: Path):
     root = folder(tmp_path, ["view00/frame_00000.png", "view00/frame_00002.png", "view01/frame_00000.png"])
     with pytest.raises(InputError, match=r"view00.*no mask of frame 1 \(1 of 3 are missing\).*a black one"):
         find_masks(root, 2, 3)

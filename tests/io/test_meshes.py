@@ -1,4 +1,4 @@
-"""Mesh files: what each format may hold, and what each way of being wrong is called."""
+"""Mesh files: the contents of each format, and the error for each kind of damage."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_obj_is_read_in_all_its_forms(tmp_path: Path, form: str) -> None:
     assert mesh.vertices[mesh.faces[0]].tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
 
 
-def test_obj_names_what_it_holds_besides_geometry(tmp_path: Path) -> None:
+def test_dropped_data_of_obj_files_is_named(tmp_path: Path) -> None:
     assert read(tmp_path, "m.obj", OBJ_FORMS["corner_forms"]).dropped == {"normals", "texture coordinates"}
     assert read(tmp_path, "m.obj", OBJ_FORMS["colors_and_weights"]).dropped == {"vertex colors"}
     assert read(tmp_path, "m.obj", TRIANGLE).dropped == frozenset()

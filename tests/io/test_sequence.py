@@ -1,4 +1,4 @@
-"""Sequences: which files, in what order, how lazily, and what is said about them."""
+"""Sequences from files: selection, order, laziness, warnings."""
 
 from __future__ import annotations
 

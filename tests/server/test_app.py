@@ -1,4 +1,4 @@
-"""What the server answers: ranges, validators, types, pages; and what it refuses."""
+"""Responses of the server: ranges, validators, types, pages, errors."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_a_link_that_leads_out_is_not_followed(client, folder):
     assert "linked" not in client.get("/").text
 
 
-def test_the_gallery_tells_rate_and_length_and_what_is_wrong_with_a_file(client):
+def test_the_gallery_shows_rate_and_length_and_what_is_wrong_with_a_file(client):
     text = client.get("/").text
     assert text.index("cut") < text.index("none") < text.index("walk")
     assert "14 frames" in text and "Mbps" in text
@@ -166,6 +166,6 @@ def test_a_preflight_from_a_page_to_the_local_network_is_answered(folder, player
 
 
 @pytest.mark.parametrize("origin", ["https://example.org/", "example.org", "", "ftp://example.org", "https://a b"])
-def test_an_origin_that_no_browser_sends_is_told(folder, player, origin):
+def test_an_origin_that_no_browser_sends_is_reported(folder, player, origin):
     with pytest.raises(InputError, match=r"--cors .*give scheme, host and port alone"):
         make_app(Library(folder), player, (origin,))

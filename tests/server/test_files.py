@@ -1,4 +1,4 @@
-"""How files are sent: every kind of range, in pieces; and what a client cannot reach."""
+"""Sent files: all kinds of ranges, streaming, and files that a client cannot reach."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_ranges_that_overlap_are_sent_once(client, folder, asked):
 
 
 @pytest.mark.parametrize("asked", ["99999999-", "-0", "0-3,99999999-"])
-def test_a_range_behind_the_end_is_told_with_the_size(client, folder, asked):
+def test_a_range_behind_the_end_is_reported_with_the_size(client, folder, asked):
     answer = client.get(WALK, headers={"Range": f"bytes={asked}"})
     assert answer.status_code == 416 and answer.content == b""
     assert answer.headers["content-range"] == f"bytes */{(folder / 'walk.reel').stat().st_size}"

@@ -1,4 +1,4 @@
-"""Which files a library has, and what it tells of each."""
+"""The files of a library, and the facts of each."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_a_folder_that_is_a_link_itself_is_served(folder):
 
 
 @pytest.mark.skipif(not BYTES_AS_NAMES, reason="names are Unicode on this system")
-def test_a_name_that_is_no_text_is_told_and_breaks_nothing(folder, player):
+def test_a_name_that_is_no_text_is_reported_and_breaks_nothing(folder, player):
     with open(os.fsencode(folder) + b"/\xff\xfe.reel", "wb") as file:  # noqa: PTH123  (bytes as a name)
         file.write(b"x")
     page = TestClient(make_app(Library(folder), player)).get("/")
@@ -95,7 +95,7 @@ def test_a_pipe_is_no_file_to_wait_for(folder):
     assert Library(folder).path_of("pipe.reel") is None
 
 
-def test_what_is_told_of_an_error_has_no_path_of_this_machine(folder, monkeypatch):
+def test_errors_in_the_gallery_have_no_path_of_this_machine(folder, monkeypatch):
     def refused(path):
         raise InputError(f"{path}: cannot be opened: Permission denied")
 
@@ -103,7 +103,7 @@ def test_what_is_told_of_an_error_has_no_path_of_this_machine(folder, monkeypatc
     assert Library(folder).entry("walk.reel").error == "cannot be opened: Permission denied"
 
 
-def test_a_file_that_went_away_is_told(folder):
+def test_a_file_that_went_away_is_reported(folder):
     (folder / "walk.reel").unlink()
     entry = Library(folder).entry("walk.reel")
     assert (entry.frames, entry.error) == (0, "is not there any more")

@@ -1,4 +1,4 @@
-"""Posters: kept as long as their file is the same, drawn without holding up anybody, clear where nothing is."""
+"""Posters: cached per version of a file, drawn without blocking other requests, with a transparent background."""
 
 from __future__ import annotations
 

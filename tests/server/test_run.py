@@ -1,4 +1,4 @@
-"""Where the server listens, and what it tells of that."""
+"""Addresses of the server and how it announces them."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_addresses_are_those_to_type():
     assert everywhere[0] == "http://localhost:81/" and not any("0.0.0.0" in address for address in everywhere)
 
 
-def test_a_taken_port_and_an_unknown_host_are_told_with_a_remedy(folder, player):
+def test_a_taken_port_and_an_unknown_host_are_reported_with_a_remedy(folder, player):
     app = make_app(Library(folder), player)
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
@@ -54,7 +54,7 @@ def test_https_answers_with_a_certificate_for_this_machines_addresses(folder, pl
     assert timedelta(days=30) < life < timedelta(days=398)  # what browsers accept
 
 
-def test_https_without_its_library_is_told_before_any_address_is(folder, player, monkeypatch):
+def test_https_without_its_library_is_reported_before_any_address_is(folder, player, monkeypatch):
     monkeypatch.setitem(sys.modules, "trustme", None)
     told = []
     with pytest.raises(ModuleNotFoundError) as caught:
@@ -70,7 +70,7 @@ def test_all_addresses_of_version_6_are_all_of_version_4_too(folder, player, liv
             assert answer.status == 200
 
 
-def test_who_listens_here_alone_answers_to_its_own_names_alone(folder, player):
+def test_a_server_for_this_machine_answers_to_local_names_only(folder, player):
     client = TestClient(make_app(Library(folder), player, hosts=ServerOptions().hosts))
     for host, code in (("localhost", 200), ("127.0.0.1:80", 200), ("[::1]:80", 200), ("evil.example", 400), ("", 400)):
         assert client.get("/files/walk.reel", headers={"Host": host}).status_code == code
