@@ -33,13 +33,6 @@ class Codec(Protocol):
         ...
 
 
-def coded_row(codec: Codec, sequence: MeshSequence, data: bytes) -> dict[str, Any]:
-    """What a row says of a stream: codec, operating point, and the rate of all its bytes over the sequence."""
-    mbps = len(data) * 8 * sequence.frame_rate / len(sequence) / 1e6
-    told = {"codec": codec.name, "options": codec.options, "frame_rate": sequence.frame_rate}
-    return told | {"bytes": len(data), "mbps": mbps}
-
-
 @runtime_checkable
 class TwoStepCodec(Codec, Protocol):
     """A codec whose encoder first finds out what does not depend on the rate: a sweep does that once for its points.

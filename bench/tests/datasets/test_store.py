@@ -29,7 +29,8 @@ def planted(monkeypatch, tmp_path):
         "performers/ball.npz": hashlib.sha256((tmp_path / "performers" / "ball.npz").read_bytes()).hexdigest(),
         "performers/walker": checksums.checksum(tmp_path / "performers" / "walker"),
     }
-    monkeypatch.setattr(checksums, "known_checksums", lambda: known)
+    for module in ("datasets", "datasets.checksums"):
+        monkeypatch.setattr(f"meshreel_bench.{module}.known_checksums", lambda: known)
     return tmp_path
 
 

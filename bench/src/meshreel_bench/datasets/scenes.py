@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from meshreel import geometry
-from meshreel.analysis.scene import segmentation as segmenter
+from meshreel.analysis import scene as segmenter
 from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment

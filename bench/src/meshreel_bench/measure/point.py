@@ -24,6 +24,7 @@ from meshreel.types import MeshSequence, evenly
 
 from ..codec import Codec, TwoStepCodec
 from ..codecs import codec_version, make_codec
+from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, SceneFrames
 from ..rows import Encoding, Group, Point, Row, Stream
@@ -72,7 +73,7 @@ def measure_point(point: Point, store: Store) -> Row:
         row,
         name=codec.name,
         options=codec.options,
-        stream=_stream(data, len(source)),
+        stream=_stream(codec, data, len(source)),
         encoding=encoding,
         decoding=decoding,
         metrics=metrics,
@@ -142,8 +143,8 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, E
     return data, Encoding(seconds / count, shares, peak_rss_mb())
 
 
-def _stream(data: bytes, frames: int) -> Stream:
-    """Return size and groups; no groups of bytes that are no .reel file."""
+def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
+    """Return size, groups and what is sent once; no groups of bytes that are no .reel file."""
     if not data.startswith(MAGIC):
         return Stream(len(data), frames)
     reader = ReelReader(BytesSource(data))
@@ -154,6 +155,8 @@ def _stream(data: bytes, frames: int) -> Stream:
         form = chunk.form.name.lower()
         groups.append(Group(chunk.first_frame, chunk.frame_count, form, chunk.size, min(own, default=None)))
     once = sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
+    if isinstance(codec, BackgroundDracoCodec):
+        once = codec.background_bytes(data)
     return Stream(len(data), frames, once, groups)
 
 

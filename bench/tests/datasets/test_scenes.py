@@ -1,0 +1,161 @@
+"""Scenes: captured once, labels, anchors, and what is measured of people and background, on a small one."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from meshreel_bench.codecs import make_codec
+from meshreel_bench.datasets import Store
+from meshreel_bench.datasets import scenes as module
+from meshreel_bench.datasets.scenes import SceneFrames, open_scene
+from meshreel_bench.measure.point import measure_point
+from meshreel_bench.report.values import value
+from meshreel_bench.rows import Point
+
+from meshreel.capture.simulated_rig import SceneFrame, SensorOptions, simulate_rig
+from meshreel.errors import InputError
+from meshreel.geometry.closest_points import Surface
+from meshreel.metrics.scene_comparison import compare_with_truth
+from meshreel.types import Mesh
+from tests.capture.depth_scenes import camera
+from tests.metrics.shapes import moved, plane, sphere
+
+BACK = moved(plane(6.0, 4), (-3, -3, 0.8))
+PLATE = Mesh.of(BACK.vertices, BACK.faces[:, ::-1])  # faces the cameras
+FRAMES = [SceneFrame.of([PLATE], [moved(sphere(0.3, 3), (0.1 * n - 0.15, 0, 0))]) for n in range(4)]
+QUIET = SensorOptions(noise=0.1, holes=0.0, flying=0.0)
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    """A folder in which the scene `room2-4` is a ball that slides before a plate."""
+    folder = tmp_path_factory.mktemp("scenes.cache")
+    cameras = tuple(camera(f"at{side}", side, 128) for side in (0, 40, 320))
+    simulate_rig(folder / "room2-4" / "rig", FRAMES, cameras, 30.0, QUIET)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def scene(cache):
+    return open_scene("room2", cache, cache, 4)
+
+
+def test_a_scene_is_captured_once_and_kept(scene, cache):
+    assert len(scene.meshes) == len(scene.truth) == 4 and scene.meshes.frame_rate == 30.0
+    first = scene.folder / "meshes" / "frame_00000.ply"
+    made = first.stat().st_mtime_ns
+    again = open_scene("room2", cache, cache, 4)
+    assert first.stat().st_mtime_ns == made and np.array_equal(again.meshes[0].faces, scene.meshes[0].faces)
+
+
+def test_labels_are_those_of_the_nearest_clean_faces_or_those_of_a_file(scene):
+    labels = [scene.labels(number) for number in range(4)]
+    middles = scene.meshes[3].vertices[scene.meshes[3].faces].mean(axis=1)
+    assert np.array_equal(labels[3], middles[:, 2] < 0.5) and labels[3].any()
+    assert np.array_equal(scene.labels(3), labels[3])  # as kept
+    path = scene.folder / "labels" / "planted.npz"
+    np.savez(
+        path, **{f"frame_{i:05}": np.packbits(~found) for i, found in enumerate(labels[:3])}, frame_00003=np.zeros(1)
+    )
+    assert np.array_equal(scene.labels(2, "planted"), ~labels[2])
+    with pytest.raises(InputError, match="frame_00003 for"):
+        scene.labels(3, "planted")
+    with pytest.raises(InputError, match=r"none\.npz: no labels of frame_00000"):
+        scene.labels(0, "none")
+    np.savez(path, frame_00000=np.zeros(1))
+    with pytest.raises(InputError, match="no labels of frame_00001"):
+        scene.labels(1, "planted")
+
+
+def test_labels_that_another_encoder_has_found_are_not_taken_for_this_ones(scene, monkeypatch):
+    """Rows of a changed segmenter would have the numbers of the old one."""
+    calls = []
+
+    class Found:
+        def moving(self, _, mesh):
+            return np.full(len(mesh.faces), len(calls) == 2)
+
+    monkeypatch.setattr(module, "segment", lambda meshes: calls.append(len(meshes)) or Found())
+    module._kept_as.cache_clear()
+    assert not scene.labels(0, "found").any() and not scene.labels(1, "found").any() and calls == [4]
+    real = module.SegmentOptions
+    monkeypatch.setattr(module, "SegmentOptions", lambda: real(island=0.5))
+    module._kept_as.cache_clear()
+    assert scene.labels(0, "found").all() and calls == [4, 4]
+    monkeypatch.undo()
+    module._kept_as.cache_clear()
+    for path in (scene.folder / "labels").glob("found*"):
+        path.unlink()
+
+
+def test_the_background_is_what_stands_also_behind_what_moves(scene):
+    still = scene.background()
+    assert abs(np.median(still.vertices[:, 2]) - 0.8) < 0.003 and (still.vertices[:, 2] > 0.5).all()
+    behind = moved(plane(0.6, 20), (-0.3, -0.3, 0.8)).vertices
+    assert np.linalg.norm(Surface(still).closest(behind).points - behind, axis=1).max() < 0.01
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [("scene_draco", {"share": 0.3}), ("scene_draco", {"share": 0.3, "levels": 1}), ("background_draco", {})],
+)
+def test_an_anchor_decodes_to_the_scene(scene, name, options):
+    codec = make_codec(name, options)
+    data = codec.encode(SceneFrames(scene, (0, 2)))
+    decoded = codec.decode(data)
+    assert len(decoded) == 2
+    row = compare_with_truth(SceneFrames(scene, (0, 2)), decoded, _Chosen(scene.truth, (0, 2)), [0, 1])
+    assert row["decoded"]["people_median_m"] < 0.005 and row["decoded"]["background_median_m"] < 0.005
+    assert row["decoded"]["covered"] > 0.9 and row["decoded"]["people_covered"] > 0.9
+    if not options.get("levels"):  # decimation denoises
+        assert row["noise_floor"]["normal_error_deg"] > row["decoded"]["normal_error_deg"]
+    json.dumps(row, allow_nan=False)
+
+
+class _Chosen:
+    """Some clean frames."""
+
+    def __init__(self, truth, numbers):
+        self._truth, self._numbers, self.cameras = truth, numbers, truth.cameras
+
+    def __len__(self):
+        return len(self._numbers)
+
+    def __getitem__(self, index):
+        return self._truth[self._numbers[index]]
+
+
+def test_people_and_background_are_measured_against_the_truth_and_the_input(cache):
+    store = Store(cache, cache)
+    floor = measure_point(Point("room2", "captured", {}, 4, metrics="regions"), store)
+    assert floor.name == "the truth itself" and floor.stream is None and floor.measured_frames == [0, 1, 2, 3]
+    assert 0 < floor.metrics["truth_people_median_m"] < 0.01 and "input_people_median_m" not in floor.metrics
+    point = Point("room2", "background_draco", {"share": 0.5}, 4, sampled=True, metrics="regions")
+    row = measure_point(point, store)
+    assert 0 < row.stream.background_bytes < row.stream.bytes and row.stream.coded_frames == 4
+    moving = (row.stream.bytes - row.stream.background_bytes) * 8 * 30 / 4
+    assert value(row, "mbps_background_10s") == pytest.approx((moving + row.stream.background_bytes * 0.8) / 1e6)
+    for name in ("truth_people_median_m", "input_background_median_m", "truth_covered"):
+        assert row.metrics[name] > 0
+    assert not any(name.startswith("seam") for name in row.metrics)  # its stream has one frame more: the background
+
+
+def test_the_truth_is_measured_beside_the_input_where_pictures_are_from_the_cameras(cache):
+    row = measure_point(Point("room2", "draco", {"qp": 8}, 4, metrics="distances"), Store(cache, cache))
+    assert row.measured_frames == [0, 2] and row.metrics["d2_psnr_paper"] > 40
+    assert row.metrics["truth_people_median_m"] > 0 and "bridges" not in row.metrics
+
+
+def test_labels_that_the_encoder_finds_are_judged_by_the_true_ones(cache, monkeypatch):
+    monkeypatch.setattr(module.SceneData, "labels", lambda *_: np.arange(4) < 2)
+    row = measure_point(Point("room2", "segmentation", {"labels": "found"}, 4, metrics="regions"), Store(cache, cache))
+    assert row.metrics == {"iou_mean": 1.0, "iou_worst": 1.0, "static_called_dynamic": 0.0}
+
+
+def test_a_body_has_no_truth_and_no_regions(tmp_path):
+    store = Store(tmp_path)
+    for codec, metrics in (("captured", "views"), ("segmentation", "regions"), ("draco", "regions")):
+        with pytest.raises(InputError, match="simulated scenes"):
+            measure_point(Point("demo", codec, {}, 1, metrics=metrics), store)
