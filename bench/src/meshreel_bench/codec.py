@@ -1,4 +1,4 @@
-"""The protocol of everything that is compared: a sequence becomes bytes, and bytes a sequence; nothing else passes."""
+"""Protocol of a codec that can be compared: a sequence becomes bytes, and bytes a sequence; nothing else passes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Codec(Protocol):
 
     @property
     def name(self) -> str:
-        """What rows and plots call it."""
+        """Name in rows and plots."""
         ...
 
     @property
@@ -25,19 +25,19 @@ class Codec(Protocol):
         ...
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """All that a decoder needs; its length is the rate."""
+        """Return all that a decoder needs; its length is the rate."""
         ...
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """The frames, from the bytes alone; may decode lazily, frame by frame."""
+        """Return the frames, from the bytes alone; may decode lazily, frame by frame."""
         ...
 
 
 @runtime_checkable
 class TwoStepCodec(Codec, Protocol):
-    """A codec whose encoder first finds out what does not depend on the rate: a sweep does that once for its points.
+    """A codec whose encoder first analyses what does not depend on the rate: a sweep does that once for its points.
 
-    `encode` is `code` of what `analyse` gives.
+    `encode` is `code` of the result of `analyse`.
     """
 
     @property
@@ -46,9 +46,9 @@ class TwoStepCodec(Codec, Protocol):
         ...
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Any:
-        """What several operating points share."""
+        """Return the analysis that several operating points share."""
         ...
 
     def code(self, analysis: Any, progress: Progress | None = None) -> bytes:
-        """The bytes; the analysis stays as it was."""
+        """Return the bytes; the analysis stays as it was."""
         ...

@@ -46,7 +46,7 @@ SCALES = {"basketball_player": 0.1}  # to metres; the others are in metres
 REMESHED = {"crane60": "crane", "samba60": "samba"}  # new connectivity in every frame, from a body that has one
 REMESHED_FRAMES = 60
 NAMES = (DEMO, SYNTHETIC, *SCENES, PROCEDURAL, *RECORDINGS, *REMESHED)
-# Endings of names: the same sequence in another order, as many frames of it as are asked for.
+# Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
     "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
     "-forth-and-back": forth_and_back,

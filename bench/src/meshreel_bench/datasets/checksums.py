@@ -1,6 +1,6 @@
-"""What the benchmark data were when numbers of them were first told: SHA-256 of files, and of folders file by file.
+"""SHA-256 of the benchmark data that the published rows were measured on: of files, and of folders file by file.
 
-In: a path. Out: nothing, or InputError. Who has other data by the same name is told before anything is measured.
+In: a path. Out: nothing, or InputError. Other data of the same name are refused before anything is measured.
 """
 
 from __future__ import annotations

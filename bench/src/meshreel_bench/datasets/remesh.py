@@ -27,7 +27,7 @@ from meshreel.types import Mesh, MeshSequence
 class RemeshOptions:
     """How a frame gets connectivity of its own."""
 
-    vertices: int = 10_000  # about so many are kept
+    vertices: int = 10_000  # about this number is kept
     levels: int = 1  # midpoint subdivisions before the jitter
     jitter: float = 0.35  # largest move of a vertex along the surface, of its shortest edge
 

@@ -48,14 +48,14 @@ def simulate_room(
     folder: Path,
     data: Path,
     options: RoomOptions = RoomOptions(),
-    tell: Callable[[int], None] = lambda _done: None,
+    progress: Callable[[int], None] = lambda _done: None,
 ) -> int:
     """Writes the scene's rig and its truth into a folder; the number of frames. Some five minutes for 60 frames."""
     room = furnished(data)
     low, high = room.vertices.min(axis=0), room.vertices.max(axis=0)
     cameras = corner_cameras(low + WALLS, high - np.array(WALLS), CAMERAS)
     frames = scene(room, data, SPEEDS[options.name], options.frames)
-    return simulate_rig(folder, frames, cameras, FRAME_RATE, options.sensor, tell)
+    return simulate_rig(folder, frames, cameras, FRAME_RATE, options.sensor, progress)
 
 
 def furnished(data: Path) -> Mesh:

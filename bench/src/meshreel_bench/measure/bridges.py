@@ -1,4 +1,4 @@
-"""Triangles that should not be: those that bridge bodies which the original frame has apart, and those without area.
+"""Count of wrong triangles: those that bridge bodies which are separate in the original frame, and slivers.
 
 In -> out: an original frame and its decoded one -> a count; 0 where all is well, and where the original is one piece.
 """

@@ -1,4 +1,4 @@
-"""How well the faces that move are told from those that stand.
+"""Score of a segmentation into faces that move and faces that stand.
 
 In: labels of each frame's faces, found and true -> intersection over union of the dynamic faces, mean and worst frame,
 and the share of the static faces that are called dynamic.
@@ -14,12 +14,12 @@ from jaxtyping import Bool
 
 from meshreel.errors import InputError
 
-Labels = Bool[np.ndarray, " _"]  # True: the face moves; as many as the frame has faces
+Labels = Bool[np.ndarray, " _"]  # True: the face moves; one a face of the frame
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentationScore:
-    """What a segmentation is worth; 1, 1 and 0 are perfect."""
+    """Score of a segmentation; 1, 1 and 0 are perfect."""
 
     iou: tuple[float, ...]  # of the dynamic faces, by frame; 1 where there are none, found or true
     static_called_dynamic: float  # share of all static faces of all frames

@@ -21,7 +21,7 @@ class Look:
     size: float = 3.4  # points, of the marker
 
 
-# In the order of legends and sheets. Colors that the color-blind tell apart (Okabe and Ito) come first; codecs that are
+# In the order of legends and tables. Colors safe for the color-blind (Okabe and Ito) come first; codecs that are
 # never in one plot may share one.
 KNOWN: dict[str, Look] = {
     BEST: Look("#D55E00", "o", 2.2, 4.4),

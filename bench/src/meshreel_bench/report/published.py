@@ -1,4 +1,4 @@
-"""Numbers that others have published, or that their released code gave, beside which ours stand.
+"""Numbers published by others, or measured of their released code, beside which ours stand.
 
 Each table says where it is from. Nothing here was measured by this package.
 """
@@ -22,7 +22,7 @@ class Published:
     mbps: float | None
 
 
-# TSMC, table 1: mean of four captured scenes, 13.73 % of the vertices dynamic, "under similar bitrates", not told.
+# TSMC, table 1: mean of four captured scenes, 13.73 % of the vertices dynamic, "under similar bitrates" (not given).
 TABLE_1 = (
     Published("TSMC", TSMC, 53.48, 0.8949, 34.50, None),
     Published("TVMC*", TVMC, 53.84, 0.8585, 10.78, None),

@@ -49,9 +49,9 @@ def _(promise: Reaches, rows: Sequence[Row]) -> list[Verdict]:
     floor = floors(row for row in rows if row.point.sequence == promise.which.sequence)
     limits = [_resolved(bound, floor) for bound in promise.bounds]
     own = [row for row in _chosen(rows, promise.which) if all(value(row, b.key) is not None for b in promise.bounds)]
-    told = ", ".join(map(_text, promise.bounds)) + (f" (aim {promise.aim})" if promise.aim else "")
+    limit = ", ".join(map(_text, promise.bounds)) + (f" (aim {promise.aim})" if promise.aim else "")
     if not own or None in limits:
-        return [Verdict(promise.text, told)]
+        return [Verdict(promise.text, limit)]
     bounds = [bound for bound in limits if bound is not None]
     good = [row for row in own if not any(_miss(row, bound) for bound in bounds)]
     if good:
@@ -59,7 +59,7 @@ def _(promise: Reaches, rows: Sequence[Row]) -> list[Verdict]:
     else:
         row = min(own, key=lambda row: sum(_miss(row, bound) for bound in bounds))
     found = [_number(value(row, b.key), b.unit) + (" (short)" if _miss(row, b) else "") for b in bounds]
-    return [Verdict(promise.text, told, ", ".join(found) + _where(row), bool(good))]
+    return [Verdict(promise.text, limit, ", ".join(found) + _where(row), bool(good))]
 
 
 @_judged.register
