@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
-from meshreel_bench.cli import describe, main, operating_point
+from meshreel_bench.cli import describe, main, make_app, operating_point
 
 from bench.tests.made_up import failed, row
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "codecs.md"
 
 
 @pytest.fixture
@@ -79,6 +82,14 @@ def test_experiments_and_codecs_are_listed(bench):
     assert {"experiment": "table2", "sequences": ["synthetic4"], "points": 33} in found["experiments"]
     _, found, _ = bench("codecs", "--json")
     assert found["codecs"]["tvmc"] == "meshreel-bench"
+
+
+def test_the_commands_of_codecs_md_parse():
+    lines = PAGE.read_text(encoding="utf-8").splitlines()
+    commands = [shlex.split(line)[1:] for line in lines if line.startswith("meshreel-bench ")]
+    assert len(commands) == 3
+    for tokens in commands:
+        make_app().parse_args(tokens, exit_on_error=False, print_error=False)
 
 
 def test_an_operating_point_is_a_codec_and_its_options():
