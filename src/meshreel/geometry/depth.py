@@ -1,4 +1,4 @@
-"""What a depth camera measured in one moment, and sequences that know it of their frames."""
+"""Depth picture of one camera at one moment, and the protocol of sequences that have such pictures."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from .cameras import PinholeCamera
 
 @dataclass(frozen=True, slots=True)
 class DepthPicture:
-    """Depths along the optical axis; 0 where nothing was measured that counts."""
+    """Depths along the optical axis of a camera; 0 is no measurement."""
 
     camera: PinholeCamera
     depth: UInt16[np.ndarray, "H W"] | Float32[np.ndarray, "H W"]
-    unit: float  # m, that a depth of 1 is
-    far: float  # m, beyond which no depth counts
+    unit: float  # m, length of a depth of 1
+    far: float  # m, beyond which depths are ignored
 
 
 @runtime_checkable
 class SeesDepth(Protocol):
-    """A sequence whose meshes were made of depth pictures, by cameras that stand still."""
+    """A sequence whose meshes were fused from depth pictures of cameras that stand still."""
 
     def pictures(self, index: int) -> list[DepthPicture | None]:
-        """Those of a frame, a camera each; None for a camera that lacks the frame."""
+        """Return the depth picture of each camera in a frame, None for a camera that lacks the frame."""
         ...
