@@ -1,7 +1,7 @@
-"""The background of a scene, which is in the file once, and what changes of it: payloads of STATIC chunks.
+"""Encode the background of a scene and its later changes: payloads of STATIC chunks.
 
-In -> out: a mesh on a lattice <-> bytes; faces to drop from a background as decoded, and a mesh to add <-> bytes. The
-mask is runs, in the order of Draco's faces, which is coherent on the surface.
+In -> out: a mesh on a lattice <-> bytes; faces to drop from a decoded background, and a mesh to add <-> bytes. The mask
+of dropped faces is run-length coded in the order of Draco's faces, which is coherent on the surface.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from .mesh import check_growth, check_step, decode_mesh, encode_mesh
 
 
 def encode_background(mesh: Mesh, step: float) -> bytes:
-    """The payload of a whole background, on the lattice of `step` (normalised units).
+    """Encode a whole background on a lattice of spacing `step` (normalised units).
 
-    Raises InputError where the extent needs more than 21 bits at that step.
+    Raises InputError if the extent needs more than 21 bits at that step.
     """
     return encode_intra([mesh], step, 0)
 
 
 def decode_background(data: bytes, place: Placement | None = None) -> Mesh:
-    """The background, in normalised units or, with `place`, in metres. FormatError on anything but one mesh."""
+    """Decode a background, in normalised units or, with `place`, in metres. FormatError on anything but one mesh."""
     meshes = decode_intra(data)
     if len(meshes) != 1:
         raise FormatError(f"background: {len(meshes)} meshes, a state has one")
@@ -37,9 +37,9 @@ def decode_background(data: bytes, place: Placement | None = None) -> Mesh:
 
 
 def encode_change(before: Mesh, dropped: Bool[np.ndarray, " F"], added: Mesh, step: float) -> bytes:
-    """The payload of a patch: faces of the background before that go, and a mesh on the lattice of `step` that comes.
+    """Encode a change of the background: faces to drop, and a mesh to add, on a lattice of spacing `step`.
 
-    `before` is the background as decoded. Raises InputError where the mesh needs more than 21 bits at that step.
+    `before` is the decoded background. Raises InputError if the mesh needs more than 21 bits at that step.
     """
     assert len(dropped) == len(before.faces)
     runs = run_lengths(dropped) if dropped.any() else np.zeros(0, np.int32)
@@ -48,10 +48,10 @@ def encode_change(before: Mesh, dropped: Bool[np.ndarray, " F"], added: Mesh, st
 
 
 def decode_change(data: bytes, before: Mesh, place: Placement | None = None) -> Mesh:
-    """The background after the change: what is left of that before, its vertices first, and behind it what is added.
+    """Decode the background after a change: the remaining vertices and faces of `before`, then the added ones.
 
-    Where faces go, so do vertices that no other uses. With `place`, `before` is in metres, and so is what comes back.
-    Raises FormatError on anything but a patch of this background.
+    Vertices that no remaining face uses are dropped. With `place`, `before` and the result are in metres. Raises
+    FormatError on anything but a change of this background.
     """
     record = unpack_all(StaticPatch, data)
     if record.form != Form.PATCH:
@@ -67,7 +67,7 @@ def decode_change(data: bytes, before: Mesh, place: Placement | None = None) -> 
 
 
 def _dropped(record: StaticPatch, faces: int) -> Bool[np.ndarray, " F"]:
-    """Which of so many faces go."""
+    """Decode which of `faces` faces are dropped."""
     if record.runs == 0 and not record.dropped:
         return np.zeros(faces, bool)
     if record.runs > faces + 1:

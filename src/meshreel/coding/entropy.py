@@ -1,6 +1,6 @@
 """Entropy coding: integer symbols <-> bytes, by the adaptive range coder in `core/` (the paper leaves its coder open).
 
-In -> out: quantised weights (N vertices x M columns) -> one stream a column; small side data -> one stream. Any first k
+In -> out: quantised weights (N vertices x M columns) -> a stream per column; small side data -> one stream. The first k
 columns decode without the rest. Integers alone choose the symbols, so every platform decodes the same. Streams are
 canonical: a truncated one, or one with a byte too many, raises FormatError.
 """
@@ -28,7 +28,7 @@ class Neighbours:
 
 
 def causal_neighbours(faces: Int32[np.ndarray, "F 3"], count: int) -> Neighbours:
-    """The neighbours that are decoded before each of `count` vertices; integers only, the same on every platform."""
+    """Return the neighbours decoded before each of `count` vertices; integers only, so the same on every platform."""
     f = faces.astype(np.int64)
     if len(f) and (f.min() < 0 or f.max() >= count):
         raise FormatError(f"a face names vertex {int(f.max())} or {int(f.min())} of {count}; the mesh is damaged")
@@ -42,12 +42,12 @@ def causal_neighbours(faces: Int32[np.ndarray, "F 3"], count: int) -> Neighbours
 
 
 def encode_weights(symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours) -> list[bytes]:
-    """One stream for each column; column c decodes with the columns before it, and without those after."""
+    """Encode one stream per column; column c decodes with the columns before it, and without those after."""
     return list(_core.encode_weights(_columns(symbols), neighbours.indptr, neighbours.indices))
 
 
 def decode_weights(streams: Sequence[bytes], count: int, neighbours: Neighbours) -> Int32[np.ndarray, "N M"]:
-    """The symbols of `count` vertices in the first len(streams) columns; FormatError where a stream is not one."""
+    """Decode the symbols of `count` vertices in the first len(streams) columns; FormatError on a damaged stream."""
     for column, stream in enumerate(streams):
         check_plausible(count, len(stream), f"weights, column {column}")
     columns = np.zeros((len(streams), count), np.int32)
@@ -59,14 +59,14 @@ def decode_weights(streams: Sequence[bytes], count: int, neighbours: Neighbours)
 
 
 def weights_cost(symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours) -> Float64[np.ndarray, " M"]:
-    """Rate of each column, bits (whole bytes: the columns are coded and measured)."""
+    """Return the rate of each column in bits (whole bytes: the columns are coded and measured)."""
     return np.array([8.0 * len(stream) for stream in encode_weights(symbols, neighbours)], dtype=np.float64)
 
 
 def contexts(
     symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours
 ) -> tuple[UInt8[np.ndarray, "N M"], UInt8[np.ndarray, "N M"]]:
-    """The context in which the coder sees each symbol's magnitude (< 15) and its sign (< 48; 0 for a zero)."""
+    """Return the contexts in which the coder codes each symbol's magnitude (< 15) and sign (< 48; 0 for a zero)."""
     columns = _columns(symbols)
     sizes, signs = np.zeros(columns.shape, np.uint8), np.zeros(columns.shape, np.uint8)
     _core.weight_contexts(columns, neighbours.indptr, neighbours.indices, sizes, signs)
@@ -74,12 +74,12 @@ def contexts(
 
 
 def encode_integers(values: Int32[np.ndarray, " N"]) -> bytes:
-    """Small side data (anchors, basis) of any int32 values as one stream; nothing for no values."""
+    """Encode small side data (anchors, basis) of any int32 values as one stream; no bytes for no values."""
     return bytes(_core.encode_integers(np.ascontiguousarray(values)))
 
 
 def decode_integers(data: bytes, count: int) -> Int32[np.ndarray, " N"]:
-    """The `count` values; FormatError where `data` is not exactly their stream."""
+    """Decode `count` values; FormatError if `data` is not exactly their stream."""
     check_plausible(count, len(data), "integers")
     values = np.zeros(count, np.int32)
     if not _core.decode_integers(data, values):
@@ -88,7 +88,7 @@ def decode_integers(data: bytes, count: int) -> Int32[np.ndarray, " N"]:
 
 
 def check_plausible(count: int, size: int, what: str) -> None:
-    """Refuses a claim of more symbols than `size` bytes can say, before memory is allocated."""
+    """Raise FormatError if `size` bytes cannot contain `count` symbols, before memory is allocated."""
     if not 0 <= count <= SYMBOLS_PER_BYTE * (size + 4) or (count > 0) != (size > 0):
         raise FormatError(f"{what}: {count} symbols cannot come from {size} bytes; the stream is damaged")
 

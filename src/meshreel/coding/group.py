@@ -1,7 +1,7 @@
-"""A group of frames and its payload: the `laplacian` form, and the choice of the decoder by the first byte.
+"""Encode a group in the form `laplacian`, and decode a group of any form by its first byte.
 
-In -> out: reference mesh + displacement field <-> bytes (paper, section 3.3). The displacements are coded against the
-reference as decoded and subdivided, which both sides have.
+In -> out: reference mesh + displacement field <-> bytes (paper, section 3.3). Displacements are coded relative to the
+decoded and subdivided reference, which both sides have.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .reference_mesh import CodedReference
 def encode_group(
     reference: CodedReference, field: Float64[np.ndarray, "V T 3"], options: DisplacementOptions
 ) -> tuple[bytes, tuple[int, ...]]:
-    """The payload of a `laplacian` group and its layer ends: k + 1 layers decode with k components."""
+    """Encode a `laplacian` group; return its payload and its layer ends: k + 1 layers decode with k components."""
     displacements = encode_displacements(field, reference.base, options)
     record = LaplacianGroup(Form.LAPLACIAN, reference.levels, reference.step, reference.data, displacements)
     payload = pack(record)
@@ -36,10 +36,10 @@ def encode_group(
 
 
 def decode_group(data: bytes, frame_count: int, layers: int | None = None) -> list[Mesh]:
-    """The frames of a group in normalised units, of whatever form, from a whole payload or a prefix of its layers.
+    """Decode the frames of a group of any form, in normalised units, from a whole payload or a prefix of its layers.
 
-    With `layers`, at most so many beyond the first: components of a `laplacian` group, levels of a `layers` group.
-    Raises FormatError where the bytes are damaged, hold another number of frames, or need another group.
+    `layers` limits the layers beyond the first: components of a `laplacian` group, levels of a `layers` group. Raises
+    FormatError if the bytes are damaged, hold another number of frames, or need another group.
     """
     return continue_group(data, frame_count, layers, None)[0]
 
@@ -47,10 +47,10 @@ def decode_group(data: bytes, frame_count: int, layers: int | None = None) -> li
 def continue_group(
     data: bytes, frame_count: int, layers: int | None, previous: LayersState | None, place: Placement | None = None
 ) -> tuple[list[Mesh], LayersState | None]:
-    """As `decode_group`, of a group that may be predicted from the one before; and what the next may be predicted from.
+    """Decode a group that may be predicted from the previous one; also return the state that predicts the next one.
 
-    `previous` is what this gave for the group before, with the same `layers`. Only the form `layers` has such a state.
-    With `place`, the frames are in metres; where the form allows, without another pass over them.
+    `previous` is the state returned for the previous group with the same `layers`; only the form `layers` has one. With
+    `place`, the frames are in metres, if the form allows without another pass over them. Errors as in `decode_group`.
     """
     form = data[0] if data else None
     if form == Form.LAYERS:
@@ -64,7 +64,7 @@ def continue_group(
 
 
 def _decode_alone(data: bytes, form: int | None, frame_count: int, layers: int | None) -> list[Mesh]:
-    """The frames of a group of a form that needs no other group."""
+    """Decode a group of a form that never needs another group."""
     if form == Form.EMPTY:
         return decode_empty(data, frame_count)
     if form == Form.DRACO:
@@ -77,7 +77,7 @@ def _decode_alone(data: bytes, form: int | None, frame_count: int, layers: int |
 def _decode_layers(
     data: bytes, levels: int | None, previous: LayersState | None, place: Placement | None
 ) -> tuple[list[Mesh], LayersState | None]:
-    """Frames of a payload, with their patches where it has them and more layers than its levels are wanted."""
+    """Decode a `layers` group, with its patches if it has them and `levels` does not exclude them."""
     records = read_layers(data, levels)
     plain = records.end == len(data) or (levels is not None and levels <= records.head.levels)
     decoded = place_layers(records, previous, place, spare=not plain)
@@ -98,7 +98,7 @@ def _decode_laplacian(record: LaplacianGroup, components: int | None) -> list[Me
 
 
 def payload_parts(data: bytes) -> dict[str, int]:
-    """Bytes of a payload by what they are for. Raises FormatError on damaged bytes."""
+    """Return the bytes of a payload by purpose. Raises FormatError on damaged bytes."""
     form = data[0] if data else None
     if form == Form.LAPLACIAN:
         record = unpack_all(LaplacianGroup, data)

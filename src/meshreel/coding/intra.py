@@ -1,7 +1,7 @@
-"""The `draco` form: every frame of a group on its own, decimated, with free midpoint subdivisions in the decoder.
+"""Encode each frame of a group separately with Draco (form `draco`), with midpoint subdivisions in the decoder.
 
-In -> out: simplified meshes <-> bytes. It is what a group falls back to where no reference follows the motion, and what
-keeps meshreel from ever being worse than the cheap anchor.
+In -> out: decimated meshes <-> bytes. A group has this form if no reference follows its motion, or if it is cheaper, so
+that meshreel is never worse than per-frame Draco (docs/decisions/0007-draco-as-the-floor.md).
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from .mesh import check_growth, check_step, decode_mesh, encode_mesh
 
 
 def encode_intra(meshes: Sequence[Mesh], step: float, levels: int) -> bytes:
-    """The payload of a group whose frames are Draco meshes on the lattice of `step` (normalised units)."""
+    """Encode the frames of a group as Draco meshes on a lattice of spacing `step` (normalised units)."""
     return pack(DracoGroup(Form.DRACO, levels, step, tuple(encode_mesh(mesh, step) for mesh in meshes)))
 
 
 def decode_intra(data: bytes) -> list[Mesh]:
-    """The frames of a group, in normalised units. Raises FormatError on anything but a payload of this form."""
+    """Decode the frames of a `draco` group, in normalised units. Raises FormatError on any other or damaged payload."""
     record = unpack_all(DracoGroup, data)
     check_step(record.step)
     meshes = []
@@ -34,12 +34,12 @@ def decode_intra(data: bytes) -> list[Mesh]:
 
 
 def encode_empty() -> bytes:
-    """The payload of a group whose frames have no surface; their number is in the index."""
+    """Encode a group whose frames have no surface; their number is in the index."""
     return pack(EmptyGroup(Form.EMPTY))
 
 
 def decode_empty(data: bytes, frame_count: int) -> list[Mesh]:
-    """As many empty meshes. Raises FormatError on anything but a payload of this form."""
+    """Return `frame_count` empty meshes. Raises FormatError on any payload that is not an empty group."""
     if unpack_all(EmptyGroup, data).form != Form.EMPTY:
-        raise FormatError("an empty group that is none")
+        raise FormatError("a payload that is not an empty group")
     return [Mesh.empty()] * frame_count

@@ -1,7 +1,7 @@
 """Karhunen-Loeve transform of displacement trajectories (paper, section 3.3.3, eqs. 8-10).
 
 In: a field of V trajectories of T displacements. Out: V x M weights in a basis whose numbers are integers over a power
-of two, so that the stream holds exactly the basis that both sides use.
+of two, so that the stream contains exactly the basis that both sides use.
 
 Differs from the paper: `forward` is the least-squares projection on the basis as transmitted, which is orthonormal only
 up to its rounding; for an orthonormal basis both are eq. 8.
@@ -19,7 +19,7 @@ from .. import _core
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """Mean and directions of a group's trajectories, strongest first."""
+    """Mean and principal directions of a group's trajectories, strongest first."""
 
     mean: Float64[np.ndarray, " C"]  # C = 3 T numbers, frame by frame; units of the field
     vectors: Float64[np.ndarray, "C M"]  # columns of unit length
@@ -27,14 +27,14 @@ class Basis:
 
 
 def fit(field: Float64[np.ndarray, "V T 3"]) -> Basis:
-    """The full basis of a field, M = 3 T, by decreasing energy; each vector's largest entry is positive."""
+    """Compute the full basis of a field, M = 3 T, by decreasing energy; each vector's largest entry is positive."""
     vertices, frames, _ = field.shape
     trajectories = field.reshape(vertices, 3 * frames)
     return fit_about(trajectories.mean(axis=0) if vertices else np.zeros(3 * frames), trajectories)
 
 
 def fit_about(mean: Float64[np.ndarray, " C"], trajectories: Float64[np.ndarray, "V C"]) -> Basis:
-    """The full basis of trajectories of C numbers about a point that is given."""
+    """Compute the full basis of trajectories of C numbers about a given mean."""
     centered = trajectories - mean
     energies, vectors = np.linalg.eigh(centered.T @ centered / max(len(trajectories), 1))
     energies, vectors = np.maximum(energies[::-1], 0.0), vectors[:, ::-1]
@@ -43,14 +43,14 @@ def fit_about(mean: Float64[np.ndarray, " C"], trajectories: Float64[np.ndarray,
 
 
 def forward(field: Float64[np.ndarray, "V T 3"], basis: Basis) -> Float64[np.ndarray, "V M"]:
-    """Weights of each vertex's trajectory in the basis, by least squares (eqs. 8 and 10)."""
+    """Project each vertex's trajectory on the basis by least squares (eqs. 8 and 10)."""
     centered = field.reshape(len(field), len(basis.mean)) - basis.mean
     gram = basis.vectors.T @ basis.vectors
     return np.ascontiguousarray(np.linalg.solve(gram, basis.vectors.T @ centered.T).T)
 
 
 def inverse(weights: Float64[np.ndarray, "V M"], basis: Basis) -> Float64[np.ndarray, "V T 3"]:
-    """The field that the weights stand for (eq. 9), summed in the order of the components."""
+    """Reconstruct the field from its weights (eq. 9), summed in the order of the components."""
     vectors = np.ascontiguousarray(basis.vectors.T)
     field = _core.klt_inverse(np.ascontiguousarray(weights), vectors, np.ascontiguousarray(basis.mean))
     return field.reshape(len(weights), len(basis.mean) // 3, 3)
@@ -58,7 +58,7 @@ def inverse(weights: Float64[np.ndarray, "V M"], basis: Basis) -> Float64[np.nda
 
 @dataclass(frozen=True, slots=True)
 class BasisSymbols:
-    """A basis in integers: `value = symbol * 2^-bits`, with its own bits for the mean and for each vector."""
+    """Basis in integers: `value = symbol * 2^-bits`, with separate bits for the mean and for each vector."""
 
     mean: Int64[np.ndarray, " C"]
     vectors: Int64[np.ndarray, "M C"]
@@ -66,9 +66,10 @@ class BasisSymbols:
 
 
 def quantize(basis: Basis, count: int, step: float) -> BasisSymbols:
-    """The first `count` vectors and the mean, each as fine as a weight's quantiser `step` (field's units) can show.
+    """Quantise the mean and the first `count` vectors, each as finely as a weight's quantiser `step` requires.
 
-    A vector's rounding is made good by those after it: each is made orthogonal to the rounded ones before.
+    `step` is in the field's units. Each vector is first made orthogonal to the rounded ones before it, so that later
+    vectors compensate the rounding of earlier ones.
     """
     width = len(basis.mean)
     bits, rows = [_bits_for(1.0, step)], np.zeros((count, width), dtype=np.int64)
@@ -86,12 +87,12 @@ def quantize(basis: Basis, count: int, step: float) -> BasisSymbols:
 
 
 def dequantize(symbols: BasisSymbols) -> Basis:
-    """The basis that the symbols stand for, exactly; energies do not travel and are zero."""
+    """Reconstruct the basis from its symbols exactly; energies are not transmitted and are zero."""
     mean = np.ldexp(symbols.mean.astype(np.float64), -int(symbols.bits[0]))
     vectors = np.ldexp(symbols.vectors.astype(np.float64), -symbols.bits[1:].astype(np.int32)[:, None])
     return Basis(mean, np.ascontiguousarray(vectors.T), np.zeros(len(vectors)))
 
 
 def _bits_for(amplitude: float, step: float) -> int:
-    """Fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/32 of a step."""
+    """Return the fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/32 of a step."""
     return int(np.clip(np.ceil(np.log2(max(16.0 * amplitude / step, 1.0))), 5, 24))

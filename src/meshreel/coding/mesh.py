@@ -1,7 +1,7 @@
-"""A static mesh and its Draco bytes, on a lattice that all meshes of a stream share.
+"""Encode static meshes with Draco on a lattice that is in the stream (paper, section 3.3.3; decision 2).
 
 In -> out: Mesh <-> bytes. Draco reorders vertices, drops degenerate faces and splits non-manifold vertices, so an
-encoder goes on from its own decoded bytes. The empty mesh is the empty string. Source: paper, section 3.3.3.
+encoder must continue from its decoded bytes. The empty mesh is the empty string.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ import numpy as np
 from ..errors import FormatError, InputError
 from ..types import Mesh
 
-MAX_BITS = 21  # float32 positions inside Draco hold no more
-COMPRESSION_LEVEL = 7  # the paper's
+MAX_BITS = 21  # bits per coordinate that Draco's float32 positions can hold
+COMPRESSION_LEVEL = 7  # from the paper
 EDGEBREAKER = 1  # Draco's number of the method
-MOST_PER_BYTE = 20_000  # vertices or faces: a flat, regular grid takes a byte for a thousand
-MAX_FACES = 64_000_000
+MOST_PER_BYTE = 20_000  # vertices or faces per byte; a flat, regular grid reaches a thousand: a guess with a margin
+MAX_FACES = 64_000_000  # faces or vertices of a group: a limit of memory, a guess
 
 
 def encode_mesh(mesh: Mesh, step: float) -> bytes:
-    """Draco bytes of the mesh with its vertices rounded to multiples of `step` (the unit of the vertices).
+    """Encode a mesh with its vertices rounded to multiples of `step` (in the unit of the vertices).
 
-    Raises InputError where the extent needs more than 21 bits at that step.
+    Raises InputError if the extent needs more than 21 bits at that step.
     """
     if mesh.is_empty:
         return b""
     import DracoPy
 
-    with np.errstate(all="ignore"):  # next to 0, or none at all: refused below
+    with np.errstate(all="ignore"):  # a step near 0 or not a number is refused below
         low = np.floor(mesh.vertices.min(axis=0) / np.float64(step)) * step
         cells = float((mesh.vertices.max(axis=0) - low).max() / np.float64(step))
     if not (step > 0 and cells + 2 <= 2**MAX_BITS):
@@ -51,9 +51,9 @@ def encode_mesh(mesh: Mesh, step: float) -> bytes:
 
 
 def decode_mesh(data: bytes, step: float) -> Mesh:
-    """The mesh of Draco bytes, its vertices exact multiples of `step`. Raises FormatError where the bytes are damaged.
+    """Decode Draco bytes to a mesh whose vertices are exact multiples of `step`. Raises FormatError on damaged bytes.
 
-    Draco gives float32 positions whose last bits depend on its build; the lattice does not.
+    The last bits of Draco's float32 positions depend on its build; those of the lattice do not.
     """
     if not data:
         return Mesh.empty()
@@ -62,7 +62,7 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
     _check_claims(data)
     try:
         decoded = DracoPy.decode(bytes(data))
-        with np.errstate(all="ignore"):  # a step next to 0, which no encoder takes: refused below
+        with np.errstate(all="ignore"):  # a step near 0, which no encoder uses, is refused below
             points = np.round(np.asarray(decoded.points, dtype=np.float64) / step) * step
         mesh = Mesh.of(points, decoded.faces)
     except Exception as error:  # DracoPy raises its own types, and others, on damaged bytes
@@ -75,10 +75,10 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
 
 
 def _check_claims(data: bytes) -> None:
-    """Raises FormatError where the head of Draco bytes claims more than they can hold: memory is taken for the claim.
+    """Raise FormatError if the head of Draco bytes claims more than they can hold, before Draco allocates memory.
 
-    The head, as Draco's bitstream specification has it: "DRACO", version (2), type of the geometry, method, flags (2);
-    then, for edgebreaker, the traversal, and in both methods the numbers of vertices and faces as varints.
+    The head, by Draco's bitstream specification: "DRACO", version (2 bytes), geometry type, method, flags (2); then the
+    traversal (edgebreaker only), and the numbers of vertices and faces as varints.
     """
     if len(data) > 10 and data[10] & 0x80:
         raise FormatError("damaged Draco data: it has metadata, which no mesh of a stream has")
@@ -95,7 +95,7 @@ def _check_claims(data: bytes) -> None:
 
 
 def check_growth(mesh: Mesh, levels: int, frames: int = 1) -> None:
-    """Raises FormatError where subdivision makes an absurd mesh, or frames (over 64 million faces or vertices)."""
+    """Raise FormatError if subdivision in all frames would make over 64 million faces or vertices."""
     if frames * max(len(mesh.faces) * 4**levels, len(mesh.vertices)) > MAX_FACES:
         raise FormatError(
             f"{len(mesh.faces)} faces of {len(mesh.vertices)} vertices, subdivided {levels} times, "
@@ -104,6 +104,6 @@ def check_growth(mesh: Mesh, levels: int, frames: int = 1) -> None:
 
 
 def check_step(step: float) -> None:
-    """Raises FormatError where a lattice's spacing is not above 0."""
+    """Raise FormatError if the spacing of a lattice is not above 0."""
     if not step > 0:
         raise FormatError(f"lattice spacing {step:g} is not above 0")

@@ -1,4 +1,7 @@
-"""A reference mesh as the decoder will have it: coded by Draco, decoded, subdivided."""
+"""Encode a reference mesh, then decode and subdivide it, so that the encoder continues from the decoder's base.
+
+In: a mesh. Out: a CodedReference.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from .mesh import decode_mesh, encode_mesh
 
 @dataclass(frozen=True, slots=True)
 class CodedReference:
-    """A reference mesh as the decoder will have it."""
+    """Reference mesh as the decoder reconstructs it, with its bytes."""
 
     data: bytes  # Draco
     step: float  # spacing of its lattice, normalised units
@@ -23,13 +26,13 @@ class CodedReference:
 
 
 def code_reference(mesh: Mesh, bits: int, levels: int) -> CodedReference:
-    """The reference on a lattice of 2^bits cells along its longest side (the paper: 14 bits), coded and decoded."""
+    """Code a reference on a lattice of 2^bits cells along its longest side (the paper: 14 bits)."""
     extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
     return code_on_lattice(mesh, extent / (2**bits - 1), levels)
 
 
 def code_on_lattice(mesh: Mesh, step: float, levels: int) -> CodedReference:
-    """The reference on a lattice of about this spacing (rounded to float32), coded and decoded."""
+    """Code a reference on a lattice of spacing `step`, rounded to float32."""
     step = float(np.float32(step))
     data = encode_mesh(mesh, step)
     decoded = decode_mesh(data, step)

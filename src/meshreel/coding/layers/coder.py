@@ -1,7 +1,8 @@
-"""The `layers` form: a coarse mesh and its motion, then for each midpoint subdivision a scalar a new vertex and frame.
+"""Encode a group in the form `layers`: a coarse mesh with its motion, then details of each midpoint subdivision.
 
-In -> out: a base mesh as coded and the wanted places of its subdivided vertices in every frame <-> bytes; every prefix
-of layers decodes to a coarser mesh. T = 1 is the intra form. A group may be predicted from the one before.
+In -> out: a coded base mesh and the desired positions of its subdivided vertices in every frame <-> bytes. A level has
+one scalar per new vertex and frame; every prefix of layers decodes to a coarser mesh. A group may be predicted from the
+previous one (docs/decisions/0012-layers-coder.md).
 """
 
 from __future__ import annotations
@@ -25,18 +26,18 @@ from .fields import Rate
 from .graph import Connectivity, connectivity
 from .trajectories import decode_trajectories, encode_trajectories
 
-MOST_FRAMES = 255
-MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
+MOST_FRAMES = 255  # of a group: a byte in the head
+MOST_NUMBERS = 1 << 29  # of decoded positions: 4 GiB
 
 
 @dataclass(frozen=True, slots=True)
 class LayerCodingOptions:
-    """How a group of layers is coded; lengths relative to the sequence's diagonal."""
+    """Options of the form `layers`; lengths relative to the sequence's diagonal (decisions 12 and 14)."""
 
     step: float = 1.8e-3  # quantiser step of the base's motion
-    detail_ratios: tuple[float, ...] = (0.6, 0.8)  # steps of the levels, in base steps; the last for all that follow
-    curvatures: tuple[int, ...] = (48, 58)  # of the levels' midpoints, 64ths; the last for all that follow
-    price: float = 0.08  # of a bit, squared steps
+    detail_ratios: tuple[float, ...] = (0.6, 0.8)  # steps of the levels, in base steps; the last for all further levels
+    curvatures: tuple[int, ...] = (48, 58)  # lift of the levels' midpoints, 64ths; the last for all further levels
+    price: float = 0.08  # price of a bit, in squared steps
     tangential: float = 0.4  # weight of squared errors of the base's vertices along the surface, 0 to 1
 
     def __post_init__(self) -> None:
@@ -49,31 +50,31 @@ class LayerCodingOptions:
             if not finest <= self.step * ratio <= coarsest:
                 raise InputError(f"step {self.step} x {ratio}: give a fraction in {finest:.2g} .. {coarsest:g}")
         if not 0 <= self.price < 1:
-            raise InputError(f"price {self.price}: give squared steps a bit, in [0, 1)")
+            raise InputError(f"price {self.price}: give squared steps per bit, in [0, 1)")
         if not 0 < self.tangential <= 1:
             raise InputError(f"tangential {self.tangential}: give a weight in (0, 1]")
 
     def curvature(self, level: int) -> int:
-        """How much the midpoints of a level are lifted, 64ths."""
+        """Return the lift of a level's midpoints, 64ths."""
         return self.curvatures[min(level, len(self.curvatures)) - 1]
 
     def rate(self, level: int) -> Rate:
-        """Step and price of a level; 0 is the base."""
+        """Return step and price of a level; level 0 is the base."""
         ratio = 1.0 if level == 0 else self.detail_ratios[min(level, len(self.detail_ratios)) - 1]
         return Rate(level_of(self.step * ratio), self.price)
 
 
 @dataclass(frozen=True, slots=True)
 class LayersState:
-    """What the next group may be predicted from."""
+    """State after a group, from which the next group may be predicted."""
 
     faces: Int32[np.ndarray, "F 3"]  # of the base
-    base: Float64[np.ndarray, "V 3"]  # its vertices in the last frame
-    scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each level decoded
-    finer: tuple[Connectivity, ...] = ()  # of the levels as far as they are at hand; from the faces alone
+    base: Float64[np.ndarray, "V 3"]  # the base's vertices in the last frame
+    scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each decoded level
+    finer: tuple[Connectivity, ...] = ()  # of the decoded levels, kept because it follows from the faces alone
 
     def nbytes_beyond(self, previous: LayersState | None) -> int:
-        """Memory that it has not in common with the state it was predicted from, bytes."""
+        """Return the memory, bytes, that this state does not share with the state from which it was predicted."""
         shared = () if previous is None else previous.finer
         own = [near.nbytes for near in self.finer if not any(near is other for other in shared)]
         return self.faces.nbytes + self.base.nbytes + sum(level.nbytes for level in self.scalars) + sum(own)
@@ -81,10 +82,10 @@ class LayersState:
 
 @dataclass(frozen=True, slots=True)
 class EncodedLayers:
-    """A group's payload, and the group as it decodes."""
+    """Payload of a group, and the group as it decodes."""
 
     payload: bytes
-    layers: tuple[int, ...]  # where each ends
+    layers: tuple[int, ...]  # offset at which each layer ends
     positions: Float64[np.ndarray, "T V 3"]
     state: LayersState
 
@@ -95,10 +96,10 @@ def encode_layers(
     options: LayerCodingOptions = LayerCodingOptions(),
     previous: LayersState | None = None,
 ) -> EncodedLayers:
-    """The payload of a group whose subdivided base should lie at `positions`; predicted from `previous` if given.
+    """Encode a group whose subdivided base should lie at `positions`; predicted from `previous` if given.
 
-    With `previous`, the base mesh is that of its last frame, and of `reference` only the number of levels counts: give
-    that of the group whose base mesh was coded.
+    With `previous`, the base mesh is that of its last frame, and only the number of levels of `reference` is used: give
+    the reference of the group whose base mesh was coded. Raises InputError for positions that cannot be coded.
     """
     frames, levels = len(positions), reference.levels
     base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
@@ -137,7 +138,7 @@ class LayersRecords:
 
 
 def read_layers(data: bytes, levels: int | None = None) -> LayersRecords:
-    """The records of a payload, or only the first so many levels. Raises FormatError on damaged bytes."""
+    """Read the records of a payload, or only those of the first `levels` levels. FormatError on damaged bytes."""
     head, offset = unpack(LayersGroup, data)
     ends = [0, offset]
     for _ in range(head.levels if levels is None else min(levels, head.levels)):
@@ -148,9 +149,9 @@ def read_layers(data: bytes, levels: int | None = None) -> LayersRecords:
 def decode_layers(
     data: bytes, levels: int | None = None, previous: LayersState | None = None
 ) -> tuple[Int32[np.ndarray, "F 3"], Float64[np.ndarray, "T V 3"], LayersState]:
-    """Faces, places of the vertices in every frame, and what the next group may be predicted from.
+    """Decode a group; return its faces, its positions in every frame, and the state that predicts the next group.
 
-    With `levels`, so many subdivisions at most, for which `data` may end behind theirs.
+    With `levels`, decode at most that many subdivisions; `data` may then end after them.
     """
     records = read_layers(data, levels)
     if levels is None and records.end != len(data):
@@ -161,21 +162,21 @@ def decode_layers(
 
 @dataclass(frozen=True, slots=True)
 class DecodedLayers:
-    """A group as decoded."""
+    """Decoded group, with spare memory behind its positions."""
 
     faces: Int32[np.ndarray, "F 3"]
     positions: Float64[np.ndarray, "T V 3"]
     state: LayersState
-    spare: Int32[np.ndarray, "N 3"]  # room behind the positions
+    spare: Int32[np.ndarray, "N 3"]  # memory for faces, behind the positions
 
 
 def place_layers(
     records: LayersRecords, previous: LayersState | None, place: Placement | None = None, spare: bool = False
 ) -> DecodedLayers:
-    """What records decode to; with `place`, vertices as placed by it, which the state never is.
+    """Decode records; with `place`, the positions are placed by it, but never the state.
 
-    With `spare`, there is room for faces of each frame, too: where a group's memory is one block, the next group gets
-    it again, without the page faults that would take as long as decoding.
+    With `spare`, the block of memory also has room for the faces of each frame: the next group gets one block again
+    without the page faults that would take as long as decoding.
     """
     head = records.head
     previous = previous if head.origin == Origin.PREVIOUS else None
@@ -204,14 +205,14 @@ def place_layers(
 
 @dataclass(frozen=True, slots=True)
 class _Room:
-    """One block of memory."""
+    """One block of memory for the positions of a group and for faces."""
 
     positions: Float64[np.ndarray, "T V 3"]
     faces: Int32[np.ndarray, "N 3"]
 
     @staticmethod
     def of(frames: int, vertices: int, faces: int) -> _Room:
-        """For so many of each in every frame."""
+        """Allocate memory for `vertices` vertices and `faces` faces in each of `frames` frames."""
         size = 3 * frames * vertices
         block = np.empty(size + (3 * frames * faces + 1) // 2)
         rows = block[size:].view(np.int32)[: 3 * frames * faces]
@@ -219,7 +220,7 @@ class _Room:
 
 
 def layers_parts(data: bytes) -> dict[str, int]:
-    """Bytes of a payload by what they are for. Raises FormatError on damaged bytes."""
+    """Return the bytes of a payload by purpose. Raises FormatError on damaged bytes."""
     head, offset = unpack(LayersGroup, data)
     parts = {"base mesh": len(head.base), "base motion": len(head.motion.basis) + len(head.motion.symbols)}
     for number in range(1, head.levels + 1):
@@ -258,10 +259,10 @@ def _check_input(positions: Float64[np.ndarray, "T V 3"], base: Mesh) -> None:
 
 
 def _before(previous: LayersState | None, number: int) -> Float64[np.ndarray, " E"] | None:
-    """The last frame's scalars of a level of the group before, where it has them."""
+    """Return the last frame's scalars of a level of the previous group, or None if it has none."""
     return previous.scalars[number - 1] if previous is not None and number <= len(previous.scalars) else None
 
 
 def _connectivity(previous: LayersState | None, number: int) -> Connectivity | None:
-    """That of a level of the group before, whose faces a group has which is predicted from it."""
+    """Return the connectivity of a level of the previous group, whose faces a predicted group shares, or None."""
     return previous.finer[number - 1] if previous is not None and number <= len(previous.finer) else None

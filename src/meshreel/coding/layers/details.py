@@ -1,7 +1,7 @@
-"""One level of subdivision <-> CodedField: a scalar for each new vertex and frame, along the decoded normal there.
+"""Encode the detail of one level of subdivision: a scalar per new vertex and frame, along the decoded normal there.
 
-In: the scalars that would place the new vertices on the wanted surface (geometry.subdivision). Out: the scalars as
-decoded, from which both sides place them; the decoder as they come about.
+In: the scalars that would place the new vertices on the desired surface (geometry.subdivision). Out: a LayersLevel, and
+the decoded scalars, from which both sides place the vertices.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from ...types import Placement
 from .fields import EncodedField, Rate, encode_field
 from .graph import Connectivity, siblings
 
-SIBLING_WEIGHTS = (36, 16)  # tried, 64ths
+SIBLING_WEIGHTS = (36, 16)  # weights of the siblings' mean that the encoder tries, 64ths: guesses
 
 
 @dataclass(frozen=True, slots=True)
 class EncodedLevel:
-    """A level's record and what both sides know of it."""
+    """Record of a level, with its field and scalars as they decode."""
 
     record: LayersLevel
     field: EncodedField
@@ -32,10 +32,10 @@ class EncodedLevel:
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """Where a last level's vertices go."""
+    """Destination of the vertices of the last decoded level."""
 
-    positions: Float64[np.ndarray, "T W 3"]  # set
-    place: Placement | None  # what it does to them
+    positions: Float64[np.ndarray, "T W 3"]  # written by the decoder
+    place: Placement | None  # applied to the vertices
 
 
 def encode_level(
@@ -45,7 +45,7 @@ def encode_level(
     curvature: int,
     previous: Float64[np.ndarray, " E"] | None,
 ) -> EncodedLevel:
-    """The cheapest way to code the scalars of a level: alone or from the frame before; more or less of siblings."""
+    """Encode the scalars of a level, alone or from the previous group, with the cheaper sibling weight."""
     follows = previous is not None and ((scalars - previous) ** 2).sum() < (scalars**2).sum()
     offsets = np.ascontiguousarray((scalars - previous if follows else scalars).T)
     near = siblings(level)
@@ -61,7 +61,7 @@ def decode_level(
     known: Float64[np.ndarray, "V 3 T"],
     previous: Float64[np.ndarray, " E"] | None,
 ) -> tuple[Float64[np.ndarray, "W 3 T"], Float64[np.ndarray, " E"]]:
-    """Rows of the level's vertices from those of the coarser one's, and the last frame's scalars.
+    """Decode the rows of a level's vertices from those of the coarser level; also return the last frame's scalars.
 
     `record` is a packed LayersLevel. Raises FormatError where it is damaged, or needs a group that is not there.
     """

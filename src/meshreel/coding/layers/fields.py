@@ -1,4 +1,4 @@
-"""Fields of trajectories <-> CodedField: KLT over time, closed-loop prediction over a causal graph, one entropy stream.
+"""Encode fields of trajectories: KLT over time, closed-loop prediction over a causal graph, one entropy stream.
 
 In: V trajectories of C numbers, a graph of their V vertices. Out: a CodedField, and the trajectories as it decodes to.
 The basis as decoded is orthonormal, so all columns share one step. A column is kept where it pays.
@@ -20,30 +20,30 @@ from ..steps import step_of
 from . import orthonormal
 from .graph import Graph
 
-MOST_BITS = 30  # of a mean's fraction: one that is a diagonal long still fits 32 bits
-FINENESS = 20.0  # a basis vector's rounding turns its column's typical weight away by about 1 / FINENESS of a step
-LEAST_SCALE = 6.0  # integers to a basis vector's unit length: rounding moves each of its numbers by at most 1/12
-MOST_SCALE = 2.0**24  # integers to a basis vector's unit length: far within their 32 bits
-LEAST_RMS = 0.2  # of a column's weights, steps: below it nearly all of them round to 0, and its vector is not worth it
-MOST_WEIGHT = 1e9  # steps: what is left of one after prediction, twice as much at most, still fits 32 bits
+MOST_BITS = 30  # fraction bits of a mean, so that one of a diagonal's length fits 32 bits
+FINENESS = 20.0  # rounding a basis vector moves its column's typical weight by about 1 / FINENESS of a step: a guess
+LEAST_SCALE = 6.0  # smallest scale of a basis vector: rounding moves each of its numbers by at most 1/12; a guess
+MOST_SCALE = 2.0**24  # largest scale of a basis vector, far within 32 bits
+LEAST_RMS = 0.2  # steps, smallest RMS weight of a column; weights of weaker ones nearly all round to 0: a guess
+MOST_WEIGHT = 1e9  # steps, largest weight: its prediction residual, at most twice as large, fits 32 bits
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """What a field is coded with."""
+    """Quantiser step of a field, and the price of its bits."""
 
     step_level: int
-    price: float  # of a bit, squared steps
+    price: float  # of a bit, in squared steps
 
     @property
     def step(self) -> float:
-        """The quantiser's step, units of the field."""
+        """Quantiser step, in the field's unit."""
         return step_of(self.step_level)
 
 
 @dataclass(frozen=True, slots=True)
 class SurfaceWeight:
-    """Where a field of places is seen from: errors along the surface count less than those across it."""
+    """Weights of the errors of positions on a surface: those along the surface count less than those across it."""
 
     normals: Float64[np.ndarray, "V C"]  # of each vertex in each frame, of unit length or zero
     tangential: float  # weight of a squared error along the surface, 0 to 1
@@ -51,7 +51,7 @@ class SurfaceWeight:
 
 @dataclass(frozen=True, slots=True)
 class EncodedField:
-    """A field's record and what both sides know of it."""
+    """Record of a field, the decoded field, and its bits."""
 
     record: CodedField
     has_mean: bool
@@ -63,7 +63,7 @@ class EncodedField:
 def encode_field(
     trajectories: Float64[np.ndarray, "V C"], graph: Graph, rate: Rate, surface: SurfaceWeight | None = None
 ) -> EncodedField:
-    """The columns that pay, quantised in a closed loop; with a surface, of places on it, which have a mean."""
+    """Encode the columns that pay, quantised in a closed loop; `surface` marks positions, which also have a mean."""
     width = trajectories.shape[1]
     mean = trajectories.mean(axis=0) if surface is not None and len(trajectories) else np.zeros(width)
     bits = _mean_bits(rate.step)
@@ -85,12 +85,12 @@ def encode_field(
 
 
 def decode_field(record: CodedField, graph: Graph, width: int, has_mean: bool) -> Float64[np.ndarray, "V C"]:
-    """The trajectories of a record. Raises FormatError where it holds none of this width."""
+    """Decode the trajectories of a record. Raises FormatError if it is damaged or has another width."""
     return _core.decode_field(pack(record), graph.core, width, has_mean)
 
 
 class _Columns:
-    """Columns of a field in the basis as transmitted, quantised and coded."""
+    """Columns of a field in the transmitted basis, quantised and coded."""
 
     def __init__(
         self,
@@ -122,7 +122,7 @@ class _Columns:
         return _core.predict_surface(self.weights, graph.core, metric, step, price)
 
     def pays(self) -> Bool[np.ndarray, " M"]:
-        """True for the columns whose absence would cost more than they do."""
+        """Return True for the columns whose absence would cost more than they do."""
         count, width = self.vectors.shape
         basis_bits = np.log2(2.0 * np.abs(self.basis) + 1)
         rows = np.repeat(np.arange(count), width - np.arange(count))
@@ -136,5 +136,5 @@ def _only(basis: klt.Basis, kept: Int64[np.ndarray, " M"]) -> klt.Basis:
 
 
 def _mean_bits(step: float) -> int:
-    """Fraction bits, at most 30, at which the mean's rounding is a sixteenth of a step."""
+    """Return the fraction bits, at most 30, at which the mean's rounding error is at most a sixteenth of a step."""
     return int(np.clip(np.ceil(np.log2(8.0 / step)), 0, MOST_BITS))

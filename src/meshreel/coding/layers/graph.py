@@ -1,7 +1,7 @@
-"""Causal graphs: which values predict which and how much each weighs, from decoded meshes only: the same on both sides.
+"""Causal prediction graphs, built from decoded meshes alone, so that they are the same on both sides.
 
 In -> out: a base mesh -> an order of its vertices, coarse to fine, and their predictors; the connectivity of a level ->
-that of the next, with each new vertex's siblings.
+that of the next level, with each new vertex's siblings.
 """
 
 from __future__ import annotations
@@ -33,28 +33,28 @@ class Graph:
 
 @dataclass(frozen=True, slots=True)
 class Hierarchy:
-    """A base mesh's vertices from the coarsest shape to the last detail."""
+    """Order of a base mesh's vertices from the coarsest shape to the finest detail, with their predictors."""
 
-    order: Int32[np.ndarray, " V"]  # the vertex at each place
-    graph: Graph  # of places
+    order: Int32[np.ndarray, " V"]  # the vertex at each place of the order
+    graph: Graph  # between places of the order
 
 
 @dataclass(frozen=True, slots=True)
 class Siblings:
-    """For each new vertex of a level those before it that share a face of the coarser level with it."""
+    """Siblings of each new vertex of a level: earlier new vertices on the same face of the coarser level."""
 
     starts: Int64[np.ndarray, " S"]  # S = E + 1
     near: Int32[np.ndarray, " N"]
 
     def graph(self, weight: int) -> Graph:
-        """Each new vertex's scalar is predicted by weight / 64 of the mean of its siblings'."""
+        """Return the graph that predicts each new vertex's scalar by weight / 64 of the mean of its siblings'."""
         counts = np.diff(self.starts)
         return Graph(self.starts, self.near, np.repeat(weight / (64.0 * np.maximum(counts, 1)), counts))
 
 
 @dataclass(frozen=True, slots=True)
 class Connectivity:
-    """What follows from the coarser level's faces alone, so that groups which share them share it."""
+    """Connectivity of a level; it follows from the coarser level's faces, so groups with the same faces share it."""
 
     level: Level
     siblings: Siblings
@@ -66,20 +66,20 @@ class Connectivity:
 
     @property
     def nbytes(self) -> int:
-        """Memory, bytes; the coarser level's faces are another's."""
+        """Memory in bytes, without the coarser level's faces, which belong to another object."""
         return (
             self.level.edges.nbytes + self.level.faces.nbytes + self.siblings.starts.nbytes + self.siblings.near.nbytes
         )
 
 
 def connectivity(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Connectivity:
-    """Of the next level. Raises FormatError where a face names none of the vertices."""
+    """Build the connectivity of the next level. Raises FormatError if a face refers to a missing vertex."""
     level = subdivide(faces, vertices)
     return Connectivity(level, siblings(level))
 
 
 def hierarchy(base: Mesh) -> Hierarchy:
-    """The order and the predictors of a base mesh's vertices. Raises FormatError where a face names none of them."""
+    """Build the hierarchy of a base mesh's vertices. Raises FormatError if a face refers to a missing vertex."""
     try:
         order, starts, near, weights = _core.hierarchy(base.vertices, base.faces)
     except ValueError as error:
@@ -88,6 +88,6 @@ def hierarchy(base: Mesh) -> Hierarchy:
 
 
 def siblings(level: Level) -> Siblings:
-    """The siblings of a level's new vertices."""
+    """Find the siblings of a level's new vertices."""
     starts, near = _core.siblings(level.faces, level.vertices, len(level.edges))
     return Siblings(starts.view(np.int64), near)

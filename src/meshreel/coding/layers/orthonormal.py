@@ -1,7 +1,7 @@
-"""Orthonormal bases <-> integers: each vector is said in the space that those before it leave.
+"""Orthonormal bases <-> integers: each vector has coordinates in the orthogonal complement of the earlier ones.
 
 In: M orthonormal vectors of C numbers. Out: C + (C - 1) + ... integers, M terms; from them, exactly orthonormal vectors
-again. A third to a half of the integers that the vectors' own numbers would take.
+again. It saves a third to a half of the integers (docs/decisions/0012-layers-coder.md).
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from ...errors import FormatError
 
 
 def forward(vectors: Float64[np.ndarray, "M C"], scales: Float64[np.ndarray, " M"]) -> Int32[np.ndarray, " N"]:
-    """The integers of vectors whose k-th is as fine as 1 / scales[k]. Encoder."""
+    """Round vectors to integers, the k-th with a step of 1 / scales[k] (encoder only)."""
     width = vectors.shape[1]
-    free = np.eye(width)  # columns: an orthonormal basis of what the vectors so far leave
+    free = np.eye(width)  # columns: an orthonormal basis of the complement of the vectors so far
     rows = []
     for vector, scale in zip(vectors, scales.tolist(), strict=True):
         inside = free.T @ vector
@@ -32,7 +32,7 @@ def forward(vectors: Float64[np.ndarray, "M C"], scales: Float64[np.ndarray, " M
 
 
 def inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64[np.ndarray, "M C"]:
-    """The vectors that the integers stand for. Raises FormatError where one of them has no direction."""
+    """Reconstruct the vectors from their integers. Raises FormatError if one of them has no direction."""
     try:
         return _core.orthonormal_inverse(symbols, count, width)
     except ValueError as error:
@@ -40,5 +40,5 @@ def inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64
 
 
 def symbol_count(count: int, width: int) -> int:
-    """How many integers say `count` vectors."""
+    """Return the number of integers for `count` vectors."""
     return count * width - count * (count - 1) // 2

@@ -1,7 +1,7 @@
-"""Where no template fits: faces a frame is shown without, and small meshes it is shown with <-> LayersPatches.
+"""Encode patches where no template fits: for each frame, faces to drop and a small mesh to add (decision 13).
 
-In -> out: for each frame of a group a mask over its faces and a mesh on a lattice <-> a record. The masks are runs that
-know the frame before; the meshes of all frames are one Draco mesh, set side by side, so that its head is paid once.
+In -> out: for each frame of a group a mask over its faces and a mesh on a lattice <-> LayersPatches. Masks are runs
+relative to the previous frame; the meshes of all frames are one Draco mesh, side by side, with a single head.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from .. import entropy
 from ..mesh import check_growth, decode_mesh, encode_mesh
 from ..steps import LEVELS, step_of
 
-MOST_CELLS = 1 << 20  # of the lattice, over all frames: what Draco's float32 positions tell apart
+MOST_CELLS = 1 << 20  # of the lattice, over all frames: as many as Draco's float32 positions can resolve
 
 
 @dataclass(frozen=True, slots=True)
 class Patches:
-    """What changes on the frames of a group."""
+    """Changes to the frames of a group: dropped faces and added meshes."""
 
-    dropped: Bool[np.ndarray, "T F"]  # faces that a frame is shown without
-    meshes: tuple[Mesh, ...]  # what it is shown with besides; possibly empty
+    dropped: Bool[np.ndarray, "T F"]  # faces that a frame does not show
+    meshes: tuple[Mesh, ...]  # mesh added to each frame; possibly empty
 
     def apply(
         self,
@@ -38,9 +38,10 @@ class Patches:
         place: Placement | None = None,
         spare: Int32[np.ndarray, "N 3"] | None = None,
     ) -> list[Mesh]:
-        """The frames as shown: vertices and faces of the patch are behind the template's.
+        """Return the patched frames: vertices and faces of a patch follow those of the template.
 
-        With `place`, in metres; `positions` are already placed then. `spare` is room for the faces of all frames.
+        With `place`, they are in metres, and `positions` must be placed already. `spare` is memory for the faces of all
+        frames.
         """
         shown = self._shown(faces, spare)
         return [
@@ -51,7 +52,7 @@ class Patches:
     def _shown(
         self, faces: Int32[np.ndarray, "F 3"], spare: Int32[np.ndarray, "N 3"] | None
     ) -> list[Int32[np.ndarray, "_ 3"]]:
-        """The faces of each frame."""
+        """Return the remaining faces of each frame."""
         shown = [faces] * len(self.dropped)
         changed = np.flatnonzero(self.dropped.any(axis=1))
         room = np.empty((len(changed) * len(faces), 3), np.int32) if spare is None or not len(spare) else spare
@@ -64,7 +65,7 @@ class Patches:
 
 
 def reach(step_level: int, frames: int) -> tuple[float, float]:
-    """How far from 0 the meshes of so many frames may be: along x, where they stand side by side, and elsewhere."""
+    """Return how far from 0 the meshes of `frames` frames may reach: along x, where they lie in a row, and elsewhere."""
     step = step_of(step_level)
     return (MOST_CELLS // frames // 2 - 0.75) * step, (MOST_CELLS // 2 - 0.75) * step
 
@@ -72,9 +73,9 @@ def reach(step_level: int, frames: int) -> tuple[float, float]:
 def encode_patches(
     dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh], step_level: int
 ) -> tuple[LayersPatches, tuple[Mesh, ...]]:
-    """The record, and the meshes as they decode.
+    """Encode patches; return the record and the meshes as they decode.
 
-    Raises InputError where the meshes need more cells than Draco can tell apart.
+    Raises InputError if the meshes need more cells than Draco can resolve.
     """
     runs = encode_runs(dropped)
     width, side_by_side = _set_out(meshes, step_of(step_level))
@@ -84,7 +85,7 @@ def encode_patches(
 
 
 def decode_patches(record: LayersPatches, frames: int, faces: int) -> Patches:
-    """The patches of a group of so many frames, whose finest level has so many faces. FormatError where damaged."""
+    """Decode the patches of a group whose finest level has `faces` faces. Raises FormatError on damaged records."""
     if record.step_level >= LEVELS:
         raise FormatError(f"patches: step level {record.step_level}, there are {LEVELS}")
     if record.runs > 2 * faces + frames * (faces + 1) + 2:
@@ -94,9 +95,9 @@ def decode_patches(record: LayersPatches, frames: int, faces: int) -> Patches:
 
 
 def encode_runs(dropped: Bool[np.ndarray, "T F"]) -> Int32[np.ndarray, " N"]:
-    """Lengths of runs: kept in all frames or not, by face; then the same as in the frame before or not, of the others.
+    """Return run lengths of two bit sequences: faces ever dropped or not; then, for those, changed since the last frame.
 
-    Both begin with a run that is kept, or the same, which alone may have no length. No runs where nothing is dropped.
+    Each begins with a run of bits that are not set, the only one that may be empty. No runs if nothing is dropped.
     """
     if not dropped.any():
         return np.zeros(0, np.int32)
@@ -107,7 +108,7 @@ def encode_runs(dropped: Bool[np.ndarray, "T F"]) -> Int32[np.ndarray, " N"]:
 
 
 def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[np.ndarray, "T F"]:
-    """The mask. Raises FormatError where the runs do not fill it."""
+    """Return the mask of dropped faces. Raises FormatError if the runs do not fill it exactly."""
     dropped = np.zeros((frames, faces), bool)
     if len(runs) == 0:
         return dropped
@@ -121,26 +122,26 @@ def decode_runs(runs: Int32[np.ndarray, " N"], frames: int, faces: int) -> Bool[
 
 
 def run_lengths(bits: Bool[np.ndarray, " N"]) -> Int32[np.ndarray, " R"]:
-    """Lengths of the runs of bits that are not set and that are, in turn; only the first may be 0."""
+    """Return the lengths of alternating runs of bits, beginning with bits that are not set; only the first may be 0."""
     turns = np.flatnonzero(np.diff(bits, prepend=False))
     return np.diff(np.concatenate([[0], turns, [len(bits)]])).astype(np.int32)
 
 
 def fill_runs(runs: Int32[np.ndarray, " N"], count: int) -> tuple[Bool[np.ndarray, " C"], Int32[np.ndarray, " R"]]:
-    """So many bits from the first runs, and the runs that are left. FormatError where no run ends with the bits."""
+    """Return `count` bits from the first runs, and the remaining runs. FormatError if no run ends with the bits."""
     if (runs < 0).any():
         raise FormatError("patches: a run of negative length")
     ends = np.cumsum(runs.astype(np.int64))
     last = int(np.searchsorted(ends, count))
     if last >= len(runs) or ends[last] != count:
-        raise FormatError(f"patches: runs that do not end with the {count} faces they tell of")
+        raise FormatError(f"patches: runs that do not end with the {count} faces they describe")
     if (runs[1 : last + 1] == 0).any():
         raise FormatError("patches: a run without length")
     return np.repeat(np.arange(last + 1) % 2 == 1, runs[: last + 1]), runs[last + 1 :]
 
 
 def _set_out(meshes: Sequence[Mesh], step: float) -> tuple[int, Mesh]:
-    """Cells that each frame has along x, and all meshes in one, that of frame t moved by t times as many."""
+    """Return the cells of a frame along x, and all meshes as one, in which that of frame t is shifted by t frames."""
     cells = [np.rint(mesh.vertices / step).astype(np.int64) for mesh in meshes]
     width = 2 * max((int(np.abs(points[:, 0]).max(initial=0)) for points in cells), default=0) + 2
     if width * len(meshes) > MOST_CELLS:
@@ -152,7 +153,7 @@ def _set_out(meshes: Sequence[Mesh], step: float) -> tuple[int, Mesh]:
 
 
 def _taken_in(record: LayersPatches, frames: int) -> tuple[Mesh, ...]:
-    """The meshes of each frame out of the one in a record."""
+    """Decode the mesh of a record and separate it into the meshes of the frames."""
     step = step_of(record.step_level)
     mesh = decode_mesh(record.mesh, step)
     if mesh.is_empty:
@@ -170,7 +171,7 @@ def _taken_in(record: LayersPatches, frames: int) -> tuple[Mesh, ...]:
 def _parted(
     mesh: Mesh, of_vertices: Int64[np.ndarray, " V"], of_faces: Int64[np.ndarray, " F"], frames: int
 ) -> tuple[Mesh, ...]:
-    """The faces of each frame and the vertices that they use, in their order; in one pass, however many the frames."""
+    """Separate a mesh into frames, keeping the order of faces and vertices; one pass for any number of frames."""
     used = np.zeros(len(mesh.vertices), bool)
     used[mesh.faces.reshape(-1)] = True
     kept = np.flatnonzero(used)

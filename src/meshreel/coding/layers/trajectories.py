@@ -1,4 +1,4 @@
-"""Base motion <-> CodedField: the first layer of the form `layers`.
+"""Encode the motion of the base mesh: the first layer of the form `layers`.
 
 In: the places of the base mesh's vertices in every frame. Out: their displacements from the base as decoded, predicted
 in a hierarchy that both sides build from it (docs/decisions).
@@ -19,7 +19,7 @@ from .graph import hierarchy
 def encode_trajectories(
     positions: Float64[np.ndarray, "T V 3"], base: Mesh, rate: Rate, tangential: float
 ) -> tuple[EncodedField, Float64[np.ndarray, "T V 3"]]:
-    """The coded motion of the base's vertices, and their places as decoded.
+    """Encode the motion of the base's vertices; return the field and the decoded positions.
 
     `tangential` is the weight of a squared error along the surface: where on it a vertex lies hardly shows.
     """
@@ -35,7 +35,7 @@ def encode_trajectories(
 
 
 def decode_trajectories(record: bytes, base: Mesh, frames: int) -> Float64[np.ndarray, "V 3 T"]:
-    """Where the base's vertices are in every frame, as rows.
+    """Decode the positions of the base's vertices in every frame, as rows.
 
     `record` is a packed LayersGroup of so many frames. Raises FormatError where it is damaged.
     """

@@ -20,22 +20,22 @@ from ..steps import LEVELS, level_of, step_of
 from . import quantize
 from .laplacian import System
 
-WORTH = 1.8  # squared steps that a bit saves along the curve of distortion over rate (measured)
-LADDER = (0, -4, -2, 2, 4)  # steps that a component may have, eighths of an octave from the base step; more is finer
-LARGE = 1000  # vertices of a component that deserves all six anchors
+WORTH = 1.8  # squared steps per bit, slope of the curve of distortion over rate (measured; decision 5)
+LADDER = (0, -4, -2, 2, 4)  # steps tried for a component, in eighths of an octave from the base step; a guess
+LARGE = 1000  # vertices from which on a connected part gets all six anchors (decision 5): a guess
 
 
 @dataclass(frozen=True, slots=True)
 class DisplacementOptions:
-    """How displacements are coded; lengths relative to the sequence's diagonal."""
+    """Options of the coding of displacements; lengths relative to the sequence's diagonal (anchors: decision 5)."""
 
-    step: float = 8e-4  # quantiser step of a component; the error is about half of it a component
-    basis_size: int | None = None  # exactly so many components; None: as many as pay
-    price: float = 0.5  # of one bit, in squared steps
+    step: float = 8e-4  # quantiser step of a component; its error is about half of it
+    basis_size: int | None = None  # number of components; None: those that pay
+    price: float = 0.5  # price of a bit, in squared steps
     anchor_rule: AnchorRule = AnchorRule.FARTHEST
-    anchor_count: int | None = None  # None: the better of six a connected component and one in twenty vertices
+    anchor_count: int | None = None  # None: the better of six per connected part and one in twenty vertices
     anchor_weight: int = 4  # 1 to 255
-    dead_zone: float | None = None  # None: shaped rounding; plain rounding up from this fraction of a step, .5 to 1
+    dead_zone: float | None = None  # plain rounding, up from this fraction of a step, .5 to 1; None: shaped rounding
 
     def __post_init__(self) -> None:
         finest, coarsest = step_of(LEVELS - 1), step_of(0)
@@ -44,7 +44,7 @@ class DisplacementOptions:
         if self.basis_size is not None and self.basis_size < 0:
             raise InputError(f"basis size {self.basis_size}: give a number of components, 0 or more")
         if not 0 <= self.price < 10:
-            raise InputError(f"price {self.price}: give squared steps a bit, 0 to 10")
+            raise InputError(f"price {self.price}: give squared steps per bit, 0 to 10")
         if self.dead_zone is not None and not 0.5 <= self.dead_zone < 1:
             raise InputError(f"dead zone {self.dead_zone}: give a fraction of a step in [0.5, 1), or None")
         if (self.anchor_count or 0) < 0 or not 1 <= self.anchor_weight <= 255:
@@ -56,10 +56,10 @@ class DisplacementOptions:
 def alternatives(
     faces: Int32[np.ndarray, "F 3"], vertices: int, options: DisplacementOptions
 ) -> tuple[DisplacementOptions, ...]:
-    """The options with a number of anchors: few with shaped rounding, and many with plain rounding.
+    """Return the options to try: few anchors with shaped rounding, and many with plain rounding (decision 5).
 
-    Few win at fine steps, where the quantiser keeps smooth errors small itself; at coarse steps most deltas are zero,
-    and the surface that the least squares lay through many anchors is what is left.
+    Few win at fine steps, where shaped rounding keeps smooth errors small. At coarse steps most deltas are zero, and
+    the result is the least-squares surface through the anchors, which must be many. A given number is kept.
     """
     if options.anchor_count is not None:
         return (replace(options, anchor_count=min(options.anchor_count, vertices)),)
@@ -70,13 +70,13 @@ def alternatives(
 
 
 def cost(distortion: float, size: int, options: DisplacementOptions) -> float:
-    """What the encoder makes small: squared error of the field + WORTH squared steps a bit of `size` bytes."""
+    """Return the cost that the encoder minimises: squared error of the field + WORTH squared steps per bit."""
     return distortion + WORTH * options.step**2 * 8 * size
 
 
 @dataclass(frozen=True, slots=True)
 class Allocation:
-    """What the encoder has decided."""
+    """Choices of the encoder: the basis as transmitted, and each component's step and symbols."""
 
     basis: klt.BasisSymbols
     levels: Int64[np.ndarray, " M"]  # of each component's step
@@ -86,7 +86,7 @@ class Allocation:
 def allocate(
     field: Float64[np.ndarray, "V T 3"], system: System, neighbours: entropy.Neighbours, options: DisplacementOptions
 ) -> Allocation:
-    """The components, steps and symbols of least distortion + price * rate."""
+    """Choose the components, steps and symbols that minimise distortion + price * rate."""
     basis = klt.fit(field)
     if options.basis_size is not None:
         kept = np.arange(len(basis.energies)) < options.basis_size
@@ -116,7 +116,7 @@ class _Components:
         self.deltas = system.forward(self.weights)
 
     def quantized(self, levels: Int64[np.ndarray, " M"]) -> Int32[np.ndarray, "R M"]:
-        """Symbols at a step level for each component; a symbol's price comes from how large its column's are."""
+        """Quantise at a step level for each component; the price of a symbol follows from its column's magnitudes."""
         steps = _steps(levels)
         if self.options.dead_zone is not None:
             return quantize.forward(self.deltas, steps, self.options.dead_zone)
@@ -129,7 +129,7 @@ class _Components:
     def value(
         self, symbols: Int32[np.ndarray, "R M"], levels: Int64[np.ndarray, " M"], neighbours: entropy.Neighbours
     ) -> Float64[np.ndarray, " M"]:
-        """Distortion + price * rate of each component: the basis is orthonormal, so they add."""
+        """Return distortion + price * rate of each component; the basis is orthonormal, so they add."""
         error = self.system.inverse(symbols * _steps(levels)) - self.weights
         bits = entropy.weights_cost(symbols[: self.vertices], neighbours)
         bits += np.log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
@@ -137,7 +137,7 @@ class _Components:
         return (error**2).sum(axis=0) + WORTH * self.options.step**2 * bits
 
     def dropped(self) -> Float64[np.ndarray, " M"]:
-        """What it costs to leave each component out."""
+        """Return the distortion caused by leaving each component out."""
         return (self.weights**2).sum(axis=0)
 
 
@@ -150,7 +150,7 @@ def _steps(levels: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
 
 
 def _slopes(symbols: Float64[np.ndarray, "V M"] | Int32[np.ndarray, "V M"]) -> Float64[np.ndarray, " M"]:
-    """Bits that a unit of magnitude costs where magnitudes follow a two-sided geometric law of each column's mean."""
+    """Return the bits per unit of magnitude under a two-sided geometric law with each column's mean magnitude."""
     mean = np.maximum(np.abs(symbols).mean(axis=0, dtype=np.float64) if len(symbols) else 1.0, 1e-3)
     ratio = mean / (1 + np.sqrt(1 + mean**2))  # of mean = 2 r / (1 - r^2)
     return -np.log2(ratio) * np.ones(symbols.shape[1])

@@ -19,13 +19,13 @@ from ..steps import LEVELS, step_of
 from . import laplacian, quantize
 from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost
 
-MOST_FRAMES = 65_535
-MOST_BITS = 30
+MOST_FRAMES = 65_535  # of a group: a uint16 in the head
+MOST_BITS = 30  # fraction bits of the mean and of a basis vector, so that values fit int32
 MOST_NUMBERS = 1 << 29  # of a decoded field: 4 GiB
 
 
 def encode_displacements(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: DisplacementOptions) -> bytes:
-    """The payload of a field; decoding it needs the same base, to the bit."""
+    """Encode a field; decoding needs the same base, bit for bit."""
     vertices, frames, _ = field.shape
     if not np.isfinite(field).all() or np.abs(field).max(initial=0.0) > 1e3:
         raise InputError("displacements must be finite and in units of the diagonal; normalise the sequence first")
@@ -36,7 +36,7 @@ def encode_displacements(field: Float64[np.ndarray, "V T 3"], base: Mesh, option
 
 
 def decode_displacements(data: bytes, base: Mesh, components: int | None = None) -> Float64[np.ndarray, "V T 3"]:
-    """The field; with `components`, that of the first so many, for which `data` may end behind theirs."""
+    """Decode a field; with `components`, only that many, in which case `data` may end after them."""
     head, offset = _read_head(data)
     count = len(head.components) if components is None else min(components, len(head.components))
     if components is None and offset + sum(map(_size, head.components)) != len(data):
@@ -62,18 +62,18 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
 
 
 def frames_of(data: bytes) -> int:
-    """The number of frames a payload claims, from its head alone."""
+    """Return the number of frames that the head of a payload claims."""
     return _read_head(data)[0].frames
 
 
 def layer_sizes(data: bytes) -> list[int]:
-    """Bytes of the head and of each component: any sum of the first k + 1 is a prefix that decodes k components."""
+    """Return the bytes of the head and of each component: the first k + 1 form a prefix that decodes k components."""
     head, offset = _read_head(data)
     return [offset] + [_size(component) for component in head.components]
 
 
 def _encode(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: DisplacementOptions) -> tuple[bytes, float]:
-    """The payload for one number of anchors, and its squared error."""
+    """Encode with one number of anchors; return the payload and its squared error."""
     vertices, frames, _ = field.shape
     count = options.anchor_count or 0
     anchors = laplacian.anchors(options.anchor_rule, count, base.faces, vertices)
@@ -103,7 +103,7 @@ def _components(choice: Allocation, anchors: list[bytes], deltas: list[bytes]) -
 
 
 def _read_head(data: bytes) -> tuple[DisplacementHead, int]:
-    """The head, checked, and the offset of the first stream."""
+    """Read and check the head; return it and the offset of the first stream."""
     head, offset = records.unpack(DisplacementHead, data)
     if not 0 < head.frames <= MOST_FRAMES or len(head.components) > 3 * head.frames:
         raise FormatError(f"displacements: {len(head.components)} components of {head.frames} frames")
@@ -125,7 +125,7 @@ def _read_basis(head: DisplacementHead, count: int) -> klt.Basis:
 
 
 def _streams(data: bytes, offset: int, components: tuple[Component, ...]) -> list[tuple[bytes, bytes]]:
-    """Each component's anchors and deltas."""
+    """Cut the streams of each component's anchors and deltas out of a payload."""
     parts = []
     for number, component in enumerate(components):
         middle = offset + component.anchors_size

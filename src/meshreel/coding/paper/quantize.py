@@ -11,16 +11,16 @@ from jaxtyping import Float64, Int32
 
 from ...errors import InputError
 
-LARGEST = 2**31 - 1
+LARGEST = 2**31 - 1  # largest magnitude of a symbol, an int32
 
 
 def forward(
     values: Float64[np.ndarray, "N M"], steps: Float64[np.ndarray, " M"], dead_zone: float = 0.5
 ) -> Int32[np.ndarray, "N M"]:
-    """Nearest multiples of the steps, halves away from zero.
+    """Round values to multiples of the steps, halves away from zero.
 
-    `dead_zone` in [0.5, 1): a magnitude is rounded up only from this fraction of a step (0.5: nearest); larger is
-    cheaper and less accurate.
+    A magnitude is rounded up only from `dead_zone`, in [0.5, 1), of a step on (0.5: nearest); larger is cheaper and
+    less accurate.
     """
     if not 0.5 <= dead_zone < 1:
         raise InputError(f"dead zone {dead_zone}: give a fraction of a step in [0.5, 1)")
@@ -35,7 +35,7 @@ def forward(
 
 
 def inverse(symbols: Int32[np.ndarray, "N M"], steps: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, "N M"]:
-    """The multiples that the symbols name; one multiplication, the same bits everywhere."""
+    """Return the multiples of the steps; one multiplication, so the bits are the same on every platform."""
     return symbols * steps
 
 
