@@ -1,4 +1,4 @@
-"""Small groups for the tests of the `layers` form: references as coded, and where their vertices should be."""
+"""Small groups for tests of the form `layers`: coded references, and the desired positions of their vertices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Backgrounds and their changes: what comes back, and what a payload may not claim."""
+"""Backgrounds and their changes: round trips, and refused payloads."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_changes_of_changes_and_of_an_empty_background() -> None:
     np.testing.assert_array_equal(anew.faces, BEFORE.faces)
 
 
-def test_what_is_placed_is_what_it_was_and_then_placed() -> None:
+def test_decoding_with_a_placement_equals_placing_the_decoded_background() -> None:
     before = decode_background(WHOLE, PLACE)
     np.testing.assert_array_equal(before.vertices, PLACE.of(BEFORE).vertices)
     after, wanted = decode_change(CHANGE, before, PLACE), PLACE.of(decode_change(CHANGE, BEFORE))

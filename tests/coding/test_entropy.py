@@ -76,7 +76,7 @@ def test_the_rate_is_within_three_percent_of_the_entropy_of_its_contexts(body: B
     assert bound < 0.97 * plain  # contexts are worth something on a mesh whose scale varies
 
 
-def test_the_entropy_of_the_contexts_is_what_an_ideal_coder_needs(body: Body) -> None:
+def test_the_rate_is_near_that_of_an_ideal_coder_with_the_same_contexts(body: Body) -> None:
     """constriction's ANS with each context's empirical distribution is the oracle of the bound above."""
     pytest.importorskip("constriction", reason="no wheel for this platform")
     symbols, neighbours, streams = body

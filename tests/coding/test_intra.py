@@ -1,4 +1,4 @@
-"""The `draco` form: frames on a lattice, and what a payload may not claim."""
+"""The form `draco`: frames on a lattice, and refused payloads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A template is found again in other frames: from the key that is chosen, and onward from the last frame of a group."""
+"""Tracking of a template: from the chosen key, and onward from the last frame of a group."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_frames_are_followed_up_to_one_that_is_lost() -> None:
     assert motion.move(BASE).shape == (4, len(BASE.vertices), 3)
 
 
-def test_from_a_key_that_is_alone_with_what_it_has_none_is_followed() -> None:
+def test_no_frame_is_tracked_if_the_first_one_differs_from_the_key() -> None:
     other = Mesh.of(BALL.vertices[:, [1, 2, 0]] * 2 + [0, 0.3, 0], BALL.faces)
     motion = choose_key([FrameSurface(mesh) for mesh in [other, *frames(2)]], OPTIONS, 1)
     assert (motion.key, motion.count) == (1, 0)

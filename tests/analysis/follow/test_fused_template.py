@@ -101,7 +101,7 @@ def test_a_hole_that_is_always_there_stays_open() -> None:
     assert gaps(fused, np.array([[0.0, 0.0, 0.0]]))[0] > 0.5 * HOLE
 
 
-def test_what_one_frame_alone_has_is_not_believed() -> None:
+def test_surface_that_only_one_frame_has_is_left_out() -> None:
     frames = [with_hole(sheet(), 0.0, 0.0), *[with_hole(sheet(), 0.0, 0.0)] * 6, sheet()]
     motion = moving(frames[0], 8)
     fused = fused_mesh(motion, carried(frames, motion), 0.001)
@@ -127,7 +127,7 @@ def test_frames_without_surface_in_common_give_the_empty_mesh() -> None:
     assert fused_mesh(motion, carried(frames, motion), 0.001).is_empty
 
 
-def test_a_hole_in_a_frame_is_no_residual_in_common_but_what_the_template_lacks_is() -> None:
+def test_the_common_residual_ignores_holes_of_the_frame_but_not_of_the_template() -> None:
     whole, holed = sheet(), with_hole(sheet(), 0.0, 0.0)
     over = residual_of(whole, FrameSurface(holed))
     assert over.by_area > 0.001
@@ -136,7 +136,7 @@ def test_a_hole_in_a_frame_is_no_residual_in_common_but_what_the_template_lacks_
     assert 0.001 < lacking.common <= lacking.by_area
 
 
-def test_what_has_flown_is_no_residual_in_common() -> None:
+def test_the_common_residual_ignores_stray_surface() -> None:
     whole = sheet()
     flown = Mesh(whole.vertices[whole.faces[0]] + (0, 0, 0.3), np.array([[0, 1, 2]], np.int32))
     residual = residual_of(whole, FrameSurface(concatenate([whole, flown])))

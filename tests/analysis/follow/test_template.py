@@ -26,7 +26,7 @@ def rms(mesh: Mesh, base: Mesh) -> float:
 
 @pytest.mark.parametrize("body", [BALL, ROUGH], ids=["ball", "rough"])
 @pytest.mark.parametrize("error", [2e-3, 1e-3, 5e-4])
-def test_the_error_asked_for_is_about_what_the_base_mesh_has(body: Mesh, error: float) -> None:
+def test_the_base_mesh_has_about_the_requested_error(body: Mesh, error: float) -> None:
     assert error / 1.4 < rms(body, base_mesh(body, TemplateOptions(error=error))) < 1.4 * error
 
 
@@ -84,7 +84,7 @@ def test_detail_that_does_not_change_stays() -> None:
     assert np.sqrt((away**2).mean()) < 0.004  # of detail that is .01
 
 
-def test_a_frame_whose_detail_differs_is_drawn_to_the_others() -> None:
+def test_a_frame_with_different_detail_is_pulled_to_the_others() -> None:
     positions = detailed(5, (2, 0.02))
     coherent = shared_detail(BASE.faces, COUNT, 2)(positions)
     plain = shared_detail(BASE.faces, COUNT, 2)(detailed(5))

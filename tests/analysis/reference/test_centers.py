@@ -53,7 +53,7 @@ def test_the_mirror_image_that_distances_allow_is_not_taken() -> None:
         np.testing.assert_allclose(found.positions, pose, atol=1e-4)
 
 
-def test_two_bodies_that_touch_in_one_frame_are_apart_in_the_reference() -> None:
+def test_two_bodies_that_touch_in_one_frame_are_separate_in_the_reference() -> None:
     one = cloud() / 2
     apart = np.array([0.5, 0, 0])
     touching = np.concatenate([one, one + np.array([0.3, 0, 0])])

@@ -75,7 +75,7 @@ def test_normals_turn_with_their_points() -> None:
     np.testing.assert_allclose(turned, vertex_normals(mesh) @ rotation(1.0).T, atol=1e-9)
 
 
-def test_two_balls_that_touch_come_apart_each_whole() -> None:
+def test_two_balls_that_touch_separate_without_damage() -> None:
     left, right = (-0.1, 0, 0), (0.1, 0, 0)  # radius .1: they touch at the origin
     mesh = both(ball(left), ball(right))
     touching = np.concatenate([inside(left), inside(right, seed=1)])
@@ -87,7 +87,7 @@ def test_two_balls_that_touch_come_apart_each_whole() -> None:
     np.testing.assert_allclose(moved[half:], mesh.vertices[half:] + shift, atol=1e-9)
 
 
-def test_a_vertex_whose_nearest_center_is_the_other_bodys_stays_with_its_own() -> None:
+def test_a_vertex_nearest_to_a_center_of_the_other_body_stays_with_its_body() -> None:
     left, right = (-0.1, 0, 0), (0.1, 0, 0)
     mesh = both(ball(left), ball(right))
     own = inside(left)

@@ -51,7 +51,7 @@ def two_balls(distances: tuple[float, ...]) -> tuple[list[Mesh], Centers]:
     return [merged_balls(d) for d in distances], Centers(positions, np.zeros(positions.shape[1], np.int32))
 
 
-def test_two_balls_that_touch_in_some_frames_are_apart_and_whole_in_the_reference() -> None:
+def test_two_balls_that_touch_in_some_frames_are_separate_and_whole_in_the_reference() -> None:
     frames, centers = two_balls((0.2, 0.2, 0.25, 0.32))
     assert [parts(frame) for frame in frames] == [1, 1, 2, 2]
     reference = extract_reference(frames, centers, QUICK)
@@ -82,7 +82,7 @@ def test_the_reference_sent_back_lies_on_each_frame() -> None:
     assert (np.sum(outward * middle, axis=1) > 0).mean() > 0.99
 
 
-def test_what_the_key_frame_lacks_comes_from_the_others() -> None:
+def test_surface_that_the_key_frame_lacks_comes_from_other_frames() -> None:
     whole = ball((0, 0, 0))
     hole = whole.faces[whole.vertices[whole.faces].mean(axis=1)[:, 2] < 0.06]
     frames = [whole, Mesh(whole.vertices, hole), whole]
@@ -95,7 +95,7 @@ def test_what_the_key_frame_lacks_comes_from_the_others() -> None:
     assert rms_gap(whole, reference.mesh) < 0.004
 
 
-def test_what_no_frame_has_is_not_invented() -> None:
+def test_no_surface_is_made_where_no_frame_has_any() -> None:
     whole = ball((0, 0, 0))
     cap = Mesh(whole.vertices, whole.faces[whole.vertices[whole.faces].mean(axis=1)[:, 2] < 0.05])
     first = inside((0, 0, 0))

@@ -1,4 +1,4 @@
-"""Centers: even, rigid where the body is, shared out over bodies, apart again after contact, repeatable."""
+"""Centers are even, rigid where the body is, distributed over bodies, separate again after contact, repeatable."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_a_small_body_gets_centers_too() -> None:
     assert (track.bodies == 1).sum() == 4
 
 
-def test_bodies_that_touch_come_apart_with_their_own_centers() -> None:
+def test_bodies_that_touch_keep_their_centers_when_they_separate() -> None:
     gaps = [0.06, 0.02, -0.01, -0.01, 0.02, 0.06]
     frames = [together(sphere(0.2, (-0.2 - g / 2, 0, 0)), sphere(0.2, (0.2 + g / 2, 0, 0))) for g in gaps]
     track = track_centers(frames, OPTIONS)

@@ -1,4 +1,4 @@
-"""What stands still, fused: noise averages out, borders stay open, and hiding in one frame hides nothing."""
+"""Background from meshes: noise averages out, borders stay open, and surface hidden in one frame is recovered."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ def test_a_hole_stays_a_hole():
     assert np.linalg.norm(mesh.vertices[:, :2] - 0.8, axis=1).min() > 0.33
 
 
-def test_what_is_hidden_in_one_frame_is_there_in_others():
+def test_surface_hidden_in_one_frame_comes_from_others():
     halves = [Mesh(FLOOR.vertices, FLOOR.faces[FLOOR.vertices[FLOOR.faces[:, 0], 0] < 1.0]) for _ in range(1)]
     mesh = fuse_background([*halves, FLOOR], VOXEL)
     assert mesh.vertices[:, 0].max() > 1.5
 
 
-def test_what_few_frames_have_is_left_out():
+def test_surface_that_few_frames_have_is_left_out():
     table = moved(plane(0.8, 16), (0.4, 0.4, 0.7))
     frames = [concatenate([FLOOR, table]), *[FLOOR] * 9]
     assert fuse_background(frames, VOXEL, BackgroundOptions(seen=0.1)).vertices[:, 2].max() > 0.6
@@ -101,7 +101,7 @@ def test_of_nothing_there_is_nothing():
     assert fuse_background([Mesh.of(np.ones((3, 3)), [[0, 1, 2]])], VOXEL).is_empty
 
 
-def test_what_is_elsewhere_in_each_frame_has_flown_and_is_left_out():
+def test_surface_that_moves_from_frame_to_frame_is_left_out():
     ribbons = [moved(plane(0.8, 16), (0.4, 0.4, 0.7 + 0.06 * math.sin(2.4 * k))) for k in range(10)]
     frames = [concatenate([floor, ribbon]) for floor, ribbon in zip(floors(10), ribbons, strict=True)]
     assert fuse_background(frames, VOXEL, BackgroundOptions(steady=9.0)).vertices[:, 2].max() > 0.6

@@ -1,4 +1,4 @@
-"""What stands still, from depth: a room measured over time, somebody in it, and pixels between two surfaces."""
+"""Background from depth pictures: noise, a body in front, and pixels between two surfaces."""
 
 from __future__ import annotations
 
@@ -47,19 +47,19 @@ def test_noise_goes_with_the_frames():
     assert errors[1] < 0.5 * errors[0]
 
 
-def test_the_shadow_of_who_moves_away_is_filled_and_nothing_of_him_is_left():
+def test_the_shadow_of_a_body_that_moves_away_is_filled_and_the_body_is_gone():
     with_ball, without = measured(AHEAD), measured(AHEAD, ball=(9.0, 0.0, 0.0))
     mesh = fuse_still_depth(moments([with_ball, with_ball, without, with_ball], moves=RADIUS + 0.2), VOXEL)
     assert mesh.vertices[:, 2].min() > RADIUS + 0.2
     assert np.linalg.norm(mesh.vertices[:, :2], axis=1).min() < 0.05  # the wall behind him
 
 
-def test_who_stands_still_casts_a_shadow():
+def test_a_body_that_never_leaves_casts_a_shadow():
     mesh = fuse_still_depth(moments([measured(AHEAD)] * 3, moves=RADIUS + 0.2), VOXEL)
     assert np.linalg.norm(mesh.vertices[:, :2], axis=1).min() > RADIUS
 
 
-def test_the_usual_depth_is_the_median_of_what_is_measured_and_needs_enough():
+def test_the_usual_depth_is_the_median_of_enough_measured_depths():
     depth = np.full((AHEAD.height, AHEAD.width), 1000, np.uint16)
     others = [depth, np.where(np.arange(AHEAD.width) < 8, 0, depth + 4), depth + 400]
     nothing = Mesh.empty(), np.zeros(0, bool)

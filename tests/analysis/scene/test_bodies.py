@@ -1,4 +1,4 @@
-"""Bodies are connected pieces, followed over time; bits are somebody's, or counted."""
+"""Bodies are connected pieces tracked over time; small bits join a body or are counted as dropped."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def walls(meshes) -> list[list[float]]:
     return [[np.nan if m.is_empty else round(float(m.vertices[:, 0].mean()), 2) for m in body] for body in meshes]
 
 
-def test_two_apart_are_two_and_each_is_itself_in_every_frame():
+def test_two_separate_pieces_are_two_bodies_with_one_number_in_every_frame():
     frames = [concatenate([at(0.1 * t), at(3 - 0.1 * t)]) for t in range(4)]
     found = find_bodies(frames, CELL)
     assert walls(found.meshes) == [[0.0, 0.1, 0.2, 0.3], [3.0, 2.9, 2.8, 2.7]] and found.dropped == 0
     assert sum(len(body[0].faces) for body in found.meshes) == len(frames[0].faces)
 
 
-def test_two_that_touch_are_one_for_the_whole_run():
+def test_pieces_that_touch_in_one_frame_are_one_body_in_the_whole_interval():
     frames = [concatenate([at(0), at(x)]) for x in (2.0, 1.4, 0.8, 0.62, 0.8, 1.4, 2.0)]
     assert len(find_bodies(frames, CELL).meshes) == 1
     assert len(find_bodies(frames[:2], CELL).meshes) == 2
@@ -118,7 +118,7 @@ def test_one_frame_has_its_pieces_as_bodies():
     assert len(find_bodies([concatenate([at(0), at(3)])], CELL).meshes) == 2
 
 
-def test_far_away_bodies_are_told_apart_as_well():
+def test_bodies_far_from_the_origin_are_separated_too():
     far = (1e6, -1e6, 2e6)
     frames = [moved(concatenate([at(0.1 * t), at(3 - 0.1 * t)]), far) for t in range(3)]
     bodies = find_bodies(frames, CELL).meshes
@@ -143,7 +143,7 @@ def test_options_that_cannot_be_are_refused(wrong):
         BodyOptions(**wrong)
 
 
-def test_a_ring_is_all_around_what_moves_but_for_large_faces():
+def test_a_ring_surrounds_moving_faces_without_large_ones():
     floor = plane(1.0, 10)
     middles = floor.vertices[floor.faces].mean(axis=1)[:, :2]
     moves = np.abs(middles - 0.5).max(axis=1) < 0.1  # 2 x 2 cells

@@ -1,4 +1,4 @@
-"""The minimum cut is the least of all cuts; what is seen free, and what belongs to it, moves."""
+"""The minimum cut is the least of all cuts; places seen free, and the places that belong to them, move."""
 
 from __future__ import annotations
 
@@ -72,11 +72,11 @@ def square(start: int, stop: int, count: int = 9) -> np.ndarray:
     return found
 
 
-def test_what_is_always_occupied_rests():
+def test_places_that_are_always_occupied_rest():
     assert not moving_places(sheet(np.zeros((20, 20), int)), FLAT).any()
 
 
-def test_what_is_seen_free_moves_and_what_is_around_it_does_not():
+def test_places_seen_free_move_and_those_around_them_do_not():
     free = square(5, 12)
     assert np.array_equal(moving_places(sheet(free), FLAT).reshape(20, 20), free > 0)
 
@@ -87,7 +87,7 @@ def test_a_part_that_is_never_seen_free_but_enclosed_moves_as_well():
     assert np.array_equal(moving_places(sheet(free), FLAT).reshape(20, 20), square(5, 12) > 0)
 
 
-def test_nothing_moves_beyond_reach_of_what_is_seen_free():
+def test_no_place_moves_beyond_reach_of_places_seen_free():
     free, near = square(2, 18), CutOptions(fewest=9, least=0.2, reach=0.15, still=(0.0, 0.0))
     free[5:15, 5:15] = 0
     found = moving_places(sheet(free), near).reshape(20, 20)

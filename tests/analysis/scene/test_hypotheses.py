@@ -1,4 +1,4 @@
-"""Hypotheses: what moves over time is found among tracked objects, and found again in the views of a moment."""
+"""Hypotheses: moving objects are found among tracked ones, and found again in the views of a moment."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def scene(frames: int = 8) -> Tracked:
     return Tracked(objects, {WALKER: "person", CHAIR: "chair", LAMP: "lamp"})
 
 
-def test_who_walks_varies_and_what_stands_does_not():
+def test_the_mask_of_a_walking_object_varies_and_that_of_a_standing_one_does_not():
     tracked = scene()
     assert variation(tracked.objects, WALKER) > 0.7 and variation(tracked.objects, LAMP) == 0
     assert 0 < variation(tracked.objects, CHAIR) < 0.05 and variation(tracked.objects, 9) == 0
@@ -45,13 +45,13 @@ def test_who_walks_varies_and_what_stands_does_not():
     assert np.array_equal(found.objects > 0, tracked.objects == WALKER) and found.kinds == {"person"}
 
 
-def test_a_kind_of_which_one_stands_says_nothing_of_the_others():
+def test_a_kind_with_one_standing_object_does_not_move_elsewhere():
     tracked = scene()
     tracked.kinds[LAMP] = "person"  # a statue
     assert hypotheses(tracked).kinds == frozenset()
 
 
-def test_objects_of_a_moment_take_the_numbers_of_what_moves():
+def test_objects_of_a_moment_take_the_numbers_of_the_moving_objects():
     moving = hypotheses(scene())
     objects = np.zeros((2, 20, 40), np.int32)
     objects[0] = np.where(scene().objects[3] == WALKER, 7, np.where(scene().objects[3] == CHAIR, 8, 0))

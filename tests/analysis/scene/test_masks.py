@@ -1,4 +1,4 @@
-"""Masks of another tool: found, checked, lifted to the faces that they were painted on."""
+"""Masks of another tool are found, checked, and lifted to the faces on which they were drawn."""
 
 from __future__ import annotations
 
@@ -52,20 +52,20 @@ def test_the_views_of_the_folder_are_those_it_was_made_for(masks: Path):
         assert np.array_equal(ours.extrinsic, other.extrinsic) and np.array_equal(ours.intrinsic, other.intrinsic)
 
 
-def test_a_missing_frame_is_told_before_any_is_read(masks: Path):
+def test_a_missing_frame_is_reported_before_any_is_read(masks: Path):
     (masks / "view01" / "frame_00001.png").unlink()
     with pytest.raises(InputError, match=r"view01: has no mask of frame 1"):
         ImageMasks(masks, 2)
     assert len(ImageMasks(masks, 1).views) == 3
 
 
-def test_a_mask_of_another_size_is_told_with_its_frame_and_size(masks: Path):
+def test_the_error_for_a_mask_of_another_size_names_its_frame_and_size(masks: Path):
     write_picture(np.zeros((30, 40), np.uint8), masks / "view02" / "frame_00001.png")
     with pytest.raises(InputError, match=r"frame_00001\.png \(frame 1\): 40 x 30 pixels where its camera has 80 x 60"):
         ImageMasks(masks, 2)
 
 
-def test_damage_is_told_before_the_first_mask_is_asked_for(masks: Path):
+def test_damage_is_reported_before_the_first_mask_is_requested(masks: Path):
     last = masks / "view02" / "frame_00001.png"
     last.write_bytes(last.read_bytes()[:60])
     with pytest.raises(InputError, match=r"frame_00001\.png: cannot be read .*make the mask again"):

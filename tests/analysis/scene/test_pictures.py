@@ -1,4 +1,4 @@
-"""Pictures of the views: normals as colors, and folders that masks can be made from."""
+"""Pictures of the views: normals as colors, and folders from which other tools make masks."""
 
 from __future__ import annotations
 

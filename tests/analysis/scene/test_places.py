@@ -1,4 +1,4 @@
-"""What is occupied and what is seen free, where a room and a ball say what is what."""
+"""Places: cells that are occupied and cells that are seen free, in a room with a ball whose state is known."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_the_room_is_never_free(places, seen):
     assert not (seen.occupied & seen.free).any()
 
 
-def test_normals_are_those_of_what_was_there(places):
+def test_the_normal_of_a_place_is_that_of_its_surface(places):
     chosen = on_ball(places, FROM)
     outward = places.middles[chosen] - [FROM, 1.2, RADIUS + 0.5 * CELL]
     outward /= np.linalg.norm(outward, axis=1)[:, None]
@@ -102,7 +102,7 @@ def test_the_same_frames_have_the_same_places(places, views):
         assert getattr(again.tally, name).tobytes() == getattr(places.tally, name).tobytes()
 
 
-def test_what_is_counted_is_what_each_frame_says(places, seen):
+def test_the_tally_counts_the_states_of_each_frame(places, seen):
     tally, rows = places.tally, np.arange(len(FRAMES))[:, None]
     assert tally.frames == len(FRAMES)
     assert np.array_equal(tally.free, seen.free.sum(axis=0)) and np.array_equal(
@@ -162,7 +162,7 @@ def test_some_frames_of_each_second_are_looked_at_however_long_a_recording_is(co
     assert max(np.diff(numbers)) <= max(1, 0.25 * rate + 1)
 
 
-def test_the_back_of_a_face_says_nothing_of_what_is_before_it():
+def test_no_place_is_seen_free_through_the_back_of_a_face():
     """Whoever looks through an open side into a wall's back is inside of something that was not scanned."""
     wall = Mesh.of(room().vertices, room().faces[:, ::-1])
     frames = [wall, moved(wall, (0, 0, 0.3))]
@@ -184,7 +184,7 @@ def measured(mesh: Mesh, view, hidden: Mesh | None = None) -> DepthPicture:
 
 
 @pytest.mark.parametrize(("hidden", "free"), [(None, True), (TABLE, False)], ids=["taken away", "in a shadow"])
-def test_what_no_camera_looked_past_is_not_known_to_be_free(views, hidden, free):
+def test_a_place_that_no_camera_measured_past_is_not_seen_free(views, hidden, free):
     """A hole in a surface: something went, or somebody stands before it. The views look through it either way."""
     frames = [WITH, WITHOUT]
     pictures = [[measured(WITH, view) for view in views], [measured(WITHOUT, view, hidden) for view in views]]
@@ -195,7 +195,7 @@ def test_what_no_camera_looked_past_is_not_known_to_be_free(views, hidden, free)
     assert share > 0.9 if free else share == 0
 
 
-def test_what_one_camera_looks_past_is_free_though_no_view_sees_it(views):
+def test_a_place_that_a_camera_measured_past_is_free_even_if_no_view_sees_it(views):
     """Somebody close to the camera: the views see surfaces from where these are seen best, and not what is before."""
     frames, away = [WITH, WITHOUT], [turned_away(view) for view in views]
     pictures = [[measured(mesh, views[0])] for mesh in frames]
@@ -223,7 +223,7 @@ def test_where_no_camera_usually_measures_anything_views_decide(views):
         assert np.array_equal(found.tally.free, alone.tally.free)
 
 
-def test_nobody_looks_behind_nothing(views):
+def test_places_behind_which_rays_hit_nothing_are_not_seen_free(views):
     """Where nothing is met, a place is not known to be free."""
     alone = each_frame([ball(FROM), ball(TO)], views)
     assert alone.free.mean() < 0.2

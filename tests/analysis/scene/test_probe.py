@@ -1,4 +1,4 @@
-"""What is a scene and what is a body alone."""
+"""Detection of scenes: rooms are scenes, lone bodies are not."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ROLLING = with_room([ball(0.5 + 0.25 * t) for t in range(5)])
 
 
 @pytest.mark.parametrize("offset", [(0, 0, 0), (1e6, -1e6, 2e6)])
-def test_a_room_is_a_scene_whoever_is_in_it_and_wherever_it_is(offset):
+def test_a_room_is_a_scene_with_or_without_people_and_anywhere_in_space(offset):
     assert is_scene([moved(mesh, offset) for mesh in ROLLING])
     assert is_scene([moved(room(), offset)] * 2)
 
@@ -38,7 +38,7 @@ def test_an_open_sheet_is_one_where_it_stands_still(offset):
     assert is_scene([moved(half, (offset * t, offset * t, 0)) for t in range(4)]) == (offset == 0)
 
 
-def test_what_has_few_cells_is_none_for_steps_of_one_do_not_show():
+def test_a_mesh_of_few_cells_is_no_scene_because_small_steps_do_not_show():
     assert not is_scene([moved(plane(1.0, 8), (0.05 * t, 0, 0)) for t in range(3)])
     assert is_scene([plane(1.0, 30)] * 3)
 
@@ -53,7 +53,7 @@ def test_frames_without_extent_are_none():
     assert not is_scene([Mesh.of(np.ones((3, 3)), [[0, 1, 2]])] * 3)
 
 
-def test_a_vertex_that_no_face_has_says_nothing():
+def test_a_vertex_that_no_face_uses_is_ignored():
     stray = [Mesh.of([*mesh.vertices, [1e7, 0, 0]], mesh.faces) for mesh in ROLLING]
     assert is_scene(stray)
 

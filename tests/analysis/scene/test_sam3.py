@@ -1,4 +1,4 @@
-"""SAM3: the whole loop, from pictures to faces, with a model that knows nothing; and folders that are no weights."""
+"""Masks by SAM3: the whole way from pictures to faces with an untrained model, and folders without weights."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_objects_have_numbers_and_the_same_pictures_give_the_same(weights: Path)
         assert np.array_equal(objects > 0, first.masks(frame, SEEN[frame], VIEWS)) and objects.max() <= 4
 
 
-def test_without_prompts_it_looks_for_what_may_move(weights: Path):
+def test_masks_are_made_with_the_default_prompts(weights: Path):
     found = observed(weights, prompts=None).masks(0, SEEN[0], VIEWS)
     assert found.shape == (3, 60, 80)
 
@@ -113,7 +113,7 @@ class Followed:
         return Tracked(np.ones((len(VIEWS), 60, 80), np.int32), {1: "ball"})
 
 
-def test_who_goes_through_the_frames_again_is_answered_from_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_masks_asked_for_a_second_time_come_from_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     tracker = Followed()
     monkeypatch.setattr(sam3, "_Tracker", lambda *_: tracker)
     masker = sam3.Sam3Masks(tmp_path, None, EASILY)
@@ -158,7 +158,7 @@ def test_a_scene_is_segmented_by_a_model_that_knows_nothing(weights: Path):
 
 
 @pytest.mark.parametrize("files", [None, [], ["config.json"], ["config.json", "model.safetensors"]])
-def test_a_folder_without_weights_is_told_what_it_must_hold(tmp_path: Path, files: list[str] | None):
+def test_the_error_for_a_folder_without_weights_lists_the_needed_files(tmp_path: Path, files: list[str] | None):
     folder = tmp_path / "sam3"
     if files is not None:
         folder.mkdir()

@@ -1,4 +1,4 @@
-"""What moves in a scene is found, and nothing else; labels are clean."""
+"""Segmentation: moving faces are found, still ones are not, and labels are clean."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_a_ball_that_rolls_is_found_and_the_room_rests(rolling):
         assert not rolling.moving(number, mesh)[on_wall].any()
 
 
-def test_a_scene_with_its_faces_inside_out_is_taken_apart_as_well(rolling):
+def test_a_scene_whose_faces_are_inside_out_is_segmented_too(rolling):
     inside_out = [Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1])) for mesh in ROLLING]
     found = segment(MeshList(tuple(inside_out)), SEGMENT)
     assert min(overlaps(inside_out, found)) > 0.9
@@ -54,7 +54,7 @@ def test_frames_that_were_not_looked_at_are_labelled_as_well():
     assert min(overlaps(ROLLING, few)) > 0.3
 
 
-def test_who_is_there_only_between_the_frames_looked_at_moves():
+def test_a_body_present_only_between_inspected_frames_moves():
     """A ball that comes after a look and is gone before the next; but for its foot, two cells above the floor."""
     frames = with_room([NONE] * 4 + [ball(1.2)] * 2 + [NONE])
     found = segment(MeshList(tuple(frames)), replace(SEGMENT, places=PlacesOptions(frames=3)))
@@ -92,12 +92,12 @@ def test_noise_as_high_as_cells_does_not_make_a_room_move(height, least):
         assert not (found.moving(number, mesh) & ~of_body(mesh)).mean() > 0.002
 
 
-def test_somebody_who_stands_and_swings_the_arms_is_found_whole():
+def test_a_standing_person_who_swings_the_arms_is_found_whole():
     frames = with_room([figure(0.5 * t) for t in range(6)])
     assert min(overlaps(frames, segment(MeshList(tuple(frames)), SEGMENT))) > 0.9
 
 
-def test_what_is_smaller_than_the_least_area_is_not_found():
+def test_moving_surface_below_the_least_area_is_not_found():
     frames = with_room([ball(0.5 + 0.25 * t, radius=0.06) for t in range(6)])
     assert not segment(MeshList(tuple(frames)), SEGMENT).chosen.any()
 
@@ -118,7 +118,7 @@ def test_the_same_frames_give_the_same_segmentation(rolling):
     assert again.keys.tobytes() == rolling.keys.tobytes() and again.chosen.tobytes() == rolling.chosen.tobytes()
 
 
-def test_far_away_scenes_are_taken_apart_as_well():
+def test_scenes_far_from_the_origin_are_segmented_too():
     far = [moved(mesh, (1e6, -1e6, 2e6)) for mesh in ROLLING]
     assert min(overlaps(far, segment(MeshList(tuple(far)), SEGMENT))) > 0.9
 
@@ -151,7 +151,7 @@ def area(mesh: Mesh, chosen: np.ndarray) -> dict[int, float]:
     return {int(n): float(face_normals(mesh)[1][chosen][label == n].sum()) for n in np.unique(label)}
 
 
-def test_an_island_takes_the_label_of_what_is_around_it():
+def test_an_island_takes_the_label_of_the_faces_around_it():
     spot = (COLUMN[:, 0] == 4) & (COLUMN[:, 1] == 4)
     assert not without_islands(SHEET, spot, 2e-4).any() and without_islands(SHEET, ~spot, 2e-4).all()
     assert np.array_equal(without_islands(SHEET, spot, 0.5e-4), spot)
@@ -216,7 +216,7 @@ class Right:
         return np.stack([(one.faces >= 0) & (middle[one.faces][..., 0] > 1.2) for one in seen])
 
 
-def test_masks_from_elsewhere_become_labels_and_what_is_not_seen_takes_its_neighbours():
+def test_masks_become_labels_and_unseen_faces_take_those_of_their_neighbours():
     masker = Right()
     found = segment_by(masker, MeshList(tuple(ROLLING[:2])), SEGMENT)
     assert masker.observed == [0, 1]

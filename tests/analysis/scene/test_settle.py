@@ -1,4 +1,4 @@
-"""A box that is carried from one side of a room to the other: what it is before, on the way, and after."""
+"""Changes of a room: a box carried across it is background before, a body on the way, and background after."""
 
 from dataclasses import replace
 
@@ -110,7 +110,7 @@ def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
     assert max(apart(room, np.array([1.2, 0.0, 1.5])) for room in (first, between, last)) < 0.01
 
 
-def test_a_background_that_is_sent_again_where_it_changes_is_whole(scene: MeshList, found: ByPlace) -> None:
+def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: ByPlace) -> None:
     """Who joins then waits for the next whole one, and patches after it count in its faces."""
     gone, came = found.rest.changes
     room = replace(preset_options().background, refresh=gone / 4.0)
@@ -127,7 +127,7 @@ def test_a_background_that_is_sent_again_where_it_changes_is_whole(scene: MeshLi
         assert apart(place.of(mesh), np.array([1.2, 0.0, 1.5])) < 0.01
 
 
-def test_what_comes_to_stand_where_nothing_stood_is_a_background_of_its_own(scene: MeshList) -> None:
+def test_an_object_put_down_where_nothing_stood_becomes_background(scene: MeshList) -> None:
     options = replace(preset_options(quality=30), segment=OPTIONS)
     parts = take_apart(scene, survey(scene), options, Stages(None, FRAMES))
     states = encode_static(replace(parts, background=Mesh.empty()), FRAMES, 4.0, options.background)

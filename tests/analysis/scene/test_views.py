@@ -56,7 +56,7 @@ def test_views_are_in_the_box_and_not_in_solids():
     assert len(place_views([hollow], SMALL)) == 14
 
 
-def test_views_see_what_is_there_at_any_of_the_moments():
+def test_views_see_the_surface_of_all_inspected_frames():
     ball = sphere(0.3)
     moments = MeshList(tuple(together(box((0, 0, 0), (5, 2.5, 4), True), moved(ball, (x, 1, 2))) for x in (1, 2, 4)))
     views = place_views(moments, SMALL)

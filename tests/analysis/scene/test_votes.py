@@ -1,4 +1,4 @@
-"""Votes: what the equations 1 to 4 say, for any masks."""
+"""Votes: equations 1 to 4 hold for any masks."""
 
 from __future__ import annotations
 

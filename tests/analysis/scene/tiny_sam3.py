@@ -1,4 +1,4 @@
-"""A SAM3 video model too small to know anything, made on the spot: random weights, and words that are letters."""
+"""A tiny SAM3 video model for tests, with random weights and single letters as tokens."""
 
 from __future__ import annotations
 

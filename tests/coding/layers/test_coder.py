@@ -214,12 +214,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in WRONG.items() for value in values])
-def test_options_name_what_is_wrong(name: str, value: object) -> None:
+def test_the_error_for_an_invalid_option_names_it(name: str, value: object) -> None:
     with pytest.raises(InputError):
         LayerCodingOptions(**{name: value})
 
 
-def test_the_parts_of_a_payload_are_told_apart() -> None:
+def test_the_bytes_of_a_payload_are_listed_by_purpose() -> None:
     parts = payload_parts(CODED.payload)
     assert list(parts) == ["base mesh", "base motion", "level 1", "level 2", "group head"]
     assert sum(parts.values()) == len(CODED.payload)

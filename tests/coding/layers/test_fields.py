@@ -57,7 +57,7 @@ def test_a_vector_without_direction_is_refused() -> None:
 
 @pytest.mark.parametrize("level", [40, 72, 100])
 @pytest.mark.parametrize("mean", [False, True])
-def test_what_is_decoded_is_what_the_encoder_saw_and_near(level: int, mean: bool) -> None:
+def test_a_field_decodes_to_the_encoders_reconstruction_which_is_near_the_input(level: int, mean: bool) -> None:
     rate, wanted = Rate(level, 0.1), trajectories()
     coded = encode_field(wanted, GRAPH, rate, ROUND if mean else None)
     decoded = decode_field(coded.record, GRAPH, wanted.shape[1], coded.has_mean)

@@ -48,7 +48,7 @@ def test_prediction_in_the_hierarchy_is_better_than_in_any_one_pass_order() -> N
     assert np.abs(errors).mean() < 0.25 * np.abs(values - values.mean(axis=0)).mean()
 
 
-def test_an_affine_field_is_nearly_foretold_inside_a_flat_sheet() -> None:
+def test_an_affine_field_is_predicted_almost_exactly_inside_a_flat_sheet() -> None:
     reference = sheet(levels=0)
     found = hierarchy(reference.mesh)
     plane = reference.mesh.vertices[found.order][:, 0]

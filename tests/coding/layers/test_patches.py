@@ -43,7 +43,7 @@ PAYLOAD = CODED.payload + pack(RECORD)
 
 
 @given(arrays(bool, st.tuples(st.integers(1, 5), st.integers(1, 40))))
-def test_a_mask_is_what_its_runs_say(dropped: np.ndarray) -> None:
+def test_runs_of_a_mask_decode_to_the_mask(dropped: np.ndarray) -> None:
     runs = encode_runs(dropped)
     np.testing.assert_array_equal(decode_runs(runs, *dropped.shape), dropped)
     assert len(runs) == 0 or dropped.any()
@@ -91,7 +91,7 @@ def test_frames_are_shown_without_the_faces_and_with_the_meshes() -> None:
         np.testing.assert_array_equal(frame.vertices[len(plain.vertices) :], DECODED[t].vertices)
 
 
-def test_a_group_that_is_placed_is_what_it_was_and_then_placed() -> None:
+def test_decoding_with_a_placement_equals_placing_the_decoded_group() -> None:
     place = Placement(1.7, (3.0, -0.25, 1e6))
     for payload in (PAYLOAD, CODED.payload):
         for levels in (None, 0, 1, BALL.levels + 1):

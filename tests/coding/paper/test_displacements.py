@@ -74,7 +74,7 @@ def test_equal_fields_give_equal_bytes_and_equal_bytes_equal_fields() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 15, 99])
-def test_basis_size_gives_exactly_so_many_components(count: int) -> None:
+def test_basis_size_is_the_number_of_components(count: int) -> None:
     data = encode_displacements(FIELD, BASE, DisplacementOptions(basis_size=count))
     assert len(layer_sizes(data)) - 1 == min(count, 15)
 
@@ -214,5 +214,5 @@ def test_the_ladder_of_steps_is_exact_and_falls_by_the_eighth_root_of_two() -> N
         assert level_of(step_of(level)) == level
 
 
-def test_the_head_says_what_it_takes() -> None:
+def test_the_head_takes_less_than_half_of_a_payload() -> None:
     assert displacements.layer_sizes(DATA)[0] < len(DATA) / 2

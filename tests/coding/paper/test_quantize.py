@@ -39,7 +39,7 @@ def test_a_dead_zone_rounds_towards_zero() -> None:
 
 
 @pytest.mark.parametrize("value", [2.0**31, -(2.0**40), np.inf, np.nan])
-def test_what_int32_cannot_hold_is_an_input_error(value: float) -> None:
+def test_values_beyond_int32_are_an_input_error(value: float) -> None:
     with pytest.raises(InputError, match="int32"):
         quantize.forward(np.array([[value]]), np.ones(1))
 

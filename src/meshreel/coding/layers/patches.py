@@ -65,7 +65,7 @@ class Patches:
 
 
 def reach(step_level: int, frames: int) -> tuple[float, float]:
-    """Return how far from 0 the meshes of `frames` frames may reach: along x, where they lie in a row, and elsewhere."""
+    """Return how far from 0 the meshes of `frames` frames may reach: along x, where they lie in a row; and in y, z."""
     step = step_of(step_level)
     return (MOST_CELLS // frames // 2 - 0.75) * step, (MOST_CELLS // 2 - 0.75) * step
 
@@ -95,7 +95,7 @@ def decode_patches(record: LayersPatches, frames: int, faces: int) -> Patches:
 
 
 def encode_runs(dropped: Bool[np.ndarray, "T F"]) -> Int32[np.ndarray, " N"]:
-    """Return run lengths of two bit sequences: faces ever dropped or not; then, for those, changed since the last frame.
+    """Return run lengths of two bit sequences: faces ever dropped; then, for these, changes since the previous frame.
 
     Each begins with a run of bits that are not set, the only one that may be empty. No runs if nothing is dropped.
     """
