@@ -37,6 +37,6 @@ def encode_trajectories(
 def decode_trajectories(record: bytes, base: Mesh, frames: int) -> Float64[np.ndarray, "V 3 T"]:
     """Decode the positions of the base's vertices in every frame, as rows.
 
-    `record` is a packed LayersGroup of so many frames. Raises FormatError where it is damaged.
+    `record` is a packed LayersGroup of `frames` frames. Raises FormatError if it is damaged.
     """
     return _core.decode_motion(record, base.vertices, base.faces, frames)
