@@ -1,147 +1,134 @@
-"""The anchors: Draco on every frame, and decimation + Draco on every frame (A2), with free subdivision (A2s).
+"""Draco per frame, as it is or decimated first: anchors A1, A2 and A2s. In -> out: a sequence <-> a .reel file.
 
-Both write .reel files whose groups are single `draco` frames, so their rate counts the same kind of container.
+Every frame is a group of its own, so that the rate counts an index as other codecs' rates do. QEM runs
+scale-normalised and keeps open borders.
 """
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.container.writer import ReelWriter
 from meshreel.decoder.video import open as open_video
+from meshreel.encoder.scene import Static
 from meshreel.encoder.sequence import make_header
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate, decimate_faces
 from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Progress
+from .base import Options, TwoSteps
 
-LARGE = 100_000  # faces; what has more is decimated in two steps: a number of vertices takes some rounds
-ON_THE_WAY = 3  # times the vertices that are wanted, after the first step
+LARGE = 100_000  # faces; a larger mesh is decimated in two steps, as QEM to a number of vertices takes some rounds
+ON_THE_WAY = 3  # vertices after the first step, in those that are wanted
+
+
+class Point(NamedTuple):
+    """How a single frame is coded."""
+
+    qp: int  # bits along the longest side of the frame
+    levels: int = 0  # midpoint subdivisions in the decoder
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
-    """What a file of single frames says of all of them."""
+class DracoCodec(Options):
+    """Draco per frame, compression level 7."""
 
-    frame_rate: float
-    seen: Survey
-    count: int
-
-
-@dataclass(frozen=True, slots=True)
-class DracoCodec:
-    """Draco per frame, compression level 7, `qp` bits along each frame's longest side."""
-
-    qp: int = 10
+    qp: int = 10  # bits along each frame's longest side
 
     def __post_init__(self) -> None:
         check_qp(self.qp)
 
     @property
     def name(self) -> str:
-        """What rows and plots call it."""
+        """The name in rows and plots."""
         return "draco"
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """The operating point, ready for JSON."""
-        return asdict(self)
-
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """A .reel file of single frames."""
+        """Return a .reel file of single frames."""
         seen = survey(sequence)
-        frames = (seen.normalise(frame) for frame in sequence)
-        return _written(frames, Head(sequence.frame_rate, seen, len(sequence)), (self.qp, 0), progress)
+        frames = Frames(sequence.frame_rate, seen, (seen.normalise(frame) for frame in sequence))
+        return write_frames(frames, [Point(self.qp)] * len(sequence), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """The frames, from the bytes alone."""
+        """Return the frames, from the bytes alone."""
         return open_video(data)
 
 
+class Frames(NamedTuple):
+    """Normalised frames of a file."""
+
+    frame_rate: float  # 1/s
+    seen: Survey
+    meshes: Iterable[Mesh]
+
+
 @dataclass(frozen=True, slots=True)
-class Decimated:
-    """A sequence with fewer vertices."""
-
-    head: Head
-    meshes: list[Mesh]  # normalised
-
-
-@dataclass(frozen=True, slots=True)
-class DecimatedDracoCodec:
-    """QEM to `fraction` of the vertices, Draco at `qp` bits, then `levels` midpoint subdivisions in the decoder.
-
-    levels = 0 is anchor A2 and levels = 1 anchor A2s. QEM runs scale-normalised and keeps open borders.
-    """
+class DecimatedDracoCodec(TwoSteps):
+    """QEM to `fraction` of the vertices, Draco, then midpoint subdivision; A2 has no levels, A2s has one."""
 
     fraction: float = 0.25
-    qp: int = 10
-    levels: int = 0
+    qp: int = 10  # bits along each frame's longest side
+    levels: int = 0  # midpoint subdivisions in the decoder
 
     def __post_init__(self) -> None:
         check_point(self.fraction, self.qp, self.levels)
 
     @property
     def name(self) -> str:
-        """What rows and plots call it."""
+        """The name in rows and plots."""
         return "decimated_draco" if self.levels == 0 else "decimated_draco_subdivided"
 
     @property
-    def options(self) -> dict[str, Any]:
-        """The operating point, ready for JSON."""
-        return asdict(self)
-
-    @property
     def analysis_key(self) -> str:
-        """The same for all operating points with as many vertices."""
+        """Equal for operating points of one fraction."""
         return f"decimated to {self.fraction!r}"
 
-    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Decimated:
-        """The decimated frames."""
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Frames:
+        """Return the decimated frames."""
         seen, meshes = survey(sequence), list[Mesh]()
         for frame in sequence:
             meshes.append(decimated(seen.normalise(frame), self.fraction))
             if progress is not None:
                 progress("decimate", len(meshes), len(sequence))
-        return Decimated(Head(sequence.frame_rate, seen, len(sequence)), meshes)
+        return Frames(sequence.frame_rate, seen, meshes)
 
-    def code(self, analysis: Decimated, progress: Progress | None = None) -> bytes:
-        """A .reel file of single frames."""
-        return _written(analysis.meshes, analysis.head, (self.qp, self.levels), progress)
-
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """A .reel file of single frames."""
-        return self.code(self.analyse(sequence, progress), progress)
+    def code(self, analysis: Frames, progress: Progress | None = None) -> bytes:
+        """Return a .reel file of single frames."""
+        points = [Point(self.qp, self.levels)] * len(analysis.seen.diagonals)
+        return write_frames(analysis, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """The frames, from the bytes alone."""
+        """Return the frames, from the bytes alone."""
         return open_video(data)
 
 
 def check_point(fraction: float, qp: int, levels: int) -> None:
+    """Raise InputError where decimated Draco cannot be at this point."""
     check_qp(qp)
     if not 0 < fraction <= 1 or not 0 <= levels <= 4:
         raise InputError(f"fraction {fraction:g}, levels {levels}: give 0 < fraction <= 1, levels 0 to 4")
 
 
 def check_qp(qp: int) -> None:
+    """Raise InputError where Draco's lattice would be too coarse or too fine."""
     if not 2 <= qp <= 20:
         raise InputError(f"qp {qp}: give 2 to 20 bits")
 
 
 def lattice_step(extent: float, qp: int) -> float:
-    """The spacing at which a mesh `extent` wide takes `qp` bits, wherever the lattice's origin lies."""
+    """Return the spacing at which a mesh `extent` wide takes `qp` bits, wherever the lattice's origin lies."""
     return max(extent, 1e-12) / (2**qp - 3)
 
 
 def decimated(mesh: Mesh, fraction: float) -> Mesh:
-    """The mesh with a fraction of its vertices; large ones in two steps."""
+    """Return the mesh with a fraction of its vertices; large meshes take two steps."""
     if fraction == 1 or mesh.is_empty:
         return mesh
     vertices = max(4, round(fraction * len(mesh.vertices)))
@@ -150,21 +137,28 @@ def decimated(mesh: Mesh, fraction: float) -> Mesh:
     return decimate(mesh, vertices)
 
 
-def encode_frame(mesh: Mesh, qp: int, levels: int) -> bytes:
-    """The payload of a frame alone."""
+def encode_frame(mesh: Mesh, point: Point) -> bytes:
+    """Return the payload of a group of one frame."""
     if mesh.is_empty:
         return encode_empty()
     extent = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
-    return encode_intra([mesh], lattice_step(extent, qp), levels)
+    return encode_intra([mesh], lattice_step(extent, point.qp), point.levels)
 
 
-def _written(meshes: Iterable[Mesh], head: Head, point: tuple[int, int], progress: Progress | None) -> bytes:
-    """A .reel file of single normalised frames, at `qp` bits and so many `levels` of subdivision."""
+def write_frames(
+    frames: Frames, points: Sequence[Point], progress: Progress | None, background: Sequence[Static] = ()
+) -> bytes:
+    """Return a .reel file of single frames, each at its point, shown with the state of the background of its time."""
+    states, shown_with = list(background), tuple[int, ...]()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "anchor.reel"
-        with ReelWriter(path, make_header(head.frame_rate, head.seen, {})) as writer:
-            for i, mesh in enumerate(meshes):
-                writer.add_group(i, 1, encode_frame(mesh, *point))
+        with ReelWriter(path, make_header(frames.frame_rate, frames.seen, {})) as writer:
+            for number, (mesh, point) in enumerate(zip(frames.meshes, points, strict=True)):
+                while states and states[0].frame <= number:
+                    state = states.pop(0)
+                    shown_with = (writer.add_static(state.payload, depends_on=shown_with if state.is_patch else ()),)
+                depends_on = () if frames.seen.is_bare(number) else shown_with
+                writer.add_group(number, 1, encode_frame(mesh, point), (), depends_on)
                 if progress is not None:
-                    progress("code", i + 1, head.count)
+                    progress("code", number + 1, len(points))
         return path.read_bytes()

@@ -1,4 +1,4 @@
-"""meshreel itself, through the same door as its users."""
+"""meshreel itself, by the functions that its users call. In -> out: a sequence <-> a .reel file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.job import shared_options
@@ -16,12 +15,13 @@ from meshreel.encoder.sequence import Encoder
 from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Progress
+from .base import TwoSteps
 from .variants import find_variant
 
 
 @dataclass(frozen=True, slots=True)
-class MeshreelCodec:
-    """A preset at a quality; what is None is the preset's own.
+class MeshreelCodec(TwoSteps):
+    """A preset at a quality; options that are None keep the preset's values.
 
     `basis_size` fixes the number of components m; a `variant` (`.variants`) changes one thing of the preset.
     """
@@ -38,36 +38,27 @@ class MeshreelCodec:
 
     @property
     def name(self) -> str:
-        """What rows and plots call it; points with a fixed m or a variant are a curve of their own."""
+        """The name in rows and plots; points with a fixed m or a variant make another curve."""
         changed = "" if self.variant is None else f", {self.variant}"
         return f"meshreel {self.preset}{changed}" + ("" if self.basis_size is None else " m")
 
     @property
-    def options(self) -> dict[str, Any]:
-        """The operating point, ready for JSON."""
-        return asdict(self)
-
-    @property
     def encoder_options(self) -> EncoderOptions:
-        """What the encoder is given."""
+        """Options of the encoder."""
         chosen = {name: value for name, value in asdict(self).items() if value is not None and name != "variant"}
         return find_variant(self.variant)(preset_options(**chosen))
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """The .reel file."""
-        return self.code(self.analyse(sequence, progress), progress)
-
     @property
     def analysis_key(self) -> str:
-        """Of all options that decide what `Encoder.prepare` finds."""
+        """Equal for options with which `Encoder.prepare` finds the same."""
         return analysis_key(self.encoder_options)
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
-        """An encoder that has found what does not depend on the rate."""
+        """Return an encoder that has found what does not depend on the rate."""
         return prepared(sequence, self.encoder_options, progress)
 
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
-        """The .reel file."""
+        """Return the .reel file."""
         analysis.progress = progress
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "video.reel"
@@ -75,17 +66,17 @@ class MeshreelCodec:
             return path.read_bytes()
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """The frames, from the bytes alone."""
+        """Return the frames, from the bytes alone."""
         return open_video(data)
 
 
 def prepared(sequence: MeshSequence, options: EncoderOptions, progress: Progress | None = None) -> Encoder:
-    """An encoder that has found what operating points share."""
+    """Return an encoder that has found what operating points share."""
     encoder = Encoder(sequence, progress=progress)
     encoder.prepare(options)
     return encoder
 
 
 def analysis_key(options: EncoderOptions) -> str:
-    """Equal for options with which `Encoder.prepare` finds the same."""
+    """Return a key that is equal for options with which `Encoder.prepare` finds the same."""
     return repr(shared_options(options))

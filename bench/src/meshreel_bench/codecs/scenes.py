@@ -1,23 +1,17 @@
-"""The anchors of a scene: decimated Draco of the whole of every frame (a), or of what moves beside one background (b).
+"""Anchors of a captured scene with labels: decimated Draco of whole frames (a), or of what moves (b). Frames <-> .reel.
 
-Both write .reel files whose groups are single `draco` frames. That of anchor b has the background before frame 0 and
-the people from then on; its decoder puts them together. QEM keeps open borders.
+Anchor b has the background as its first frame; its decoder puts the parts together. QEM keeps open borders.
 """
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from meshreel.analysis.survey import Survey
-from meshreel.container.writer import ReelWriter
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.sequence import make_header
 from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.topology import concatenate, drop_unreferenced
@@ -25,15 +19,16 @@ from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Progress
 from ..datasets.scenes import TRUE, SceneFrames
-from .draco import check_qp, encode_frame
+from .base import Options
+from .draco import Frames, Point, check_qp, write_frames
 
 
 @dataclass(frozen=True, slots=True)
-class SceneDracoCodec:
-    """Anchor a: every frame of the whole scene with this share of its faces, Draco at `qp` bits."""
+class SceneDracoCodec(Options):
+    """Anchor a: the whole of every frame with a share of its faces."""
 
     share: float = 0.1
-    qp: int = 11
+    qp: int = 11  # bits along the frame's longest side
     levels: int = 0  # midpoint subdivisions in the decoder
 
     def __post_init__(self) -> None:
@@ -42,33 +37,28 @@ class SceneDracoCodec:
 
     @property
     def name(self) -> str:
-        """What rows and plots call it."""
+        """The name in rows and plots."""
         return "a: decimated Draco" + (", subdivided" if self.levels else "")
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """The operating point, ready for JSON."""
-        return asdict(self)
-
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """A .reel file of single frames."""
+        """Return a .reel file of single frames."""
         frames = _scene_frames(sequence)
         meshes = [frames.scene.decimated(number, self.share) for number in frames.numbers]
-        return _encode(frames, meshes, [(self.qp, self.levels)] * len(meshes), progress)
+        return _written(frames.frame_rate, meshes, [Point(self.qp, self.levels)] * len(meshes), progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """The frames, from the bytes alone."""
+        """Return the frames, from the bytes alone."""
         return open_video(data)
 
 
 @dataclass(frozen=True, slots=True)
-class BackgroundDracoCodec:
-    """Anchor b: a background once, fused over time and decimated, and what moves of every frame, decimated."""
+class BackgroundDracoCodec(Options):
+    """Anchor b: a background once, fused over time and decimated, and what moves in every frame, decimated."""
 
     share: float = 0.25  # of the faces that move
-    qp: int = 11
+    qp: int = 11  # bits along the longest side of what moves
     levels: int = 0  # midpoint subdivisions in the decoder, of what moves
-    background_share: float = 0.035  # about as many faces as meshreel's has
+    background_share: float = 0.035  # of its faces: about as many as meshreel's background has
     background_qp: int = 11
     labels: str = TRUE  # which faces move: see SceneData.labels
 
@@ -80,34 +70,28 @@ class BackgroundDracoCodec:
 
     @property
     def name(self) -> str:
-        """What rows and plots call it."""
+        """The name in rows and plots."""
         given = "" if self.labels == TRUE else f", labels {self.labels}"
         return "b: background once, decimated Draco" + (", subdivided" if self.levels else "") + given
 
-    @property
-    def options(self) -> dict[str, Any]:
-        """The operating point, ready for JSON."""
-        return asdict(self)
-
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """A .reel file whose first frame is the background."""
+        """Return a .reel file whose first frame is the background."""
         frames = _scene_frames(sequence)
-        still = frames.scene.background(self.labels)
-        meshes = [decimate_faces(still, max(4, round(self.background_share * len(still.faces))))]
+        meshes = [_with_share(frames.scene.background(self.labels), self.background_share)]
         for number in frames.numbers:
             mesh = frames.scene.meshes[number]
             moving = drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[frames.scene.labels(number, self.labels)]))
-            meshes.append(decimate_faces(moving, max(4, round(self.share * len(moving.faces)))))
-        points = [(self.background_qp, 0), *[(self.qp, self.levels)] * len(frames)]
-        return _encode(frames, meshes, points, progress)
+            meshes.append(_with_share(moving, self.share))
+        points = [Point(self.background_qp), *[Point(self.qp, self.levels)] * len(frames)]
+        return _written(frames.frame_rate, meshes, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """The frames, from the bytes alone."""
+        """Return the frames, from the bytes alone."""
         still, *frames = open_video(data)
         return [concatenate([still, moving]) for moving in frames]
 
     def background_bytes(self, data: bytes) -> int:
-        """How much of the file is the background."""
+        """Return the size of the background in the file."""
         return open_video(data).reader.groups[0].size
 
 
@@ -116,23 +100,18 @@ def _check_share(share: float) -> None:
         raise InputError(f"share {share:g}: give 0 < share <= 1")
 
 
+def _with_share(mesh: Mesh, share: float) -> Mesh:
+    return decimate_faces(mesh, max(4, round(share * len(mesh.faces))))
+
+
 def _scene_frames(sequence: MeshSequence) -> SceneFrames:
     if not isinstance(sequence, SceneFrames):
-        raise InputError("this anchor is for scenes with labels: give frames of `evaluation.scenes`")
+        raise InputError("this anchor is for scenes with labels: give frames of `meshreel_bench.datasets.scenes`")
     return sequence
 
 
-def _encode(
-    frames: SceneFrames, meshes: Sequence[Mesh], points: Iterable[tuple[int, int]], progress: Progress | None
-) -> bytes:
-    """A .reel file of these meshes, each with its bits and subdivisions."""
+def _written(frame_rate: float, meshes: Sequence[Mesh], points: Sequence[Point], progress: Progress | None) -> bytes:
+    """Return a .reel file of meshes in metres."""
     corners = np.concatenate([mesh.vertices for mesh in meshes if not mesh.is_empty])
     seen = Survey(corners.min(axis=0), corners.max(axis=0), tuple(mesh.diagonal for mesh in meshes))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "anchor.reel"
-        with ReelWriter(path, make_header(frames.frame_rate, seen, {})) as writer:
-            for i, (mesh, (qp, levels)) in enumerate(zip(meshes, points, strict=True)):
-                writer.add_group(i, 1, encode_frame(seen.normalise(mesh), qp, levels))
-                if progress is not None:
-                    progress("code", i + 1, len(meshes))
-        return path.read_bytes()
+    return write_frames(Frames(frame_rate, seen, map(seen.normalise, meshes)), points, progress)

@@ -18,15 +18,15 @@ from jaxtyping import Float64, Int32, Int64
 from meshreel.coding.entropy import decode_integers, encode_integers
 from meshreel.errors import FormatError
 
+from .blobs import join, split
 from .grid import OFFSETS, POINTS
-from .wire import Reader, Writer
 
 DEGREE = 8  # of the polynomials, in all three axes together
 ONE = 1 << 12  # what a value of 1 is in a basis; a vector's root mean square is 1
 COEFFICIENT = 1 << 9  # what a coefficient of 1 is
 MOST = 64  # components that were learned
 ENERGY = 1 << 20  # what a mean square of 1 is in the package data
-FILE = "basis.bin"  # package data: energies, mean and components, as `pack` writes them
+FILE = "basis.bin"  # package data: energies, mean and components, as `pack_learned` writes them
 _LARGEST = 1 << 20  # of a coefficient: integers below 2^53 all along
 
 
@@ -81,21 +81,18 @@ def basis_of(symbols: BasisSymbols) -> Basis:
 
 def encode_basis(symbols: BasisSymbols) -> bytes:
     """The classes, then the coefficients."""
-    out = Writer()
-    out.blob(encode_integers(symbols.classes))
-    out.blob(encode_integers(np.concatenate(symbols.coefficients).astype(np.int32)))
-    return bytes(out.data)
+    coefficients = np.concatenate(symbols.coefficients).astype(np.int32)
+    return join([encode_integers(symbols.classes), encode_integers(coefficients)])
 
 
 def decode_basis(data: bytes, count: int) -> BasisSymbols:
     """The basis of `count` vectors. Raises FormatError where the bytes are not one."""
-    read = Reader(data)
-    classes = decode_integers(read.blob(), count)
+    first, second = split(data, 2)
+    classes = decode_integers(first, count)
     if (classes < 0).any() or (classes > 7).any():
         raise FormatError(f"basis: a parity class of {classes.max()} or {classes.min()} is outside of 0 to 7")
     lengths = np.cumsum([len(members(kind)) for kind in [0, *classes.tolist()]])
-    coefficients = decode_integers(read.blob(), int(lengths[-1]))
-    read.end()
+    coefficients = decode_integers(second, int(lengths[-1]))
     if (np.abs(coefficients.astype(np.int64)) > _LARGEST).any():
         raise FormatError("basis: a coefficient is beyond 2^20; the stream is damaged")
     return BasisSymbols(classes, tuple(np.split(coefficients, lengths[:-1])))
@@ -103,15 +100,13 @@ def decode_basis(data: bytes, count: int) -> BasisSymbols:
 
 def learned(count: int) -> tuple[BasisSymbols, Float64[np.ndarray, " M"]]:
     """The first `count` vectors that were learned, and each weight's mean square, voxels squared."""
-    read = Reader((files(__package__) / FILE).read_bytes())
-    energies = decode_integers(read.blob(), MOST) / ENERGY
-    symbols = decode_basis(read.blob(), MOST)
+    first, second = split((files(__package__) / FILE).read_bytes(), 2)
+    energies = decode_integers(first, MOST) / ENERGY
+    symbols = decode_basis(second, MOST)
     return BasisSymbols(symbols.classes[:count], symbols.coefficients[: count + 1]), energies[:count]
 
 
-def pack(symbols: BasisSymbols, energies: Float64[np.ndarray, " M"]) -> bytes:
+def pack_learned(symbols: BasisSymbols, energies: Float64[np.ndarray, " M"]) -> bytes:
     """The package data that `learned` reads."""
-    out = Writer()
-    out.blob(encode_integers(np.maximum(np.rint(energies * ENERGY), 1).astype(np.int32)))
-    out.blob(encode_basis(symbols))
-    return bytes(out.data)
+    integers = np.maximum(np.rint(energies * ENERGY), 1).astype(np.int32)
+    return join([encode_integers(integers), encode_basis(symbols)])

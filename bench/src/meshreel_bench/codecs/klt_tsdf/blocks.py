@@ -6,21 +6,40 @@ All by the product's adaptive range coder with contexts from neighbours that are
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Bool, Int32, Int64
 
 from meshreel.coding.entropy import Neighbours, check_plausible, decode_weights, encode_weights
 from meshreel.errors import FormatError, InputError
+from meshreel.format.kinds import Array, Rest, Varint
+from meshreel.format.records import pack, unpack, unpack_all
 
+from .blobs import join, split
 from .grid import block_keys
-from .wire import Reader, Writer
 
 MOST_BLOCKS = 1 << 15  # of a frame
 MOST_PLACES = 1 << 19  # of a group's box: 1024 cells along its diagonal need no more
 MOST_SYMBOLS = 1 << 26  # of a group
 FARTHEST = 1 << 15  # blocks from the origin
 _AROUND = np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if (x, y, z) < (0, 0, 0)])
+
+
+@dataclass(frozen=True, slots=True)
+class Total:
+    """Size of a group; a Box follows where it is not 0."""
+
+    blocks: Annotated[int, Varint(), "of all frames"]
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """The box around the blocks of a group, and which of its places they are."""
+
+    corners: Annotated[tuple[int, ...], Array(6, Varint()), "lowest place, 2n or -2n - 1, and length, by axis"]
+    streams: Annotated[bytes, Rest(), "a blob per frame: a bit per place"]
 
 
 def neighbours(frames: Sequence[Int64[np.ndarray, "_ 3"]], reach: int = 3) -> Neighbours:
@@ -50,66 +69,57 @@ def encode_places(frames: Sequence[Int64[np.ndarray, "_ 3"]]) -> bytes:
 
     Raises InputError where there are more blocks, or places, than a decoder takes.
     """
-    out, every = Writer(), np.concatenate(frames)
+    every = np.concatenate(frames)
     fullest = max(len(places) for places in frames)
-    out.number(len(every))
     if len(every) == 0:
-        return bytes(out.data)
+        return pack(Total(0))
     low, shape = every.min(axis=0), np.ptp(every, axis=0) + 1
     if fullest > MOST_BLOCKS or shape.prod() > MOST_PLACES or np.abs(every).max() >= FARTHEST:
         raise InputError(
             f"{fullest} blocks in a box of {shape.prod()}: over {MOST_BLOCKS} or too far; give fewer cells"
         )
-    for axis in range(3):
-        out.integer(int(low[axis]))
-        out.number(int(shape[axis]))
     bits = np.zeros((int(shape.prod()), len(frames)), np.int32)
     for column, places in enumerate(frames):
         bits[np.ravel_multi_index(tuple((places - low).T), tuple(shape)), column] = 1
-    for stream in encode_weights(bits, neighbours([_box(shape)])):
-        out.blob(stream)
-    return bytes(out.data)
+    streams = join(encode_weights(bits, neighbours([_box(shape)])))
+    corners = np.stack([np.where(low < 0, -2 * low - 1, 2 * low), shape], axis=1)
+    return pack(Total(len(every))) + pack(Box(tuple(corners.reshape(-1).tolist()), streams))
 
 
 def decode_places(data: bytes, count: int) -> list[Int64[np.ndarray, "_ 3"]]:
     """The blocks of `count` frames. Raises FormatError where the bytes are damaged."""
-    read = Reader(data)
-    total = read.number(MOST_BLOCKS * count)
-    if total == 0:
-        read.end()
+    head, offset = unpack(Total, data)
+    if head.blocks == 0 and offset == len(data):
         return [np.zeros((0, 3), np.int64)] * count
-    pairs = [(read.integer(FARTHEST), read.number(2 * FARTHEST)) for _ in range(3)]
-    low, shape = np.array([a for a, _ in pairs]), np.array([b for _, b in pairs])
+    record = unpack_all(Box, data[offset:])
+    if max(record.corners) > 2 * FARTHEST:
+        raise FormatError(f"a box of {record.corners}, over {FARTHEST} blocks away; the stream is damaged")
+    zigzag, shape = np.array(record.corners).reshape(3, 2).T
+    low = np.where(zigzag % 2, -(zigzag + 1) // 2, zigzag // 2)
     if not 0 < shape.prod() <= MOST_PLACES:
         raise FormatError(f"a box of {shape.tolist()} blocks; the stream is damaged")
-    streams = [read.blob() for _ in range(count)]
-    read.end()
+    streams = split(record.streams, count)
     for stream in streams:
         check_plausible(int(shape.prod()), len(stream), "places")
     box = _box(shape)
     bits = decode_weights(streams, len(box), neighbours([box])) == 1
     frames = [box[bits[:, column]] + low for column in range(count)]
-    if sum(map(len, frames)) != total or max(map(len, frames)) > MOST_BLOCKS:
-        raise FormatError(f"{sum(map(len, frames))} blocks, not {total}; the stream is damaged")
+    if sum(map(len, frames)) != head.blocks or max(map(len, frames)) > MOST_BLOCKS:
+        raise FormatError(f"{sum(map(len, frames))} blocks, not {head.blocks}; the stream is damaged")
     return frames
 
 
 def encode_symbols(symbols: Int32[np.ndarray, "B M"], frames: Sequence[Int64[np.ndarray, "_ 3"]]) -> bytes:
     """The symbols of all blocks of a group, a stream for each component."""
-    out = Writer()
-    if len(symbols):
-        for stream in encode_weights(symbols, neighbours(frames, 1)):
-            out.blob(stream)
-    return bytes(out.data)
+    return join(encode_weights(symbols, neighbours(frames, 1))) if len(symbols) else b""
 
 
 def decode_symbols(data: bytes, frames: Sequence[Int64[np.ndarray, "_ 3"]], width: int) -> Int32[np.ndarray, "B M"]:
     """The symbols of `width` components. Raises FormatError where the bytes are damaged."""
-    read, count = Reader(data), sum(map(len, frames))
+    count = sum(map(len, frames))
     if count * width > MOST_SYMBOLS:
         raise FormatError(f"{count} blocks of {width} components: over {MOST_SYMBOLS} symbols; the stream is damaged")
-    streams = [read.blob() for _ in range(width)] if count else []
-    read.end()
+    streams = split(data, width if count else 0)
     if not count:
         return np.zeros((0, width), np.int32)
     return decode_weights(streams, count, neighbours(frames, 1))

@@ -6,27 +6,45 @@ import operator
 import zlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jaxtyping import Float64
 
 from meshreel.analysis.survey import survey
 from meshreel.errors import FormatError, InputError
+from meshreel.format.kinds import F64, Array, Blob, Bytes, Rest, Varint
+from meshreel.format.records import pack, unpack_all
 from meshreel.types import Mesh, MeshSequence
 
 from ...codec import Progress
 from .basis import MOST, basis_of, decode_basis, encode_basis, learned
+from .blobs import join, split
 from .frames import Group, decode_frame, decode_group, encode_group
 from .weights import STEP_ONE, TRUNCATION, Model
-from .wire import Reader, Writer
 
 MAGIC = b"KLTT"
 VERSION = 1
-PLACES = ("stream", "codec")  # where the basis is
 MOST_FRAMES = 1 << 20
-MOST_ROUNDS = 32
+MOST_GROUP = 64  # frames
 MOST_STEP = STEP_ONE * 3
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A sequence; its CRC-32 follows as four bytes, little-endian."""
+
+    magic: Annotated[bytes, Bytes(4), "KLTT"]
+    version: Annotated[int, Varint(), "1"]
+    frames: Annotated[int, Varint(), "of the sequence, above 0"]
+    group: Annotated[int, Varint(), "frames of a group, the last one's aside"]
+    basis: Annotated[int, Varint(), "number of components"]
+    step: Annotated[int, Varint(), "of the weights, in units of 1 / STEP_ONE voxels"]
+    deblocking: Annotated[int, Varint(), "0"]
+    voxel: Annotated[float, F64, "m"]
+    low: Annotated[tuple[float, ...], Array(3, F64), "m, where the grid begins"]
+    table: Annotated[bytes, Blob(Varint()), "the basis"]
+    groups: Annotated[bytes, Rest(), "a blob per group"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +55,6 @@ class KltTsdfCodec:
     basis: int = 32  # principal components kept
     step: float = 0.05  # of the weights' quantiser, in truncations (3 voxels) of root mean square over a block
     group: int = 10  # frames that share the entropy coder's adaptive models
-    deblocking: int = 0  # rounds of the decoder's deblocking
-    basis_in: str = "stream"  # or "codec": a table of every decoder, and not in the rate
 
     def __post_init__(self) -> None:
         """Refuses what cannot be coded."""
@@ -48,17 +64,13 @@ class KltTsdfCodec:
             raise InputError(f"basis {self.basis}: give 1 to {MOST} components")
         if not 0.0005 <= self.step <= 1:
             raise InputError(f"step {self.step:g}: give 0.0005 to 1 truncations")
-        if not 1 <= self.group <= 64:
-            raise InputError(f"group {self.group}: give 1 to 64 frames")
-        if not 0 <= self.deblocking <= MOST_ROUNDS:
-            raise InputError(f"deblocking {self.deblocking}: give 0 to {MOST_ROUNDS} rounds")
-        if self.basis_in not in PLACES:
-            raise InputError(f"basis_in {self.basis_in!r}: give one of {', '.join(PLACES)}")
+        if not 1 <= self.group <= MOST_GROUP:
+            raise InputError(f"group {self.group}: give 1 to {MOST_GROUP} frames")
 
     @property
     def name(self) -> str:
         """What rows and plots call it."""
-        return "klt_tsdf" if self.basis_in == "stream" else "klt_tsdf, table not counted"
+        return "klt_tsdf"
 
     @property
     def options(self) -> dict[str, Any]:
@@ -70,21 +82,29 @@ class KltTsdfCodec:
         seen = survey(sequence)
         voxel = seen.diagonal / self.cells
         symbols, energies = learned(self.basis)
-        model = Model(basis_of(symbols), max(round(self.step * TRUNCATION * STEP_ONE), 1), self.deblocking)
-        out = Writer(bytearray(MAGIC))
-        out.number(VERSION)
-        for number in (len(sequence), self.group, self.basis, model.step, model.deblocking):
-            out.number(number)
-        for value in (voxel, *seen.low):
-            out.real(float(value))
-        out.blob(encode_basis(symbols) if self.basis_in == "stream" else b"")
+        model = Model(basis_of(symbols), max(round(self.step * TRUNCATION * STEP_ONE), 1))
+        groups = list[bytes]()
         for start in range(0, len(sequence), self.group):
             numbers = range(start, min(start + self.group, len(sequence)))
             meshes = (_reported(_scaled(sequence[n], seen.low, voxel), n, len(sequence), progress) for n in numbers)
-            out.blob(encode_group(meshes, model, energies))
+            groups.append(encode_group(meshes, model, energies))
         if progress is not None:
             progress("code", len(sequence), len(sequence))
-        return bytes(out.data) + zlib.crc32(out.data).to_bytes(4, "little")
+        stream = Stream(
+            magic=MAGIC,
+            version=VERSION,
+            frames=len(sequence),
+            group=self.group,
+            basis=self.basis,
+            step=model.step,
+            deblocking=0,
+            voxel=voxel,
+            low=tuple(map(float, seen.low)),
+            table=encode_basis(symbols),
+            groups=join(groups),
+        )
+        data = pack(stream)
+        return data + zlib.crc32(data).to_bytes(4, "little")
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """The frames, from the bytes alone; a group is decoded when one of its frames is asked for."""
@@ -104,28 +124,25 @@ def _reported(mesh: Mesh, number: int, total: int, progress: Progress | None) ->
 
 @dataclass(slots=True)
 class Video(Sequence[Mesh]):
-    """The frames of a stream; the group that was asked for last is kept."""
+    """The frames of a stream; the group of the last one is kept."""
 
-    frames: int
-    group: int
-    voxel: float  # m
-    low: Float64[np.ndarray, " 3"]  # m, where the grid begins
+    stream: Stream
     model: Model
     groups: list[bytes]
     _last: tuple[int, Group] | None = field(default=None)
 
     def __len__(self) -> int:
-        return self.frames
+        return self.stream.frames
 
     def __getitem__(self, index: int) -> Mesh:  # type: ignore[override]
-        """A frame, m. Raises FormatError where its bytes are damaged."""
-        number = range(self.frames)[operator.index(index)]
-        which, inside = divmod(number, self.group)
+        """Return a frame, m. Raises FormatError where its bytes are damaged."""
+        number = range(len(self))[operator.index(index)]
+        which, inside = divmod(number, self.stream.group)
         if self._last is None or self._last[0] != which:
-            count = min(self.group, self.frames - which * self.group)
-            self._last = which, decode_group(self.groups[which], count, self.model.basis.vectors.shape[1])
+            count = min(self.stream.group, len(self) - which * self.stream.group)
+            self._last = which, decode_group(self.groups[which], count, self.stream.basis)
         mesh = decode_frame(self._last[1], inside, self.model)
-        return Mesh.of(mesh.vertices * self.voxel + self.low, mesh.faces)
+        return Mesh.of(mesh.vertices * self.stream.voxel + self.stream.low, mesh.faces)
 
 
 def open_video(data: bytes) -> Video:
@@ -134,16 +151,14 @@ def open_video(data: bytes) -> Video:
         raise FormatError(f"begins with {data[:4]!r}, not {MAGIC!r}: no stream of klt_tsdf")
     if zlib.crc32(data[:-4]).to_bytes(4, "little") != data[-4:]:
         raise FormatError(f"checksum of {len(data)} bytes is wrong; the stream is damaged")
-    read = Reader(data[4:-4])
-    if (version := read.number(1 << 20)) != VERSION:
-        raise FormatError(f"version {version} of klt_tsdf; this one reads {VERSION}")
-    most = (MOST_FRAMES, 64, MOST, MOST_STEP, MOST_ROUNDS)
-    frames, group, width, step, rounds = (read.number(bound) for bound in most)
-    voxel, *low = (read.real() for _ in range(4))
-    if not (frames and group and width and step and 1e-12 < voxel < 1e12 and np.abs(low).max() < 1e18):
-        raise FormatError(f"{frames} frames in groups of {group}, {width} components, voxels of {voxel:g} m: damaged")
-    table = read.blob()
-    symbols = decode_basis(table, width) if table else learned(width)[0]
-    groups = [read.blob() for _ in range(-(-frames // group))]
-    read.end()
-    return Video(frames, group, voxel, np.array(low), Model(basis_of(symbols), step, rounds), groups)
+    stream = unpack_all(Stream, data[:-4])
+    if stream.version != VERSION:
+        raise FormatError(f"version {stream.version} of klt_tsdf; this one reads {VERSION}")
+    for name, most in (("frames", MOST_FRAMES), ("group", MOST_GROUP), ("basis", MOST), ("step", MOST_STEP)):
+        if not 0 < (value := getattr(stream, name)) <= most:
+            raise FormatError(f"{name} {value} is not 1 to {most}; the stream is damaged")
+    if stream.deblocking or not (1e-12 < stream.voxel < 1e12 and max(map(abs, stream.low)) < 1e18):
+        raise FormatError(f"voxels of {stream.voxel:g} m, deblocking {stream.deblocking}; the stream is damaged")
+    symbols = decode_basis(stream.table, stream.basis)
+    groups = split(stream.groups, -(-stream.frames // stream.group))
+    return Video(stream, Model(basis_of(symbols), stream.step), groups)

@@ -11,17 +11,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
+from jaxtyping import Float64, Int32, Int64
 
 from meshreel.errors import FormatError, InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.types import Mesh
 
+from .blobs import join, split
 from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols
 from .grid import SIDE, block_keys, prepared, sample
 from .surface import Field, cells_of, count_crossed, crossed, field_of, polygonize, without
 from .weights import Model, forward
-from .wire import Reader, Writer
 
 _FAR = 1.5  # voxels from the surface beyond which decoded surface is left out
 _PAST = 0.5  # voxels past a border
@@ -53,21 +53,15 @@ def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndar
         if (count := count_crossed(field)) > MOST_CROSSED:
             raise InputError(f"surface in {count} cells of a frame, over {MOST_CROSSED}; give fewer cells")
         group.omitted.append(_encode_omitted(mesh, field))
-    out = Writer()
-    out.blob(encode_places(group.places))
-    out.blob(encode_symbols(np.concatenate(group.symbols), group.places))
-    for data in group.omitted:
-        out.blob(data)
-    return bytes(out.data)
+    coded = encode_symbols(np.concatenate(group.symbols), group.places)
+    return join([encode_places(group.places), coded, *group.omitted])
 
 
 def decode_group(data: bytes, count: int, width: int) -> Group:
     """The group of `count` frames. Raises FormatError where the bytes are damaged."""
-    read = Reader(data)
-    places = decode_places(read.blob(), count)
-    symbols = decode_symbols(read.blob(), places, width)
-    omitted = [read.blob() for _ in range(count)]
-    read.end()
+    first, second, *omitted = split(data, 2 + count)
+    places = decode_places(first, count)
+    symbols = decode_symbols(second, places, width)
     return Group(places, np.split(symbols, np.cumsum([len(p) for p in places])[:-1]), omitted)
 
 
@@ -91,21 +85,17 @@ def _encode_omitted(mesh: Mesh, field: Field) -> bytes:
     chosen[owners[np.isin(block_keys(every), cells)]] = True
     if not chosen.any():
         return b""
-    out, seen = Writer(), every[chosen[owners]]
-    out.blob(encode_bits(chosen, field.places))
-    out.blob(encode_bits(np.isin(block_keys(seen), cells), seen))
-    return bytes(out.data)
+    seen = every[chosen[owners]]
+    return join([encode_bits(chosen, field.places), encode_bits(np.isin(block_keys(seen), cells), seen)])
 
 
 def _decode_omitted(data: bytes, field: Field) -> Int64[np.ndarray, "C 3"]:
     """The cells that are left out."""
     if not data:
         return np.zeros((0, 3), np.int64)
-    read = Reader(data)
-    cells = crossed(field, decode_bits(read.blob(), field.places))
-    bits: Bool[np.ndarray, " C"] = decode_bits(read.blob(), cells)
-    read.end()
-    return cells[bits]
+    first, second = split(data, 2)
+    cells = crossed(field, decode_bits(first, field.places))
+    return cells[decode_bits(second, cells)]
 
 
 def _wrong(mesh: Mesh, decoded: Mesh) -> Int64[np.ndarray, " C"]:

@@ -1,8 +1,7 @@
 """The decoder's distances and their zero level. In -> out: blocks and symbols -> a mesh in voxel units.
 
-Where blocks share voxels their mean is taken; before, they may be made to agree there, each weight within what its
-symbol leaves open (the variational deblocking of Tang et al. 2018). Marching cubes run over the cells of these blocks
-alone. All up to the signs is in integers, so encoder and decoder see the same cells crossed on every platform.
+Voxels that blocks share get the mean of their values. Marching cubes run over the cells of these blocks alone. All up
+to the signs is in integers, so encoder and decoder see the same cells crossed on every platform.
 """
 
 from __future__ import annotations
@@ -18,16 +17,12 @@ from meshreel.geometry.voxels import distinct
 from meshreel.types import Mesh
 
 from .basis import ONE
-from .grid import POINTS, SIDE, VOLUME, block_keys, places_of, voxel_index
+from .grid import POINTS, SIDE, block_keys, places_of, voxel_index
 from .weights import LARGEST, STEP_ONE, Model, distances
 
 _SURE = 3 * ONE * STEP_ONE  # three voxels: what is farther has no more of a vote
 _BARELY = ONE * STEP_ONE // 64
 _NEAR = ONE * STEP_ONE  # a voxel: what is farther from the zero level shows nowhere
-_DOWN = 1 << 10  # distances in the deblocking are in units of 2^-14 voxels
-_GRADIENT = 1 << 23  # 729 x 2^14, and a step of 1.4 beyond the descent's
-_CLAMP = 1 << 24
-_SHARED = (np.indices((POINTS,) * 3) % SIDE == 0).any(axis=0).reshape(-1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,28 +38,9 @@ class Field:
 def field_of(places: Int64[np.ndarray, "B 3"], symbols: Int32[np.ndarray, "B M"], model: Model) -> Field:
     """The distances that the symbols of some blocks stand for."""
     keys, index = voxel_index(places)
-    middle = np.clip(symbols.astype(np.float64) * model.step, -LARGEST, LARGEST)
-    weights = middle
-    for _ in range(model.deblocking if len(places) else 0):
-        weights = agreed(weights, middle, index, model)
+    weights = np.clip(symbols.astype(np.float64) * model.step, -LARGEST, LARGEST)
     values = _mean(distances(weights, model.basis), index, len(keys))
     return Field(places, keys, index, _closed(places, keys, np.where(values == 0, 1.0, values)))
-
-
-def agreed(
-    weights: Float64[np.ndarray, "B M"],
-    middle: Float64[np.ndarray, "B M"],
-    index: Int64[np.ndarray, "B N"],
-    model: Model,
-) -> Float64[np.ndarray, "B M"]:
-    """The weights a step of gradient descent nearer to agreement, within half a step of the middle."""
-    values = distances(weights, model.basis)
-    means = _mean(values, index, int(index.max()) + 1)
-    seen = _SHARED & (np.abs(means) <= _NEAR)[index]
-    apart = np.where(seen, np.floor((values - means[index]) / _DOWN), 0.0)
-    gradient = np.clip(apart, -_CLAMP, _CLAMP) @ model.basis.vectors
-    half = model.step // 2
-    return np.clip(weights - np.floor(gradient / _GRADIENT + 0.5), middle - half, middle + half)
 
 
 def _mean(values: Float64[np.ndarray, "B N"], index: Int64[np.ndarray, "B N"], count: int) -> Float64[np.ndarray, " U"]:
@@ -155,6 +131,3 @@ def without(mesh: Mesh, cells: Int64[np.ndarray, "C 3"]) -> Mesh:
     if len(cells) == 0:
         return mesh
     return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[~np.isin(cells_of(mesh), block_keys(cells))]))
-
-
-assert len(_SHARED) == VOLUME

@@ -20,7 +20,7 @@ from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sof
 from meshreel.geometry.topology import subdivide_midpoint, vertex_normals
 from meshreel.types import Mesh
 
-from .basis import COEFFICIENT, MOST, ONE, BasisSymbols, degrees, members, pack, polynomials
+from .basis import COEFFICIENT, MOST, ONE, BasisSymbols, degrees, members, pack_learned, polynomials
 from .grid import Blocks, prepared, sample
 from .weights import beyond, trust
 
@@ -37,7 +37,7 @@ def train() -> bytes:
     found = [_some(sample(mesh), generator) for mesh in meshes(generator)]
     values = np.concatenate([blocks.values for blocks in found])
     weights = np.concatenate([trust(blocks) for blocks in found])
-    return pack(*_symbols(*_moments(values, weights)))
+    return pack_learned(*_symbols(*_moments(values, weights)))
 
 
 def meshes(generator: np.random.Generator) -> Iterator[Mesh]:

@@ -30,7 +30,6 @@ class Model:
 
     basis: Basis
     step: int  # of the weights, in units of 1 / STEP_ONE voxels
-    deblocking: int = 0  # rounds
 
 
 def trust(blocks: Blocks) -> Float64[np.ndarray, "B N"]:
