@@ -111,12 +111,12 @@ class Video(Sequence[Mesh]):
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """What the encoder recorded in the file, such as preset and quality; decoding does not need it."""
+        """Values that the encoder recorded, such as preset and quality; decoding does not need them."""
         return self.reader.metadata
 
     @property
     def up(self) -> Up:
-        """The axis that points up: y, z, -y or -z; y if the file does not name one."""
+        """Axis that points up: y, z, -y or -z; y if the file does not name one."""
         return self.reader.up
 
     def __len__(self) -> int:
