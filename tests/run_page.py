@@ -42,6 +42,7 @@ def small(preset_options: Any) -> Any:
     from meshreel.analysis.reference.extraction import ReferenceOptions
     from meshreel.analysis.reference.track import TrackOptions
     from meshreel.encoder.draco import IntraOptions
+    from meshreel.encoder.options import PaperOptions
 
     def options(*arguments: Any, **named: Any) -> Any:
         reference = ReferenceOptions(vertices=300, keys=1, trial_vertices=300)
@@ -49,7 +50,9 @@ def small(preset_options: Any) -> Any:
         reference = replace(reference, fuse=replace(reference.fuse, subdivisions=0, poisson=poisson))
         intra = IntraOptions(fractions=(0.5, 1.0), steps=(1.0,), levels=(0,))
         track = TrackOptions(centers=100, samples=5000)
-        return replace(preset_options(*arguments, **named), track=track, reference=reference, intra=intra)
+        made = preset_options(*arguments, **named)
+        paper = {"track": track, "reference": reference} if isinstance(made.method, PaperOptions) else {}
+        return replace(made, method=replace(made.method, intra=intra, **paper))
 
     return options
 

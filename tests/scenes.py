@@ -12,7 +12,7 @@ from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.places import PlacesOptions
 from meshreel.analysis.scene.segmentation import SegmentOptions
 from meshreel.analysis.scene.views import ViewsOptions
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.options import EncoderOptions, SceneOptions
 from meshreel.geometry.topology import concatenate, weld
 from meshreel.types import Mesh
 
@@ -76,7 +76,7 @@ def overlap(found: np.ndarray, wanted: np.ndarray) -> float:
 
 def quick_scene(preset: str = "best", **options: float) -> EncoderOptions:
     """Options that are quick on these scenes."""
-    return replace(quick(preset, **options), segment=SEGMENT, background=BackgroundOptions(frames=4))
+    return replace(quick(preset, **options), scene=SceneOptions(SEGMENT, BackgroundOptions(frames=4)))
 
 
 def _capsule(points: np.ndarray, start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:

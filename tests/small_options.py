@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage
+from meshreel.analysis.scene.segmentation import SegmentOptions
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.encoder.draco import IntraOptions
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.options import EncoderOptions, LayersOptions, PaperOptions, SceneOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.target import Fidelity
 
@@ -25,22 +26,28 @@ def quick(
 ) -> EncoderOptions:
     """The preset's options made small; takes what `preset_options` takes."""
     options = preset_options(preset, quality, basis_size, group_size, centers, key_interval)
-    options = replace(options, intra=TRIALS)
-    options = replace(options, segment=replace(options.segment, views=VIEWS))
-    return _quick_best(options) if preset == "best" else _quick_paper(options)
+    method = options.method
+    method = _quick_layers(method) if isinstance(method, LayersOptions) else _quick_paper(method)
+    return replace(options, method=method, scene=SceneOptions(SegmentOptions(views=VIEWS)))
 
 
-def _quick_best(options: EncoderOptions) -> EncoderOptions:
+def with_method(options: EncoderOptions, **changes: object) -> EncoderOptions:
+    """The options with other values of the recipe's own."""
+    return replace(options, method=replace(options.method, **changes))  # type: ignore[arg-type]
+
+
+def _quick_layers(options: LayersOptions) -> LayersOptions:
     coarse = Stage(40, (0.1, 0.06, 0.03), (10.0, 1.0, 0.1))
     fine = Stage(120, (0.024, 0.012), (0.3, 0.1))
     fit = replace(options.fit, gates=(0.024, 0.012), smoothing=(2.0, 0.4))
-    return replace(options, embedded=EmbeddedOptions(coarse, fine, samples=800), fit=fit)
+    return replace(options, embedded=EmbeddedOptions(coarse, fine, samples=800), fit=fit, intra=TRIALS)
 
 
-def _quick_paper(options: EncoderOptions) -> EncoderOptions:
+def _quick_paper(options: PaperOptions) -> PaperOptions:
     fuse = replace(options.reference.fuse, poisson=replace(options.reference.fuse.poisson, depth=6))
     return replace(
         options,
+        intra=TRIALS,
         target=Fidelity(distance=0.003, angle=15.0, worst=0.006),
         track=replace(options.track, centers=min(options.track.centers, 150), samples=3000),
         reference=replace(options.reference, vertices=150, keys=1, trial_depth=5, trial_vertices=150, fuse=fuse),

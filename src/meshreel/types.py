@@ -134,6 +134,7 @@ class MeshList:
 
     meshes: tuple[Mesh, ...]
     frame_rate: float = 30.0  # 1/s
+    up: Up = "y"  # the axis that points up
 
     def __len__(self) -> int:
         return len(self.meshes)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from meshreel.capture.recording import Kept, open_recording
-from meshreel.geometry.depth import SeesDepth
+from meshreel.geometry.derived_sequences import Chosen, captured
 from meshreel.types import Mesh
 from tests.capture import depth_scenes
 from tests.capture.depth_scenes import camera
@@ -58,8 +58,8 @@ def test_depth_pictures_are_given_per_camera_and_none_for_a_missing_one(tmp_path
     folder = depth_scenes.record(tmp_path / "rig", CAMERAS, [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0)])
     (folder / "right" / "depth" / "depth_00001.png").unlink()
     found, _ = open_recording(folder)
-    assert isinstance(found, SeesDepth)
-    both, one = found.pictures(0), found.pictures(1)
+    assert captured(found) is found and Chosen(found, [1]).depth is not None
+    both, one = found.depth[0], found.depth[1]
     assert [picture is not None for picture in both] == [True, True]
     assert one[0] is not None and one[1] is None
     assert np.array_equal(one[0].depth, found.rig.depth(0, 1)) and one[0].unit == CAMERAS[0].depth_unit

@@ -12,24 +12,29 @@ from PIL import Image
 import meshreel
 from meshreel.capture.recording import open_recording
 from meshreel.cli.encode import describe
+from meshreel.encoder.interval import Interval
 from meshreel.encoder.paper import encode_interval
 from meshreel.io.depth_pictures import write_depth
 from meshreel.io.write import write_mesh
 from tests.capture.depth_scenes import camera, measured, record
 from tests.cli.conftest import failed
+from tests.small_options import quick
 from tests.small_scene import scene
 
 pytestmark = pytest.mark.usefixtures("quick_presets", "quick_bodies")
 FRAMES = ("--fps", "10")
+QUICK = quick("paper").method
 
 
 @pytest.fixture
 def quick_bodies(monkeypatch):
     """Bodies coded frame by frame: what is told of a scene does not depend on how its bodies are coded."""
 
-    def frame_by_frame(frames, options, stages):
-        intervals = [frames] if frames[0].is_empty else [[frame] for frame in frames]
-        return [group for interval in intervals for group in encode_interval(interval, options, stages)]
+    def frame_by_frame(interval, options, stages):
+        del options
+        frames = interval.frames
+        alone = [frames] if frames[0].is_empty else [[frame] for frame in frames]
+        return [group for some in alone for group in encode_interval(Interval(some), QUICK, stages)]
 
     monkeypatch.setattr("meshreel.encoder.layers.encode_interval", frame_by_frame)
 

@@ -17,7 +17,7 @@ from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
-from tests.small_options import quick
+from tests.small_options import quick, with_method
 
 OPTIONS = quick(group_size=2, key_interval=0.2)
 BALLS = MeshList(tuple(sliding_sphere(8, step=0.02, levels=4)), frame_rate=20.0)
@@ -27,7 +27,7 @@ BALLS = MeshList(tuple(sliding_sphere(8, step=0.02, levels=4)), frame_rate=20.0)
 def written(tmp_path_factory):
     """Eight frames, a random-access point every four: the file and the summary."""
     path = tmp_path_factory.mktemp("best") / "balls.reel"
-    return path, encode(BALLS, path, OPTIONS)
+    return path, encode(BALLS, path, options=OPTIONS)
 
 
 def test_every_key_interval_has_a_group_that_stands_alone(written):
@@ -44,7 +44,13 @@ def test_an_executor_gives_the_same_bytes(written, tmp_path):
     path, summary = written
     last: dict[str, int] = {}
     with ThreadPoolExecutor(2) as executor:
-        again = encode(BALLS, tmp_path / "b.reel", OPTIONS, executor, lambda s, done, _: last.update({s: done}))
+        again = encode(
+            BALLS,
+            tmp_path / "b.reel",
+            options=OPTIONS,
+            executor=executor,
+            progress=lambda s, done, _: last.update({s: done}),
+        )
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
     assert again == summary
     assert last == {"survey": 8, "code": 8}
@@ -53,7 +59,7 @@ def test_an_executor_gives_the_same_bytes(written, tmp_path):
 def test_processes_give_the_same_bytes(written, tmp_path):
     path, summary = written
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
-        assert encode(BALLS, tmp_path / "b.reel", OPTIONS, executor) == summary
+        assert encode(BALLS, tmp_path / "b.reel", options=OPTIONS, executor=executor) == summary
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
 
 
@@ -70,7 +76,12 @@ def test_no_more_runs_are_read_than_there_are_workers_and_one(tmp_path):
             return future
 
     with Waiting(2) as executor:
-        encode(BALLS, tmp_path / "b.reel", replace(OPTIONS, group_size=1, key_interval=0.05), executor)
+        encode(
+            BALLS,
+            tmp_path / "b.reel",
+            options=with_method(replace(OPTIONS, key_interval=0.05), group_size=1),
+            executor=executor,
+        )
     assert executor.most == 3
 
 
@@ -79,7 +90,7 @@ def test_more_empty_frames_than_a_group_holds_are_more_groups(tmp_path, monkeypa
     told: dict[str, int] = {}
     frames = MeshList((Mesh.empty(),) * 150, frame_rate=30.0)
     options = replace(OPTIONS, key_interval=600.0)
-    summary = encode(frames, tmp_path / "a.reel", options, progress=lambda s, done, _: told.update({s: done}))
+    summary = encode(frames, tmp_path / "a.reel", options=options, progress=lambda s, done, _: told.update({s: done}))
     assert [group.frame_count for group in summary.groups] == [100, 50]
     assert told == {"survey": 150, "code": 150}
     with meshreel.open(tmp_path / "a.reel") as video:
@@ -108,7 +119,7 @@ def test_an_odd_sequence_comes_back_frame_by_frame(tmp_path):
     ball = BALLS[0]
     triangle = Mesh.of([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     frames = (Mesh.empty(), ball, Mesh.of(1e4 * ball.vertices, ball.faces), triangle, Mesh.empty(), Mesh.empty())
-    summary = encode(MeshList(frames), tmp_path / "a.reel", quick())
+    summary = encode(MeshList(frames), tmp_path / "a.reel", options=quick())
     video = meshreel.open(tmp_path / "a.reel")
     assert [mesh.is_empty for mesh in video] == [frame.is_empty for frame in frames]
     assert [group.form for group in summary.groups][-1] == Form.EMPTY
@@ -120,6 +131,6 @@ def test_an_odd_sequence_comes_back_frame_by_frame(tmp_path):
 def test_coordinates_around_a_million_keep_their_millimetres(tmp_path):
     far = np.array([4.5e6, 1.2e2, 5.1e6])
     balls = MeshList(tuple(Mesh.of(ball.vertices + far, ball.faces) for ball in list(BALLS)[:2]))
-    encode(balls, tmp_path / "far.reel", quick())
+    encode(balls, tmp_path / "far.reel", options=quick())
     for ball, found in zip(BALLS, meshreel.open(tmp_path / "far.reel"), strict=False):
         assert surface_errors(ball, Mesh.of(found.vertices - far, found.faces)).symmetric_rms < 0.003

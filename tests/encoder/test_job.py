@@ -10,28 +10,28 @@ from meshreel_bench.codecs.tvmc.tracking import track_sequence
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.encoder import job, paper
 from meshreel.encoder import sequence as encoding
+from meshreel.encoder.interval import Interval
 from meshreel.encoder.job import GroupStore, shared_options
 from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.target import Fidelity
-from meshreel.format.layout import Form
 from meshreel.types import Mesh, MeshList
 from tests.scenes import ball, quick_scene, with_room
-from tests.small_options import quick
+from tests.small_options import quick, with_method
 
 BODY = tuple(soft_bodies(SoftBodiesOptions(frames=4, people=1, spacing=0.04)))
 PAPER = quick("paper", group_size=2)
 
 
 def with_basis(size: int) -> EncoderOptions:
-    return replace(PAPER, displacements=replace(PAPER.displacements, basis_size=size))
+    return with_method(PAPER, displacements=replace(PAPER.method.displacements, basis_size=size))
 
 
 @pytest.fixture
 def looked(monkeypatch):
     """The windows that were looked at, by number of frames."""
     seen, find = list[int](), paper.find_groups
-    monkeypatch.setattr(job, "find_groups", lambda frames, *rest: seen.append(len(frames)) or find(frames, *rest))
+    monkeypatch.setattr(job, "find_groups", lambda some, *rest: seen.append(len(some.frames)) or find(some, *rest))
     return seen
 
 
@@ -43,7 +43,7 @@ def test_a_prepared_encoder_looks_at_each_window_once_and_writes_the_bytes_of_on
     for size in (1, 2):
         prepared.encode(tmp_path / "prepared.reel", with_basis(size))
         assert looked == [2, 2]
-        encode(sequence, tmp_path / "alone.reel", with_basis(size))
+        encode(sequence, tmp_path / "alone.reel", options=with_basis(size))
         assert (tmp_path / "prepared.reel").read_bytes() == (tmp_path / "alone.reel").read_bytes()
         looked[2:] = []
 
@@ -51,28 +51,28 @@ def test_a_prepared_encoder_looks_at_each_window_once_and_writes_the_bytes_of_on
 def test_an_encoder_that_was_prepared_for_other_options_looks_again(looked, tmp_path):
     prepared = Encoder(MeshList(BODY))
     prepared.prepare(PAPER)
-    prepared.encode(tmp_path / "a.reel", replace(PAPER, group_size=4))
+    prepared.encode(tmp_path / "a.reel", with_method(PAPER, group_size=4))
     assert looked == [2, 2, 4]
 
 
 @pytest.mark.parametrize("codec", ["meshreel", "tvmc"])
 def test_the_bodies_of_a_noisy_scene_are_looked_at_once_and_as_noisy_ones(codec, monkeypatch, tmp_path):
     """Whoever codes them: what `prepare` kept is what `encode` asks for."""
-    told, find = list[float](), paper.find_groups
+    noises, find = list[float](), paper.find_groups
     monkeypatch.setattr(
-        job, "find_groups", lambda frames, options, *rest: told.append(options.noise) or find(frames, options, *rest)
+        job, "find_groups", lambda interval, *rest: noises.append(interval.noise) or find(interval, *rest)
     )
     options, rolling = quick_scene("paper", group_size=2), with_room([ball(0.5 + 0.35 * t) for t in range(4)])
     prepared = Encoder(MeshList(tuple(rolling)))
     prepared.prepare(options)
-    looked = len(told)
-    assert looked >= 2 and min(told) > 0
+    looked = len(noises)
+    assert looked >= 2 and min(noises) > 0
     for _ in range(2):
         if codec == "meshreel":
             prepared.encode(tmp_path / "a.reel", options)
         else:
             assert track_sequence(prepared, options).groups
-    assert len(told) == looked
+    assert len(noises) == looked
 
 
 def test_with_workers_nothing_is_looked_at_ahead(looked):
@@ -85,20 +85,22 @@ def test_with_workers_nothing_is_looked_at_ahead(looked):
 
 def test_spans_that_are_kept_are_those_that_are_found():
     store, ball = GroupStore(), list(deforming_sphere(3, levels=2))
-    options = replace(PAPER, target=Fidelity(1e-7, 1.0, 1e-7), groups=replace(PAPER.groups, depth=1))  # never reached
-    store.keep(ball, options)
-    kept, found = store.find(ball, options), paper.find_groups(ball, options)
+    groups = replace(PAPER.method.groups, depth=1)
+    options = replace(PAPER.method, target=Fidelity(1e-7, 1.0, 1e-7), groups=groups)  # never reached
+    store.keep(Interval(ball), options)
+    kept, found = store.find(Interval(ball), options), paper.find_groups(Interval(ball), options)
     assert [len(span.frames) for span in kept] == [len(span.frames) for span in found] and len(kept) > 1
     for ours, theirs in zip(kept, found, strict=True):
         assert all(a is b for a, b in zip(ours.frames, theirs.frames, strict=True))
         assert (ours.fitted is None) == (theirs.fitted is None)
 
 
-@pytest.mark.parametrize("form", [Form.LAPLACIAN, Form.LAYERS])
-def test_what_decides_about_a_rate_alone_is_not_shared(form):
-    options = replace(PAPER, form=form)
-    rates = replace(options, quality=3.0, displacements=replace(options.displacements, step=0.5, basis_size=2))
+@pytest.mark.parametrize("preset", ["paper", "best"])
+def test_what_decides_about_a_rate_alone_is_not_shared(preset):
+    options = quick(preset)
+    displacements = replace(options.method.displacements, step=0.05)
+    rates = with_method(replace(options, quality=3.0), displacements=displacements)
     assert shared_options(rates) == shared_options(options)
-    assert shared_options(replace(options, dynamic_only=True)) != shared_options(options)
-    track = replace(options, track=replace(options.track, centers=7))
-    assert (shared_options(track) == shared_options(options)) == (form == Form.LAYERS)
+    assert shared_options(replace(options, scene=None)) != shared_options(options)
+    fit = with_method(options, fit=replace(options.method.fit, anchor=0.5))
+    assert (shared_options(fit) == shared_options(options)) == (preset == "best")

@@ -14,13 +14,14 @@ from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sli
 from meshreel.coding.group import continue_group
 from meshreel.encoder import layers as layered
 from meshreel.encoder.forms import EncodedGroup
+from meshreel.encoder.interval import Interval
 from meshreel.encoder.layers import encode_interval
 from meshreel.encoder.target import measure
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
 from tests.small_options import quick
 
-OPTIONS = quick(group_size=4)
+OPTIONS = quick(group_size=4).method
 BALL = Mesh.of(sliding_sphere(1, levels=2)[0].vertices / 12**0.5, sliding_sphere(1, levels=2)[0].faces)  # diagonal 1
 FINE = Mesh.of(sliding_sphere(1)[0].vertices / 12**0.5, sliding_sphere(1)[0].faces)  # 258 vertices
 
@@ -46,7 +47,7 @@ def decoded(groups: Sequence[EncodedGroup]) -> list[Mesh]:
 
 def coded(frames: Sequence[Mesh], options=OPTIONS) -> list[EncodedGroup]:
     """The groups, after a look at what holds for all: frames are all there, and qualities are those of the bytes."""
-    groups = list(encode_interval(frames, options))
+    groups = list(encode_interval(Interval(frames), options))
     assert sum(group.frame_count for group in groups) == len(frames)
     assert max(group.frame_count for group in groups) <= options.group_size or groups[0].form == Form.EMPTY
     assert not groups[0].predicted
@@ -67,21 +68,21 @@ def test_one_frame_is_a_group_of_its_own():
 
 
 def test_of_a_body_that_stands_still_all_groups_but_the_first_are_predicted_and_tiny():
-    groups = coded([FINE] * 7, quick(group_size=3))
+    groups = coded([FINE] * 7, quick(group_size=3).method)
     assert [(group.frame_count, group.predicted) for group in groups] == [(3, False), (3, True), (1, True)]
     assert len(groups[-1].payload) < 0.15 * len(groups[0].payload)
     assert max(group.fidelity.distance for group in groups) < 4e-4
 
 
 def test_a_body_that_slides_is_followed_across_groups():
-    groups = coded([moved(FINE, 0.01 * t, 0, 0) for t in range(6)], quick(group_size=3))
+    groups = coded([moved(FINE, 0.01 * t, 0, 0) for t in range(6)], quick(group_size=3).method)
     assert [(group.form, group.predicted) for group in groups] == [(Form.LAYERS, False), (Form.LAYERS, True)]
     assert len(groups[1].payload) < 0.6 * len(groups[0].payload)
 
 
 def test_a_body_that_becomes_another_cuts_the_group_there():
     other = Mesh.of(BALL.vertices * [1.6, 0.3, 0.8] + [0, 0.3, 0], BALL.faces)
-    groups = coded([BALL, BALL, BALL, other, other], quick(group_size=5))
+    groups = coded([BALL, BALL, BALL, other, other], quick(group_size=5).method)
     starts = np.cumsum([0, *(group.frame_count for group in groups)]).tolist()
     assert 3 in starts
     assert max(group.fidelity.worst for group in groups) < 1e-3
@@ -97,7 +98,7 @@ def test_a_frame_is_prepared_once_for_all_that_is_tried_with_it(monkeypatch: pyt
 
     monkeypatch.setattr(layered, "FrameSurface", Counted)
     other = Mesh.of(BALL.vertices * [1.6, 0.3, 0.8] + [0, 0.3, 0], BALL.faces)
-    first = next(encode_interval([BALL, BALL, BALL, other, other], quick(group_size=5)))
+    first = next(encode_interval(Interval([BALL, BALL, BALL, other, other]), quick(group_size=5).method))
     assert first.frame_count < 5 and len(prepared) == 5  # though it is cut, and tried anew
 
 
@@ -179,7 +180,7 @@ class Asked(Sequence[Mesh]):
 
 def test_only_the_frames_of_one_group_are_asked_for_at_a_time():
     frames = Asked([BALL] * 6)
-    groups = encode_interval(frames, replace(OPTIONS, group_size=2))
+    groups = encode_interval(Interval(frames), replace(OPTIONS, group_size=2))
     for number in range(3):
         frames.asked.clear()
         next(groups)
@@ -189,7 +190,9 @@ def test_only_the_frames_of_one_group_are_asked_for_at_a_time():
 def test_the_same_frames_give_the_same_bytes():
     frames = list(deforming_sphere(2, levels=2))
     frames = [Mesh.of(mesh.vertices / 4, mesh.faces) for mesh in frames]
-    assert [list(encode_interval(frames, OPTIONS))] * 2 == [list(encode_interval(frames, OPTIONS)) for _ in range(2)]
+    assert [list(encode_interval(Interval(frames), OPTIONS))] * 2 == [
+        list(encode_interval(Interval(frames), OPTIONS)) for _ in range(2)
+    ]
 
 
 def test_a_body_with_new_connectivity_in_every_frame_is_followed():
@@ -198,5 +201,5 @@ def test_a_body_with_new_connectivity_in_every_frame_is_followed():
     high = np.max([mesh.vertices.max(axis=0) for mesh in meshes], axis=0)
     scale = np.linalg.norm(high - low)
     frames = [Mesh.of((mesh.vertices - (low + high) / 2) / scale, mesh.faces) for mesh in meshes]
-    groups = coded(frames, quick(quality=20))
+    groups = coded(frames, quick(quality=20).method)
     assert max(group.fidelity.worst for group in groups) < 4e-3

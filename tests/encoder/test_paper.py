@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from meshreel.capture.procedural import sliding_sphere
@@ -12,10 +10,9 @@ from meshreel.encoder.draco import IntraOptions, cheapest_intra
 from meshreel.encoder.forms import EncodedGroup, cheaper
 from meshreel.encoder.target import Fidelity
 from meshreel.format.layout import Form
-from tests.small_options import quick
 
 BALLS = list(sliding_sphere(2, levels=1))
-OPTIONS = replace(quick(), intra=IntraOptions(fractions=(1.0,), steps=(0.7,), levels=(0,)))
+OPTIONS = IntraOptions(fractions=(1.0,), steps=(0.7,), levels=(0,))
 ASKED = Fidelity(distance=0.002, angle=30.0, worst=0.004)
 
 
@@ -42,7 +39,7 @@ def test_draco_is_taken_where_it_is_the_better_bargain(monkeypatch, size, distan
 
 
 def test_a_body_of_few_faces_is_left_to_draco():
-    found = cheapest_intra(BALLS, ASKED, 1e6, OPTIONS.intra)
+    found = cheapest_intra(BALLS, ASKED, 1e6, OPTIONS)
     assert found is not None
     payload, fidelity = found
     group = EncodedGroup(Form.LAYERS, 2, bytes(len(payload) * 2 // 3), (), ASKED)

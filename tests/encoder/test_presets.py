@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
-from meshreel.analysis.follow.template import TemplateOptions
-from meshreel.coding.layers.coder import LayerCodingOptions
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.options import EncoderOptions, LayersOptions, PaperOptions
 from meshreel.encoder.presets import PRESETS, displacement_step, preset_options, reference_vertices
 from meshreel.errors import InputError
-from meshreel.format.layout import Form
 
 
-def test_the_default_preset_is_best_and_bare_options_are_those_of_paper():
-    assert preset_options() == preset_options("best", 50.0) != preset_options("paper")
-    assert preset_options("paper") == EncoderOptions()
-
-
-def test_what_only_best_uses_defaults_to_its_values_at_50():
-    best = preset_options("best", 50.0)
-    assert best.layers == LayerCodingOptions()
-    assert best.template.error == pytest.approx(TemplateOptions().error, rel=1e-3)
-    assert best.template.levels == TemplateOptions().levels
+def test_the_default_options_are_those_that_encode_takes_by_default():
+    assert EncoderOptions() == preset_options() == preset_options("best", 50.0)
+    assert preset_options("paper").method == PaperOptions()
 
 
 def test_the_laplacian_form_follows_the_quality_in_every_preset():
     for quality in (0, 25, 50, 100):
-        steps = {preset_options(preset, quality).displacements.step for preset in PRESETS}
+        steps = {preset_options(preset, quality).method.displacements.step for preset in PRESETS}
         assert steps == {displacement_step(quality)}
 
 
@@ -39,7 +28,7 @@ def test_more_quality_means_finer_steps_and_more_vertices():
     vertices = [reference_vertices(q) for q in qualities]
     assert steps == sorted(steps, reverse=True) and vertices == sorted(vertices)
     assert len(set(steps)) == len(set(vertices)) == len(qualities)
-    best = [preset_options("best", q) for q in qualities]
+    best = [preset_options("best", q).method for q in qualities]
     assert all(a.layers.step > b.layers.step and a.template.error > b.template.error for a, b in pairwise(best))
     assert all(a.target.distance > b.target.distance for a, b in pairwise(best))
 
@@ -73,14 +62,8 @@ def test_a_key_interval_out_of_range_is_refused(seconds):
 @pytest.mark.parametrize("keys", [0, -1, 6])
 def test_at_least_one_key_is_tried_and_no_more_than_there_are_places_for(keys):
     with pytest.raises(InputError, match=f"{keys} keys: give 1 to 5"):
-        replace(preset_options(), keys=keys)
-
-
-@pytest.mark.parametrize("form", [Form.DRACO, Form.EMPTY])
-def test_a_form_that_follows_no_template_cannot_be_asked_for(form):
-    with pytest.raises(InputError, match="give LAPLACIAN or LAYERS"):
-        replace(preset_options(), form=form)
+        LayersOptions(keys=keys)
 
 
 def test_many_centers_bring_the_samples_they_need():
-    assert preset_options("paper", centers=20_000).track.samples >= 80_000
+    assert preset_options("paper", centers=20_000).method.track.samples >= 80_000

@@ -10,7 +10,7 @@ import pytest
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.draco import IntraOptions
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.options import EncoderOptions, PaperOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import encode
 from meshreel.geometry.decimate import decimate
@@ -29,10 +29,12 @@ LOOK = ComparisonOptions(views=ParallelViewOptions())  # of 128 x 128 pixels, SS
 
 def quicker(options: EncoderOptions) -> EncoderOptions:
     """Few centers, one key frame and few trials of the per-frame form; nothing that follows the quality is changed."""
-    fuse = replace(options.reference.fuse, poisson=replace(options.reference.fuse.poisson, depth=6))
-    reference = replace(options.reference, keys=1, canonical_keys=1, trial_depth=5, trial_vertices=150, fuse=fuse)
-    track = replace(options.track, centers=150, samples=3000)
-    return replace(options, reference=reference, track=track, intra=IntraOptions(fractions=(0.5, 1.0)))
+    method = replace(options.method, intra=IntraOptions(fractions=(0.5, 1.0)))
+    if isinstance(method, PaperOptions):
+        fuse = replace(method.reference.fuse, poisson=replace(method.reference.fuse.poisson, depth=6))
+        reference = replace(method.reference, keys=1, canonical_keys=1, trial_depth=5, trial_vertices=150, fuse=fuse)
+        method = replace(method, reference=reference, track=replace(method.track, centers=150, samples=3000))
+    return replace(options, method=method)
 
 
 def walker() -> MeshList:
@@ -51,7 +53,7 @@ def test_quality_is_monotone(preset, make, tmp_path):
     body, rows = make(), []
     for quality in QUALITIES:
         path = tmp_path / f"{quality}.reel"
-        size = encode(body, path, quicker(preset_options(preset, quality=quality))).size
+        size = encode(body, path, options=quicker(preset_options(preset, quality))).size
         rows.append({"bytes": size} | compare_sequences(body, open_video(path), LOOK).to_row())
     for (a, low), (b, high) in pairwise(zip(QUALITIES, rows, strict=True)):
         between = f"from quality {a} to {b}"

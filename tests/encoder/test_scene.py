@@ -42,10 +42,15 @@ OPTIONS = quick_scene(group_size=3)
 FAR = np.array([1e6, -1e6, 2e6])
 
 
+def in_scene(options, **changes):
+    """The options with other values of how a scene is segmented."""
+    return replace(options, scene=replace(options.scene, segment=replace(options.scene.segment, **changes)))
+
+
 def encoded(frames, path, options=OPTIONS, rate=30.0, **more):
     """The frames that come back and the summary."""
     sequence = MeshList(tuple(frames), rate)
-    summary = encode(sequence, path, options, **more)
+    summary = encode(sequence, path, options=options, **more)
     video = meshreel.open(path)
     assert len(video) == len(frames) == summary.frame_count and path.stat().st_size == summary.size
     return video, summary
@@ -74,8 +79,9 @@ def assert_rolls(video, offset=(0.0, 0.0, 0.0)):
 def plainly(monkeypatch):
     """Bodies coded frame by frame, where it does not matter how: a fraction of the time."""
 
-    def coded(frames, options, stages=None):
+    def coded(interval, options, stages=None):
         del options, stages
+        frames = interval.frames
         if frames[0].is_empty:
             return [EncodedGroup(Form.EMPTY, len(frames), encode_empty(), (), NO_ERROR)]
         assert not any(mesh.is_empty for mesh in frames)
@@ -138,12 +144,12 @@ def test_a_scene_that_is_encoded_again_is_taken_apart_once(tmp_path, monkeypatch
     encoded(ROLLING, tmp_path / "alone.reel", quick_scene(quality=60), rate=4.0)
     assert (tmp_path / "alone.reel").read_bytes() == (tmp_path / "60.reel").read_bytes()
     other = quick_scene(quality=60)
-    encoder.encode(tmp_path / "other.reel", replace(other, segment=replace(other.segment, threshold=0.4)))
+    encoder.encode(tmp_path / "other.reel", in_scene(other, threshold=0.4))
     assert len(count) == 3
     for _ in range(2):  # cameras of the same numbers, made anew
-        views = scene_views(MeshList(tuple(ROLLING), 4.0), other.segment)
+        views = scene_views(MeshList(tuple(ROLLING), 4.0), other.scene.segment)
         cameras = tuple(replace(view, extrinsic=view.extrinsic.copy()) for view in views)
-        encoder.encode(tmp_path / "given.reel", replace(other, segment=replace(other.segment, cameras=cameras)))
+        encoder.encode(tmp_path / "given.reel", in_scene(other, cameras=cameras))
     assert len(count) == 4
 
 
@@ -156,23 +162,23 @@ def test_preset_paper_has_scenes_too(tmp_path):
 
 @pytest.mark.parametrize("preset", ["paper", "best"])
 def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, monkeypatch, tmp_path):
-    told, coded = [], scene._coded_intervals
-    monkeypatch.setattr(scene, "_coded_intervals", lambda runs, work: told.append(work.options) or coded(runs, work))
+    noises, coded = [], scene._coded_intervals
+    monkeypatch.setattr(
+        scene, "_coded_intervals", lambda some, job: noises.extend(i.noise for i in some) or coded(some, job)
+    )
     video, _ = encoded(ROLLING, tmp_path / "a.reel", quick_scene(preset, group_size=1))
-    assert told
-    for options in told:
-        noise = options.noise * video.reader.header.scale
-        assert 0.5 * NOISE < noise < 3 * NOISE
-        clean = target_of(ROLLING, options.target, 0.0).distance
-        assert target_of(ROLLING, options.target, options.noise).distance == pytest.approx(
-            np.hypot(clean, options.noise)
-        )
+    assert noises
+    target = quick_scene(preset).method.target
+    for noise in noises:
+        assert 0.5 * NOISE < noise * video.reader.header.scale < 3 * NOISE
+        clean = target_of(ROLLING, target, 0.0).distance
+        assert target_of(ROLLING, target, noise).distance == pytest.approx(np.hypot(clean, noise))
 
 
 def test_where_everything_may_move_no_background_is_looked_for(tmp_path, monkeypatch):
     monkeypatch.setattr("meshreel.encoder.sequence.is_scene", None)
     small = [Mesh.of(plane(1.0, 6).vertices, plane(1.0, 6).faces)] * 2
-    options = replace(quick_scene("paper", group_size=1), dynamic_only=True)
+    options = replace(quick_scene("paper", group_size=1), scene=None)
     video, summary = encoded(small, tmp_path / "a.reel", options)
     assert summary.scene is None and not statics(video) and rms(small[1].vertices, video[1]) < 0.01
 
@@ -237,7 +243,7 @@ def test_a_vertex_that_no_face_has_does_not_make_the_scene_larger(tmp_path):
 
 @pytest.mark.usefixtures("plainly")
 def test_the_background_may_be_sent_again(tmp_path):
-    options = replace(OPTIONS, background=BackgroundOptions(frames=4, refresh=0.2))
+    options = replace(OPTIONS, scene=replace(OPTIONS.scene, background=BackgroundOptions(frames=4, refresh=0.2)))
     video, summary = encoded(ROLLING, tmp_path / "a.reel", options, rate=10.0)
     assert len(statics(video)) == 2
     assert_rolls(video)
@@ -378,7 +384,7 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
 @pytest.mark.usefixtures("plainly")
 def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
     sequence = MeshList(tuple(ROLLING))
-    parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS, Stages(None, 4))
+    parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS.scene, Stages(None, 4))
     assert rms(parts.background.vertices, room()) < NOISE
     assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.segmentation.cell == pytest.approx(CELL, rel=0.2)
     number = 2
@@ -408,7 +414,7 @@ def test_still_surface_that_is_in_no_part_of_the_file_is_told(tmp_path):
 def test_a_scene_that_is_not_in_metres_is_refused_with_its_size(tmp_path):
     small = MeshList(tuple(Mesh(mesh.vertices * 1e-3, mesh.faces) for mesh in small_scene.scene(4)), 10.0)
     with pytest.raises(InputError, match=r"frame 0: \d+ of \d+ faces stand still.*is 0\.00\d+ m large.*--scale"):
-        encode(small, tmp_path / "a.reel", quick_scene())
+        encode(small, tmp_path / "a.reel", options=quick_scene())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -416,5 +422,5 @@ def test_a_frame_in_another_unit_is_refused_by_its_number(tmp_path):
     frames = list(small_scene.scene(12))
     frames[2] = Mesh(frames[2].vertices * 1000, frames[2].faces)
     with pytest.raises(InputError, match=r"frame 2 is 3\.\d+e\+03 m large, half of the frames at most 3\.\d+ m; mend"):
-        encode(MeshList(tuple(frames), 10.0), tmp_path / "a.reel", quick_scene())
+        encode(MeshList(tuple(frames), 10.0), tmp_path / "a.reel", options=quick_scene())
     assert list(tmp_path.iterdir()) == []

@@ -19,7 +19,7 @@ from meshreel.format.layout import Form
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh, MeshList
-from tests.small_options import quick
+from tests.small_options import quick, with_method
 
 paper = partial(quick, "paper")
 BODY = SoftBodiesOptions(frames=6, people=1, spacing=0.035)
@@ -31,12 +31,12 @@ def body(tmp_path_factory):
     """A walking body in two groups: the sequence, the file and the summary."""
     sequence = MeshList(tuple(soft_bodies(BODY)))
     path = tmp_path_factory.mktemp("body") / "body.reel"
-    return sequence, path, encode(sequence, path, paper(group_size=3))
+    return sequence, path, encode(sequence, path, options=paper(group_size=3))
 
 
 def decoded(sequence, path, options=None):
     """The frames that come back, each within reach of the original."""
-    summary = encode(sequence, path, options or paper())
+    summary = encode(sequence, path, options=options or paper())
     video = meshreel.open(path)
     assert len(video) == len(sequence) == summary.frame_count
     assert path.stat().st_size == summary.size
@@ -71,7 +71,13 @@ def test_the_same_input_gives_the_same_bytes_with_an_executor_too(body, tmp_path
     sequence, path, _ = body
     stages: list[tuple[str, int, int]] = []
     with ThreadPoolExecutor(2) as executor:
-        encode(sequence, tmp_path / "b.reel", paper(group_size=3), executor, lambda *told: stages.append(told))
+        encode(
+            sequence,
+            tmp_path / "b.reel",
+            options=paper(group_size=3),
+            executor=executor,
+            progress=lambda *done: stages.append(done),
+        )
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
     assert ("survey", 6, 6) in stages and ("code", 6, 6) in stages
 
@@ -79,7 +85,10 @@ def test_the_same_input_gives_the_same_bytes_with_an_executor_too(body, tmp_path
 def test_every_stage_reports_every_frame(tmp_path):
     last: dict[str, int] = {}
     encode(
-        sliding_sphere(2, levels=2), tmp_path / "a.reel", paper(), progress=lambda s, done, _: last.update({s: done})
+        sliding_sphere(2, levels=2),
+        tmp_path / "a.reel",
+        options=paper(),
+        progress=lambda s, done, _: last.update({s: done}),
     )
     assert last == dict.fromkeys(last, 2)
     assert {"survey", "track", "code"} <= set(last)
@@ -87,7 +96,7 @@ def test_every_stage_reports_every_frame(tmp_path):
 
 def test_draco_takes_a_group_that_costs_less_that_way(tmp_path):
     coarse = sliding_sphere(2, levels=1)  # 18 vertices: any reference costs more
-    options = replace(paper(), intra=IntraOptions((1.0,), (2.0, 1.0, 0.7, 0.5), (0,)))
+    options = with_method(paper(), intra=IntraOptions((1.0,), (2.0, 1.0, 0.7, 0.5), (0,)))
     video, summary = decoded(coarse, tmp_path / "a.reel", options)
     assert {group.form for group in summary.groups} == {Form.DRACO}
     assert len(video[0].faces) == len(coarse[0].faces)
@@ -120,14 +129,14 @@ def test_one_frame_is_legal(tmp_path):
 
 
 def test_a_list_of_foreign_meshes_gives_the_bytes_of_the_same_sequence(tmp_path):
-    encode(MeshList((BALL, BALL)), tmp_path / "a.reel", paper())
-    encode([BALL.to_trimesh(), (BALL.vertices, BALL.faces)], tmp_path / "b.reel", paper())
+    encode(MeshList((BALL, BALL)), tmp_path / "a.reel", options=paper())
+    encode([BALL.to_trimesh(), (BALL.vertices, BALL.faces)], tmp_path / "b.reel", options=paper())
     assert (tmp_path / "a.reel").read_bytes() == (tmp_path / "b.reel").read_bytes()
 
 
 def test_no_frames_are_refused(tmp_path):
     with pytest.raises(InputError, match="no frames"):
-        encode(MeshList(()), tmp_path / "a.reel", paper())
+        encode(MeshList(()), tmp_path / "a.reel", options=paper())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -204,7 +213,7 @@ def test_a_coordinate_that_is_not_finite_is_refused_with_its_frame(bad, tmp_path
     vertices = BALL.vertices.copy()
     vertices[3, 1] = bad
     with pytest.raises(InputError, match=r"frame 1: vertex 3 .*finite"):
-        encode(MeshList((BALL, Mesh.of(vertices, BALL.faces))), tmp_path / "a.reel", paper())
+        encode(MeshList((BALL, Mesh.of(vertices, BALL.faces))), tmp_path / "a.reel", options=paper())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -212,15 +221,21 @@ def test_a_coordinate_that_is_not_finite_is_refused_with_its_frame(bad, tmp_path
 def test_a_face_that_names_no_vertex_is_refused_with_its_frame(index, tmp_path):
     with pytest.raises(InputError, match=rf"frame 1: .*vertex {index}"):
         frames = (BALL, Mesh.of(BALL.vertices, [*BALL.faces, [0, 1, index]]))
-        encode(MeshList(frames), tmp_path / "a.reel", paper())
+        encode(MeshList(frames), tmp_path / "a.reel", options=paper())
 
 
 def test_a_bad_file_is_named_with_its_frame_before_anything_is_coded(tmp_path):
     for number, bad in enumerate(("0", "0", "nan")):
         (tmp_path / f"f{number}.obj").write_text(f"v 0 0 {bad}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(InputError, match=r"frame 2 \(.*f2\.obj\)"):
-        encode(open_sequence(tmp_path, SequenceOptions()), tmp_path / "a.reel", paper())
+        encode(open_sequence(tmp_path, SequenceOptions()), tmp_path / "a.reel", options=paper())
     assert not (tmp_path / "a.reel").exists()
+
+
+def test_options_and_a_quality_or_preset_are_one_too_many(tmp_path):
+    for given in ({"quality": 60}, {"preset": "paper"}):
+        with pytest.raises(InputError, match="leave quality and preset out"):
+            encode(MeshList((BALL,)), tmp_path / "a.reel", options=paper(), **given)
 
 
 def test_absurd_options_are_refused():

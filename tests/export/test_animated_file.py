@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -94,9 +93,8 @@ def test_fewer_layers_are_exported_as_they_decode(tmp_path, layers):
 
 
 def test_what_points_up_is_what_the_file_shows(tmp_path):
-    path, options = tmp_path / "a.reel", quick("best")
-    views = replace(options.segment.views, up="-z")
-    encode(MeshList((sphere(),)), path, replace(options, segment=replace(options.segment, views=views)))
+    path = tmp_path / "a.reel"
+    encode(MeshList((sphere(),), up="-z"), path, options=quick("best"))
     video = meshreel.open(path)
     export(video, tmp_path / "told.glb")
     export(video, tmp_path / "given.glb", options=ExportOptions(up="-z"))
@@ -266,7 +264,7 @@ def test_viewers_that_do_not_animate_show_the_first_frame(tmp_path, name):
 def test_a_file_of_one_frame_shows_it(tmp_path, extension):
     mesh = next(mesh for mesh in meshreel.open(GOLDEN / "layers.reel"))
     meshreel.encode(
-        MeshList((Mesh.of(mesh.vertices - mesh.vertices[0], mesh.faces),), 10.0), tmp_path / "a.reel", quick()
+        MeshList((Mesh.of(mesh.vertices - mesh.vertices[0], mesh.faces),), 10.0), tmp_path / "a.reel", options=quick()
     )
     video = meshreel.open(tmp_path / "a.reel")
     assert export(video, tmp_path / f"a.{extension}") == 1

@@ -7,6 +7,7 @@ of a camera that stands still measure mostly the same depths in all frames.
 from __future__ import annotations
 
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from jaxtyping import Float64
 from ..errors import InputError
 from ..geometry.depth import DepthPicture
 from ..io.sequence import SequenceOptions
-from ..types import Mesh, MeshSequence
+from ..types import Mesh, MeshSequence, Up
 from .fusion import FusionOptions, fuse_depths
 from .rig import Rig, read_rig
 
@@ -63,8 +64,25 @@ class Recording(MeshSequence):
             self._kept.put(number, mesh)
         return mesh
 
-    def pictures(self, index: int) -> list[DepthPicture | None]:
-        """Return each camera's depth picture of a frame, None for a camera that lacks the frame (`SeesDepth`)."""
+    @property
+    def up(self) -> Up:
+        """The axis that points up, as the rig is described."""
+        return self.rig.up
+
+    @property
+    def depth(self) -> RigDepth:
+        """The depth pictures that the frames are fused from."""
+        return RigDepth(self.rig, tuple(self.numbers))
+
+
+@dataclass(frozen=True, slots=True)
+class RigDepth:
+    """The depth pictures of some frames of a rig's recording (`geometry.depth.DepthFrames`)."""
+
+    rig: Rig
+    numbers: tuple[int, ...]  # of the frames, in the files' names
+
+    def __getitem__(self, index: int) -> list[DepthPicture | None]:
         frame, files = self.numbers[index], self.rig.files
         cameras = enumerate(self.rig.cameras)
         return [camera.picture(self.rig.depth(k, frame)) if frame in files[k] else None for k, camera in cameras]

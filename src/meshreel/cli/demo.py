@@ -67,7 +67,7 @@ def command(
     file, picture = output / "demo.reel", output / "demo.png"
     with common.stages(frames) as progress, workers(jobs) as executor:
         capture = _captured(output / "rig", room, progress)
-        summary = encode(capture, file, options, executor, progress)
+        summary = encode(capture, file, options=options, executor=executor, progress=progress)
         with open_video(file) as video:
             truth = _judged(output / "rig", capture, video, progress)
             write_sheet(capture, video, picture, SheetOptions(frames=_spread(frames, 3), height=360, unit="mm"))

@@ -14,8 +14,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..analysis.scene.segmentation import SegmentOptions
-from ..encoder.options import EncoderOptions
+from ..encoder.options import EncoderOptions, SceneOptions
 from ..encoder.presets import preset_options
 from ..encoder.quality import Goal, encode_to
 from ..encoder.sequence import Encoder
@@ -90,10 +89,12 @@ class Parting:
         if self.dynamic_only and (self.background_refresh is not None or masking.wanted):
             raise InputError("--dynamic-only looks for no background: leave out --background-refresh, masks and views")
 
-    def options(self, options: EncoderOptions, segment: SegmentOptions) -> EncoderOptions:
-        """Return the options with these flags and the options of the segmentation."""
+    def scene(self, options: SceneOptions, masking: Masking) -> SceneOptions | None:
+        """Return the options of the scene; None for --dynamic-only. Raises InputError for a wrong file of views."""
+        if self.dynamic_only:
+            return None
         background = replace(options.background, refresh=self.background_refresh)
-        return replace(options, background=background, segment=segment, dynamic_only=self.dynamic_only)
+        return replace(options, segment=masking.options(options.segment), background=background)
 
 
 def command(
@@ -129,14 +130,14 @@ def command(
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     parting.check(masking)
     source = open_source(inputs, reading)
-    segment = masking.options(preset_options().segment, source)
+    scene = parting.scene(preset_options().scene or SceneOptions(), masking)
 
     def options_at(quality: float) -> EncoderOptions:
-        return parting.options(coding.options(quality), segment)
+        return replace(coding.options(quality), scene=scene)
 
     goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
-    sequence, masker = source.sequence, masking.masker(len(source.sequence))
+    sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
         encoder = Encoder(sequence, executor, progress, masker)
         if goal is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,18 +14,18 @@ from ..analysis.scene.labelling import Segmentation
 from ..analysis.scene.masks import CAMERAS, Masker
 from ..analysis.scene.pictures import write_views
 from ..analysis.scene.preview import FrameViews, label_colors, look_at_labels, sheet
-from ..analysis.scene.segmentation import scene_views, segment, segment_by
+from ..analysis.scene.segmentation import SegmentOptions, scene_views, segment, segment_by
 from ..encoder.labels import FrameLabels, label_frames
-from ..encoder.options import EncoderOptions
+from ..encoder.options import EncoderOptions, SceneOptions
 from ..encoder.presets import preset_options
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
 from ..io.mask_pictures import is_mask, write_picture
 from ..io.write import frame_names, left_over, make_folder, replacing, write_colored
-from ..types import evenly
+from ..types import MeshSequence, evenly
 from .console import Common
 from .flags import Reading
-from .sources import Masking, Source, open_source
+from .sources import Masking, open_source
 
 COLUMNS = 4  # views in the sheet (guess)
 MOST_PREVIEWS = 16  # frames whose pictures are in memory together (guess)
@@ -64,16 +64,16 @@ def command(
         raise InputError(f"--previews {previews}: give 0 to {MOST_PREVIEWS}")
     if views_only and (masking.masks or masking.sam3):
         raise InputError("--views-only needs no masks; leave out --masks and --sam3")
-    options = preset_options()
     source = open_source(inputs, reading)
-    options = replace(options, segment=masking.options(options.segment, source))
+    scene, sequence = preset_options().scene or SceneOptions(), masking.upright(source)
+    scene = replace(scene, segment=masking.options(scene.segment))
     masker = masking.masker(len(source.sequence))
     left = _left_over(output, len(source.sequence), views_only, previews)
     if views_only:
-        row = _write_views(source, output, options, common)
+        row = _write_views(sequence, output, scene.segment, common)
         text = f"{output}: pictures of {row['frames']} frames from {row['views']} views, and {CAMERAS}"
     else:
-        row = _write_labels(source, masker, output, options, previews, common)
+        row = _write_labels(_Labelling(sequence, masker, scene), output, previews, common)
         text = f"{output}: {_describe(row)}"
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *left)
     common.warn(warnings)
@@ -93,33 +93,39 @@ def _left_over(output: Path, count: int, views_only: bool, previews: int) -> tup
     return (*left_over(output / LABELS, frame_names(count, "npz")), *left_over(output / COLORED, colored))
 
 
-def _write_views(source: Source, output: Path, options: EncoderOptions, common: Common) -> dict[str, Any]:
-    frames = source.sequence
-    views = scene_views(frames, options.segment)
+def _write_views(frames: MeshSequence, output: Path, options: SegmentOptions, common: Common) -> dict[str, Any]:
+    views = scene_views(frames, options)
     with common.stages(len(frames)) as progress:
         write_views(output, frames, views, lambda done: progress("look", done, len(frames)))
     return {"frames": len(frames), "views": len(views)}
 
 
-def _write_labels(
-    source: Source, masker: Masker | None, output: Path, options: EncoderOptions, previews: int, common: Common
-) -> dict[str, Any]:
-    frames, count = source.sequence, len(source.sequence)
+@dataclass(frozen=True, slots=True)
+class _Labelling:
+    """A scene to label, and how."""
+
+    frames: MeshSequence
+    masker: Masker | None
+    options: SceneOptions
+
+
+def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common) -> dict[str, Any]:
+    frames, count, options = scene.frames, len(scene.frames), scene.options
     chosen = evenly(count, previews)
     names = [Path(name).stem for name in frame_names(count, "npz")]
     tally, preview = _Tally(), _Preview()
     with common.stages(count) as progress:
         by: Segmentation
-        if masker is None:
+        if scene.masker is None:
             views = scene_views(frames, options.segment)
             by = segment(frames, options.segment, lambda share: progress("segment", round(share * count), count))
         else:
-            masks = segment_by(masker, frames, options.segment)
+            masks = segment_by(scene.masker, frames, options.segment)
             views, by = tuple(masks.views), masks
         progress("segment", count, count)
         for folder in (LABELS, *([COLORED] if chosen else [])):
             make_folder(output / folder)
-        for number, labels in enumerate(label_frames(frames, by, options)):
+        for number, labels in enumerate(label_frames(frames, by, EncoderOptions(scene=options))):
             with replacing(output / LABELS / f"{names[number]}.npz") as file:
                 np.savez_compressed(file, moving=labels.moving, bodies=labels.bodies)
             tally.add(labels)

@@ -16,6 +16,7 @@ from ..capture.recording import open_recording
 from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
 from ..geometry.cameras import unpack_cameras
+from ..geometry.derived_sequences import Upright
 from ..io.sequence import captured, open_sequence
 from ..types import MeshSequence, Up
 from .flags import Reading
@@ -25,11 +26,10 @@ _READ = Reading()
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A sequence, and the warnings and the up axis of its source."""
+    """A sequence and the warnings of its source."""
 
     sequence: MeshSequence
     remarks: tuple[str, ...] = ()
-    up: Up = "y"  # axis that points up, as recorded with the cameras
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -50,7 +50,7 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
         if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:
             options = replace(options, frame_rate=float(rate))
         sequence = open_sequence(inputs[0] if len(inputs) == 1 else list(inputs), options)
-        return Source(sequence, up=sequence.up)
+        return Source(sequence)
     reading.options()  # raises InputError for values that no sequence can have
     if reading.scale != _READ.scale:
         raise InputError(f"--scale {reading.scale:g}: {folder} is a rig, whose poses are in metres; leave it out")
@@ -58,7 +58,7 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
     if reading.fps not in (_READ.fps, recording.frame_rate):
         text = f"--fps {reading.fps:g}: {folder} is a rig of {recording.frame_rate:g} frames a second"
         raise InputError(f"{text}; leave it out, or mend the rig's description")
-    return Source(recording, tuple(remarks), recording.rig.up)
+    return Source(recording, tuple(remarks))
 
 
 @Parameter(name="*")
@@ -95,9 +95,12 @@ class Masking:
         """True if any flag except --up is given."""
         return replace(self, up=None) != Masking()
 
-    def options(self, options: SegmentOptions, source: Source) -> SegmentOptions:
-        """Return the options with the requested views. Raises InputError if their file cannot be used."""
-        options = replace(options, views=replace(options.views, up=self.up or source.up))
+    def upright(self, source: Source) -> Upright:
+        """Return the sequence with the axis that points up: the one that was asked for, else that of the cameras."""
+        return Upright(source.sequence, self.up)
+
+    def options(self, options: SegmentOptions) -> SegmentOptions:
+        """Return the options with the views that were asked for. Raises InputError where their file is wrong."""
         if self.views is None:
             return options
         try:

@@ -17,11 +17,12 @@ from ..coding.paper.displacements import DisplacementOptions
 from ..coding.reference_mesh import CodedReference
 from ..format.layout import Form
 from ..types import Mesh
-from .draco import cheapest_intra, finest_intra
-from .options import EncoderOptions
-from .target import NO_ERROR, Fidelity, measure, target_of
+from .draco import IntraOptions, cheapest_intra, finest_intra
+from .target import NO_ERROR, Fidelity, measure
 
-MOST_FOR_HALF = 2  # times the bytes that half the distance (6 dB) may cost; a finer template gives 4 dB for that
+MOST_FOR_HALF = (
+    2  # times the bytes that half the distance (6 dB) may cost; a finer template gains 4 dB for that (decision 0007)
+)
 MOST_EMPTY = 65_535  # frames of a group without surface: what its field in the index holds
 
 
@@ -57,14 +58,14 @@ def displacement_field(
     return np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])
 
 
-def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions) -> EncodedGroup:
+def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: IntraOptions) -> EncodedGroup:
     """Return the group, or its `draco` form where that is the better bargain.
 
     That is where Draco is as good and smaller, or so much better that no finer template would reach it for the bytes,
     as on bodies of few, large faces.
     """
     size = len(group.payload)
-    found = cheapest_intra(frames, group.fidelity, MOST_FOR_HALF * size, options.intra)
+    found = cheapest_intra(frames, group.fidelity, MOST_FOR_HALF * size, options)
     if found is None:
         return group
     payload, fidelity = found
@@ -73,10 +74,9 @@ def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: EncoderOptions
     return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
 
 
-def intra_only(frames: Sequence[Mesh], options: EncoderOptions) -> EncodedGroup:
+def intra_only(frames: Sequence[Mesh], target: Fidelity, options: IntraOptions) -> EncodedGroup:
     """Encode frames in the `draco` form at the target's fidelity, or as finely as that form can."""
-    target = target_of(frames, options.target, options.noise)
-    found = cheapest_intra(frames, target, np.inf, options.intra)
+    found = cheapest_intra(frames, target, np.inf, options)
     payload, fidelity = found or finest_intra(frames, target.distance)
     return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
 

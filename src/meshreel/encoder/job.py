@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..format.layout import Form
-from ..types import Mesh, MeshSequence
-from .options import EncoderOptions
+from ..geometry.derived_sequences import CapturedSequence
+from .interval import Interval
+from .options import EncoderOptions, PaperOptions, SceneOptions
 from .paper import Fitted, FoundGroup, find_groups
 from .progress import Stages
 
@@ -27,17 +26,17 @@ class GroupStore:
     def __init__(self) -> None:
         self._known: dict[bytes, Found] = {}
 
-    def keep(self, frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> None:
-        """Find and keep the groups of an interval, whose frames are all empty or none is."""
-        if not frames[0].is_empty and (key := _key(frames, options)) not in self._known:
-            found = find_groups(frames, options, stages)
+    def keep(self, interval: Interval, options: PaperOptions, stages: Stages | None = None) -> None:
+        """Find and keep the groups of an interval."""
+        if not interval.frames[0].is_empty and (key := _key(interval, options)) not in self._known:
+            found = find_groups(interval, options, stages)
             self._known[key] = tuple((len(group.frames), group.fitted) for group in found)
 
-    def find(self, frames: Sequence[Mesh], options: EncoderOptions, stages: Stages | None = None) -> list[FoundGroup]:
+    def find(self, interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
         """Return what `paper.find_groups` returns, from the store where the interval is kept."""
-        if not self._known or (known := self._known.get(_key(frames, options))) is None:
-            return find_groups(frames, options, stages)
-        groups, first = list[FoundGroup](), 0
+        if not self._known or (known := self._known.get(_key(interval, options))) is None:
+            return find_groups(interval, options, stages)
+        frames, groups, first = list(interval.frames), list[FoundGroup](), 0
         for count, fitted in known:
             groups.append(FoundGroup(frames[first : first + count], fitted))
             first += count
@@ -48,31 +47,38 @@ class GroupStore:
 class Job:
     """A sequence to encode, its options, and the means to do it."""
 
-    sequence: MeshSequence
+    sequence: CapturedSequence
     options: EncoderOptions
     executor: Executor | None
     stages: Stages
     store: GroupStore = field(default_factory=GroupStore)
 
+    @property
+    def scene(self) -> SceneOptions:
+        """The options of a scene, where the sequence is one."""
+        assert self.options.scene is not None, "a sequence without scene options is not taken apart"
+        return self.options.scene
+
 
 def shared_options(options: EncoderOptions) -> EncoderOptions:
     """Return the options with defaults for all that encodes at several rates need not share.
 
-    Form LAPLACIAN shares all but the coding of displacements; form LAYERS shares only how a scene is taken apart.
+    The paper's recipe shares all but the coding of displacements; that of layers only how a scene is taken apart.
     """
-    if options.form == Form.LAPLACIAN:
+    if isinstance(options.method, PaperOptions):
         plain = EncoderOptions()
-        return replace(options, preset=plain.preset, quality=plain.quality, displacements=plain.displacements)
-    apart = {name: getattr(options, name) for name in ("form", "dynamic_only", "segment", "background")}
-    return EncoderOptions(**apart)
+        return replace(options, method=_shared(options.method), preset=plain.preset, quality=plain.quality)
+    return EncoderOptions(scene=options.scene)
 
 
-def _key(frames: Sequence[Mesh], options: EncoderOptions) -> bytes:
+def _shared(options: PaperOptions) -> PaperOptions:
+    return replace(options, displacements=PaperOptions().displacements)
+
+
+def _key(interval: Interval, options: PaperOptions) -> bytes:
     """Return a key that is equal where the groups are."""
-    plain = EncoderOptions()  # how a scene was taken apart shows in the frames
-    decisive = replace(shared_options(options), segment=plain.segment, background=plain.background)
-    digest = hashlib.sha256(repr(decisive).encode())
-    for frame in frames:
+    digest = hashlib.sha256(repr((_shared(options), interval.noise)).encode())
+    for frame in interval.frames:
         for array in (frame.vertices, frame.faces):
             digest.update(repr((array.shape, array.dtype)).encode())
             digest.update(np.ascontiguousarray(array).data)

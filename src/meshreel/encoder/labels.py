@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, UInt16
 
-from ..analysis.scene.bodies import with_ring
+from ..analysis.scene.bodies import BodyOptions, with_ring
 from ..analysis.scene.labelling import Segmentation
 from ..geometry.topology import part_of
 from ..types import Mesh, MeshSequence
@@ -30,7 +30,7 @@ class FrameLabels:
 def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[FrameLabels]:
     """The labels of each frame; a body has the same number in all frames."""
     cell = segmentation.cell
-    tracks = Tracks(cell, options)
+    tracks = Tracks(cell, options.scene.bodies if options.scene else BodyOptions())
     for frames in key_intervals(sequence, segmentation, options):
         moving = list[Bool[np.ndarray, " F"]]()
         parts, coded = list[Mesh](), list[Mesh]()

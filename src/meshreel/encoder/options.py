@@ -1,4 +1,7 @@
-"""Options of the encoder; `presets.preset_options` makes them from a preset's name and a quality."""
+"""Options of the encoder: a recipe with its own options, how a scene is taken apart, and the key interval.
+
+`EncoderOptions()` is what `encode` uses by default; `presets.preset_options` makes options for a preset and a quality.
+"""
 
 from __future__ import annotations
 
@@ -18,59 +21,89 @@ from ..analysis.scene.segmentation import SegmentOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
-from ..format.layout import Form
 from .draco import IntraOptions
 from .tails import TailOptions
 from .target import Fidelity
 
-MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it
-MOST_NOISE = 0.05  # RMS, of the diagonal: beyond, nothing is left of a hand
-MOST_SECONDS = 600  # of a key interval: whoever joins late decodes as much before a picture is there
+MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
+MOST_SECONDS = 600  # of a key interval: viewers who join late decode that much before the first picture (guess)
+STEP = LayerCodingOptions().step
 
 
 @dataclass(frozen=True, slots=True)
-class EncoderOptions:
-    """How to encode; `presets.preset_options` fills it from a preset's name and a quality."""
+class PaperOptions:
+    """Options of the paper's recipe (`paper.py`); the defaults are those of quality 50."""
 
-    preset: str = "paper"
-    quality: float = 50.0  # 0 to 100; what the other fields were made from, recorded in the file
     group_size: int = 10  # most frames in a group, the paper's GoF
     reference_bits: int = 14  # of the reference's lattice (paper: qp = 14)
     levels: int = 1  # midpoint subdivisions of the decoded reference
-    target: Fidelity = Fidelity(0.0005, 7.0, 0.0008)  # what every frame should be worth, relative to its own diagonal
+    target: Fidelity = Fidelity(0.0005, 7.0, 0.0008)  # that every frame should reach, relative to its own diagonal
     track: TrackOptions = field(default_factory=TrackOptions)
     reference: ReferenceOptions = field(default_factory=ReferenceOptions)
     fit: FitOptions = field(default_factory=FitOptions)
     groups: GroupOptions = field(default_factory=GroupOptions)
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)
     intra: IntraOptions = field(default_factory=IntraOptions)
-    form: Form = Form.LAPLACIAN  # of the groups that a template follows; or LAYERS
-    keys: int = 5  # frames tried as the key of a group, at most (form LAYERS)
-    predict: bool = True  # groups from the one before, where its template still fits (form LAYERS)
-    key_interval: float = 4.0  # s, at most, from one random-access point to the next (form LAYERS)
+
+    def __post_init__(self) -> None:
+        _check_group_size(self.group_size)
+        if not 1 <= self.reference_bits <= 20 or not 0 <= self.levels <= 4:
+            raise InputError(f"reference bits {self.reference_bits}, levels {self.levels}: give 1 to 20 and 0 to 4")
+
+
+@dataclass(frozen=True, slots=True)
+class LayersOptions:
+    """Options of the recipe of layers (`layers.py`); the defaults are those of quality 50."""
+
+    group_size: int = 16  # most frames in a group
+    target: Fidelity = Fidelity(0.2 * STEP + 0.00005, 7.0, STEP)  # that every frame should reach, of its own diagonal
+    keys: int = 5  # frames tried as the key of a group, at most
+    predict: bool = True  # groups from the one before, where its template still fits
     embedded: EmbeddedOptions = field(default_factory=EmbeddedOptions)
     template: TemplateOptions = field(default_factory=TemplateOptions)
-    layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
-    tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches (form LAYERS)
-    noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture
     fused: FusedOptions = field(default_factory=FusedOptions)
-    dynamic_only: bool = False  # True: no background is looked for, everything may move
+    fit: FitOptions = FitOptions(restart=False, pull=0.3, second_smoothing=0.7)
+    groups: GroupOptions = GroupOptions(worth=0.9)
+    layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
+    tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches
+    displacements: DisplacementOptions = field(default_factory=DisplacementOptions)  # where layers miss the target
+    intra: IntraOptions = field(default_factory=IntraOptions)
+
+    def __post_init__(self) -> None:
+        _check_group_size(self.group_size)
+        if not 1 <= self.keys <= len(PLACES):
+            raise InputError(f"{self.keys} keys: give 1 to {len(PLACES)}")
+
+
+MethodOptions = PaperOptions | LayersOptions  # which of both names the recipe
+
+
+@dataclass(frozen=True, slots=True)
+class SceneOptions:
+    """How a scene is taken apart into a background and moving bodies."""
+
     segment: SegmentOptions = field(default_factory=SegmentOptions)
     background: BackgroundOptions = field(default_factory=BackgroundOptions)
     bodies: BodyOptions = field(default_factory=BodyOptions)
 
+
+@dataclass(frozen=True, slots=True)
+class EncoderOptions:
+    """How to encode. `quality` and `preset` name what the other fields were made from; a file records them."""
+
+    method: MethodOptions = field(default_factory=LayersOptions)
+    scene: SceneOptions | None = field(default_factory=SceneOptions)  # None: no background is looked for
+    key_interval: float = 4.0  # s, at most, from one random-access point to the next; of a scene in both recipes
+    quality: float = 50.0  # 0 to 100
+    preset: str = "best"
+
     def __post_init__(self) -> None:
         if not 0 <= self.quality <= 100:
             raise InputError(f"quality must be in 0 to 100, got {self.quality:g}")
-        if not 1 <= self.group_size <= MOST_FRAMES:
-            raise InputError(f"group size must be in 1 to {MOST_FRAMES}, got {self.group_size}")
-        if self.form not in (Form.LAPLACIAN, Form.LAYERS):
-            raise InputError(f"form {self.form}: give LAPLACIAN or LAYERS; the others are taken where these cost more")
-        if not 1 <= self.keys <= len(PLACES):
-            raise InputError(f"{self.keys} keys: give 1 to {len(PLACES)}")
         if not 0 < self.key_interval <= MOST_SECONDS:
             raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0 and at most {MOST_SECONDS}")
-        if not 1 <= self.reference_bits <= 20 or not 0 <= self.levels <= 4:
-            raise InputError(f"reference bits {self.reference_bits}, levels {self.levels}: give 1 to 20 and 0 to 4")
-        if not 0 <= self.noise <= MOST_NOISE:
-            raise InputError(f"noise {self.noise:g}: give it in units of the diagonal, 0 to {MOST_NOISE:g}")
+
+
+def _check_group_size(size: int) -> None:
+    if not 1 <= size <= MOST_FRAMES:
+        raise InputError(f"group size must be in 1 to {MOST_FRAMES}, got {size}")

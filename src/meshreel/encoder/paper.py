@@ -14,15 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64
 
-from ..analysis.fit.surface_fit import Fit, fit_frames
+from ..analysis.fit.surface_fit import Fit, Guides, fit_frames
 from ..analysis.groups import cut_at
 from ..analysis.reference.extraction import extract_reference, predict
 from ..analysis.reference.track import track_centers
 from ..coding.reference_mesh import CodedReference, code_reference
 from ..errors import NoReferenceError
-from ..types import Centers, Frames, Mesh
+from ..types import Centers, Mesh
 from .forms import EncodedGroup, cheaper, empty_groups, intra_only, laplacian
-from .options import EncoderOptions
+from .interval import Interval
+from .options import PaperOptions
 from .progress import Stages
 from .target import target_of
 
@@ -43,40 +44,43 @@ class FoundGroup:
     fitted: Fitted | None  # None: no reference follows them
 
 
-FindGroups = Callable[[Sequence[Mesh], EncoderOptions, "Stages | None"], list[FoundGroup]]
+FindGroups = Callable[[Interval, PaperOptions, "Stages | None"], list[FoundGroup]]
 
 
 def encode_interval(
-    frames: Frames, options: EncoderOptions, stages: Stages | None = None, find: FindGroups | None = None
+    interval: Interval, options: PaperOptions, stages: Stages | None = None, find: FindGroups | None = None
 ) -> list[EncodedGroup]:
-    """Encode an interval: as one group, or as several where one reference cannot follow. All frames are empty or none.
+    """Encode an interval as one group, or as several where one reference cannot follow.
 
     `find` replaces `find_groups`; pass a store's `find` to reuse the references of an earlier encode.
     """
-    stages, frames = stages or Stages(None, len(frames)), list(frames)
-    if frames[0].is_empty:
-        groups = list(empty_groups(len(frames)))
+    count = len(interval.frames)
+    stages = stages or Stages(None, count)
+    if interval.frames[0].is_empty:
+        groups = list(empty_groups(count))
     else:
-        groups = [_encode_group(group, options) for group in (find or find_groups)(frames, options, stages)]
-    stages.add("code", len(frames))
+        found = (find or find_groups)(interval, options, stages)
+        groups = [_encode_group(group, options, interval.noise) for group in found]
+    stages.add("code", count)
     return groups
 
 
-def find_groups(frames: Frames, options: EncoderOptions, stages: Stages | None = None) -> list[FoundGroup]:
+def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None = None) -> list[FoundGroup]:
     """Cut an interval into groups that one reference follows each, or none does; every frame has a surface.
 
     The interval is cut where the fit fails, `options.groups.depth` times at most.
     """
-    stages, frames = stages or Stages(None, len(frames)), list(frames)
+    frames = list(interval.frames)
+    stages = stages or Stages(None, len(frames))
     if len(frames) == 1:
         return [FoundGroup(frames, None)]
     centers = track_centers(frames, options.track)
     stages.add("track", len(frames))
-    return _found(frames, centers, options, options.groups.depth, stages)
+    return _Cutting(options, interval.noise).groups(frames, centers, options.groups.depth, stages)
 
 
 def analyze(
-    frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, stages: Stages
+    frames: Sequence[Mesh], centers: Centers, options: PaperOptions, stages: Stages
 ) -> tuple[CodedReference, Fit]:
     """Return the reference of a group as decoded, and its fit to every frame (paper, sections 3.3.1 and 3.3.2).
 
@@ -90,39 +94,44 @@ def analyze(
     if coded.base.is_empty:
         raise NoReferenceError("the reference mesh has no faces left after Draco")
     predictions = predict(reference, coded.base, centers, options.reference.deform)
-    fit = fit_frames(coded.base.faces, predictions, frames, replace(options.fit, key=reference.key))
+    fit = fit_frames(coded.base.faces, predictions, frames, options.fit, Guides(key=reference.key))
     stages.add("fit", len(frames))
     return coded, fit
 
 
-def _found(
-    frames: Sequence[Mesh], centers: Centers, options: EncoderOptions, depth: int, stages: Stages
-) -> list[FoundGroup]:
-    """Cut as `find_groups` does, from tracked centers; `depth` times at most."""
-    if len(frames) == 1:
-        return [FoundGroup(frames, None)]
-    try:
-        reference, fit = analyze(frames, centers, options, stages)
-    except NoReferenceError:
-        return [FoundGroup(frames, None)]
-    residuals = np.array([residual.rms for residual in fit.residuals])
-    target = target_of(frames, options.target, options.noise)
-    cut = cut_at(residuals / target.distance, options.groups)
-    if cut is None:
-        return [FoundGroup(frames, Fitted(reference, fit.positions))]
-    if depth == 0:
-        return [FoundGroup(frames, None)]
-    head, tail = frames[:cut], frames[cut:]
-    known = replace(centers, positions=centers.positions[:cut])
-    retracked = track_centers(tail, options.track)  # centers that were lost before the cut would spoil what follows
-    quick = replace(options, reference=options.reference.fewer_trials())
-    again = Stages(None, len(frames))  # these frames have been through the stages once
-    return [*_found(head, known, quick, depth - 1, again), *_found(tail, retracked, quick, depth - 1, again)]
+@dataclass(frozen=True, slots=True)
+class _Cutting:
+    """How an interval is cut into groups."""
+
+    options: PaperOptions
+    noise: float
+
+    def groups(self, frames: Sequence[Mesh], centers: Centers, depth: int, stages: Stages) -> list[FoundGroup]:
+        """Cut frames as `find_groups` does, from tracked centers; `depth` times at most."""
+        options = self.options
+        if len(frames) == 1:
+            return [FoundGroup(frames, None)]
+        try:
+            reference, fit = analyze(frames, centers, options, stages)
+        except NoReferenceError:
+            return [FoundGroup(frames, None)]
+        residuals = np.array([residual.rms for residual in fit.residuals])
+        cut = cut_at(residuals / target_of(frames, options.target, self.noise).distance, options.groups)
+        if cut is None:
+            return [FoundGroup(frames, Fitted(reference, fit.positions))]
+        if depth == 0:
+            return [FoundGroup(frames, None)]
+        head, tail = frames[:cut], frames[cut:]
+        known = replace(centers, positions=centers.positions[:cut])
+        retracked = track_centers(tail, options.track)  # centers that were lost before the cut would spoil the tail
+        quick = _Cutting(replace(options, reference=options.reference.fewer_trials()), self.noise)
+        again = Stages(None, len(frames))  # these frames have been through the stages once
+        return [*quick.groups(head, known, depth - 1, again), *quick.groups(tail, retracked, depth - 1, again)]
 
 
-def _encode_group(found: FoundGroup, options: EncoderOptions) -> EncodedGroup:
+def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> EncodedGroup:
     """Encode a group in the cheaper of both forms, or in the only one it can have."""
     if found.fitted is None:
-        return intra_only(found.frames, options)
+        return intra_only(found.frames, target_of(found.frames, options.target, noise), options.intra)
     group = laplacian(found.frames, found.fitted.reference, found.fitted.positions, options.displacements)
-    return group if options.displacements.basis_size is not None else cheaper(found.frames, group, options)
+    return group if options.displacements.basis_size is not None else cheaper(found.frames, group, options.intra)

@@ -1,6 +1,6 @@
-"""A scene is taken apart: what moves, what stands still, how noisy it is, and how large what moves (section 3.2).
+"""Taking a scene apart: moving surface, background, noise, and the size of the moving bodies (paper, section 3.2).
 
-In: the frames of a scene, options. Out: Parts, which every segment of the scene is coded by.
+In: the frames of a scene, options. Out: Parts, which the encoding of every interval of the scene uses.
 """
 
 from __future__ import annotations
@@ -23,30 +23,30 @@ from ..analysis.survey import Survey, check_one_unit
 from ..errors import InputError
 from ..geometry.closest_points import Outline, distances
 from ..geometry.connected import connected
-from ..geometry.depth import SeesDepth
-from ..geometry.derived_sequences import ChosenParts
+from ..geometry.derived_sequences import CapturedSequence, ChosenParts
 from ..geometry.topology import concatenate, face_normals, part_of
 from ..types import Mesh, MeshSequence, evenly
-from .options import EncoderOptions
+from .options import SceneOptions
 from .progress import Stages
 
-PROBES = 8  # frames, at most, that what moves is measured in
-LOST = 0.5  # of a frame's faces: as many stand still only where there is a background
-OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise
+MOST_NOISE = 0.05  # RMS, of the diagonal of a body: beyond, nothing is left of a hand (guess)
+PROBES = 8  # frames, at most, in which moving surface is measured (guess)
+LOST = 0.5  # share of a frame's faces that may stand still where no background was found (guess)
+OUTLIER = 3.0  # times the segmentation's `noise`: still surface farther from the background is no noise (guess)
 NORMAL_MEDIAN = 0.6745  # of the absolute value of what is normally distributed, in standard deviations
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """From a frame on, the room is another."""
+    """A change of the room from a frame on."""
 
     frame: int
-    came: Mesh  # m, what has come to stand
+    came: Mesh  # m, surface that stands still from this frame on
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What does not change over a scene's segments."""
+    """The parts of a scene, which all of its intervals share."""
 
     seen: Survey  # of the scene; its unit is the diagonal of the largest body that moves, or its own where nothing does
     segmentation: Segmentation
@@ -56,16 +56,21 @@ class Parts:
     deviation: float  # m, the same by the median, as a standard deviation: without its tails
     astray: float = 0.0  # share of the frames' surface that stands still, but is not in the background
 
+    @property
+    def body_noise(self) -> float:
+        """RMS distance of the bodies from the truth, normalised: as noisy as the surface that stands still."""
+        return min(self.noise / self.seen.unit, MOST_NOISE)
+
     @cached_property
     def outline(self) -> Outline | None:
-        """Where the background ends; None where there is none."""
+        """The borders of the background; None where there is none."""
         return None if self.background.is_empty else Outline(self.background)
 
 
 def take_apart(
-    sequence: MeshSequence, seen: Survey, options: EncoderOptions, stages: Stages, masker: Masker | None = None
+    sequence: CapturedSequence, seen: Survey, options: SceneOptions, stages: Stages, masker: Masker | None = None
 ) -> Parts:
-    """What stands still in a scene, and what is known of what moves; by somebody's masks where there are any.
+    """Separate a scene into background and moving surface; by the masks of a masker where there is one.
 
     Raises InputError where frames are of different units, or of another than metres.
     """
@@ -81,14 +86,14 @@ def take_apart(
         _check_nothing_lost(sequence, segmentation, options.background)
     changes = [_change(sequence, segmentation, frame, options.background) for frame in segmentation.changes]
     stages.reach("background", 1.0)
-    noise, deviation, sizes, astray = _measured(sequence, segmentation, background, changes)
-    unit = float(np.median(sizes)) if sizes else 0.0
+    found = _measured(sequence, segmentation, background, changes)
+    unit = float(np.median(found.sizes)) if found.sizes else 0.0
     seen = replace(seen, scale=unit or seen.diagonal)
-    return Parts(seen, segmentation, background, changes, noise, deviation, astray)
+    return Parts(seen, segmentation, background, changes, found.noise, found.deviation, found.astray)
 
 
 def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions) -> None:
-    """Where a background is empty, no frame may have much that stands still: it would be in no part of the file."""
+    """Raise InputError where there is no background, but much of a frame stands still: the file would lack it."""
     for number in evenly(len(sequence), options.frames):
         mesh = sequence[number]
         still = segmentation.still_at_first(number, mesh)
@@ -98,17 +103,19 @@ def _check_nothing_lost(sequence: MeshSequence, segmentation: Segmentation, opti
             raise InputError(f"{text}: {size}; if so, encode with --dynamic-only")
 
 
-def _background(sequence: MeshSequence, segmentation: Segmentation, options: BackgroundOptions, stages: Stages) -> Mesh:
-    """What stands still at first, from the cameras' depth where it is known; cells in m."""
+def _background(
+    sequence: CapturedSequence, segmentation: Segmentation, options: BackgroundOptions, stages: Stages
+) -> Mesh:
+    """Fuse the surface that stands still at first, from the cameras' depth where it is known."""
     numbers, cell = evenly(len(sequence), options.frames), segmentation.cell
 
     def stands(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         stages.reach("background", number / len(sequence))
         return segmentation.still_at_first(number, mesh)
 
-    if options.depth and isinstance(sequence, SeesDepth):
+    if options.depth and (depth := sequence.depth) is not None:
         meshes = ((number, sequence[number]) for number in numbers)
-        moments = (Moment(sequence.pictures(k), mesh, stands(k, mesh)) for k, mesh in meshes)
+        moments = (Moment(depth[k], mesh, stands(k, mesh)) for k, mesh in meshes)
         return fuse_still_depth(moments, cell, options)
 
     def clear(number: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
@@ -124,13 +131,20 @@ def _change(sequence: MeshSequence, segmentation: Segmentation, frame: int, opti
     return Change(frame, fuse_background(later, segmentation.cell, options))
 
 
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """What some frames show of noise and bodies."""
+
+    noise: float  # m, RMS distance of still surface from the background
+    deviation: float  # m, the same by the median
+    sizes: list[float]  # m, diagonals of the largest body of each frame
+    astray: float  # share of all surface that stands still far from the background
+
+
 def _measured(
     sequence: MeshSequence, segmentation: Segmentation, background: Mesh, changes: Sequence[Change]
-) -> tuple[float, float, list[float], float]:
-    """RMS distance of still surface from the background, m, its deviation by the median, m; sizes of largest bodies.
-
-    What is far from the background is no noise: what it is of all surface comes last.
-    """
+) -> _Measured:
+    """Measure noise and bodies in some frames; still surface that is far from the background is no noise."""
     far = OUTLIER * segmentation.noise
     squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
     for number in evenly(len(sequence), PROBES):
@@ -151,8 +165,8 @@ def _measured(
             lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
     astray = lost / whole if whole else 0.0
     if not squares:
-        return 0.0, 0.0, sizes, astray
-    return math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes, astray
+        return _Measured(0.0, 0.0, sizes, astray)
+    return _Measured(math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes, astray)
 
 
 def _largest(mesh: Mesh) -> float:

@@ -1,7 +1,7 @@
 """Presets: one name and one quality from 0 to 100 set every option of the encoder.
 
-In -> out: what a user chooses -> EncoderOptions. The curves were chosen after rate-distortion points of a captured
-dancer; what they give is in docs/results.md.
+In -> out: what a user chooses -> EncoderOptions. The curves were fitted to rate-distortion points of a captured dancer
+(decision 0009); docs/results.md has the rates they lead to.
 """
 
 from __future__ import annotations
@@ -9,16 +9,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ..analysis.fit.surface_fit import FitOptions
 from ..analysis.follow.template import TemplateOptions
-from ..analysis.groups import GroupOptions
 from ..analysis.reference.extraction import ReferenceOptions
 from ..analysis.reference.track import TrackOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
-from ..format.layout import Form
-from .options import EncoderOptions
+from .options import EncoderOptions, LayersOptions, PaperOptions
 from .target import Fidelity
 
 PRESETS = ("best", "paper")
@@ -32,7 +29,7 @@ def preset_options(
     centers: int | None = None,
     key_interval: float | None = None,
 ) -> EncoderOptions:
-    """The encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
+    """Return the encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
 
     Raises InputError for an unknown preset or values out of range.
     """
@@ -46,40 +43,33 @@ def preset_options(
         raise InputError(f"centers {centers}: preset `best` tracks none; use preset `paper`")
     if preset != "best" and key_interval is not None:
         raise InputError(f"key interval {key_interval:g}: groups of preset `{preset}` all decode on their own")
-    chosen = _best(float(quality)) if preset == "best" else _paper(float(quality), centers)
-    options = replace(chosen, preset=preset, quality=float(quality))
+    method = layers_options(float(quality)) if preset == "best" else paper_options(float(quality), centers, basis_size)
     if group_size is not None:
-        options = replace(options, group_size=group_size)
-    if basis_size is not None:
-        options = replace(options, displacements=replace(options.displacements, basis_size=basis_size))
-    if key_interval is not None:
-        options = replace(options, key_interval=key_interval)
-    return options
+        method = replace(method, group_size=group_size)
+    options = EncoderOptions(method, quality=float(quality), preset=preset)
+    return options if key_interval is None else replace(options, key_interval=key_interval)
 
 
-def _paper(quality: float, centers: int | None) -> EncoderOptions:
+def paper_options(quality: float = 50.0, centers: int | None = None, basis_size: int | None = None) -> PaperOptions:
+    """Return the options of the paper's recipe at a quality."""
     step = displacement_step(quality)
     centers = 2000 if centers is None else centers
-    return EncoderOptions(
+    return PaperOptions(
         track=TrackOptions(centers=centers, samples=max(45_000, 4 * centers)),
         target=Fidelity(distance=0.5 * step + 0.0001, angle=7.0, worst=step),
         reference=ReferenceOptions(vertices=reference_vertices(quality)),
-        displacements=DisplacementOptions(step=step),
+        displacements=DisplacementOptions(step=step, basis_size=basis_size),
     )
 
 
-def _best(quality: float) -> EncoderOptions:
-    """Layers and template alone belong to this preset: their defaults are its values at quality 50."""
+def layers_options(quality: float = 50.0) -> LayersOptions:
+    """Return the options of the recipe of layers at a quality."""
     step = motion_step(quality)
-    return EncoderOptions(
-        form=Form.LAYERS,
-        group_size=16,
+    return LayersOptions(
         target=Fidelity(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
         template=TemplateOptions(error=0.00088 * (step / 0.0012) ** 0.55),
         layers=LayerCodingOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
-        fit=FitOptions(restart=False, pull=0.3, second_smoothing=0.7),  # the defaults are those of `paper`
-        groups=GroupOptions(worth=0.9),  # likewise
     )
 
 
@@ -94,10 +84,10 @@ def displacement_step(quality: float) -> float:
 
 
 def reference_vertices(quality: float) -> int:
-    """Vertices of the reference mesh: 800 at 0, 2000 at 50, 5000 at 100."""
+    """Number of vertices of the reference mesh: 800 at 0, 2000 at 50, 5000 at 100."""
     return round(2000 * 2.5 ** ((quality - 50) / 50))
 
 
 def quality_of_vertices(vertices: int) -> float:
-    """The quality, 0 to 100, at which a reference mesh has nearest to so many vertices."""
+    """Return the quality, 0 to 100, whose reference mesh is nearest to this number of vertices."""
     return min(max(50 + 50 * math.log(max(vertices, 1) / 2000, 2.5), 0.0), 100.0)

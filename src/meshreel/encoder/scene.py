@@ -1,7 +1,7 @@
-"""A scene becomes chunks: its background once, and each moving body of a segment as groups of its own (section 3.2).
+"""The chunks of a scene: its background once, and each moving body as groups of its own track (paper, section 3.2).
 
-In: frames of a scene, options. Out: what the writer needs, in the order of time. A segment of frames is read once; in
-memory are what moves in it, and the bytes of what is coded so far.
+In: a job, the parts of its scene. Out: the payloads of the file, in the order of time. A key interval is read once; in
+memory are its moving surface and the bytes of all groups so far.
 
 Normalised coordinates have the middle of the scene's box as origin and the size of what moves as unit, so that a
 quality means the same for a person in a room as for one alone.
@@ -17,20 +17,20 @@ import numpy as np
 from jaxtyping import Bool
 
 from ..analysis.scene.background import BackgroundOptions
-from ..analysis.scene.bodies import at_most, find_bodies, same_bodies, with_ring
+from ..analysis.scene.bodies import BodyOptions, at_most, find_bodies, same_bodies, with_ring
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.survey import Survey
 from ..coding.background import decode_background, decode_change, encode_background, encode_change
 from ..format.checks import MOST_TRACKS
-from ..format.layout import Form
 from ..geometry.closest_points import distances
 from ..geometry.decimate import decimate, decimate_faces
 from ..types import Mesh, MeshSequence, Placement
 from .forms import EncodedGroup, empty_groups
+from .interval import Interval
 from .job import Job
-from .options import MOST_NOISE, EncoderOptions
+from .options import EncoderOptions
 from .parts import Change, Parts
-from .recipe import encode_apart, encode_interval
+from .recipe import encode_apart, encode_interval, longest_interval
 
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
 HALFWAY = 0.3  # of the vertices: what has fewer than half as many is decimated from there, a third of the time
@@ -56,20 +56,11 @@ class TrackGroup:
 
 
 @dataclass(frozen=True, slots=True)
-class TrackInterval:
-    """Frames of one track that are coded together."""
-
-    track: int
-    first_frame: int
-    frames: list[Mesh]  # normalised, all with surface or all without
-
-
-@dataclass(frozen=True, slots=True)
 class CodedBodies:
-    """What moves, as coded."""
+    """The moving bodies as encoded."""
 
-    groups: list[TrackGroup]  # in the order that a file has them
-    dropped: int  # faces of bits that were only there for a moment, and are in none of the groups
+    groups: list[TrackGroup]  # in the order of the file
+    dropped: int  # faces of pieces that were there for a moment only, and are in none of the groups
 
 
 def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:
@@ -126,98 +117,91 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
 
 
 def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
-    """The groups of all tracks; each track has all frames, and no group has frames with surface and without."""
-    sequence, stages = job.sequence, job.stages
-    options = options_of(parts, job.options)
-    tracks, found = Tracks(parts.segmentation.cell, options), list[TrackGroup]()
-    for frames in key_intervals(sequence, parts.segmentation, options):
-        runs = track_intervals(sequence, parts, frames, tracks)
-        coded = _coded_intervals([run.frames for run in runs], replace(job, options=options))
-        done, count = 0, sum(len(run.frames) for run in runs)
-        for run, groups in zip(runs, coded, strict=True):
-            first = run.first_frame
+    """Encode the groups of all tracks; each track has all frames, and no group has frames with surface and without."""
+    tracks, found = Tracks(parts.segmentation.cell, job.scene.bodies), list[TrackGroup]()
+    for frames in key_intervals(job.sequence, parts.segmentation, job.options):
+        intervals = track_intervals(job, parts, frames, tracks)
+        done, count = 0, sum(len(interval.frames) for interval in intervals)
+        for interval, groups in zip(intervals, _coded_intervals(intervals, job), strict=True):
+            first = interval.first_frame
             for group in groups:
-                found.append(TrackGroup(run.track, first, group))
+                found.append(TrackGroup(interval.track, first, group))
                 first += group.frame_count
                 before, done = done, done + group.frame_count  # frames of all tracks count as frames of the scene
-                stages.add("code", done * len(frames) // count - before * len(frames) // count)
+                job.stages.add("code", done * len(frames) // count - before * len(frames) // count)
         found += tracks.late(frames)
     return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
 
 
-def options_of(parts: Parts | None, options: EncoderOptions) -> EncoderOptions:
-    """Options for the bodies of a scene, which are as noisy as what stands still; the same without `parts`."""
-    return options if parts is None else replace(options, noise=min(parts.noise / parts.seen.unit, MOST_NOISE))
+def scene_intervals(job: Job, parts: Parts) -> Iterator[Interval]:
+    """Yield the intervals of all tracks of a scene, in the order of time."""
+    tracks = Tracks(parts.segmentation.cell, job.scene.bodies)
+    for frames in key_intervals(job.sequence, parts.segmentation, job.options):
+        yield from track_intervals(job, parts, frames, tracks)
 
 
-def track_intervals(sequence: MeshSequence, parts: Parts, frames: range, tracks: Tracks) -> list[TrackInterval]:
-    """What moves in the next segment, apart in tracks and in runs of frames that can be coded together."""
-    moving, found = [_moving(sequence[number], parts, number) for number in frames], list[TrackInterval]()
+def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> list[Interval]:
+    """Assign the moving surface of a key interval to tracks, and cut each track where frames cannot share an interval.
+
+    Frames can where all have a surface or none has, and where they are of about one scale.
+    """
+    moving, found = [_moving(job.sequence[number], parts, number) for number in frames], list[Interval]()
+    longest = longest_interval(job.options, job.sequence.frame_rate)
     for track, meshes in tracks.of(moving):
         normalised = [parts.seen.normalise(mesh) for mesh in meshes]
-        for run in _runs(normalised, frames, parts.seen, tracks.options):
-            found.append(TrackInterval(track, frames.start + run.start, normalised[run.start : run.stop]))
+        for cut in _cut(normalised, frames, parts.seen, longest):
+            some = normalised[cut.start : cut.stop]
+            found.append(Interval(some, parts.body_noise, frames.start + cut.start, track))
     return found
 
 
-def all_intervals(
-    sequence: MeshSequence, seen: Survey, parts: Parts | None, options: EncoderOptions
-) -> Iterator[TrackInterval]:
-    """The windows of form LAPLACIAN: of a scene, or where there are no `parts` of a sequence that may all move."""
-    if parts is None:
-        for window in seen.intervals(options.group_size):
-            yield TrackInterval(0, window.start, [seen.normalise(sequence[number]) for number in window])
-        return
-    tracks = Tracks(parts.segmentation.cell, options)
-    for frames in key_intervals(sequence, parts.segmentation, options):
-        yield from track_intervals(sequence, parts, frames, tracks)
-
-
-def _coded_intervals(runs: Sequence[list[Mesh]], job: Job) -> Iterator[Iterable[EncodedGroup]]:
-    """The groups of each run, in order."""
+def _coded_intervals(intervals: Sequence[Interval], job: Job) -> Iterator[Iterable[EncodedGroup]]:
+    """Yield the groups of each interval, in order."""
+    method = job.options.method
     if job.executor is None:
-        return (encode_interval(frames, job.options, None, job.store.find) for frames in runs)
-    return job.executor.map(encode_apart, [(frames, job.options) for frames in runs])
+        return (encode_interval(interval, method, None, job.store.find) for interval in intervals)
+    return job.executor.map(encode_apart, intervals, [method] * len(intervals))
 
 
 def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:
-    """Runs of frames that are coded on their own, of even lengths, cut also where the background is another."""
+    """Yield the key intervals of a scene, of even lengths, cut also where the background changes or is sent again."""
     count, frame_rate = len(sequence), sequence.frame_rate
     longest = max(1, round(options.key_interval * frame_rate))
-    others = set(segmentation.changes) | set(refreshes(count, frame_rate, options.background))
+    others = set(segmentation.changes)
+    if options.scene is not None:
+        others |= set(refreshes(count, frame_rate, options.scene.background))
     for start, stop in pairwise(sorted({0, count} | others)):
         pieces = -(-(stop - start) // longest)
         yield from (range(a, b) for a, b in pairwise(start + (stop - start) * k // pieces for k in range(pieces + 1)))
 
 
-def _runs(meshes: Sequence[Mesh], frames: range, seen: Survey, options: EncoderOptions) -> list[range]:
-    """Frames of a body that can be coded together: with surface or without, and of one scale.
+def _cut(meshes: Sequence[Mesh], frames: range, seen: Survey, longest: int) -> list[range]:
+    """Cut a body's frames into intervals of at most `longest` frames.
 
-    A run is cut, too, where the scene begins or ends to have a surface: frames without are shown without background.
+    They are cut, too, where the scene begins or ends to have a surface: frames without are shown without background.
     """
-    size = len(meshes) if options.form == Form.LAYERS else options.group_size
     cuts = [k for k in range(1, len(frames)) if seen.is_bare(frames[k]) != seen.is_bare(frames[k - 1])]
-    runs = []
+    found = []
     for start, stop in pairwise([0, *cuts, len(frames)]):
         sizes = replace(seen, diagonals=tuple(mesh.diagonal for mesh in meshes[start:stop]))
-        runs += [range(start + run.start, start + run.stop) for run in sizes.intervals(size)]
-    return runs
+        found += [range(start + some.start, start + some.stop) for some in sizes.intervals(longest)]
+    return found
 
 
 class Tracks:
-    """Which track each body of a segment is coded in: its own from before, or one that is free."""
+    """Assigns the bodies of each key interval to tracks: to their own from before, or to one that is free."""
 
-    def __init__(self, cell: float, options: EncoderOptions) -> None:
-        self._cell, self.options = cell, options
+    def __init__(self, cell: float, options: BodyOptions) -> None:
+        self._cell, self._options = cell, options
         self._last: list[Mesh] = []  # of each track, in the last frame so far
         self._frames = 0
         self.dropped = 0  # faces that are in no track
 
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
-        """Each track's mesh in each frame of the next segment."""
-        apart = find_bodies(moving, self._cell, self.options.bodies)
+        """Return each track's mesh in each frame of the next key interval."""
+        apart = find_bodies(moving, self._cell, self._options)
         bodies, self.dropped = at_most(apart.meshes, MOST_TRACKS), self.dropped + apart.dropped
-        before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self.options.bodies)
+        before = same_bodies(self._last, [body[0] for body in bodies], self._cell, self._options)
         free = [number for number in range(len(self._last) + len(bodies) + 1) if number not in before]
         numbers = [free.pop(0) if old < 0 else old for old in before]
         count = max([len(self._last), 1, *(number + 1 for number in numbers)])
@@ -231,7 +215,7 @@ class Tracks:
         return list(enumerate(found))
 
     def late(self, frames: range) -> Iterator[TrackGroup]:
-        """The empty frames of tracks that began in this segment, up to it."""
+        """Yield the empty frames, up to this key interval, of tracks that began in it."""
         for track in self._new:
             first = 0
             for group in empty_groups(frames.start):

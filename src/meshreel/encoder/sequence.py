@@ -27,46 +27,55 @@ from ..decoder.video import open as open_video
 from ..errors import InputError
 from ..format.layout import Form, Header
 from ..geometry.closest_points import distances
+from ..geometry.derived_sequences import captured
 from ..geometry.topology import drop_unreferenced
 from ..metrics.distance import PSNR_CEILING, psnr
-from ..types import Frames, Mesh, MeshSequence, as_sequence, evenly
+from ..types import MeshSequence, Up, as_sequence, evenly
 from .forms import EncodedGroup
+from .interval import Interval, NormalisedFrames
 from .job import GroupStore, Job
-from .options import EncoderOptions
+from .options import EncoderOptions, PaperOptions
 from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
-from .recipe import encode_apart, encode_interval
+from .recipe import encode_apart, encode_interval, longest_interval
 from .scene import (
     Static,
     TrackGroup,
-    all_intervals,
     encode_bodies,
     encode_static,
-    options_of,
+    scene_intervals,
 )
 from .summary import GroupSummary, SceneSummary, Summary
 
-MEASURED = 4  # frames of a scene that are compared with what is decoded
+QUALITY, PRESET = 50.0, "best"  # the default operating point (decision 0009)
+MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less
 
 
 def encode(
     sequence: MeshSequence | Iterable[object],
     path: str | Path,
+    quality: float = QUALITY,
+    preset: str = PRESET,
+    *,
     options: EncoderOptions | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Summary:
-    """Writes `sequence` to a .reel file at `path`, which appears only when it is complete; None: preset `best` at 50.
+    """Encode meshes as a .reel file at `path`, which appears only when it is complete.
 
-    A scene with a background is taken apart; who has masks of what moves gives them to an `Encoder`.
-
-    With an executor, runs of frames are encoded side by side; the bytes are the same. In memory are then as many runs
-    as it has workers and one more, each of a key interval (preset `best`) or a group; of a scene, what moves in one
-    key interval. Raises InputError for frames that cannot be used, before anything is coded.
+    `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`). `options` replace quality and preset;
+    make them with `preset_options`. Most of a scene stands still: it becomes a background and bodies. With an executor,
+    intervals are encoded side by side, to the same bytes; memory then holds an interval for each worker and one more.
+    Raises InputError for frames that cannot be used, before anything is encoded.
     """
-    return Encoder(as_sequence(sequence), executor, progress).encode(path, options or preset_options())
+    if options is None:
+        options = preset_options(preset, quality)
+    elif (quality, preset) != (QUALITY, PRESET):
+        text = f"options and quality {quality:g}, preset {preset!r}: options already have both"
+        raise InputError(f"{text}; leave quality and preset out, or give preset_options(preset, quality) as options")
+    return Encoder(as_sequence(sequence), executor, progress).encode(path, options)
 
 
 class Encoder:
@@ -83,7 +92,7 @@ class Encoder:
 
         Who is told of progress may change: `progress` is an attribute.
         """
-        self.sequence, self._executor, self._masker = sequence, executor, masker
+        self.sequence, self._executor, self._masker = captured(sequence), executor, masker
         self.progress = progress
         self.store = GroupStore()  # those that `prepare` found
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
@@ -95,21 +104,20 @@ class Encoder:
         return self.sequence.frame_rate
 
     def prepare(self, options: EncoderOptions) -> None:
-        """Finds what `encode` finds before a rate is chosen. Raises what it does.
+        """Find in advance what `encode` finds before a rate is chosen; raises what `encode` raises.
 
-        The parts of a scene; and the spans of form LAPLACIAN, for as many sizes of its basis as are wanted, unless
-        there is an executor. They take a few hundred kB a frame, as long as this object lives.
+        These are the parts of a scene and, for the paper's recipe without an executor, its groups for any size of the
+        basis. They take a few hundred kB a frame, as long as this object lives.
         """
         job, parts = self._job(options), self.parts(options)
-        if options.form == Form.LAPLACIAN and self._executor is None:
-            self._keep_groups(job, parts)
+        if isinstance(options.method, PaperOptions) and self._executor is None:
+            for interval in _intervals(job, parts):
+                self.store.keep(interval, options.method, job.stages if parts is None else None)
+                job.stages.reach("fit", interval.stop / len(job.sequence))
 
-    def _keep_groups(self, job: Job, parts: Parts | None) -> None:
-        options, stages, count = options_of(parts, job.options), job.stages, len(job.sequence)
-        seen = survey(job.sequence, stages) if parts is None else parts.seen
-        for run in all_intervals(job.sequence, seen, parts, options):
-            self.store.keep(run.frames, options, stages if parts is None else None)
-            stages.reach("fit", (run.first_frame + len(run.frames)) / count)
+    def intervals(self, options: EncoderOptions) -> Iterator[Interval]:
+        """Yield the intervals that `encode` encodes, of all tracks of a scene."""
+        return _intervals(self._job(options), self.parts(options))
 
     def parts(self, options: EncoderOptions) -> Parts | None:
         """What the sequence is made of; None where it is no scene, or is not to be taken for one."""
@@ -117,8 +125,8 @@ class Encoder:
 
     def encode(self, path: str | Path, options: EncoderOptions) -> Summary:
         """As the function `encode`, which says what is raised."""
-        if options.dynamic_only and self._masker is not None:
-            raise InputError("masks for a sequence that has no background (dynamic_only): give one of both")
+        if options.scene is None and self._masker is not None:
+            raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
         check_target(Path(path))
         job, parts = self._job(options), self.parts(options)
         return _encode_bodies(job, Path(path)) if parts is None else _encode_scene(job, Path(path), parts)
@@ -128,7 +136,7 @@ class Encoder:
         return Job(self.sequence, options, self._executor, stages, self.store)
 
     def _is_scene(self, options: EncoderOptions) -> bool:
-        if options.dynamic_only or not len(self.sequence):
+        if options.scene is None or not len(self.sequence):
             return False
         if self._stands is None:
             self._stands = is_scene(self.sequence)
@@ -136,10 +144,10 @@ class Encoder:
 
     def _parts(self, job: Job) -> Parts:
         """What the scene is made of; found anew where other options say otherwise."""
-        how = (job.options.segment, job.options.background)
+        how = (job.scene.segment, job.scene.background)
         if self._scene is None or self._scene[:2] != how:
             seen = survey(job.sequence, job.stages, cleaned=False)
-            self._scene = (*how, take_apart(job.sequence, seen, job.options, job.stages, self._masker))
+            self._scene = (*how, take_apart(job.sequence, seen, job.scene, job.stages, self._masker))
         return self._scene[2]
 
 
@@ -153,19 +161,19 @@ def _encode_bodies(job: Job, path: Path) -> Summary:
             for group in encoded:
                 each = TrackGroup(0, writer.frame_count, group)
                 groups.append(_added(writer, each, [], seen.diagonal))
-        writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups) | _upright(options))
+        writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups) | _upright(sequence.up))
     return Summary(path.stat().st_size, tuple(groups), _warnings(seen))
 
 
 def _encode_scene(job: Job, path: Path, parts: Parts) -> Summary:
     """As `encode`, for a scene with a background."""
     sequence, options, seen = job.sequence, job.options, parts.seen
-    states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
+    states = encode_static(parts, len(sequence), sequence.frame_rate, job.scene.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
         coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
-        writer.header = make_header(sequence.frame_rate, seen, metadata | _upright(options))
+        writer.header = make_header(sequence.frame_rate, seen, metadata | _upright(sequence.up))
     measured = evenly(len(sequence), MEASURED)
     psnr = _measured(sequence, path, seen.diagonal, measured)
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
@@ -262,36 +270,33 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
 
 
 def _encoded_intervals(job: Job, seen: Survey) -> Iterator[Iterable[EncodedGroup]]:
-    """The groups of each run of frames that needs no other, in order; with an executor, a run a worker ahead."""
-    sequence, options, executor, stages = job.sequence, job.options, job.executor, job.stages
-    layered = options.form == Form.LAYERS
-    size = max(1, round(options.key_interval * sequence.frame_rate)) if layered else options.group_size
-    intervals = (_Normalised(sequence, seen, numbers) for numbers in seen.intervals(size))
+    """Yield the groups of each interval, in order; with an executor, as many intervals ahead as it has workers."""
+    method, executor, stages = job.options.method, job.executor, job.stages
     if executor is None:
-        for frames in intervals:
-            yield encode_interval(frames, options, stages, job.store.find)
+        for interval in _body_intervals(job, seen):
+            yield encode_interval(interval, method, stages, job.store.find)
         return
     ahead = getattr(executor, "_max_workers", 8)
     waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()
-    for frames in intervals:
-        waiting.append((len(frames), executor.submit(encode_apart, (list(frames), options))))
+    for interval in _body_intervals(job, seen):
+        waiting.append((len(interval.frames), executor.submit(encode_apart, interval.in_memory(), method)))
         if len(waiting) > ahead:
             yield _arrived(waiting, stages)
     while waiting:
         yield _arrived(waiting, stages)
 
 
-class _Normalised(Frames):
-    """Frames of a sequence in normalised coordinates, read when they are asked for."""
+def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
+    """Yield the intervals of a sequence, of a scene where there are parts."""
+    if parts is None:
+        return _body_intervals(job, survey(job.sequence, job.stages))
+    return scene_intervals(job, parts)
 
-    def __init__(self, sequence: MeshSequence, seen: Survey, numbers: range) -> None:
-        self._sequence, self._seen, self._numbers = sequence, seen, numbers
 
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __getitem__(self, index: int) -> Mesh:
-        return self._seen.normalise(self._sequence[self._numbers[index]])
+def _body_intervals(job: Job, seen: Survey) -> Iterator[Interval]:
+    """Yield the intervals of a sequence that is no scene."""
+    for numbers in seen.intervals(longest_interval(job.options, job.sequence.frame_rate)):
+        yield Interval(NormalisedFrames(job.sequence, seen, numbers), first_frame=numbers.start)
 
 
 def _arrived(waiting: deque[tuple[int, Future[list[EncodedGroup]]]], stages: Stages) -> list[EncodedGroup]:
@@ -316,9 +321,8 @@ def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[s
     }
 
 
-def _upright(options: EncoderOptions) -> dict[str, Any]:
-    """The axis that points up, for players, where it is not y."""
-    up = options.segment.views.up
+def _upright(up: Up) -> dict[str, Any]:
+    """Return the metadata that tells players which axis points up; none for y, their default."""
     return {} if up == "y" else {"up": up}
 
 

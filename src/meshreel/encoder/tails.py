@@ -41,7 +41,6 @@ class TailOptions:
     thresholds: tuple[float, ...] = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest
     shares: tuple[float, ...] = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept
     lattice: float = 2.0  # spacing of the patches' lattice, in RMS distances of the rest
-    noise: float = 0.0  # RMS distance from which on the thresholds count where the rest is nearer
     exchange: float = 1.33  # relative fall of the squared error for a relative rise of the rate: 4 dB a doubling
 
     def __post_init__(self) -> None:
@@ -51,8 +50,6 @@ class TailOptions:
             raise InputError(f"shares {self.shares}: give fractions of the vertices, in (0, 1]; none: no patches")
         if not self.lattice > 0 or not self.exchange > 0:
             raise InputError(f"lattice {self.lattice:g}, exchange {self.exchange:g}: give numbers above 0")
-        if not 0 <= self.noise < np.inf:
-            raise InputError(f"tails noise {self.noise:g}: give a distance, 0 where there is none")
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,22 +62,24 @@ class Tails:
 
 def find_tails(
     frames: Sequence[Mesh],
-    positions: Float64[np.ndarray, "T V 3"],
-    faces: Int32[np.ndarray, "F 3"],
+    decoded: Sequence[Mesh],
     size: int,
     options: TailOptions = TailOptions(),
+    noise: float = 0.0,
 ) -> Tails | None:
-    """The layer of patches that lowers squared error + price x bytes most; None where none does.
+    """Find the layer of patches that lowers squared error + price x bytes most; None where none does.
 
-    `size` is that of the layers without it, bytes. Neither the mean nor the larger of both directions' errors rises by
-    more than the layer's bytes are worth.
+    The `decoded` meshes of a group have the same faces; `size` is that of their layers, bytes. `noise` is the RMS
+    distance of the frames from the truth: thresholds count from there where the rest is nearer. Neither the mean nor
+    the larger of both directions' errors rises by more than the layer's bytes are worth.
     """
-    shown = [_Frame(frame, Mesh(points, faces)) for frame, points in zip(frames, positions, strict=True)]
+    shown = [_Frame(frame, mesh) for frame, mesh in zip(frames, decoded, strict=True)]
+    faces = decoded[0].faces
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
     if not EXACT**2 < usual < np.inf:
         return None
     price = options.exchange * len(frames) * usual / size
-    usual = max(usual, options.noise**2)
+    usual = max(usual, noise**2)
     search = _Search(shown, faces, usual, price, options, _step_level(frames, options.lattice * usual**0.5))
     best, least = None, search.cost(None)
     better = list[_Coded]()  # each than those before it
@@ -96,7 +95,11 @@ def find_tails(
             least = cost
             better.append(tried)
     chosen = next((tried for tried in reversed(better) if search.holds(tried)), None)
-    return None if chosen is None else Tails(chosen.record, chosen.parts.apply(positions, faces))
+    return (
+        None
+        if chosen is None
+        else Tails(chosen.record, chosen.parts.apply(np.stack([mesh.vertices for mesh in decoded]), faces))
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Depth picture of one camera at one moment, and the protocol of sequences that have such pictures."""
+"""Depth pictures: the measurements of a depth camera at one moment, and those of a recording by frame."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class DepthPicture:
 
     camera: PinholeCamera
     depth: UInt16[np.ndarray, "H W"] | Float32[np.ndarray, "H W"]
-    unit: float  # m, length of a depth of 1
-    far: float  # m, beyond which depths are ignored
+    unit: float  # m, of a depth of 1
+    far: float  # m, beyond which no depth counts
 
 
 @runtime_checkable
-class SeesDepth(Protocol):
-    """A sequence whose meshes were fused from depth pictures of cameras that stand still."""
+class DepthFrames(Protocol):
+    """The depth pictures of a recording, by frame; its cameras stand still."""
 
-    def pictures(self, index: int) -> list[DepthPicture | None]:
-        """Return the depth picture of each camera in a frame, None for a camera that lacks the frame."""
+    def __getitem__(self, index: int, /) -> list[DepthPicture | None]:
+        """Return a frame's pictures, one for each camera; None for a camera that lacks the frame."""
         ...

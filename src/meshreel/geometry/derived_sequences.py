@@ -1,18 +1,45 @@
-"""Sequences derived lazily from another sequence: each frame is made when it is read."""
+"""Sequences derived from another one, frame by frame on access, and the capabilities that a sequence may have.
+
+A sequence may know which axis points up and the depth pictures behind its meshes. Every wrapper keeps both;
+`captured` is the one adapter for sequences that lack these attributes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool
 
-from ..types import Mesh, MeshSequence
+from ..types import Mesh, MeshSequence, Up
+from .depth import DepthFrames, DepthPicture
 from .topology import part_of
 
 
+@runtime_checkable
+class CapturedSequence(MeshSequence, Protocol):
+    """A MeshSequence that knows its up axis and, where depth cameras recorded it, their pictures."""
+
+    @property
+    def up(self) -> Up:
+        """The axis that points up."""
+        ...
+
+    @property
+    def depth(self) -> DepthFrames | None:
+        """The depth pictures from which the meshes were made; None where they are not known."""
+        ...
+
+
+def captured(sequence: MeshSequence) -> CapturedSequence:
+    """Return the sequence with its capabilities; without them, y points up and no depth is known."""
+    return sequence if isinstance(sequence, CapturedSequence) else DerivedSequence(sequence)
+
+
 class DerivedSequence(MeshSequence):
-    """Base of sequences with the length and frame rate of their source; a subclass makes the frames."""
+    """A sequence of as many frames as its source, with the same capabilities; here also the same frames."""
 
     def __init__(self, source: MeshSequence) -> None:
         self._source = source
@@ -22,15 +49,34 @@ class DerivedSequence(MeshSequence):
         """Frames per second, 1/s."""
         return self._source.frame_rate
 
+    @property
+    def up(self) -> Up:
+        """The axis that points up; y where the source does not know it."""
+        return getattr(self._source, "up", "y")
+
+    @property
+    def depth(self) -> DepthFrames | None:
+        """The depth pictures of the frames; None where the source knows none."""
+        return getattr(self._source, "depth", None)
+
     def __len__(self) -> int:
         return len(self._source)
 
-
-class Backwards(DerivedSequence):
-    """The frames from the last to the first."""
-
     def __getitem__(self, index: int) -> Mesh:
-        return self._source[range(len(self))[::-1][index]]
+        return self._source[index]
+
+
+class Upright(DerivedSequence):
+    """The same frames with a given axis that points up; None keeps the source's."""
+
+    def __init__(self, source: MeshSequence, up: Up | None) -> None:
+        super().__init__(source)
+        self._up = up
+
+    @property
+    def up(self) -> Up:
+        """The axis that points up."""
+        return self._up or super().up
 
 
 class TurnedOver(DerivedSequence):
@@ -48,6 +94,12 @@ class Chosen(DerivedSequence):
         super().__init__(source)
         self._numbers = tuple(numbers)
 
+    @property
+    def depth(self) -> DepthFrames | None:
+        """The depth pictures of the chosen frames; None where the source knows none."""
+        known = super().depth
+        return None if known is None else _ChosenDepth(known, self._numbers)
+
     def __len__(self) -> int:
         return len(self._numbers)
 
@@ -55,8 +107,15 @@ class Chosen(DerivedSequence):
         return self._source[self._numbers[index]]
 
 
+class Backwards(Chosen):
+    """The frames from the last to the first."""
+
+    def __init__(self, source: MeshSequence) -> None:
+        super().__init__(source, range(len(source))[::-1])
+
+
 class ChosenParts(Chosen):
-    """Chosen faces of some frames: `choose` says which, of a frame's number in the source and its mesh."""
+    """Chosen faces of some frames; `choose` selects them by a frame's number in the source and its mesh."""
 
     def __init__(
         self, source: MeshSequence, numbers: Sequence[int], choose: Callable[[int, Mesh], Bool[np.ndarray, " F"]]
@@ -70,6 +129,17 @@ class ChosenParts(Chosen):
 
 
 def forth_and_back(source: MeshSequence, count: int) -> Chosen:
-    """As many frames of a sequence that is played forth and back, over and over; ends are not repeated."""
+    """Return `count` frames of a sequence that is played forth and back, over and over; ends are not repeated."""
     once = [*range(len(source)), *range(len(source) - 2, 0, -1)]
     return Chosen(source, [once[number % len(once)] for number in range(count)])
+
+
+@dataclass(frozen=True, slots=True)
+class _ChosenDepth:
+    """The depth pictures of some frames, by their numbers."""
+
+    source: DepthFrames
+    numbers: tuple[int, ...]
+
+    def __getitem__(self, index: int) -> list[DepthPicture | None]:
+        return self.source[self.numbers[index]]

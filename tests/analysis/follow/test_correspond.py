@@ -45,11 +45,11 @@ def tried(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The keys that are tried."""
     keys, motion = list[int](), correspond._follow
 
-    def told(targets: list[FrameSurface], key: int, options: EmbeddedOptions) -> correspond.KeyMotion:
+    def recorded(surfaces: list[FrameSurface], key: int, *rest: object) -> correspond.KeyMotion:
         keys.append(key)
-        return motion(targets, key, options)
+        return motion(surfaces, key, *rest)
 
-    monkeypatch.setattr(correspond, "_follow", told)
+    monkeypatch.setattr(correspond, "_follow", recorded)
     return keys
 
 

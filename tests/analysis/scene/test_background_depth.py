@@ -9,7 +9,7 @@ from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth, usual_pictures
 from meshreel.capture.fusion import FusionOptions, fuse_depths
 from meshreel.geometry.closest_points import distances
-from meshreel.geometry.depth import SeesDepth
+from meshreel.geometry.derived_sequences import captured
 from meshreel.types import Mesh, MeshList
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
 
@@ -85,4 +85,4 @@ def test_of_nothing_there_is_nothing(pictures):
 
 
 def test_plain_meshes_have_no_depth():
-    assert not isinstance(MeshList((Mesh.empty(),)), SeesDepth)
+    assert captured(MeshList((Mesh.empty(),))).depth is None

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from meshreel.analysis.scene.background import BackgroundOptions
 from meshreel.analysis.scene.cut import CutOptions
 from meshreel.analysis.scene.labelling import ByPlace
 from meshreel.analysis.scene.places import PlacesOptions
@@ -13,12 +14,13 @@ from meshreel.analysis.scene.settle import NEVER, SettleOptions
 from meshreel.analysis.scene.views import ViewsOptions
 from meshreel.analysis.survey import survey
 from meshreel.coding.background import decode_background, decode_change
+from meshreel.encoder.options import SceneOptions
 from meshreel.encoder.parts import take_apart
-from meshreel.encoder.presets import preset_options
 from meshreel.encoder.progress import Stages
 from meshreel.encoder.scene import encode_static
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld
 from meshreel.types import Mesh, MeshList, Placement
 
@@ -95,8 +97,8 @@ def test_changes_are_two_of_the_frames(found: ByPlace) -> None:
 
 
 def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
-    options = replace(preset_options(quality=30), segment=OPTIONS)
-    parts = take_apart(scene, survey(scene), options, Stages(None, FRAMES))
+    options = SceneOptions(OPTIONS)
+    parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
     states = encode_static(parts, FRAMES, 4.0, options.background)
     assert [state.is_patch for state in states] == [False, True, True]
     place, rooms = Placement(parts.seen.unit, tuple(parts.seen.center)), [decode_background(states[0].payload)]
@@ -113,8 +115,8 @@ def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
 def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: ByPlace) -> None:
     """Who joins then waits for the next whole one, and patches after it count in its faces."""
     gone, came = found.rest.changes
-    room = replace(preset_options().background, refresh=gone / 4.0)
-    parts = take_apart(scene, survey(scene), replace(preset_options(quality=30), segment=OPTIONS), Stages(None, FRAMES))
+    room = BackgroundOptions(refresh=gone / 4.0)
+    parts = take_apart(captured(scene), survey(scene), SceneOptions(OPTIONS), Stages(None, FRAMES))
     states = encode_static(parts, FRAMES, 4.0, room)
     whole = {frame: frame % gone == 0 for frame in sorted({*range(0, FRAMES, gone), came})}
     assert {state.frame: not state.is_patch for state in states} == whole
@@ -127,9 +129,9 @@ def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: B
         assert apart(place.of(mesh), np.array([1.2, 0.0, 1.5])) < 0.01
 
 
-def test_an_object_put_down_where_nothing_stood_becomes_background(scene: MeshList) -> None:
-    options = replace(preset_options(quality=30), segment=OPTIONS)
-    parts = take_apart(scene, survey(scene), options, Stages(None, FRAMES))
+def test_what_comes_to_stand_where_nothing_stood_is_a_background_of_its_own(scene: MeshList) -> None:
+    options = SceneOptions(OPTIONS)
+    parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
     states = encode_static(replace(parts, background=Mesh.empty()), FRAMES, 4.0, options.background)
     came = parts.changes[-1].frame
     assert [(state.frame, state.is_patch) for state in states] == [(came, False)]

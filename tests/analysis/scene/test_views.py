@@ -76,7 +76,7 @@ def test_the_same_meshes_give_the_same_views_which_are_all_of_one_size():
 
 @pytest.mark.parametrize(("up", "axis"), [("y", 1), ("z", 2), ("-y", 1)])
 def test_pictures_stand_upright(up, axis):
-    for view in place_views([ROOM], ViewsOptions(count=6, width=80, height=60, up=up)):
+    for view in place_views([ROOM], ViewsOptions(count=6, width=80, height=60), up):
         if abs(view.extrinsic[2, axis]) < 0.9:  # it does not look straight up or down
             assert (view.extrinsic[1, axis] < 0) == (not up.startswith("-"))  # y points down in a picture
 
@@ -105,7 +105,6 @@ def test_empty_frames_are_passed_over_and_none_but_empty_ones_refused():
         {"width": 4},
         {"fov": 5.0},
         {"fov": float("nan")},
-        {"up": "x"},
         {"places": 1},
         {"reach": 0.5},
         {"samples": 1},

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from meshreel.analysis.scene.probe import is_scene
 from meshreel.analysis.survey import survey
 from meshreel.decoder.video import open as open_video
+from meshreel.encoder.options import SceneOptions
 from meshreel.encoder.parts import take_apart
-from meshreel.encoder.presets import preset_options
 from meshreel.encoder.progress import Stages
 from meshreel.encoder.scene import Static, encode_static
+from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import part_of
 from meshreel.types import Mesh, MeshSequence
 
@@ -55,11 +56,11 @@ class BackgroundOnceDracoCodec(TwoSteps):
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Still:
         """Return the background and what moves. Raises InputError for frames that cannot be used."""
-        stages, options = Stages(progress, len(sequence)), preset_options("best")
+        stages, options = Stages(progress, len(sequence)), SceneOptions()
         if not (len(sequence) and is_scene(sequence)):
             seen = survey(sequence, stages)
             return Still((), Frames(sequence.frame_rate, seen, [seen.normalise(mesh) for mesh in sequence]))
-        parts = take_apart(sequence, survey(sequence, stages, cleaned=False), options, stages)
+        parts = take_apart(captured(sequence), survey(sequence, stages, cleaned=False), options, stages)
         states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
         moving = list[Mesh]()
         for number, mesh in enumerate(sequence):

@@ -9,22 +9,39 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.options import EncoderOptions, LayersOptions, SceneOptions
 from meshreel.errors import InputError
 
 Change = Callable[[EncoderOptions], EncoderOptions]
 
+
+def _layers(change: Callable[[LayersOptions], LayersOptions]) -> Change:
+    """A change of the recipe of layers."""
+
+    def changed(options: EncoderOptions) -> EncoderOptions:
+        if not isinstance(options.method, LayersOptions):
+            raise InputError("this variant changes the recipe of layers; use preset `best`")
+        return replace(options, method=change(options.method))
+
+    return changed
+
+
+def _background_from_meshes(options: EncoderOptions) -> EncoderOptions:
+    scene = options.scene or SceneOptions()
+    return replace(options, scene=replace(scene, background=replace(scene.background, depth=False)))
+
+
 VARIANTS: dict[str, Change] = {
-    "no shared detail": lambda o: replace(o, fit=replace(o.fit, components=0)),
-    "middle key, no cuts": lambda o: replace(
-        o, keys=1, groups=replace(o.groups, limit=1e9, tolerance=1e9, worth=math.inf)
+    "no shared detail": _layers(lambda o: replace(o, fit=replace(o.fit, components=0))),
+    "middle key, no cuts": _layers(
+        lambda o: replace(o, keys=1, groups=replace(o.groups, limit=1e9, tolerance=1e9, worth=math.inf))
     ),
-    "flat midpoints": lambda o: replace(o, layers=replace(o.layers, curvatures=(0,))),
-    "plain rounding": lambda o: replace(o, layers=replace(o.layers, price=0.0)),
-    "errors along the surface count": lambda o: replace(o, layers=replace(o.layers, tangential=1.0)),
-    "groups alone": lambda o: replace(o, predict=False),
-    "no tails": lambda o: replace(o, tails=None),
-    "background from meshes": lambda o: replace(o, background=replace(o.background, depth=False)),
+    "flat midpoints": _layers(lambda o: replace(o, layers=replace(o.layers, curvatures=(0,)))),
+    "plain rounding": _layers(lambda o: replace(o, layers=replace(o.layers, price=0.0))),
+    "errors along the surface count": _layers(lambda o: replace(o, layers=replace(o.layers, tangential=1.0))),
+    "groups alone": _layers(lambda o: replace(o, predict=False)),
+    "no tails": _layers(lambda o: replace(o, tails=None)),
+    "background from meshes": _background_from_meshes,
 }
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from meshreel.capture.recording import Recording
 from meshreel.geometry.cameras import PinholeCamera
-from meshreel.geometry.depth import DepthPicture
+from meshreel.geometry.depth import DepthFrames
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import frame_names, make_folder, write_mesh
-from meshreel.types import Frames, Mesh
+from meshreel.types import Frames, Mesh, Up
 
 
 class Captured(Frames):
@@ -40,6 +40,12 @@ class Captured(Frames):
         """Where it was seen from."""
         return tuple(camera.view for camera in self._recording.rig.cameras)
 
-    def pictures(self, index: int) -> list[DepthPicture | None]:
-        """What each camera measured in a frame."""
-        return self._recording.pictures(index)
+    @property
+    def up(self) -> Up:
+        """The axis that points up."""
+        return self._recording.up
+
+    @property
+    def depth(self) -> DepthFrames:
+        """The depth pictures of the cameras, by frame."""
+        return self._recording.depth

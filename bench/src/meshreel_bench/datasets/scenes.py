@@ -88,7 +88,7 @@ class SceneData:
     def _fused(self, source: str) -> Mesh:
         options = BackgroundOptions()
         meshes = ((number, self.meshes[number]) for number in evenly(len(self.meshes), options.frames))
-        moments = (Moment(self.meshes.pictures(k), mesh, ~self.labels(k, source)) for k, mesh in meshes)
+        moments = (Moment(self.meshes.depth[k], mesh, ~self.labels(k, source)) for k, mesh in meshes)
         return fuse_still_depth(moments, FusionOptions().voxel, options)
 
 

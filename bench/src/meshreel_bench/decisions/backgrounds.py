@@ -55,7 +55,7 @@ def background(scene: SceneData, options: BackgroundOptions, labels: dict[int, n
     """Fuse the background as the encoder does, with labels that are known."""
     numbers = evenly(len(scene.meshes), options.frames)
     if options.depth:
-        moments = (Moment(scene.meshes.pictures(k), scene.meshes[k], ~labels[k]) for k in numbers)
+        moments = (Moment(scene.meshes.depth[k], scene.meshes[k], ~labels[k]) for k in numbers)
         return fuse_still_depth(moments, VOXEL, options)
     still = (Mesh(mesh.vertices, mesh.faces[~labels[k]]) for k, mesh in ((k, scene.meshes[k]) for k in numbers))
     return fuse_background((drop_unreferenced(mesh) for mesh in still), VOXEL, options)

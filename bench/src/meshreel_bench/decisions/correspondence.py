@@ -13,7 +13,7 @@ from jaxtyping import Float64
 
 from meshreel.analysis.fit.match import FrameSurface
 from meshreel.analysis.fit.residual import Residual, residual_of
-from meshreel.analysis.fit.surface_fit import FitOptions, fit_frames
+from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames
 from meshreel.analysis.follow.embedded import register
 from meshreel.analysis.reference.centers import ReferenceCenterOptions, affinity, largest_distances
 from meshreel.analysis.reference.deform import DeformOptions, bind, center_motions, move, neighbours
@@ -57,7 +57,7 @@ def measure(sources: Sources) -> Iterator[Row]:
             begin = time.process_time()
             predictions = predict(frames, case.key, template)
             cost = (time.process_time() - begin) / len(frames)
-            fit = fit_frames(template.faces, predictions, frames, FitOptions(key=case.key))
+            fit = fit_frames(template.faces, predictions, frames, FitOptions(), Guides(key=case.key))
             plain, predicted = motion_bits(fit.positions[:, : len(base.vertices)], base, case.key)
             yield {
                 "case": case.name,

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from meshreel.coding.intra import decode_intra, encode_intra
+from meshreel.encoder.interval import Interval
 from meshreel.encoder.layers import encode_interval
-from meshreel.encoder.presets import preset_options
+from meshreel.encoder.presets import layers_options
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import face_normals, part_of
@@ -116,7 +117,7 @@ def _anchor(frame: Mesh, fraction: float) -> bytes:
 
 def _coded(body: Body, way: str, quality: float, noise: float) -> Row:
     begin = time.process_time()
-    groups = list(encode_interval(body.frames, replace(preset_options("best", quality), noise=noise)))
+    groups = list(encode_interval(Interval(body.frames, noise), layers_options(quality)))
     cost = (time.process_time() - begin) / len(body.frames)
     row = _row(body, way, sum(len(group.payload) for group in groups), list(chain(*decoded(groups))))
     forms = [f"{group.form.name} {group.frame_count}" for group in groups]

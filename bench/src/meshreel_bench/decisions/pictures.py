@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from meshreel.analysis.reference.extraction import MDS
-from meshreel.encoder.presets import preset_options
+from meshreel.encoder.options import PaperOptions
 from meshreel.geometry.topology import components as connected
 from meshreel.metrics.error_sheet import SheetOptions, write_sheet
 from meshreel.metrics.viewpoints import Box
@@ -46,7 +46,7 @@ def main(folder: Path = Path("docs/pictures")) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     matplotlib.rcParams["font.family"] = "DejaVu Sans"  # comes with matplotlib: the same letters everywhere
     room_picture.draw(folder / "room.png")
-    stages = compute(story(), preset_options("paper"))
+    stages = compute(story(), PaperOptions())
     for name, draw in PICTURES.items():
         draw(stages, folder / f"{name}.png")
         print(folder / f"{name}.png")
@@ -156,7 +156,7 @@ def components(stages: Stages, path: Path) -> None:
     kept = numbers <= stages.components
     axes.bar(numbers[kept], deviations[kept], color=BODIES[1], label=f"as many as are sent: {stages.components}")
     axes.bar(numbers[~kept], deviations[~kept], color="lightgrey", label="the others")
-    step = 100 * preset_options("paper").displacements.step
+    step = 100 * PaperOptions().displacements.step
     axes.axhline(step, color=BODIES[0], linewidth=1, label=f"base step of the quantiser: {step:.2f} %")
     axes.set(
         yscale="log", xlabel="component", ylabel="RMS of its weights,\n% of the diagonal", xlim=(0, len(numbers) + 1)

@@ -12,7 +12,7 @@ from functools import cache
 import DracoPy
 import numpy as np
 
-from meshreel.analysis.fit.surface_fit import fit_frames
+from meshreel.analysis.fit.surface_fit import Guides, fit_frames
 from meshreel.analysis.reference.centers import affinity, largest_distances
 from meshreel.analysis.reference.deform import neighbours
 from meshreel.analysis.reference.extraction import MDS
@@ -23,7 +23,8 @@ from meshreel.coding.paper.displacements import DisplacementOptions, decode_disp
 from meshreel.coding.paper.laplacian import System, anchors
 from meshreel.coding.reference_mesh import code_reference
 from meshreel.encoder.draco import cheapest_intra
-from meshreel.encoder.presets import displacement_step, preset_options
+from meshreel.encoder.options import PaperOptions
+from meshreel.encoder.presets import displacement_step
 from meshreel.encoder.target import measure
 from meshreel.format.layout import AnchorRule
 from meshreel.types import Mesh
@@ -35,7 +36,7 @@ from .stages import FIRST, Stages, compute, story
 @cache
 def stages_of(first: int = 0) -> Stages:
     """Return the stages of ten frames of the story: apart from the first on, taking hands from `FIRST` on."""
-    return compute(story(first), preset_options("paper"))
+    return compute(story(first), PaperOptions())
 
 
 def float_rows() -> Iterator[Row]:
@@ -94,7 +95,7 @@ def anchor_rows(stages: Stages) -> Iterator[Row]:
 
 def pose_rows(stages: Stages) -> Iterator[Row]:
     """Yield the residual of the fit from each pose, of all frames and of the worst one, and which pose was chosen."""
-    options = preset_options("paper")
+    options = PaperOptions()
     distances = largest_distances(stages.centers)
     kin = neighbours(affinity(distances, options.reference.centers), options.reference.deform)
     tracked = GroupCenters(stages.centers.positions, distances, kin)
@@ -104,7 +105,7 @@ def pose_rows(stages: Stages) -> Iterator[Row]:
         pose = stages.spread if frame == MDS else stages.centers.positions[frame]
         mesh = group.fused(pose, key, options.reference.fuse.poisson.depth, options.reference.vertices)
         base = code_reference(mesh, options.reference_bits, options.levels).base
-        fit = fit_frames(base.faces, group.sent(base, pose), stages.frames, replace(options.fit, key=key))
+        fit = fit_frames(base.faces, group.sent(base, pose), stages.frames, options.fit, Guides(key=key))
         rms = [residual.rms for residual in fit.residuals]
         chosen = (frame, key) == (stages.reference.frame, stages.reference.key)
         yield {
@@ -119,7 +120,7 @@ def pose_rows(stages: Stages) -> Iterator[Row]:
 def floor_rows(stages: Stages) -> Iterator[Row]:
     """Yield bytes of the group in the laplacian form, and in the draco form of the same fidelity."""
     quality = measure(stages.frames, stages.decoded)
-    found = cheapest_intra(stages.frames, quality, np.inf, preset_options("paper").intra)
+    found = cheapest_intra(stages.frames, quality, np.inf, PaperOptions().intra)
     yield {
         "laplacian_bytes": len(stages.payload),
         "draco_bytes": len(found[0]) if found else None,
@@ -130,10 +131,13 @@ def floor_rows(stages: Stages) -> Iterator[Row]:
 
 def second_fit_rows(stages: Stages) -> Iterator[Row]:
     """Yield bytes and distance of fits without a second fit, or with one from few or many components of the first."""
-    options = preset_options("paper")
-    faces, how = stages.coded.base.faces, replace(options.fit, key=stages.reference.key)
+    options = PaperOptions()
+    faces, guides = stages.coded.base.faces, Guides(key=stages.reference.key)
     starts = (0, 3, 15)
-    fits = [fit_frames(faces, stages.predictions, stages.frames, replace(how, components=start)) for start in starts]
+    fits = [
+        fit_frames(faces, stages.predictions, stages.frames, replace(options.fit, components=start), guides)
+        for start in starts
+    ]
     for sent in (3, 10, None):
         for start, fit in zip(starts, fits, strict=True):
             field = np.ascontiguousarray(np.moveaxis(fit.positions, 0, 1) - stages.coded.base.vertices[:, None])

@@ -17,7 +17,6 @@ from meshreel.capture.fusion import FusionOptions
 from meshreel.capture.recording import Recording, open_recording
 from meshreel.capture.simulated_rig import SensorOptions, simulate_rig
 from meshreel.decoder.video import open as open_video
-from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import encode
 from meshreel.geometry.topology import components, concatenate, part_of
 from meshreel.metrics.viewpoints import Box, OrthographicCamera
@@ -37,7 +36,7 @@ def draw(path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         capture = captured(Path(folder) / "rig")
         frame, moves = capture[SHOWN], segment(capture).moving(SHOWN, capture[SHOWN])
-        encode(capture, Path(folder) / "room.reel", preset_options())
+        encode(capture, Path(folder) / "room.reel")
         with open_video(Path(folder) / "room.reel") as video:
             background, decoded = video.background(SHOWN), video[SHOWN]
     sheet, camera = Sheet(4, PANEL), _oblique(background)

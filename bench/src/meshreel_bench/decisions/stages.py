@@ -5,12 +5,12 @@ In: frames of the procedural story, in which two people walk up to each other an
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.analysis.fit.surface_fit import Fit, fit_frames
+from meshreel.analysis.fit.surface_fit import Fit, Guides, fit_frames
 from meshreel.analysis.reference.centers import largest_distances, reference_centers
 from meshreel.analysis.reference.deform import bind, center_motions, move
 from meshreel.analysis.reference.extraction import Reference, extract_reference, predict
@@ -20,7 +20,7 @@ from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
 from meshreel.coding.group import decode_group, encode_group, payload_parts
 from meshreel.coding.reference_mesh import CodedReference, code_reference
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.options import PaperOptions
 from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Centers, Mesh, MeshList
 
@@ -66,7 +66,7 @@ def story(first: int = FIRST, count: int = COUNT) -> MeshList:
     return MeshList(tuple(people[first + t] for t in range(count)), people.frame_rate)
 
 
-def compute(sequence: MeshList, options: EncoderOptions) -> Stages:
+def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     """The stages of a sequence that is one group."""
     seen = survey(sequence)
     frames = tuple(seen.normalise(mesh) for mesh in sequence)
@@ -76,7 +76,7 @@ def compute(sequence: MeshList, options: EncoderOptions) -> Stages:
     reference = extract_reference(frames, centers, options.reference)
     coded = code_reference(reference.mesh, options.reference_bits, options.levels)
     predictions = predict(reference, coded.base, centers, options.reference.deform)
-    fit = fit_frames(coded.base.faces, predictions, frames, replace(options.fit, key=reference.key))
+    fit = fit_frames(coded.base.faces, predictions, frames, options.fit, Guides(key=reference.key))
     field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
     payload, layers = encode_group(coded, field, options.displacements)
     moved = tuple(
@@ -105,7 +105,7 @@ def _moved(
     own: Float64[np.ndarray, "K 3"],
     pose: Float64[np.ndarray, "K 3"],
     reference: Reference,
-    options: EncoderOptions,
+    options: PaperOptions,
 ) -> Moved:
     binding = bind(frame, own, reference.neighbours, options.reference.deform)
     motions = center_motions(own, pose, reference.neighbours)

@@ -14,8 +14,9 @@ import numpy as np
 from jaxtyping import Bool
 
 from meshreel.encoder.forms import EncodedGroup
+from meshreel.encoder.interval import Interval
 from meshreel.encoder.layers import encode_interval
-from meshreel.encoder.presets import preset_options
+from meshreel.encoder.presets import layers_options
 from meshreel.encoder.tails import TailOptions, find_tails
 from meshreel.format.records import pack
 from meshreel.geometry.closest_points import Surface
@@ -45,7 +46,7 @@ def measure(sources: Sources) -> Iterator[Row]:
         frames = case.frames(sources.data)
         name = f"{case.performer} {case.first}-{case.first + case.count - 1}"
         for quality in QUALITIES:
-            groups = list(encode_interval(frames, replace(preset_options("best", quality), tails=None)))
+            groups = list(encode_interval(Interval(frames), replace(layers_options(quality), tails=None)))
             for row in rows_of(frames, groups):
                 yield {"case": name, "quality": quality} | row
 
@@ -73,8 +74,7 @@ def with_tails(
     frames: Sequence[Mesh], plain: list[Mesh], size: int, options: TailOptions | None
 ) -> tuple[list[Mesh], int]:
     """Return the frames of a group as shown, and the bytes of its patches."""
-    positions = np.stack([mesh.vertices for mesh in plain])
-    found = options and find_tails(frames, positions, plain[0].faces, size, options)
+    found = options and find_tails(frames, plain, size, options)
     return (found.frames, len(pack(found.record))) if found else (plain, 0)
 
 

@@ -17,7 +17,7 @@ from meshreel.analysis.follow.correspond import choose_key
 from meshreel.analysis.follow.template import shared_detail
 from meshreel.coding.layers.coder import LayerCodingOptions, encode_layers
 from meshreel.coding.reference_mesh import CodedReference, code_on_lattice
-from meshreel.encoder.presets import preset_options
+from meshreel.encoder.options import LayersOptions
 from meshreel.encoder.target import measure as measure_fidelity
 from meshreel.geometry.decimate import decimate
 from meshreel.types import Mesh
@@ -40,15 +40,16 @@ CHOICES: dict[str, dict[str, Any]] = {
 
 def measure(sources: Sources) -> Iterator[Row]:
     """Yield a row for each point."""
-    best, frames = preset_options("best"), CASE.frames(sources.data)
+    best, frames = LayersOptions(), CASE.frames(sources.data)
     targets = [FrameSurface(frame) for frame in frames]
     course = choose_key(targets, best.embedded)
     for vertices, levels in TEMPLATES:
         reference = code_on_lattice(decimate(frames[course.key], vertices), LATTICE * best.layers.step, levels)
         base, faces = reference.mesh, reference.base.faces
         shared = shared_detail(base.faces, len(base.vertices), levels)
-        fit = replace(best.fit, key=course.key)
-        positions = fit_surfaces(faces, course.move(reference.base), targets, fit, Guides(None, shared))
+        positions = fit_surfaces(
+            faces, course.move(reference.base), targets, best.fit, Guides(None, shared, course.key)
+        )
         name = f"{vertices} vertices, {levels} levels"
         tried: dict[str, dict[str, Any]] = {"": {}} | (CHOICES if (vertices, levels) == TRIED else {})
         for choice, changes in tried.items():

@@ -8,6 +8,7 @@ coder represents cheaply: the first fit's strongest components (decision 10), or
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -22,6 +23,9 @@ from .residual import NOTHING, Residual, residual_of
 from .shape import doubtful, strongest_components, turned_laplacian
 from .system import Problem, Template, solve
 
+FOLLOWED = 6e-4  # RMS noise from which the second fit trusts the coherent positions more than the frames (decision 16)
+NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit the noise
+GATE = 6.0  # RMS distances of the noise that a pair may be apart at least: three standard deviations
 Coherence = Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]
 
 
@@ -41,7 +45,6 @@ class FitOptions:
     restart: bool = True  # the second fit starts from the coherent positions, and the key keeps its first fit
     second_smoothing: float | None = None  # row weight of the coherent shape; None: the last of `smoothing`
     guard: float = 1.0  # factor on the smoothing where faces fold over or collapse
-    key: int | None = None  # frame that is fitted first; None: the middle one
     iterations: int = 40  # largest number of conjugate-gradient iterations per round
     tolerance: float = 1e-3  # relative residual at which they stop
 
@@ -64,6 +67,26 @@ class FitOptions:
         if self.iterations < 1 or not 0 <= self.tolerance < 1:
             raise InputError(f"{self.iterations} iterations, tolerance {self.tolerance}: give at least 1, and 0 to 1")
 
+    def rounds(self, noise: float) -> Rounds:
+        """Return the rounds for frames at this RMS distance from the truth: wider and stiffer where there is noise."""
+        last = self.smoothing[-1] if self.second_smoothing is None else self.second_smoothing
+        if noise == 0:
+            return Rounds(self.gates, self.smoothing, self.pull, last)
+        chosen = NOISY_ROUNDS if len(self.gates) >= NOISY_ROUNDS.stop else slice(None)
+        gates = tuple(max(gate, GATE * noise) for gate in self.gates[chosen])
+        stiffer = math.hypot(1.0, noise / FOLLOWED)
+        return Rounds(gates, self.smoothing[chosen], stiffer * self.pull, stiffer * last)
+
+
+@dataclass(frozen=True, slots=True)
+class Rounds:
+    """Gates and weights of both fits, as in FitOptions, for frames of known noise."""
+
+    gates: tuple[float, ...]
+    smoothing: tuple[float, ...]
+    pull: float
+    second_smoothing: float
+
 
 @dataclass(frozen=True, slots=True)
 class Guides:
@@ -71,6 +94,8 @@ class Guides:
 
     rest: Float64[np.ndarray, "V 3"] | None = None  # the template's shape; None: that of the key frame's fit
     coherence: Coherence | None = None  # first fit -> positions that attract the second fit; None: `components`
+    key: int | None = None  # frame that is fitted first; None: the middle one
+    noise: float = 0.0  # RMS distance of the frames from the truth; 0: a clean capture
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,8 +148,8 @@ def fit_frames(
     count = len(frames)
     if len(predictions) != count:
         raise InputError(f"{len(predictions)} predictions for {count} frames: give one for each")
-    if options.key is not None and not 0 <= options.key < count:
-        raise InputError(f"key {options.key} is not one of {count} frames: give 0 to {count - 1}")
+    if guides.key is not None and not 0 <= guides.key < count:
+        raise InputError(f"key {guides.key} is not one of {count} frames: give 0 to {count - 1}")
     if len(faces) == 0 or count == 0:
         return Fit(predictions.copy(), (NOTHING,) * count)
     surfaces = [None if mesh.is_empty else FrameSurface(mesh) for mesh in frames]
@@ -140,7 +165,8 @@ def fit_surfaces(
     guides: Guides = Guides(),
 ) -> Float64[np.ndarray, "T V 3"]:
     """Fit a template to prepared frames (None: an empty one); return its positions without residuals."""
-    registration = _Registration(Template(faces, predictions.shape[1]), surfaces, options, _key(surfaces, options))
+    key, template = _key(surfaces, guides.key), Template(faces, predictions.shape[1])
+    registration = _Registration(template, surfaces, options, key, guides.noise)
     positions = registration.first(predictions, guides.rest)
     if options.components and len(surfaces) > 1:
         if guides.coherence is None:
@@ -151,9 +177,9 @@ def fit_surfaces(
     return positions
 
 
-def _key(surfaces: Sequence[FrameSurface | None], options: FitOptions) -> int:
+def _key(surfaces: Sequence[FrameSurface | None], key: int | None) -> int:
     """Return the frame nearest to the requested key, or to the middle, that is not empty."""
-    middle = len(surfaces) // 2 if options.key is None else options.key
+    middle = len(surfaces) // 2 if key is None else key
     there = [t for t, surface in enumerate(surfaces) if surface is not None]
     return min(there, key=lambda t: (abs(t - middle), t), default=middle)
 
@@ -166,12 +192,13 @@ class _Registration:
     surfaces: Sequence[FrameSurface | None]
     options: FitOptions
     key: int
+    noise: float  # RMS distance of the frames from the truth
 
     def first(
         self, predictions: Float64[np.ndarray, "T V 3"], given: Float64[np.ndarray, "V 3"] | None
     ) -> Float64[np.ndarray, "T V 3"]:
         """Fit every frame from its prediction, the key frame first: its fit is the rest shape if none is given."""
-        options, template = self.options, self.template
+        options, template, rounds = self.options, self.template, self.options.rounds(self.noise)
         positions = predictions.copy()
         rest = predictions[self.key] if given is None else given
         for at in [self.key] + [t for t in range(len(self.surfaces)) if t != self.key]:
@@ -179,11 +206,11 @@ class _Registration:
             if surface is None:
                 continue
             x = predictions[at]
-            for gate, smoothing in zip(options.gates, options.smoothing, strict=True):
+            for gate, smoothing in zip(rounds.gates, rounds.smoothing, strict=True):
                 shape, turns = turned_laplacian(template, rest, x)
                 stiffness = np.full(template.count, smoothing)
                 if (
-                    options.guard > 1 and smoothing == options.smoothing[-1]
+                    options.guard > 1 and smoothing == rounds.smoothing[-1]
                 ):  # not in earlier rounds, which must follow the data
                     stiffness[doubtful(template, rest, turns, x)] *= options.guard
                 x = self._round(x, surface, gate, Problem(shape, stiffness, predictions[at], options.anchor))
@@ -195,20 +222,19 @@ class _Registration:
         self, first: Float64[np.ndarray, "T V 3"], coherent: Float64[np.ndarray, "T V 3"]
     ) -> Float64[np.ndarray, "T V 3"]:
         """Fit the frames again, near coherent positions made from the first fit."""
-        options, template = self.options, self.template
+        options, template, rounds = self.options, self.template, self.options.rounds(self.noise)
         positions = first.copy()
-        smoothing = options.smoothing[-1] if options.second_smoothing is None else options.second_smoothing
         for at, surface in enumerate(self.surfaces):
             if surface is None or (at == self.key and options.restart):
                 continue
             x = coherent[at] if options.restart else first[at]
-            stiffness = np.full(template.count, smoothing)
+            stiffness = np.full(template.count, rounds.second_smoothing)
             if options.guard > 1:
                 _, turns = turned_laplacian(template, first[self.key], x)
                 stiffness[doubtful(template, first[self.key], turns, x)] *= options.guard
             shape = template.laplacian @ coherent[at]
-            for gate in options.gates[-2:]:
-                x = self._round(x, surface, gate, Problem(shape, stiffness, coherent[at], options.pull))
+            for gate in rounds.gates[-2:]:
+                x = self._round(x, surface, gate, Problem(shape, stiffness, coherent[at], rounds.pull))
             positions[at] = x
         return positions
 

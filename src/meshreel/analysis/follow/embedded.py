@@ -8,6 +8,7 @@ It replaces the paper's volume tracking (section 3.1) in preset `best` (docs/dec
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -26,6 +27,7 @@ from .embedded_graph import DeformationGraph, area_samples, build_graph, farthes
 from .embedded_match import NORMAL_REACH, SampledSurface
 from .embedded_solve import GraphSolver, Planes, Pose, RestGraph, moved, rotation, turned, unmoved
 
+LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs come and go (decision 16)
 BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
 UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far (decision 15)
 
@@ -83,12 +85,31 @@ class EmbeddedOptions:
                 f"settled {self.settled}, uneven {self.uneven}: give > 0, and >= 0 for the others"
             )
 
+    def limits(self, noise: float) -> ResidualLimits:
+        """Return the limits for frames at this RMS distance from the truth; with noise no key is in doubt."""
+        if noise == 0:
+            return ResidualLimits(self.doubt, self.rekeyed, self.lost, self.settled, self.uneven)
+        lost = math.hypot(self.lost, LOST * noise)
+        return ResidualLimits(math.hypot(self.doubt, noise), lost, lost, math.hypot(self.settled, noise), math.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualLimits:
+    """Residuals at which tracking is repeated or given up, as in EmbeddedOptions, for frames of known noise."""
+
+    doubt: float
+    rekeyed: float
+    lost: float
+    settled: float
+    uneven: float
+
 
 class Tracker:
     """Tracker of a key frame's mesh: registers one frame at a time, outward from the key in either direction."""
 
-    def __init__(self, key_mesh: Mesh, key: int, options: EmbeddedOptions | None = None) -> None:
+    def __init__(self, key_mesh: Mesh, key: int, options: EmbeddedOptions | None = None, noise: float = 0.0) -> None:
         self.options, self.key = options or EmbeddedOptions(), key
+        self.limits = self.options.limits(noise)
         self.mesh = clean(key_mesh)
         if self.mesh.is_empty:
             raise InputError(f"the key frame {key} is empty; choose one that has a surface")
@@ -158,7 +179,7 @@ class Tracker:
             residual = self._measure(pose, surface)
             if residual < best[1]:
                 best = pose, residual
-            if residual < max(o.doubt, UNUSUAL * float(usual)):
+            if residual < max(self.limits.doubt, UNUSUAL * float(usual)):
                 return best
         stay = self._poses[last], self._measure(self._poses[last], surface)
         return best if best[1] < stay[1] else stay

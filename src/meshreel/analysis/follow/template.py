@@ -6,6 +6,7 @@ In: a key frame; fitted positions of the subdivided base. Out: the base; positio
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ from ...geometry.decimate import BOUNDARY_WEIGHT, decimate
 from ...geometry.subdivision import heights, levels_of, refine
 from ...types import Mesh
 
+NOISY_ERROR = 0.5  # RMS distances of the noise that a base mesh may miss in addition (decision 16)
+NOISY_BORDER = 100.0  # weight of open borders under noise: a coarse base cuts their corners (decision 16)
 FEWEST = 40  # smallest number of vertices of a base mesh, enough for a body's limbs: a guess
 DECAY = 1.2  # the error of quadric decimation falls with this power of the number of vertices (measured on bodies)
 CURVATURE = 52  # 64ths, lift of midpoints, between the coder's 48 and 58 (decision 14)
@@ -28,7 +31,8 @@ ROUNDS = 2  # rounds of the search for the number of vertices: a guess
 class TemplateOptions:
     """Options of the template of a group (decision 14)."""
 
-    error: float = 1.1e-3  # desired RMS distance of the key frame's vertices to the base mesh, in diagonals
+    # Desired RMS distance of the key frame's vertices to the base mesh, in diagonals; `presets` at quality 50.
+    error: float = 0.00088 * (0.0018 / 0.0012) ** 0.55
     levels: int = 2  # midpoint subdivisions of the base
     border: float = BOUNDARY_WEIGHT  # weight of open borders in the decimation
 
@@ -40,16 +44,17 @@ class TemplateOptions:
             )
 
 
-def base_mesh(key: Mesh, options: TemplateOptions) -> Mesh:
+def base_mesh(key: Mesh, options: TemplateOptions, noise: float = 0.0) -> Mesh:
     """Decimate the key frame until its error is about `options.error`."""
-    most = len(key.vertices)
+    most, aim = len(key.vertices), math.hypot(options.error, NOISY_ERROR * noise)
+    border = NOISY_BORDER if noise else options.border
     count = min(max(most // 20, FEWEST), most)
     for left in reversed(range(ROUNDS + 1)):
-        base = decimate(key, max(count, 4), options.border)
+        base = decimate(key, max(count, 4), border)
         error = _rms(key, base)
-        if left == 0 or error == 0.0 or abs(np.log(error / options.error)) < 0.05:
+        if left == 0 or error == 0.0 or abs(np.log(error / aim)) < 0.05:
             break
-        wanted = round(len(base.vertices) * (error / options.error) ** (1 / DECAY))
+        wanted = round(len(base.vertices) * (error / aim) ** (1 / DECAY))
         if (count := min(max(wanted, FEWEST), most)) == len(base.vertices):
             break
     return base

@@ -18,7 +18,7 @@ from ...errors import InputError
 from ...geometry.closest_points import Surface
 from ...types import Centers, Mesh
 from ..fit.match import FrameSurface
-from ..fit.surface_fit import FitOptions, fit_surfaces
+from ..fit.surface_fit import FitOptions, Guides, fit_surfaces
 from .centers import ReferenceCenterOptions, affinity, largest_distances, reference_centers
 from .deform import DeformOptions, Neighbours, bind, center_motions, move, neighbours
 from .fuse import FuseOptions, Group, GroupCenters
@@ -139,7 +139,7 @@ def _trial(group: Group, surfaces: list[FrameSurface], attempt: _Attempt, option
         return Trial(frame, key, np.inf, np.inf)
     tried = sorted({key, *np.linspace(0, len(surfaces) - 1, options.trial_frames).round().astype(int).tolist()})
     some = [surfaces[t] for t in tried]
-    fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], some, replace(TRIAL_FIT, key=tried.index(key)))
+    fitted = fit_surfaces(mesh.faces, group.sent(mesh, pose)[tried], some, TRIAL_FIT, Guides(key=tried.index(key)))
     rms = []
     for frame_surface, moved in zip(some, fitted, strict=True):
         original = frame_surface.mesh.vertices

@@ -8,7 +8,7 @@ sequence (docs/decisions/0018-places.md); and labels are cleaned on the surface.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,8 +16,7 @@ import numpy as np
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.closest_points import distances
-from ...geometry.depth import DepthPicture, SeesDepth
-from ...geometry.derived_sequences import Chosen, TurnedOver
+from ...geometry.derived_sequences import CapturedSequence, Chosen, TurnedOver, captured
 from ...geometry.topology import edge_lengths, face_normals
 from ...geometry.voxels import Lattice
 from ...types import Mesh, MeshSequence, evenly
@@ -57,6 +56,7 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), re
     If nothing is found to move and the faces show their backs to the inside of the scene, it is segmented again with
     all faces reversed.
     """
+    frames = captured(frames)
     chosen = _with_surface(frames, options.places.chosen(len(frames), frames.frame_rate))
     if not chosen:
         nothing = np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0)
@@ -68,19 +68,15 @@ def segment(frames: MeshSequence, options: SegmentOptions = SegmentOptions(), re
     return found
 
 
-def _by_place(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions, report: Report) -> ByPlace:
+def _by_place(frames: CapturedSequence, chosen: Sequence[int], options: SegmentOptions, report: Report) -> ByPlace:
     cell, views = edge_length(frames, chosen), _views(frames, chosen, options)
     lattice = _lattice(frames, chosen, cell)
-    pictures = _pictures_of(frames, chosen) if isinstance(frames, SeesDepth) else None
-    places = find_places(Observations(Chosen(frames, chosen), views, pictures, report), lattice, options.places)
+    some = Chosen(frames, chosen)
+    pictures = None if some.depth is None else some.depth.__getitem__
+    places = find_places(Observations(some, views, pictures, report), lattice, options.places)
     moving = moving_places(places, options.cut)
     rest = find_rest(places, moving, chosen, frames.frame_rate, options.settle)
     return ByPlace(cell, lattice, places.keys, moving, rest, options.island)
-
-
-def _pictures_of(frames: SeesDepth, chosen: Sequence[int]) -> Callable[[int], list[DepthPicture | None]]:
-    """Return a function from an index into `chosen` to the depth pictures that the cameras took of that frame."""
-    return lambda number: frames.pictures(chosen[number])
 
 
 def _faces_away(mesh: Mesh) -> bool:
@@ -125,7 +121,7 @@ def _with_surface(frames: MeshSequence, numbers: Sequence[int]) -> list[int]:
 def _views(frames: MeshSequence, chosen: Sequence[int], options: SegmentOptions) -> tuple[PinholeCamera, ...]:
     """Return the cameras in the options, or views placed for a few of the chosen frames."""
     some = Chosen(frames, chosen[:: max(1, len(chosen) // _PROBES)])
-    return _looking(options.cameras, frames, chosen) or place_views(some, options.views)
+    return _looking(options.cameras, frames, chosen) or place_views(some, options.views, some.up)
 
 
 def _looking(

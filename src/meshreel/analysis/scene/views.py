@@ -21,7 +21,7 @@ from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays
 from ...geometry.topology import face_normals
-from ...types import UP_AXES, Frames, Mesh, check_up
+from ...types import UP_AXES, Frames, Mesh, Up
 
 _TOUCHES = 1e-3  # of a ray's length: a hit this near its end is the sample itself; a guess
 _INSIDE = 0.5  # a place that sees more than this share of its samples from behind is inside an object; a guess
@@ -37,7 +37,6 @@ class ViewsOptions:
     width: int = 320  # pixels
     height: int = 240  # pixels
     fov: float = 75.0  # degrees, horizontal
-    up: str = "y"  # the axis that points up in the pictures: y, z, -y or -z
     places: int = 6  # candidate places along the longest side of the box
     reach: float = 1.0  # size of the box in which views stand, in sizes of the scene's box: 2 for a lone body
     frames: int = 4  # frames inspected, spread evenly over those given
@@ -50,7 +49,6 @@ class ViewsOptions:
             raise InputError(f"views of {self.width} x {self.height} pixels: give 8 to 4096 a side")
         if not 10 <= self.fov <= 150:
             raise InputError(f"field of view {self.fov:g}: give 10 to 150 degrees")
-        check_up(self.up)
         if not 1 <= self.reach <= 10:
             raise InputError(f"reach {self.reach:g}: give 1 to 10 boxes")
         if not (2 <= self.places <= 10 and 1 <= self.frames <= 16 and 16 <= self.samples <= 8192):
@@ -58,7 +56,9 @@ class ViewsOptions:
             raise InputError(f"{text}: give 2 to 10, 1 to 16 and 16 to 8192")
 
 
-def place_views(meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOptions()) -> tuple[PinholeCamera, ...]:
+def place_views(
+    meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOptions(), up: Up = "y"
+) -> tuple[PinholeCamera, ...]:
     """Place views that together see nearly all of the meshes; the same meshes always give the same views.
 
     Only `options.frames` of the meshes are read. Raises InputError if none of those has a surface. Takes some 4 s of
@@ -71,10 +71,10 @@ def place_views(meshes: Sequence[Mesh] | Frames, options: ViewsOptions = ViewsOp
     low = np.min([s.mesh.vertices[s.mesh.faces].min(axis=(0, 1)) for s in samples], axis=0)
     high = np.max([s.mesh.vertices[s.mesh.faces].max(axis=(0, 1)) for s in samples], axis=0)
     places = _outside(_grid(low, high, options), samples)
-    candidates = [_looking(eye, turn, options) for eye, _ in places for turn in _turns(options)]
+    candidates = [_looking(eye, turn, options) for eye, _ in places for turn in _turns(up)]
     pixels = np.empty((len(candidates), sum(len(part.points) for part in samples)), np.float32)  # some 100 MB
     for number, (eye, sees) in enumerate(places):
-        pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, options)
+        pixels[len(_WAYS) * number : len(_WAYS) * (number + 1)] = _pixels(eye, sees, samples, _turns(up), options)
     return _greedy(candidates, pixels, options.count)
 
 
@@ -135,7 +135,11 @@ def _outside(
 
 
 def _pixels(
-    eye: np.ndarray, sees: list[np.ndarray], samples: list[_Samples], options: ViewsOptions
+    eye: np.ndarray,
+    sees: list[np.ndarray],
+    samples: list[_Samples],
+    turns: Float64[np.ndarray, "W 3 3"],
+    options: ViewsOptions,
 ) -> Float32[np.ndarray, "W N"]:
     """Return the size in pixels, at most 1, of each sample's face in each viewing direction; all frames in one row."""
     across = math.tan(math.radians(options.fov) / 2)
@@ -147,7 +151,7 @@ def _pixels(
         distance = np.maximum(np.linalg.norm(ahead, axis=1), 1e-12)
         facing = np.abs((part.normals * ahead).sum(axis=1)) / distance
         whole = np.where(free, focal**2 * facing * part.areas / distance**2, 0).astype(np.float32)  # on the axis
-        x, y, z = np.moveaxis((ahead / distance[:, None]).astype(np.float32) @ _turns(options).swapaxes(1, 2), 2, 0)
+        x, y, z = np.moveaxis((ahead / distance[:, None]).astype(np.float32) @ turns.swapaxes(1, 2), 2, 0)
         within = (np.abs(x) < across * z) & (np.abs(y) < high * z)
         found.append(np.where(within, np.minimum(whole / np.maximum(z, 1e-3) ** 3, 1), 0))
     return np.concatenate(found, axis=1).astype(np.float32)
@@ -177,9 +181,9 @@ def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], o
 
 
 @cache
-def _turns(options: ViewsOptions) -> Float64[np.ndarray, "W 3 3"]:
+def _turns(axis: Up) -> Float64[np.ndarray, "W 3 3"]:
     """Return the rotation from world to camera for each viewing direction; upright unless the direction is vertical."""
-    up = np.array(UP_AXES[options.up])
+    up = np.array(UP_AXES[axis])
     turns = []
     for way in _WAYS:
         forward = way / np.linalg.norm(way)

@@ -7,6 +7,7 @@ previous one (docs/decisions/0012-layers-coder.md).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
@@ -26,8 +27,9 @@ from .fields import Rate
 from .graph import Connectivity, connectivity
 from .trajectories import decode_trajectories, encode_trajectories
 
+NOISY_STEP = 0.8  # RMS distances of the noise that a step is wide in addition (decision 0016)
 MOST_FRAMES = 255  # of a group: a byte in the head
-MOST_NUMBERS = 1 << 29  # of decoded positions: 4 GiB
+MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +60,14 @@ class LayerCodingOptions:
         """Return the lift of a level's midpoints, 64ths."""
         return self.curvatures[min(level, len(self.curvatures)) - 1]
 
-    def rate(self, level: int) -> Rate:
-        """Return step and price of a level; level 0 is the base."""
+    def step_above(self, noise: float) -> float:
+        """Return the step for frames at this RMS distance from the truth: below the noise there is nothing to code."""
+        return math.hypot(self.step, NOISY_STEP * noise)
+
+    def rate(self, level: int, noise: float = 0.0) -> Rate:
+        """Return step and price of a level; 0 is the base."""
         ratio = 1.0 if level == 0 else self.detail_ratios[min(level, len(self.detail_ratios)) - 1]
-        return Rate(level_of(self.step * ratio), self.price)
+        return Rate(level_of(self.step_above(noise) * ratio), self.price)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +101,7 @@ def encode_layers(
     positions: Float64[np.ndarray, "T V 3"],
     options: LayerCodingOptions = LayerCodingOptions(),
     previous: LayersState | None = None,
+    noise: float = 0.0,
 ) -> EncodedLayers:
     """Encode a group whose subdivided base should lie at `positions`; predicted from `previous` if given.
 
@@ -104,7 +111,9 @@ def encode_layers(
     frames, levels = len(positions), reference.levels
     base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
     _check_input(positions, base)
-    field, known = encode_trajectories(positions[:, : len(base.vertices)], base, options.rate(0), options.tangential)
+    field, known = encode_trajectories(
+        positions[:, : len(base.vertices)], base, options.rate(0, noise), options.tangential
+    )
     origin = Origin.ALONE if previous is None else Origin.PREVIOUS
     data = reference.data if previous is None else b""
     head = LayersGroup(
@@ -119,7 +128,7 @@ def encode_layers(
             raise InputError(f"{positions.shape[1]} vertices where level {number} has {level.count}")
         curvature = options.curvature(number)
         aim = heights(positions[:, : level.count], known, level, curvature)
-        coded = encode_level(aim, level, options.rate(number), curvature, _before(previous, number))
+        coded = encode_level(aim, level, options.rate(number, noise), curvature, _before(previous, number))
         parts.append(pack(coded.record))
         scalars.append(coded.scalars)
         known, faces = refine(known, level, coded.scalars, curvature), level.faces

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from meshreel.coding.layers.patches import run_lengths
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.options import EncoderOptions, PaperOptions
 from meshreel.encoder.presets import preset_options, quality_of_vertices
 from meshreel.encoder.progress import Stages
 from meshreel.encoder.sequence import Encoder
@@ -55,7 +55,9 @@ class TvmcCodec:
         """Of preset `paper`, at the quality that has as many vertices: what a reference must reach comes from it."""
         quality = quality_of_vertices(self.vertices)
         options = preset_options("paper", quality=quality, group_size=self.group_size, centers=self.centers)
-        return replace(options, reference=replace(options.reference, vertices=self.vertices))
+        assert isinstance(options.method, PaperOptions)
+        reference = replace(options.method.reference, vertices=self.vertices)
+        return replace(options, method=replace(options.method, reference=reference))
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """The stream. Raises InputError for frames that cannot be used."""

@@ -14,10 +14,12 @@ from jaxtyping import Float64
 from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.reference_mesh import CodedReference
 from meshreel.encoder.forms import displacement_field, intra_only
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.interval import Interval
+from meshreel.encoder.options import EncoderOptions, PaperOptions
 from meshreel.encoder.paper import FoundGroup
-from meshreel.encoder.scene import Static, TrackInterval, all_intervals, encode_static, options_of
+from meshreel.encoder.scene import Static, encode_static
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.target import target_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,20 +65,23 @@ def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
     Spans that the encoder prepared are not looked for again.
     """
     sequence, parts, groups = encoder.sequence, encoder.parts(options), list[Tracked | Untracked]()
-    seen, options = survey(sequence) if parts is None else parts.seen, options_of(parts, options)
-    for run in all_intervals(sequence, seen, parts, options):
-        if not run.frames[0].is_empty:
-            groups += _groups(run, encoder.store.find(run.frames, options), options)
-    states = [] if parts is None else encode_static(parts, len(sequence), sequence.frame_rate, options.background)
+    assert isinstance(options.method, PaperOptions), "references are those of the paper's recipe"
+    for interval in encoder.intervals(options):
+        if not interval.frames[0].is_empty:
+            groups += _groups(interval, encoder.store.find(interval, options.method), options.method)
+    seen, states = survey(sequence) if parts is None else parts.seen, list[Static]()
+    if parts is not None and options.scene is not None:
+        states = encode_static(parts, len(sequence), sequence.frame_rate, options.scene.background)
     return Tracking(seen, states, sorted(groups, key=lambda group: group.first_frame))
 
 
-def _groups(run: TrackInterval, found: Sequence[FoundGroup], options: EncoderOptions) -> Iterator[Tracked | Untracked]:
-    """The groups of a window."""
-    first = run.first_frame
+def _groups(interval: Interval, found: Sequence[FoundGroup], options: PaperOptions) -> Iterator[Tracked | Untracked]:
+    """The groups of an interval."""
+    first = interval.first_frame
     for group in found:
         if group.fitted is None:
-            yield Untracked(first, len(group.frames), intra_only(group.frames, options).payload)
+            target = target_of(group.frames, options.target, interval.noise)
+            yield Untracked(first, len(group.frames), intra_only(group.frames, target, options.intra).payload)
         else:
             reference = group.fitted.reference
             yield Tracked(first, reference, displacement_field(reference, group.fitted.positions))
