@@ -1,7 +1,7 @@
-"""Encodes a mesh sequence: survey it, encode it window by window, write it.
+"""Encoding of a mesh sequence: survey it, take a scene apart, encode its intervals, and write the file.
 
-Reads beside decoder.py. A window of frames is a value, so windows can be spread over processes, and memory does not
-grow with the length of the sequence.
+In: a sequence, options. Out: a .reel file and a Summary. An interval needs no other frames, so intervals can be spread
+over processes, and memory does not grow with the length of the sequence.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Which components a displacement field gets, and its symbols (encoder; reverse water-filling, paper section 3.3.3).
+"""Choice of components and steps for a displacement field (encoder; reverse water-filling, paper section 3.3.3).
 
-In: a field, its base's Laplacian system. Out: the basis as transmitted and each component's step and symbols, such that
+In: a field, its base's Laplacian system. Out: the basis as transmitted and each component's step, such that
 distortion + price * rate is least: the distortion is the squared error after the least-squares inverse (the basis is
 orthonormal but for its rounding, so components add), the rate is what the entropy coder really spends.
 """
@@ -80,7 +80,6 @@ class Allocation:
 
     basis: klt.BasisSymbols
     levels: Int64[np.ndarray, " M"]  # of each component's step
-    symbols: Int32[np.ndarray, "R M"]  # V deltas, then l anchors
 
 
 def allocate(
@@ -94,13 +93,27 @@ def allocate(
         kept = basis.energies > (0.4 * options.step) ** 2
     coded = _Components(field, _only(basis, kept), system, options)
     ladder = [np.full(coded.count, level_of(options.step) + offset) for offset in LADDER]
-    values = np.array([coded.value(coded.quantized(levels), levels, neighbours) for levels in ladder])
+    values = np.array([coded.value(coded.rounded(levels), levels, neighbours) for levels in ladder])
     levels = np.choose(values.argmin(axis=0), ladder) if coded.count else ladder[0]
     pays = values.min(axis=0) < coded.dropped() if options.basis_size is None else np.ones(coded.count, dtype=bool)
     if not pays.all():
         kept[kept] = pays
         coded, levels = _Components(field, _only(basis, kept), system, options), levels[pays]
-    return Allocation(coded.basis, levels, coded.quantized(levels))
+    return Allocation(coded.basis, levels)
+
+
+def round_deltas(
+    deltas: Float64[np.ndarray, "R M"], levels: Int64[np.ndarray, " M"], system: System, options: DisplacementOptions
+) -> Int32[np.ndarray, "R M"]:
+    """Round deltas to symbols; a symbol's price comes from how large its column's symbols are."""
+    steps, vertices = steps_of(levels), system.vertices
+    if options.dead_zone is not None:
+        return quantize.forward(deltas, steps, options.dead_zone)
+    price = options.price * (options.step / steps) ** 2  # of a bit, in the component's own squared steps
+    symbols = np.rint(deltas / steps)
+    for _ in range(2):
+        symbols = system.quantize(deltas, steps, price * _slopes(symbols[:vertices]))
+    return symbols
 
 
 class _Components:
@@ -115,22 +128,15 @@ class _Components:
         self.weights = klt.forward(field, klt.dequantize(self.basis))
         self.deltas = system.forward(self.weights)
 
-    def quantized(self, levels: Int64[np.ndarray, " M"]) -> Int32[np.ndarray, "R M"]:
-        """Quantise at a step level for each component; the price of a symbol follows from its column's magnitudes."""
-        steps = _steps(levels)
-        if self.options.dead_zone is not None:
-            return quantize.forward(self.deltas, steps, self.options.dead_zone)
-        price = self.options.price * (self.options.step / steps) ** 2  # of a bit, in the component's own squared steps
-        symbols = np.rint(self.deltas / steps)
-        for _ in range(2):
-            symbols = self.system.quantize(self.deltas, steps, price * _slopes(symbols[: self.vertices]))
-        return symbols
+    def rounded(self, levels: Int64[np.ndarray, " M"]) -> Int32[np.ndarray, "R M"]:
+        """Return the symbols at a step level for each component."""
+        return round_deltas(self.deltas, levels, self.system, self.options)
 
     def value(
         self, symbols: Int32[np.ndarray, "R M"], levels: Int64[np.ndarray, " M"], neighbours: entropy.Neighbours
     ) -> Float64[np.ndarray, " M"]:
-        """Return distortion + price * rate of each component; the basis is orthonormal, so they add."""
-        error = self.system.inverse(symbols * _steps(levels)) - self.weights
+        """Distortion + price * rate of each component: the basis is orthonormal, so they add."""
+        error = self.system.inverse(symbols * steps_of(levels)) - self.weights
         bits = entropy.weights_cost(symbols[: self.vertices], neighbours)
         bits += np.log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
         bits += np.log2(2.0 * np.abs(self.basis.vectors) + 1).sum(axis=1)
@@ -145,7 +151,7 @@ def _only(basis: klt.Basis, kept: Bool[np.ndarray, " C"]) -> klt.Basis:
     return klt.Basis(basis.mean, np.ascontiguousarray(basis.vectors[:, kept]), basis.energies[kept])
 
 
-def _steps(levels: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
+def steps_of(levels: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
     return np.array([step_of(level) for level in levels.tolist()], dtype=np.float64)
 
 

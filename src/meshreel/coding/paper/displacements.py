@@ -15,9 +15,9 @@ from ...format import records
 from ...format.layout import Component, DisplacementHead
 from ...types import Mesh
 from .. import entropy, klt
-from ..steps import LEVELS, step_of
+from ..steps import LEVELS
 from . import laplacian, quantize
-from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost
+from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost, round_deltas, steps_of
 
 MOST_FRAMES = 65_535  # of a group: a uint16 in the head
 MOST_BITS = 30  # fraction bits of the mean and of a basis vector, so that values fit int32
@@ -49,13 +49,14 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
     neighbours = entropy.causal_neighbours(base.faces, vertices)
     anchors = laplacian.anchors(head.anchor_rule, head.anchor_count, base.faces, vertices)
     parts = _streams(data, offset, head.components[:count])
-    deltas = entropy.decode_weights([deltas for _, deltas in parts], vertices, neighbours)
+    rounded = entropy.decode_weights([deltas for _, deltas in parts], vertices, neighbours)
     fixed = [entropy.decode_integers(stream, len(anchors)) for stream, _ in parts]
-    symbols = np.concatenate([deltas, np.array(fixed, dtype=np.int32).reshape(count, len(anchors)).T])
-    steps = np.array([step_of(component.step_level) for component in head.components[:count]], dtype=np.float64)
+    symbols = np.concatenate([rounded, np.array(fixed, dtype=np.int32).reshape(count, len(anchors)).T])
+    steps = steps_of(np.array([component.step_level for component in head.components[:count]], dtype=np.int64))
     try:
         system = laplacian.System(base, anchors, head.anchor_weight)
-        weights = system.inverse(quantize.inverse(symbols, steps))  # eq. 13
+        deltas = quantize.inverse(symbols, steps)
+        weights = system.inverse(deltas)  # eq. 13
     except ValueError as error:  # collapsed faces, which no encoder's Draco keeps, tie parts that have no anchor
         raise FormatError(f"displacements: the base's least squares have no solution: {error}") from error
     return klt.inverse(weights, _read_basis(head, count))  # eq. 9
@@ -73,33 +74,42 @@ def layer_sizes(data: bytes) -> list[int]:
 
 
 def _encode(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: DisplacementOptions) -> tuple[bytes, float]:
-    """Encode with one number of anchors; return the payload and its squared error."""
-    vertices, frames, _ = field.shape
-    count = options.anchor_count or 0
-    anchors = laplacian.anchors(options.anchor_rule, count, base.faces, vertices)
+    """Return the payload for one number of anchors, and its squared error.
+
+    What chooses components and steps stands before the chain; `decode_displacements` undoes the chain line by line.
+    """
+    vertices = len(field)
+    anchors = laplacian.anchors(options.anchor_rule, options.anchor_count or 0, base.faces, vertices)
     system = laplacian.System(base, anchors, options.anchor_weight)
     neighbours = entropy.causal_neighbours(base.faces, vertices)
-    choice = allocate(field, system, neighbours, options)  # eqs. 8 and 12
-    anchor_streams = [entropy.encode_integers(column) for column in choice.symbols[vertices:].T]
-    delta_streams = entropy.encode_weights(choice.symbols[:vertices], neighbours)
-    head = DisplacementHead(
+    choice = allocate(field, system, neighbours, options)
+    basis, steps = klt.dequantize(choice.basis), steps_of(choice.levels)
+
+    weights = klt.forward(field, basis)  # eq. 8
+    deltas = system.forward(weights)  # eq. 12
+    symbols = round_deltas(deltas, choice.levels, system, options)
+    fixed = [entropy.encode_integers(column) for column in symbols[vertices:].T]
+    streams = list(zip(fixed, entropy.encode_weights(symbols[:vertices], neighbours), strict=True))
+
+    error = klt.inverse(system.inverse(quantize.inverse(symbols, steps)), basis) - field
+    payload = records.pack(_head(field.shape[1], choice, streams, options)) + b"".join(map(b"".join, streams))
+    return payload, float((error**2).sum())
+
+
+def _head(
+    frames: int, choice: Allocation, streams: list[tuple[bytes, bytes]], options: DisplacementOptions
+) -> DisplacementHead:
+    """Return the head of the streams of each component's anchors and deltas."""
+    parts = zip(choice.basis.bits[1:].tolist(), choice.levels.tolist(), streams, strict=True)
+    return DisplacementHead(
         frames=frames,
         anchor_rule=options.anchor_rule,
-        anchor_count=count,
+        anchor_count=options.anchor_count or 0,
         anchor_weight=options.anchor_weight,
         mean_bits=int(choice.basis.bits[0]),
-        components=_components(choice, anchor_streams, delta_streams),
+        components=tuple(Component(bits, level, len(fixed), len(deltas)) for bits, level, (fixed, deltas) in parts),
         basis=entropy.encode_integers(np.append(choice.basis.mean, choice.basis.vectors).astype(np.int32)),
     )
-    streams = (stream for pair in zip(anchor_streams, delta_streams, strict=True) for stream in pair)
-    weights = system.inverse(quantize.inverse(choice.symbols, np.array([step_of(k) for k in choice.levels.tolist()])))
-    error = klt.inverse(weights, klt.dequantize(choice.basis)) - field
-    return records.pack(head) + b"".join(streams), float((error**2).sum())
-
-
-def _components(choice: Allocation, anchors: list[bytes], deltas: list[bytes]) -> tuple[Component, ...]:
-    parts = zip(choice.basis.bits[1:].tolist(), choice.levels.tolist(), anchors, deltas, strict=True)
-    return tuple(Component(bits, level, len(fixed), len(stream)) for bits, level, fixed, stream in parts)
 
 
 def _read_head(data: bytes) -> tuple[DisplacementHead, int]:

@@ -42,6 +42,7 @@ class System:
     """Extended Laplacian of one base mesh, factorised once and used for any number of columns."""
 
     def __init__(self, base: Mesh, anchors: Int32[np.ndarray, " l"], weight: int = 1) -> None:
+        self.vertices = len(base.vertices)
         self._core = _core.Laplacian(base.vertices, base.faces, anchors, float(weight))
 
     def forward(self, weights: Float64[np.ndarray, "V M"]) -> Float64[np.ndarray, "R M"]:
