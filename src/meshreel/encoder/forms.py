@@ -20,9 +20,8 @@ from ..types import Mesh
 from .draco import IntraOptions, cheapest_intra, finest_intra
 from .target import NO_ERROR, Fidelity, measure
 
-MOST_FOR_HALF = (
-    2  # times the bytes that half the distance (6 dB) may cost; a finer template gains 4 dB for that (decision 0007)
-)
+# Times the bytes that half the distance (6 dB) may cost: a finer template gains 4 dB for that (decision 0007).
+MOST_FOR_HALF = 2
 MOST_EMPTY = 65_535  # frames of a group without surface: what its field in the index holds
 
 

@@ -1,4 +1,4 @@
-"""Which faces of a scene move, and with which body: what `scene.py` codes, as labels of faces (section 3.2).
+"""Labels of a scene's faces: which faces move, and with which body (paper, section 3.2).
 
 In: frames of a scene, and who says what moves in them. Out: labels, frame by frame; a segment of frames is in memory.
 """
@@ -21,14 +21,14 @@ from .scene import Tracks, key_intervals
 
 @dataclass(frozen=True, slots=True)
 class FrameLabels:
-    """Of the faces of one frame."""
+    """Labels of the faces of one frame."""
 
     moving: Bool[np.ndarray, " F"]
-    bodies: UInt16[np.ndarray, " F"]  # the track that codes the face, and one; 0: it rests, or is of no body
+    bodies: UInt16[np.ndarray, " F"]  # 1 + the track that has the face; 0: it stands still, or belongs to no body
 
 
 def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[FrameLabels]:
-    """The labels of each frame; a body has the same number in all frames."""
+    """Yield the labels of each frame; a body has the same number in all frames."""
     cell = segmentation.cell
     tracks = Tracks(cell, options.scene.bodies if options.scene else BodyOptions())
     for frames in key_intervals(sequence, segmentation, options):
@@ -47,12 +47,12 @@ def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: En
 
 
 def _numbers(part: Mesh, bodies: list[tuple[int, Mesh]]) -> UInt16[np.ndarray, " F"]:
-    """The number of the body that has each face of what moves; bodies have connected pieces of it, and some more."""
+    """Return the number of the body that has each moving face; bodies are connected pieces and a ring around them."""
     from scipy.spatial import cKDTree
 
     found = np.zeros(len(part.faces), np.uint16)
     corners = part.vertices[part.faces[:, 0]]
     for number, body in bodies:
         if not body.is_empty and len(corners):
-            found[cKDTree(body.vertices).query(corners)[0] == 0] = number  # its vertices are those of the frame
+            found[cKDTree(body.vertices).query(corners)[0] == 0] = number  # a body has the frame's vertices
     return found

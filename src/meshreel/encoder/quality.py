@@ -1,4 +1,4 @@
-"""Encoding to a rate or to a PSNR: the quality that gives it is searched for, with whole encodes.
+"""Search for the quality whose encode meets a rate or a PSNR; each trial is a whole encode.
 
 In: a sequence and a goal. Out: a file that meets it. The rate is nearly exponential in the quality and the PSNR nearly
 linear, so that a few secant steps are enough.
@@ -17,14 +17,14 @@ from .options import EncoderOptions
 from .sequence import Encoder
 from .summary import Summary
 
-TRIALS = 8  # whole encodes, at most
+TRIALS = 8  # whole encodes, at most (guess)
 FIRST_QUALITY = 50.0
-DIGITS = 4  # significant ones of a quality that is tried: what the file records says all of it
+DIGITS = 4  # significant digits of a tried quality: a file records all of them
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What a file should be; exactly one of both."""
+    """Goal of a search: exactly one of a PSNR and a rate."""
 
     psnr: float | None = None  # d2_psnr_paper, mean over the frames, dB; reached within 0.3 dB
     mbps: float | None = None  # of the whole file, Mbit/s; reached within 5 %
@@ -38,27 +38,27 @@ class Goal:
 
     @property
     def tolerance(self) -> float:
-        """How near a measured value must be to the wanted one; a little less than what is promised."""
+        """Largest difference between measured and wanted value; a little below the promised 0.3 dB or 5 %."""
         return 0.25 if self.mbps is None else math.log(1.04)
 
     @property
     def slope(self) -> float:
-        """How the measured value rises with the quality, about, before two are known."""
+        """Typical rise of the measured value per point of quality, used until two values are known."""
         return 0.16 if self.mbps is None else math.log(2) / 22
 
     @property
     def wanted(self) -> float:
-        """The goal where it is linear in the quality: dB, or the logarithm of the rate."""
+        """The wanted value on a scale that is nearly linear in the quality: dB, or the logarithm of the rate."""
         return math.log(self.mbps) if self.mbps is not None else float(self.psnr or 0.0)
 
     def measured(self, summary: Summary, frame_rate: float) -> float:
-        """The same of a file."""
+        """Return the value of a file on the scale of `wanted`."""
         if self.mbps is None:
             return summary.psnr
         return math.log(summary.size * 8 * frame_rate / summary.frame_count / 1e6)
 
     def exceeded_by_background(self, summary: Summary, frame_rate: float) -> str:
-        """What is wrong where a scene's background, whose size no quality changes, leaves nothing of the rate."""
+        """Return an error text where a scene's background, whose size no quality changes, exceeds the rate; else ""."""
         if self.mbps is None or summary.scene is None:
             return ""
         seconds = summary.frame_count / frame_rate
@@ -76,7 +76,7 @@ class Goal:
 def encode_to(
     encoder: Encoder, path: str | Path, goal: Goal, options_at: Callable[[float], EncoderOptions]
 ) -> tuple[Summary, float]:
-    """Writes a file that meets the goal; gives its summary and the quality it took.
+    """Write a file that meets the goal; return its summary and the quality that met it.
 
     `options_at` makes the options of a quality from 0 to 100. Raises InputError, and leaves no file, where no quality
     meets the goal: at once where a scene's background alone is more than the rate.
@@ -111,7 +111,7 @@ class Search:
         self._known: dict[float, float] = {}
 
     def next(self) -> float | None:
-        """The quality to try; None where nothing is left."""
+        """Return the quality to try next; None where none is left."""
         if not self._known:
             return FIRST_QUALITY
         wanted = self._goal.wanted
@@ -127,16 +127,16 @@ class Search:
         return None if ahead in self._known else ahead
 
     def learn(self, quality: float, value: float) -> None:
-        """Takes in what a quality gave."""
+        """Add the value that a quality led to."""
         self._known[quality] = value
 
     def found(self) -> str:
-        """What was tried, for a message."""
+        """Return the tried qualities and their values for a message."""
         tried = sorted(self._known.items())
         return ", ".join(f"quality {quality:.4g} gives {self._goal.text_of(value)}" for quality, value in tried)
 
     def _slope(self) -> float:
-        """From the two outermost qualities known, where there are two."""
+        """Return the rise per point between the two outermost known qualities, or the typical one."""
         (q0, v0), (q1, v1) = min(self._known.items()), max(self._known.items())
         return max((v1 - v0) / (q1 - q0), 0.3 * self._goal.slope) if q1 > q0 else self._goal.slope
 

@@ -32,9 +32,10 @@ from .options import EncoderOptions
 from .parts import Change, Parts
 from .recipe import encode_apart, encode_interval, longest_interval
 
-FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)  # of the background's vertices, tried in order
-HALFWAY = 0.3  # of the vertices: what has fewer than half as many is decimated from there, a third of the time
-LEAST_NOISE = 1e-4  # of the unit: a background is no finer than with that much
+# Of the background's vertices, tried in order (decision 0019).
+FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)
+HALFWAY = 0.3  # of the vertices; smaller meshes are decimated from this one, in a third of the time (guess)
+LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +65,9 @@ class CodedBodies:
 
 
 def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:
-    """The states of the background in `count` frames: as few faces as are about as near to it as noise is.
+    """Encode the states of the background: as few faces as stay about as near to it as the noise.
 
-    A whole one at the start and, where it is to be refreshed, again; and a patch for each change of the room.
+    The first state is whole, as are those of a refresh; each change of the room is a patch of the state before.
     """
     noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
     step, most = options.lattice * noise, options.coarse * noise
@@ -81,25 +82,25 @@ def encode_static(parts: Parts, count: int, frame_rate: float, options: Backgrou
             state = decode_change(payload, state)
         if whole and not state.is_empty:
             payload = encode_background(state, step)
-            state = decode_background(payload)  # in the order of faces that the next patch counts in
+            state = decode_background(payload)  # the next patch counts faces in the decoded order
         if not (whole and state.is_empty):
             found.append(Static(frame, payload, not whole))
     return found
 
 
 def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> range:
-    """The frames at which the background is sent, whole, the first among them."""
+    """Return the frames at which the whole background is sent; the first frame is one of them."""
     return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
 
 
 def _gone(parts: Parts, state: Mesh, change: Change) -> Bool[np.ndarray, " F"]:
-    """The faces of a state of the background, normalised, that a change takes away."""
+    """Return a mask of the background's faces, normalised, that a change removes."""
     place = Placement(parts.seen.unit, tuple(parts.seen.center))
     return parts.segmentation.gone(change.frame, place.of(state))
 
 
 def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
-    """The payload of a mesh with as few vertices as leave it within an RMS distance, and that as decoded."""
+    """Encode a mesh with the fewest vertices that stay within an RMS distance; return payload and decoded mesh."""
     if mesh.is_empty:
         return b"", mesh
     smaller = decimate_faces(mesh, max(4, round(2 * HALFWAY * len(mesh.vertices))))
@@ -228,5 +229,5 @@ def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
 
 
 def _apart(mesh: Mesh, small: Mesh) -> float:
-    """RMS distance of a mesh's vertices to a simplified one."""
+    """Return the RMS distance from the vertices of a mesh to a simplified mesh."""
     return float(np.sqrt((distances(mesh.vertices, small) ** 2).mean()))

@@ -50,7 +50,7 @@ from .summary import GroupSummary, SceneSummary, Summary
 
 QUALITY, PRESET = 50.0, "best"  # the default operating point (decision 0009)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
-ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less
+ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
 
 
 def encode(
@@ -79,7 +79,7 @@ def encode(
 
 
 class Encoder:
-    """A sequence that is encoded once, or at several rates: what these share is found once."""
+    """Encoder of one sequence at one or several rates; analyses that do not depend on the rate are done once."""
 
     def __init__(
         self,
@@ -88,19 +88,19 @@ class Encoder:
         progress: Progress | None = None,
         masker: Masker | None = None,
     ) -> None:
-        """Executor and progress are those of `encode`; with a `masker`, who says what moves, it is a scene.
+        """Take executor and progress as `encode` does; with a `masker`, whose masks mark moving pixels, it is a scene.
 
-        Who is told of progress may change: `progress` is an attribute.
+        The attribute `progress` may be replaced between encodes.
         """
         self.sequence, self._executor, self._masker = captured(sequence), executor, masker
         self.progress = progress
-        self.store = GroupStore()  # those that `prepare` found
+        self.store = GroupStore()  # groups that `prepare` found
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
-        self._stands: bool | None = masker is not None or None  # whether most of it stands still; None: not looked at
+        self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
 
     @property
     def frame_rate(self) -> float:
-        """Of the sequence, 1/s."""
+        """Frames per second of the sequence, 1/s."""
         return self.sequence.frame_rate
 
     def prepare(self, options: EncoderOptions) -> None:
@@ -120,11 +120,11 @@ class Encoder:
         return _intervals(self._job(options), self.parts(options))
 
     def parts(self, options: EncoderOptions) -> Parts | None:
-        """What the sequence is made of; None where it is no scene, or is not to be taken for one."""
+        """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
         return self._parts(self._job(options)) if self._is_scene(options) else None
 
     def encode(self, path: str | Path, options: EncoderOptions) -> Summary:
-        """As the function `encode`, which says what is raised."""
+        """Encode the sequence as the function `encode` does, with the same errors."""
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
         check_target(Path(path))
@@ -143,7 +143,7 @@ class Encoder:
         return self._stands
 
     def _parts(self, job: Job) -> Parts:
-        """What the scene is made of; found anew where other options say otherwise."""
+        """Return the parts of the scene; they are found again where the options of the scene changed."""
         how = (job.scene.segment, job.scene.background)
         if self._scene is None or self._scene[:2] != how:
             seen = survey(job.sequence, job.stages, cleaned=False)
@@ -152,7 +152,7 @@ class Encoder:
 
 
 def _encode_bodies(job: Job, path: Path) -> Summary:
-    """As `encode`, for a sequence in which everything may move."""
+    """Encode a sequence in which everything may move."""
     sequence, options = job.sequence, job.options
     seen = survey(sequence, job.stages)
     groups: list[GroupSummary] = []
@@ -166,7 +166,7 @@ def _encode_bodies(job: Job, path: Path) -> Summary:
 
 
 def _encode_scene(job: Job, path: Path, parts: Parts) -> Summary:
-    """As `encode`, for a scene with a background."""
+    """Encode a scene with a background."""
     sequence, options, seen = job.sequence, job.options, parts.seen
     states = encode_static(parts, len(sequence), sequence.frame_rate, job.scene.background)
     with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
@@ -187,7 +187,7 @@ def _encode_scene(job: Job, path: Path, parts: Parts) -> Summary:
 def _added_in_order(
     writer: ReelWriter, coded: Sequence[TrackGroup], states: Sequence[Static], seen: Survey
 ) -> list[GroupSummary]:
-    """Writes all groups, and each state of the background before the first group that is shown with it."""
+    """Write all groups, and each state of the background before the first group that is shown with it."""
     groups, waiting, static = list[GroupSummary](), deque(states), list[int]()
     for each in coded:
         while waiting and waiting[0].frame <= each.first_frame:
@@ -199,7 +199,7 @@ def _added_in_order(
 
 
 def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
-    """Writes a group of a track, which names the background of its frames where it is given."""
+    """Write a group of a track, with the chunk of the background that its frames are shown with."""
     group, track, last = each.group, each.track, writer.last_of(each.track)
     before = [last] if group.predicted and last is not None else []
     writer.add_group(each.first_frame, group.frame_count, group.payload, group.layers, (*static, *before), track)
@@ -209,7 +209,7 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
 
 
 def _measured(sequence: MeshSequence, path: Path, diagonal: float, numbers: Sequence[int]) -> float:
-    """d2_psnr_paper, dB, mean over some frames of a file."""
+    """Return the mean d2_psnr_paper, dB, over some frames of a file."""
     with open_video(path) as video:
         found = []
         for number in numbers:
@@ -234,20 +234,20 @@ def _warnings(seen: Survey) -> tuple[str, ...]:
 
 
 def _lost(faces: int) -> tuple[str, ...]:
-    """What a user must know of bits of a scene that belong to no body."""
+    """Return a warning of moving pieces of a scene that belong to no body."""
     if not faces:
         return ()
     return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
 
 
 def _still(least: float) -> tuple[str, ...]:
-    """What a user must know of a scene in which nothing was found to move, by how far it must, m."""
+    """Return a warning of a scene in which nothing moves by more than `least`, m."""
     text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
     return (f"{text}; if something does, encode with --dynamic-only",)
 
 
 def _astray(share: float) -> tuple[str, ...]:
-    """What a user must know of surface that stands still, by its share of all, and is in no part of the file."""
+    """Return a warning of still surface that the file lacks, by its share of all surface."""
     if share <= ASTRAY:
         return ()
     text = f"{100 * share:.1f} % of the surface stands still, but is far from the background that frames share"
@@ -257,7 +257,7 @@ def _astray(share: float) -> tuple[str, ...]:
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
-    """The header of a file whose coordinates are normalised by `seen`."""
+    """Return the header of a file whose coordinates are normalised by a survey."""
     low, high = ((corner - seen.center) / seen.unit for corner in (seen.low, seen.high))
     return Header(
         frame_rate=frame_rate,
@@ -307,7 +307,7 @@ def _arrived(waiting: deque[tuple[int, Future[list[EncodedGroup]]]], stages: Sta
 
 
 def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:
-    """What `info` shows of the encoding: not needed to decode, but counted in the rate."""
+    """Return the metadata that `info` shows; decoding does not need it, but the rate includes it."""
     frames = sum(group.frame_count for group in groups)
     mean_square = sum(group.frame_count * group.fidelity.distance**2 for group in groups) / frames
     return {
@@ -327,5 +327,5 @@ def _upright(up: Up) -> dict[str, Any]:
 
 
 def _rounded(value: float) -> float | None:
-    """Four digits; None for what JSON has no number for."""
+    """Round to four significant digits; None where JSON has no number."""
     return float(f"{value:.4g}") if math.isfinite(value) else None

@@ -1,4 +1,4 @@
-"""What is told of an encode once its file is written."""
+"""Summary of an encode: the size, the groups and the warnings of a written file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .target import Fidelity
 
 @dataclass(frozen=True, slots=True)
 class GroupSummary:
-    """What is left of a group once it is written; distances in metres."""
+    """Form, size and fidelity of a written group; distances in metres."""
 
     form: Form
     frame_count: int
@@ -23,7 +23,7 @@ class GroupSummary:
 
 @dataclass(frozen=True, slots=True)
 class SceneSummary:
-    """What is left of a scene's parts."""
+    """Sizes and measurements of the parts of a scene."""
 
     background: int  # bytes, of all its states
     faces: int  # of the first of them, as decoded
@@ -35,21 +35,21 @@ class SceneSummary:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What an encode made."""
+    """Size, groups and warnings of a written file."""
 
     size: int  # bytes of the file
     groups: tuple[GroupSummary, ...]
-    warnings: tuple[str, ...] = ()  # what a user must know of frames that were not kept, a line each
+    warnings: tuple[str, ...] = ()  # about surface that was not kept, a line each
     scene: SceneSummary | None = None  # of a scene with a background
 
     @property
     def frame_count(self) -> int:
-        """Frames of the sequence."""
+        """Number of frames of the sequence."""
         return sum(group.frame_count for group in self.groups if group.track == 0)
 
     @property
     def psnr(self) -> float:
-        """d2_psnr_paper, mean over the frames, dB; of a scene, over those that were measured."""
+        """Mean d2_psnr_paper over the frames, dB; of a scene, over the measured frames."""
         if self.scene is not None:
             return self.scene.psnr
         return sum(group.frame_count * group.fidelity.psnr for group in self.groups) / self.frame_count

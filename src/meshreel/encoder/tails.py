@@ -25,10 +25,10 @@ from ..geometry.decimate import decimate
 from ..geometry.topology import clean, components, concatenate, drop_unreferenced, face_normals
 from ..types import Mesh
 
-BODY = 0.98  # of the surface; the rest are the tails
-LEAST_BYTES = 4  # that a region or a patch takes at least
+BODY = 0.98  # share of the surface; the rest is the tails (decision 0013)
+LEAST_BYTES = 4  # bytes of a region or a patch at least (guess)
 DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share
-EXACT = 1e-7  # RMS distance of the rest, of the diagonal, at which a byte is worth nothing any more
+EXACT = 1e-7  # RMS distance of the rest, of the diagonal, below which no byte is worth spending (guess)
 
 
 TINY = 1e-300  # of areas: a mesh may have none
@@ -36,12 +36,12 @@ TINY = 1e-300  # of areas: a mesh may have none
 
 @dataclass(frozen=True, slots=True)
 class TailOptions:
-    """What is tried."""
+    """Candidates that the search for patches tries."""
 
     thresholds: tuple[float, ...] = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest
     shares: tuple[float, ...] = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept
     lattice: float = 2.0  # spacing of the patches' lattice, in RMS distances of the rest
-    exchange: float = 1.33  # relative fall of the squared error for a relative rise of the rate: 4 dB a doubling
+    exchange: float = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 0013)
 
     def __post_init__(self) -> None:
         if not self.thresholds or min(self.thresholds) <= 1:
@@ -54,7 +54,7 @@ class TailOptions:
 
 @dataclass(frozen=True, slots=True)
 class Tails:
-    """A layer of patches and the frames that are shown with it."""
+    """A layer of patches, and the frames as decoded with it."""
 
     record: LayersPatches
     frames: list[Mesh]
@@ -120,20 +120,20 @@ class _Search:
 
     @property
     def nothing(self) -> Bool[np.ndarray, "T F"]:
-        """A mask that drops no face."""
+        """Return a mask that drops no face."""
         return np.zeros((len(self.frames), len(self.faces)), bool)
 
     def coded(self, dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh]) -> _Coded:
-        """A mask and patches, as decoded."""
+        """Return a mask and patches as a decoder sees them."""
         record, decoded = encode_patches(dropped, meshes, self.step_level)
         return _Coded(record, Patches(dropped, decoded), len(pack(record)))
 
     def cost(self, tried: _Coded | None) -> float:
-        """Squared error, mean of both directions, with the price of the bytes."""
+        """Return the cost: the squared error, mean of both directions, plus the price of the bytes."""
         return self._errors(tried).mean(axis=1).sum() + (self.price * tried.size if tried else 0.0)
 
     def holds(self, tried: _Coded) -> bool:
-        """Whether the larger of both directions' errors pays for the bytes, too."""
+        """True where the fall of the larger error of both directions also pays for the bytes."""
         before, after = (self._errors(which).max(axis=1).sum() for which in (None, tried))
         return bool(after + self.price * tried.size < before)
 
@@ -144,14 +144,14 @@ class _Search:
         return np.array([frame.errors_with(gone, patch, self.usual) for frame, gone, patch in pairs])
 
     def masks(self) -> Iterator[Bool[np.ndarray, "T F"]]:
-        """Faces that are worth dropping, for each threshold; none that are empty."""
+        """Yield a mask of the faces worth dropping for each threshold, except empty masks."""
         for threshold in self.options.thresholds:
             chosen = self._paying(np.stack([frame.apart > threshold**2 * self.usual for frame in self.frames]))
             if chosen.any():
                 yield chosen
 
     def _paying(self, far: Bool[np.ndarray, "T F"]) -> Bool[np.ndarray, "T F"]:
-        """Of the regions of faces, connected in space and time, those that are worth their bytes."""
+        """Return the regions of faces, connected in space and time, that are worth their bytes."""
         labels = _regions(self.faces, far)
         gains = np.zeros(far.shape)
         for gain, frame, gone in zip(gains, self.frames, far, strict=True):
@@ -166,7 +166,7 @@ class _Search:
         return chosen
 
     def patches(self, best: _Coded | None) -> Iterator[tuple[Mesh, ...]]:
-        """Patches that are worth their bytes, for each threshold."""
+        """Yield the patches worth their bytes for each threshold."""
         if not self.options.shares:
             return
         left = [frame.left(best.parts.dropped[t] if best else None) for t, frame in enumerate(self.frames)]
@@ -178,7 +178,7 @@ class _Search:
                 yield meshes
 
     def _patch(self, frame: _Frame, squared: Float64[np.ndarray, " N"], threshold: float) -> Mesh:
-        """What a frame should be shown with besides, where its own samples are so far from what is decoded."""
+        """Yield the patches of a frame where its samples are farther than a limit from the decoded mesh."""
         chosen = []
         for faces in frame.lost(squared, threshold**2 * self.usual):
             samples = frame.samples_of(faces)
@@ -209,7 +209,7 @@ class _Search:
 
 
 def _step_level(frames: Sequence[Mesh], step: float) -> int:
-    """The lattice that is asked for, or the finest one that has room for whatever part of the frames."""
+    """Return the level of the wanted lattice, or of the finest lattice that holds every part of the frames."""
     level = level_of(step)
     far = np.max([np.abs(frame.vertices).max(axis=0) for frame in frames], axis=0)
     while level > 0 and not _within(far, level, len(frames)):
@@ -223,7 +223,7 @@ def _within(far: Float64[np.ndarray, " 3"], step_level: int, frames: int) -> boo
 
 
 class _Frame:
-    """A frame and its decoded mesh, sampled at vertices and centroids, and how far each is from the other."""
+    """A frame and its decoded mesh, sampled at vertices and centroids, with the distances between both."""
 
     def __init__(self, original: Mesh, decoded: Mesh) -> None:
         self.original, self.decoded = original, decoded
@@ -237,19 +237,19 @@ class _Frame:
         self.errors = (float(self.weights @ self.squared), float(self.areas @ self.apart / max(self.areas.sum(), TINY)))
 
     def body(self) -> float:
-        """Mean squared distance from the frame to the decoded mesh without the farthest 2 % of the surface."""
+        """Return the mean squared distance from the frame to the decoded mesh except its farthest 2 %."""
         order = np.argsort(self.squared)
         inside = order[: np.searchsorted(np.cumsum(self.weights[order]), BODY)]
         return float(self.weights[inside] @ self.squared[inside])
 
     def gains(self, gone: Bool[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
-        """What dropping each of these faces takes away from the mean of both errors, if all are dropped."""
+        """Return how much each face lowers the mean of both errors when all these faces are dropped."""
         invented = self.areas * (self.apart - self.errors[1]) / max(self.areas.sum(), TINY)
         lost = self.weights * (self.left(gone) - self.squared)
         return (invented * gone - np.bincount(self.hit, lost, len(gone))) / 2
 
     def left(self, gone: Bool[np.ndarray, " F"] | None) -> Float64[np.ndarray, " N"]:
-        """Squared distances from the frame's samples to what remains of the decoded mesh."""
+        """Return squared distances from the frame's samples to the decoded mesh without the dropped faces."""
         if gone is None or not gone.any():
             return self.squared
         if gone.all():
@@ -261,7 +261,7 @@ class _Frame:
         return squared
 
     def errors_with(self, gone: Bool[np.ndarray, " F"], patch: Mesh, least: float) -> tuple[float, float]:
-        """Mean squared distances, forward and backward, with a patch and without some faces.
+        """Return mean squared distances, forward and backward, with a patch and without the dropped faces.
 
         Samples that are nearer than `least` (squared) are not asked whether the patch is nearer still.
         """
@@ -275,7 +275,7 @@ class _Frame:
         return float(self.weights @ squared), float(areas @ apart / areas.sum()) if areas.any() else np.inf
 
     def lost(self, squared: Float64[np.ndarray, " N"], limit: float) -> Iterator[Int64[np.ndarray, " S"]]:
-        """Connected faces of the frame that are farther than a limit (squared) from what is decoded, with a rim."""
+        """Yield connected faces, with a rim, that are farther than a squared limit from the decoded mesh."""
         faces, count = self.original.faces, len(self.original.vertices)
         far = _of_faces(squared, faces) > limit
         touched = np.zeros(count, bool)
@@ -286,7 +286,7 @@ class _Frame:
         yield from np.split(wide[order], np.flatnonzero(np.diff(labels[order])) + 1) if len(wide) else ()
 
     def samples_of(self, faces: Int64[np.ndarray, " S"]) -> Int64[np.ndarray, " n"]:
-        """The samples on some of the frame's faces."""
+        """Return the numbers of the samples on some of the frame's faces."""
         return np.concatenate([np.unique(self.original.faces[faces]), len(self.original.vertices) + faces])
 
     def _apart(self, mesh: Mesh) -> tuple[Float64[np.ndarray, " F"], Float64[np.ndarray, " F"]]:
@@ -306,12 +306,12 @@ def _squared(
 
 
 def _of_faces(squared: Float64[np.ndarray, " N"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
-    """Means over the faces; 1/12 for each corner and 3/4 for the centroid integrate quadratics exactly."""
+    """Return means over the faces; 1/12 for each corner and 3/4 for the centroid integrate quadratics exactly."""
     return squared[faces].sum(axis=1) / 12 + 0.75 * squared[-len(faces) :]
 
 
 def _regions(faces: Int32[np.ndarray, "F 3"], far: Bool[np.ndarray, "T F"]) -> Int64[np.ndarray, "T F"]:
-    """Labels of the regions of faces that share a vertex, or are the same in the next frame; -1 outside."""
+    """Label regions of faces that share a vertex or are the same face in the next frame; -1 outside."""
     count = int(faces.max()) + 1
     frames, at = np.nonzero(far)
     corners = frames[:, None] * count + faces[at]
