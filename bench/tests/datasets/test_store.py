@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,21 @@ def test_a_file_more_or_one_by_another_name_is_other_data(planted):
     second = checksums.checksum(folder)
     (folder / "b.obj").rename(folder / "c.obj")
     assert len({first, second, checksums.checksum(folder)}) == 3
+
+
+def test_color_pictures_of_a_recording_leave_its_checksum_as_it_is(planted):
+    folder = planted / "performers" / "walker"
+    before = checksums.checksum(folder)
+    (folder / "color").mkdir()
+    (folder / "color" / "00000.png").write_text("")
+    assert checksums.checksum(folder) == before
+
+
+def test_a_table_of_checksums_is_rewritten_from_the_data(planted):
+    table = planted / "checksums.json"
+    table.write_text(json.dumps(dict.fromkeys(["performers/walker", "performers/ball.npz"], "")))
+    checksums.write_checksums(planted, table)
+    assert json.loads(table.read_text()) == checksums.known_checksums()
 
 
 def test_what_is_missing_is_told(tmp_path):

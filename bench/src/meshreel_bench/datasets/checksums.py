@@ -1,6 +1,6 @@
-"""SHA-256 of the benchmark data that the published rows were measured on: of files, and of folders file by file.
+"""SHA-256 of the benchmark data that the published rows were measured on.
 
-In: a path. Out: nothing, or InputError. Other data of the same name are refused before anything is measured.
+In: a path. Out: nothing, or InputError: other data of the same name are refused before anything is measured.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ from pathlib import Path
 from meshreel.errors import InputError
 
 TABLE = "checksums.json"  # package data: by path below the benchmark data
+UNREAD = "color"  # folder of a recording whose pictures no measurement reads
 
 
 def check_source(path: Path, known_as: Path) -> None:
-    """Raises InputError where `path` is not what is known by the name `known_as`.
+    """Raise InputError where `path` differs from the benchmark data called `known_as`.
 
-    What has no checksum is not looked at, and a path that is missing is left to whoever opens it.
+    Data without a checksum are accepted; a missing path is left to the function that opens it.
     """
     expected = known_checksums().get(known_as.as_posix())
     if expected is None or not path.exists():
@@ -32,19 +33,27 @@ def check_source(path: Path, known_as: Path) -> None:
 
 @cache
 def known_checksums() -> dict[str, str]:
-    """By path below the benchmark data."""
+    """Return the checksums by path below the benchmark data."""
     table: dict[str, str] = json.loads((files(__package__) / TABLE).read_text(encoding="utf-8"))
     return table
 
 
-def checksum(path: Path) -> str:
-    """SHA-256 of a file, or of the names and contents of all files below a folder, in the order of their names.
+def write_checksums(data: Path, table: Path) -> None:
+    """Replace the checksums in a table by those of the benchmark data in a folder; a new entry may have any value."""
+    found = {name: checksum(data / name) for name in sorted(json.loads(table.read_text(encoding="utf-8")))}
+    table.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
-    Files are read again where their sizes or times have changed. Raises InputError where one cannot be read.
+
+def checksum(path: Path) -> str:
+    """Return the SHA-256 of a file, or of names and contents of a folder's files in the order of their names.
+
+    The color pictures of a recording are left out. Files are read again where their sizes or times have changed.
+    Raises InputError where one cannot be read.
     """
     try:
-        files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
-        stamps = [(file, file.stat()) for file in files]
+        below = (p for p in path.rglob("*") if p.is_file() and path / UNREAD not in p.parents)
+        listed = sorted(below) if path.is_dir() else [path]
+        stamps = [(file, file.stat()) for file in listed]
         return _checksum(path, tuple((file, stat.st_size, stat.st_mtime_ns) for file, stat in stamps))
     except OSError as error:
         raise InputError(
