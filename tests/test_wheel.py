@@ -8,6 +8,7 @@ import subprocess
 import sys
 import urllib.request
 import venv
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -25,15 +26,37 @@ def fetch(address: str) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def python(tmp_path_factory):
-    """The interpreter of a new environment that has the wheel and nothing of this checkout."""
+def wheel(tmp_path_factory):
+    """The wheel of `meshreel`, built from this checkout."""
     folder = tmp_path_factory.mktemp("wheel")
     subprocess.run([sys.executable, *PIP, "wheel", str(ROOT), "--no-deps", "-w", str(folder)], check=True)
-    [wheel] = folder.glob("meshreel-*.whl")
-    venv.create(folder / "venv", with_pip=True)
-    found = folder / "venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+    [found] = folder.glob("meshreel-*.whl")
+    return found
+
+
+@pytest.fixture(scope="module")
+def python(wheel):
+    """The interpreter of a new environment that has the wheel and nothing of this checkout."""
+    folder = wheel.parent / "venv"
+    venv.create(folder, with_pip=True)
+    found = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
     subprocess.run([found, *PIP, "install", f"{wheel}[play]"], check=True)
     return found
+
+
+@pytest.mark.slow
+def test_the_wheel_contains_the_product_and_nothing_else(wheel):
+    names = zipfile.ZipFile(wheel).namelist()
+    assert {name.split("/")[0].split("-")[0] for name in names} == {"meshreel"}
+    assert not [name for name in names if "bench" in name and name != "meshreel/cli/no_bench.py"]
+    assert [name for name in names if name.startswith("meshreel/_core")]
+
+
+@pytest.mark.slow
+def test_the_wheel_without_the_bench_names_its_distribution(python, tmp_path):
+    command = [python, "-m", "meshreel", "bench", "run", "figure6"]
+    answer = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert answer.returncode == 2 and "pip install meshreel-bench" in answer.stderr
 
 
 @pytest.mark.slow

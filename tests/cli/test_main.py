@@ -120,3 +120,9 @@ def test_a_reader_that_leaves_is_no_error():
     golden = Path(__file__).parents[2] / "conformance" / "v1" / "draco.reel"
     done = subprocess.run([sys.executable, "-c", code, "info", golden, "--json"], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+@pytest.mark.parametrize("arguments", [(), ("run", "figure6", "-o", "rows.jsonl", "--jobs", "2")])
+def test_without_the_bench_its_command_names_the_distribution(run, monkeypatch, arguments):
+    monkeypatch.setattr("meshreel.cli.entry_points", lambda group: [])
+    assert failed(run("bench", *arguments), "pip install meshreel-bench")
