@@ -11,7 +11,6 @@ import pytest
 
 import meshreel
 from meshreel.capture.procedural import sliding_sphere
-from meshreel.encoder import layers as layered
 from meshreel.encoder.sequence import encode
 from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
@@ -86,7 +85,7 @@ def test_no_more_runs_are_read_than_there_are_workers_and_one(tmp_path):
 
 
 def test_more_empty_frames_than_a_group_holds_are_more_groups(tmp_path, monkeypatch):
-    monkeypatch.setattr(layered, "MOST_EMPTY", 100)
+    monkeypatch.setattr("meshreel.encoder.forms.MOST_EMPTY", 100)
     told: dict[str, int] = {}
     frames = MeshList((Mesh.empty(),) * 150, frame_rate=30.0)
     options = replace(OPTIONS, key_interval=600.0)

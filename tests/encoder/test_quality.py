@@ -20,7 +20,7 @@ from meshreel.errors import InputError
 from meshreel.format.layout import Form
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.types import MeshList
-from tests.small_options import quick
+from tests.small_options import quick, with_method
 
 
 def searched(goal: Goal, curve: Callable[[float], float]) -> tuple[float | None, int]:
@@ -100,7 +100,7 @@ BODY = MeshList(tuple(soft_bodies(SoftBodiesOptions(frames=2, people=1, spacing=
 def options_at(quality: float) -> meshreel.EncoderOptions:
     """No per-frame form: quick, and a smooth curve."""
     options = quick(quality=quality)
-    return replace(options, intra=replace(options.intra, fractions=()))
+    return with_method(options, intra=replace(options.method.intra, fractions=()))
 
 
 def test_a_file_meets_the_psnr_that_was_asked_for(tmp_path) -> None:

@@ -28,6 +28,7 @@ from meshreel.errors import InputError
 from meshreel.format.checks import MOST_TRACKS
 from meshreel.format.layout import Form
 from meshreel.geometry.closest_points import distances
+from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import concatenate, face_normals
 from meshreel.geometry.voxels import Lattice
 from meshreel.types import Mesh, MeshList, Placement
@@ -282,7 +283,7 @@ def tracks(frames: list[Mesh], segment: int = 2) -> list[str]:
     seen = replace(survey(sequence), scale=1.0)
     parts = Parts(seen, ALL, NONE, [], 0.0, 0.0)
     options = replace(OPTIONS, key_interval=float(segment))
-    coded = encode_bodies(Job(sequence, options, None, Stages(None, len(frames))), parts)
+    coded = encode_bodies(Job(captured(sequence), options, None, Stages(None, len(frames))), parts)
     assert coded.dropped == 0
     assert coded.groups == sorted(coded.groups, key=lambda each: (each.first_frame, each.track))
     count = max(each.track for each in coded.groups) + 1
@@ -358,7 +359,9 @@ def test_more_bodies_than_a_file_has_tracks_share_some():
     many = concatenate([moved(plate, (k % 17, k // 17, 0)) for k in range(MOST_TRACKS + 20)])
     sequence = MeshList((many, many), 1.0)
     seen = replace(survey(sequence), scale=1.0)
-    coded = encode_bodies(Job(sequence, OPTIONS, None, Stages(None, 2)), Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0))
+    coded = encode_bodies(
+        Job(captured(sequence), OPTIONS, None, Stages(None, 2)), Parts(seen, ALL, NONE, [], CELL, 0.0, 0.0)
+    )
     assert {each.track for each in coded.groups} == set(range(MOST_TRACKS)) and coded.dropped == 0
     faces = [len(decode_intra(each.group.payload)[0].faces) for each in coded.groups if each.first_frame == 0]
     assert sum(faces) == len(many.faces)
@@ -383,7 +386,7 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
 
 @pytest.mark.usefixtures("plainly")
 def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
-    sequence = MeshList(tuple(ROLLING))
+    sequence = captured(MeshList(tuple(ROLLING)))
     parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS.scene, Stages(None, 4))
     assert rms(parts.background.vertices, room()) < NOISE
     assert 0.5 * NOISE < parts.noise < 3 * NOISE and parts.segmentation.cell == pytest.approx(CELL, rel=0.2)
@@ -421,6 +424,8 @@ def test_a_scene_that_is_not_in_metres_is_refused_with_its_size(tmp_path):
 def test_a_frame_in_another_unit_is_refused_by_its_number(tmp_path):
     frames = list(small_scene.scene(12))
     frames[2] = Mesh(frames[2].vertices * 1000, frames[2].faces)
-    with pytest.raises(InputError, match=r"frame 2 is 3\.\d+e\+03 m large, half of the frames at most 3\.\d+ m; mend"):
+    with pytest.raises(
+        InputError, match=r"frame 2 is 3\.\d+e\+03 m large, half of the frames at most 3\.\d+ m; correct its unit"
+    ):
         encode(MeshList(tuple(frames), 10.0), tmp_path / "a.reel", options=quick_scene())
     assert list(tmp_path.iterdir()) == []

@@ -7,7 +7,7 @@ import pytest
 
 from meshreel.analysis.fit.border import border_sides
 from meshreel.analysis.fit.shape import strongest_components
-from meshreel.analysis.fit.surface_fit import FitOptions, fit_frames
+from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames
 from meshreel.errors import InputError
 from meshreel.geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint
 from meshreel.types import Mesh
@@ -108,8 +108,8 @@ def test_the_second_fit_is_nearer_to_few_components() -> None:
     predictions = predictions + rng.normal(0, 0.0005, predictions.shape)
 
     def tail(components: int) -> float:
-        options = FitOptions(components=components, pull=0.3, key=0)
-        positions = fit_frames(template.faces, predictions, frames, options).positions
+        options = FitOptions(components=components, pull=0.3)
+        positions = fit_frames(template.faces, predictions, frames, options, Guides(key=0)).positions
         return float(np.linalg.norm(positions - strongest_components(positions, 0, 2)))
 
     assert tail(2) < 0.7 * tail(0)
@@ -169,6 +169,6 @@ def test_options_that_make_no_sense_are_refused(wrong: dict[str, object]) -> Non
 def test_a_key_outside_the_frames_and_missing_predictions_are_refused() -> None:
     template = ball(1)
     with pytest.raises(InputError, match="key 3"):
-        fit_frames(template.faces, template.vertices[None], [ball(1)], FitOptions(key=3))
+        fit_frames(template.faces, template.vertices[None], [ball(1)], FitOptions(), Guides(key=3))
     with pytest.raises(InputError, match="1 predictions for 2 frames"):
         fit_frames(template.faces, template.vertices[None], [ball(1)] * 2, FitOptions())
