@@ -1,11 +1,12 @@
-"""Bases of the codecs here, which are frozen dataclasses: their fields are the operating point."""
+"""Bases of the codecs here, which are frozen dataclasses whose fields are the operating point, and of their frames."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, cast
 
-from meshreel.types import MeshSequence
+from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Progress
 
@@ -37,3 +38,17 @@ class TwoSteps(Options):
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """Return the stream. Raises InputError for frames that cannot be used."""
         return self.code(self.analyse(sequence, progress), progress)
+
+
+class DecodedFrames(Sequence[Mesh]):
+    """Frames of a stream, each decoded on access."""
+
+    __slots__ = ()
+
+    def frame(self, number: int) -> Mesh:
+        """Return frame `number`, which is in range, in metres. Raises FormatError where its bytes are damaged."""
+        raise NotImplementedError
+
+    def __getitem__(self, index: Any) -> Any:
+        numbers = range(len(self))[index]
+        return [self.frame(number) for number in numbers] if isinstance(numbers, range) else self.frame(numbers)

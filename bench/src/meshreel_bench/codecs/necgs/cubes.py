@@ -1,10 +1,8 @@
 """Deformable marching cubes (NeCGS, section 3.1): the surface of a TSDF-Def volume.
 
-In -> out: signed distances and deformations at the points of a grid -> a mesh in cells. A vertex lies where the
-distance is zero on an edge of the grid between two points that the deformation has moved.
-
-The 256 cases are derived, not stored. On a face of a cube with four crossings each inside corner is cut off by itself,
-which both cubes of the face say alike: the surface has no holes.
+In -> out: signed distances and deformations at the points of a grid -> a mesh in cells. A vertex is the zero of the
+distance on an edge between two grid points that the deformation has moved. The 256 cases are derived, not stored. On a
+face with four crossings each inside corner is cut off alone, in both cubes of the face: the surface has no holes.
 """
 
 from __future__ import annotations
@@ -21,20 +19,20 @@ from meshreel.geometry.topology import drop_unreferenced
 from meshreel.types import Mesh
 
 REACH = 0.5  # cells that a deformation of 1 moves a point, so that cells do not fold over
-STEEP = 0.8  # a change along an edge, where a surface has half: no surface but a flip of sign far from any
+STEEP = 0.8  # change along an edge, of which a surface has half: a flip of sign far from any surface
 
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """Where the surface of a grid of K x K x K points runs; V vertices on edges of the grid."""
+    """Topology of the surface of a grid of K x K x K points; V vertices on edges of the grid."""
 
     low: Int64[np.ndarray, " V"]  # flat number of the edge's first point
-    high: Int64[np.ndarray, " V"]  # and of its second, one further along one axis
+    high: Int64[np.ndarray, " V"]  # of its second point, one further along an axis
     faces: Int32[np.ndarray, "F 3"]  # counter-clockwise from outside
 
 
 def extract(volume: Float32[np.ndarray, "K K K 4"], trimmed: bool) -> Mesh:
-    """The mesh of a TSDF-Def volume, in cells; `trimmed` leaves out what is too steep to be a surface."""
+    """Return the mesh of a TSDF-Def volume, in cells; `trimmed` leaves out flips of sign far from any surface."""
     resolution, flat = len(volume), volume.reshape(-1, 4).astype(np.float64)
     found = cut(volume[..., 0])
     vertices = place(flat[found.low], flat[found.high], *(grid_points(n, resolution) for n in (found.low, found.high)))
@@ -46,18 +44,18 @@ def extract(volume: Float32[np.ndarray, "K K K 4"], trimmed: bool) -> Mesh:
 
 
 def place(low: Any, high: Any, first: Any, second: Any) -> Any:
-    """Vertices on edges, cells: V x 4 values and V x 3 places of both ends; arrays of NumPy or of torch."""
+    """Return vertices on edges, cells, from V x 4 values and V x 3 places of both ends; NumPy arrays or tensors."""
     share = (low[:, 0] / (low[:, 0] - high[:, 0]))[:, None]
     return (1 - share) * (first + REACH * low[:, 1:]) + share * (second + REACH * high[:, 1:])
 
 
 def grid_points(numbers: Int64[np.ndarray, " N"], resolution: int) -> Float64[np.ndarray, "N 3"]:
-    """The places of grid points by their flat numbers, cells."""
+    """Return the places of grid points with given flat numbers, cells."""
     return np.stack(np.unravel_index(numbers, (resolution,) * 3), axis=1).astype(np.float64)
 
 
 def cut(distances: Float32[np.ndarray, "K K K"]) -> Cut:
-    """The edges between a negative value and one that is not, and the faces between these."""
+    """Return the edges where the sign changes, and the faces between these."""
     resolution = len(distances)
     inside = (distances < 0).astype(np.uint8)
     ends = (slice(None, -1), slice(1, None))
@@ -82,7 +80,7 @@ _EDGES = [(n, axis) for axis in range(3) for n in range(8) if not n >> axis & 1]
 
 @cache
 def _table() -> Int64[np.ndarray, "N T 3"]:
-    """The triangles of each case, as numbers of `_EDGES`; -1 where there are no more."""
+    """Return the triangles of each case as numbers of `_EDGES`, filled up with -1."""
     cases = [_triangles(case) for case in range(256)]
     table = np.full((256, max(map(len, cases)), 3), -1)
     for case, triangles in enumerate(cases):
@@ -91,7 +89,7 @@ def _table() -> Int64[np.ndarray, "N T 3"]:
 
 
 def _triangles(case: int) -> list[tuple[int, int, int]]:
-    """The loops in which the surface meets the cube's faces, each as a fan; bit n of `case`: corner n is inside."""
+    """Return the loops of the surface on the cube's faces, each as a fan; bit n of `case`: corner n is inside."""
     following = dict(step for side in _sides() for step in _steps(side, case))
     triangles = []
     while following:
@@ -103,7 +101,7 @@ def _triangles(case: int) -> list[tuple[int, int, int]]:
 
 
 def _sides() -> list[list[int]]:
-    """The corners of each of the six faces, counter-clockwise from outside."""
+    """Return the corners of the six faces, counter-clockwise from outside."""
     sides = []
     for axis in range(3):
         b, c = 1 << (axis + 1) % 3, 1 << (axis + 2) % 3
@@ -113,7 +111,7 @@ def _sides() -> list[list[int]]:
 
 
 def _steps(side: list[int], case: int) -> list[tuple[int, int]]:
-    """For each run of inside corners around a face, the edge where it begins and the edge where it ends."""
+    """Return the first and the last edge of each run of inside corners around a face."""
     crossed = []
     for a, b in zip(side, side[1:] + side[:1], strict=True):
         if (case >> a ^ case >> b) & 1:

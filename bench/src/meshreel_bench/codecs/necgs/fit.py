@@ -1,8 +1,7 @@
-"""The optimal TSDF-Def volume of a mesh (NeCGS, section 3.1, eq. 1): deformations that bring its surface to the mesh.
+"""Fit of a TSDF-Def volume to a mesh (NeCGS, section 3.1, eq. 1). Needs the extra `necgs`.
 
-In -> out: distances and a mesh, in cells -> a K x K x K x 4 volume. Adam moves distances and deformations so that the
-squared distances between the extracted surface and the mesh become small, both ways, and the deformations with them.
-The extra `necgs`.
+In -> out: distances and a mesh, in cells -> a K x K x K x 4 volume. Adam reduces the squared distances between the
+extracted surface and the mesh, both ways, and the size of the deformations.
 """
 
 from __future__ import annotations
@@ -19,14 +18,14 @@ from meshreel.types import Mesh
 from .cubes import cut, grid_points, place
 from .network import repeatable
 
-RATE = 0.01  # of Adam
-SHORT = 1e-3  # weight of the deformations' mean size
-_SAMPLES = 4.0  # of the mesh, for each vertex that is extracted at first
+RATE = 0.01  # of Adam; a guess
+SHORT = 1e-3  # weight of the deformations' mean size; a guess
+_SAMPLES = 4.0  # points of the mesh per vertex of the first surface
 _MOST_SAMPLES = 60_000
 
 
 def fit_volume(distances: Float32[np.ndarray, "K K K"], mesh: Mesh, steps: int) -> Float32[np.ndarray, "K K K 4"]:
-    """The volume after so many steps; before the first the deformations are zero."""
+    """Return the volume after `steps` steps from zero deformations."""
     start = np.concatenate([distances[..., None], np.zeros((*distances.shape, 3), np.float32)], axis=-1)
     first = cut(distances)
     if steps == 0 or not len(first.faces):
@@ -34,10 +33,10 @@ def fit_volume(distances: Float32[np.ndarray, "K K K"], mesh: Mesh, steps: int) 
     surface = Surface(mesh)
     count = int(min(_SAMPLES * len(first.low), _MOST_SAMPLES))
     samples = scatter(mesh, np.ones(len(mesh.faces), bool), count).points
-    with repeatable():
-        return _descended(start, surface, samples, steps)
+    return _descended(start, surface, samples, steps)
 
 
+@repeatable()
 def _descended(start: np.ndarray, surface: Surface, samples: np.ndarray, steps: int) -> np.ndarray:
     volume = torch.from_numpy(start).reshape(-1, 4).requires_grad_()
     adam = torch.optim.Adam([volume], lr=RATE)
@@ -55,7 +54,7 @@ def _descended(start: np.ndarray, surface: Surface, samples: np.ndarray, steps: 
 
 
 def _error(volume: Tensor, resolution: int, surface: Surface, samples: np.ndarray) -> Tensor | None:
-    """Mean squared distances both ways, cells^2, and the deformations' size; None where there is no surface left."""
+    """Return squared distances both ways, cells^2, plus the size of deformations; None if no surface is left."""
     found = cut(volume.detach()[:, 0].numpy().reshape((resolution,) * 3))
     if not len(found.faces):
         return None

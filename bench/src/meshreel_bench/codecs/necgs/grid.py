@@ -1,10 +1,8 @@
-"""Where the frames' grids lie, and the truncated signed distances of a mesh at their points.
+"""Placement of the grids of frames, and truncated signed distances of a mesh at their points.
 
-In -> out: meshes, m -> a placement of one grid a frame; a mesh in cells -> K x K x K values, negative inside. Distances
-are those to the closest point (`geometry.closest_points`). Inside is where the winding number is above 1/2
-(`geometry.inside`), but for points whose closest face has no inside on either side, a sheet's: behind it is inside
-there, as of the walls of a room that was seen from within, whose number is below -1/2. What flips its sign far from any
-surface, past a sheet's border, is trimmed by the decoder.
+In -> out: meshes, m -> one grid per frame; a mesh in cells -> K x K x K values, negative inside. Inside is where the
+winding number is above 1/2; close to a sheet, which has no inside on either side, such as the wall of a room seen from
+within, it is behind the sheet. The decoder trims the flips of sign past the border of a sheet.
 """
 
 from __future__ import annotations
@@ -22,28 +20,28 @@ from meshreel.geometry.topology import border_edges, face_normals, weld
 from meshreel.types import Mesh
 
 TRUNCATION = 2.0  # cells at which a distance becomes 1, as in the authors' code
-MARGIN = 2  # cells between the largest frame and its grid's sides
-FARTHEST = 1 << 30  # cells that a frame may be away
-SHEETS = 0.05  # share of a mesh's area from which sheets are kept and trimmed; less of them is left out
-_BLOCK = 4  # points a side of a block that is decided at once where no surface is near
+MARGIN = 2  # cells between the largest frame and the sides of its grid; a guess
+FARTHEST = 1 << 30  # cells between two frames, at most
+SHEETS = 0.05  # share of a mesh's area from which sheets are kept and trimmed; a guess
+_BLOCK = 4  # points along a side of a block that has one sign where no surface is near
 _PROBE = 0.02  # cells before and behind a face
-_ASKED = 20_000  # faces, at least where there are as many, that tell whether there are sheets
+_ASKED = 20_000  # faces in the sample that shows whether there are sheets
 
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """One grid a frame, of cells of one size; frames move by whole cells, so that what stands still stays the same."""
+    """One grid per frame with cells of one size; grids move by whole cells, so that still surface stays the same."""
 
     cell: float  # m
     anchor: tuple[float, float, float]  # m, middle of the grid of a frame without a shift
     shifts: Int32[np.ndarray, "T 3"]  # cells
 
     def inverse(self, mesh: Mesh, frame: int, resolution: int) -> Mesh:
-        """A frame in metres in the cells of its grid."""
+        """Convert a frame from metres to cells of its grid."""
         return Mesh((mesh.vertices - self._origin(frame, resolution)) / self.cell, mesh.faces)
 
     def forward(self, mesh: Mesh, frame: int, resolution: int) -> Mesh:
-        """A frame in cells in metres."""
+        """Convert a frame from cells to metres."""
         return Mesh(mesh.vertices * self.cell + self._origin(frame, resolution), mesh.faces)
 
     def _origin(self, frame: int, resolution: int) -> Float64[np.ndarray, " 3"]:
@@ -54,7 +52,7 @@ Box = tuple[Float64[np.ndarray, " 3"], Float64[np.ndarray, " 3"]]  # lowest and 
 
 
 def box_of(mesh: Mesh) -> Box | None:
-    """The box of a mesh's faces; None where it has none."""
+    """Return the box of a mesh's faces; None if it has none."""
     if mesh.is_empty:
         return None
     used = mesh.vertices[np.unique(mesh.faces)]
@@ -62,7 +60,7 @@ def box_of(mesh: Mesh) -> Box | None:
 
 
 def place_grids(boxes: Sequence[Box | None], resolution: int) -> Placement:
-    """Grids into which every frame's box fits; that of an empty frame is where the anchor is."""
+    """Return grids that hold the box of every frame; the grid of an empty frame is at the anchor."""
     full = [box for box in boxes if box is not None]
     if not full:
         return Placement(1.0, (0.0, 0.0, 0.0), np.zeros((len(boxes), 3), np.int32))
@@ -77,7 +75,7 @@ def place_grids(boxes: Sequence[Box | None], resolution: int) -> Placement:
 
 
 def truncated_distances(mesh: Mesh, resolution: int) -> tuple[Float32[np.ndarray, "K K K"], bool]:
-    """Distances of a mesh in cells, -1 to 1 for `TRUNCATION` cells, and whether it has sheets to trim."""
+    """Return distances of a mesh in cells, -1 to 1 for `TRUNCATION` cells, and whether it has sheets to trim."""
     solid = Mesh(mesh.vertices, mesh.faces[face_normals(mesh)[1] > 0])  # zero areas break the winding number's tree
     if solid.is_empty:
         return np.ones((resolution,) * 3, np.float32), False
@@ -99,7 +97,7 @@ def truncated_distances(mesh: Mesh, resolution: int) -> tuple[Float32[np.ndarray
 
 
 class _Signs:
-    """Which side of a mesh points are on; its faces have areas."""
+    """Inside and outside of a mesh without faces of zero area."""
 
     def __init__(self, mesh: Mesh) -> None:
         self.surface = Surface(mesh)
@@ -107,8 +105,8 @@ class _Signs:
         self.has_sheets = not self._closed and self._many_are_sheets()
 
     def inside(self, points: Float64[np.ndarray, "N 3"], hits: Hits) -> Bool[np.ndarray, " N"]:
-        """Whether points are inside a body, or behind the sheet that is closest to them."""
-        sheet = np.zeros(len(points), bool)  # untrimmed, one loose face would have all that is behind it inside
+        """Return which points are inside a body or behind the sheet that is closest to them."""
+        sheet = np.zeros(len(points), bool)  # untrimmed, one loose face would turn all behind it into inside
         if self.has_sheets:
             asked, which = np.unique(hits.faces, return_inverse=True)
             sheet = self._sheets(asked)[which]
@@ -117,18 +115,18 @@ class _Signs:
         return behind
 
     def _enclosed(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Whether points are in a body; all faces of a closed mesh may look inwards."""
+        """Return which points are in a body; a closed mesh may have all its faces turned inwards."""
         numbers = winding_numbers(self.surface.mesh, points)
         return (np.abs(numbers) if self._closed else numbers) > 0.5
 
     def _many_are_sheets(self) -> bool:
-        """Whether they are more than `SHEETS` of the area, by some of the faces."""
+        """Return whether sheets are more than `SHEETS` of the area, by a sample of the faces."""
         some = np.arange(0, len(self.surface.mesh.faces), max(1, len(self.surface.mesh.faces) // _ASKED))
         areas = self.surface.areas[some]
         return bool(areas[self._sheets(some)].sum() > SHEETS * areas.sum())
 
     def _sheets(self, faces: Int64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
-        """Which of some faces have no inside on either side."""
+        """Return which faces have no inside on either side."""
         mesh = self.surface.mesh
         middles, offsets = mesh.vertices[mesh.faces[faces]].mean(axis=1), _PROBE * self.surface.normals[faces]
         return ~(self._enclosed(middles - offsets) | self._enclosed(middles + offsets))

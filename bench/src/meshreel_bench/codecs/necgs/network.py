@@ -1,7 +1,7 @@
-"""The auto-decoder (NeCGS, section 3.2 and appendix B): embedded features -> TSDF-Def volumes, in PyTorch.
+"""Auto-decoder (NeCGS, section 3.2 and appendix B): embedded features -> TSDF-Def volumes. Needs the extra `necgs`.
 
 Each module is a convolution of 3 x 3 x 3, a shuffle of its channels into 2 x 2 x 2 points, and a GELU; a last
-convolution makes the four numbers of every point. The extra `necgs`.
+convolution makes the four numbers of every point.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from meshreel.errors import InputError
 
 from .shape import SIDE, Shape, dequantize, quantize
 
-EMPTY = 1.0  # the distance at which training starts, as of a point far outside
+EMPTY = 1.0  # distance at which training starts: that of a point far outside
 
 
 def decode_volumes(features: Tensor, parameters: Sequence[Tensor]) -> Tensor:
-    """The B x 4 x K x K x K volumes of B x C x 4 x 4 x 4 features."""
+    """Return the B x 4 x K x K x K volumes of B x C x 4 x 4 x 4 features."""
     *modules, last = zip(parameters[::2], parameters[1::2], strict=True)
     values = features
     for weights, bias in modules:
@@ -34,9 +34,10 @@ def decode_volumes(features: Tensor, parameters: Sequence[Tensor]) -> Tensor:
 
 
 def _convolved(values: Tensor, weights: Tensor, bias: Tensor) -> Tensor:
-    """The convolution; the weights' layout chooses an algorithm that takes two thirds of the time on processors.
+    """Return a convolution.
 
-    There, one that is faster still takes no single small volume: two halves with their neighbouring layers are as good.
+    On CPUs the layout of the weights selects an algorithm that takes two thirds of the time. A single small volume is
+    cut into two halves with a shared border, for which a faster algorithm exists.
     """
     weights = weights.contiguous(memory_format=torch.channels_last_3d)
     if len(values) > 1 or values.device.type != "cpu":
@@ -49,23 +50,23 @@ def _convolved(values: Tensor, weights: Tensor, bias: Tensor) -> Tensor:
 
 
 def _shuffled(values: Tensor) -> Tensor:
-    """8 channels of a point as 2 x 2 x 2 points of one channel."""
+    """Turn 8 channels of a point into 2 x 2 x 2 points of one channel."""
     count, channels, *sides = values.shape
     blocks = values.reshape(count, channels // 8, 2, 2, 2, *sides).permute(0, 1, 5, 2, 6, 3, 7, 4)
     return blocks.reshape(count, channels // 8, *(2 * side for side in sides))
 
 
 def rounded(values: Tensor, bits: int) -> Tensor:
-    """Values as they will be decoded (eq. 5); the gradient passes straight through the rounding."""
+    """Return values as decoded (eq. 5); the gradient passes straight through the rounding."""
     clamped = values.clamp(-1, 1)
     levels = float(1 << (bits - 1))
     return clamped + (torch.round(clamped * levels) / levels - clamped).detach()
 
 
 def initial_parameters(shape: Shape, seed: int) -> list[Tensor]:
-    """Weights that keep the size of values from module to module (He et al. 2015), biases of zero.
+    """Return weights that preserve the size of values (He et al. 2015) and biases of zero.
 
-    The last convolution's volume is empty at first: far from any surface, and without deformation.
+    The last convolution makes an empty volume: far from any surface, without deformation.
     """
     generator = torch.Generator().manual_seed(seed)
     found = []
@@ -74,42 +75,60 @@ def initial_parameters(shape: Shape, seed: int) -> list[Tensor]:
         found.append((2 * torch.rand((outputs, inputs, 3, 3, 3), generator=generator) - 1) * bound)
         found.append(torch.zeros(outputs))
     weights, bias = found[-2:]
-    weights[0] /= 6**0.5  # what follows is no GELU
+    weights[0] /= 6**0.5  # no GELU follows
     weights[1:] = 0
     bias[0] = EMPTY
     return found
 
 
 def to_symbols(values: Tensor, bits: int) -> np.ndarray:
-    """The symbols of a tensor, flat, int32."""
+    """Return the symbols of a tensor, flat, int32."""
     return quantize(values.detach().cpu().numpy().astype(np.float64).reshape(-1), bits)
 
 
 def from_symbols(symbols: np.ndarray, size: Sequence[int], bits: int) -> Tensor:
-    """The tensor of symbols."""
+    """Return the tensor of symbols."""
     return torch.from_numpy(dequantize(symbols, bits).astype(np.float32).reshape(tuple(size)))
 
 
+@contextmanager
+def repeatable() -> Iterator[None]:
+    """Make torch deterministic: one thread, and only algorithms whose results are repeatable."""
+    threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
+    memory: Any = torch.utils.deterministic  # torch's own types lack its setting
+    filled = memory.fill_uninitialized_memory
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it, torch refuses to be deterministic on GPUs
+    torch.set_num_threads(1)
+    torch.use_deterministic_algorithms(True)
+    memory.fill_uninitialized_memory = False  # saves a tenth of the time; nothing reads such memory
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+        torch.use_deterministic_algorithms(strict)
+        memory.fill_uninitialized_memory = filled
+
+
 class Network:
-    """An auto-decoder as decoded."""
+    """A decoded auto-decoder."""
 
     def __init__(self, shape: Shape, symbols: Sequence[np.ndarray], device: str) -> None:
-        """Takes the symbols of every tensor, flat."""
         self._shape, self._device = shape, choose_device(device)
         tensors = zip(symbols, shape.tensors, strict=True)
         self._parameters = [from_symbols(flat, size, shape.bits).to(self._device) for flat, size in tensors]
 
+    @repeatable()
+    @torch.no_grad()
     def volume(self, symbols: np.ndarray) -> Float32[np.ndarray, "K K K 4"]:
-        """The TSDF-Def volume of a feature's symbols."""
+        """Return the TSDF-Def volume of a feature's symbols."""
         size = (1, self._shape.features, SIDE, SIDE, SIDE)
-        with repeatable(), torch.no_grad():
-            feature = from_symbols(symbols, size, self._shape.bits).to(self._device)
-            volume = decode_volumes(feature, self._parameters)[0].clamp(-1, 1)
+        feature = from_symbols(symbols, size, self._shape.bits).to(self._device)
+        volume = decode_volumes(feature, self._parameters)[0].clamp(-1, 1)
         return np.ascontiguousarray(volume.permute(1, 2, 3, 0).cpu().numpy())
 
 
 def choose_device(device: str) -> torch.device:
-    """The device of that name; `auto` is a GPU where torch sees one. InputError where there is none of that name."""
+    """Return a device by name; `auto` is a GPU if torch sees one. Raises InputError for a device that is absent."""
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     try:
@@ -117,21 +136,3 @@ def choose_device(device: str) -> torch.device:
     except (RuntimeError, AssertionError) as error:
         reason = str(error).splitlines()[0]
         raise InputError(f"device {device!r} cannot be used ({reason}); give cpu, cuda or auto") from error
-
-
-@contextmanager
-def repeatable() -> Iterator[None]:
-    """Inside, the same numbers come of the same numbers: one thread, and only algorithms that are deterministic."""
-    threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
-    memory: Any = torch.utils.deterministic  # torch's own types lack its setting
-    filled = memory.fill_uninitialized_memory
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # without it, torch refuses to be deterministic on GPUs
-    torch.set_num_threads(1)
-    torch.use_deterministic_algorithms(True)
-    memory.fill_uninitialized_memory = False  # a tenth of the time, and nothing reads such memory
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
-        torch.use_deterministic_algorithms(strict)
-        memory.fill_uninitialized_memory = filled

@@ -1,4 +1,4 @@
-"""What the auto-decoder is made of: all that both sides must know besides its numbers."""
+"""Sizes of the auto-decoder and quantization of its numbers (NeCGS, section 3.2 and appendix A.1)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float64, Int32
 
-SIDE = 4  # K': points a side of an embedded feature
+SIDE = 4  # K': points along a side of an embedded feature
 OUTPUTS = 4  # of a grid point: its distance and three components of its deformation
 RESOLUTIONS = (16, 32, 64, 128)
 MOST_CHANNELS = 128
@@ -20,26 +20,26 @@ _NARROWING = (1.0, 0.75, 0.5, 0.375, 0.25)  # of 64: 64, 48, 32, 24 and 16 chann
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """The sizes of an auto-decoder."""
+    """Sizes of an auto-decoder."""
 
-    resolution: int  # K, points a side of the grid; one of RESOLUTIONS
+    resolution: int  # K, points along a side of the grid; one of RESOLUTIONS
     features: int  # C, channels of an embedded feature
     channels: int  # of the first module's output
     bits: int  # N: numbers are multiples of 2 / 2^N from -1 to 1
 
     @property
     def feature_size(self) -> int:
-        """Numbers of an embedded feature."""
+        """Length of an embedded feature."""
         return self.features * SIDE**3
 
     @property
     def most(self) -> int:
-        """The largest symbol, that of 1; the smallest is its negative."""
+        """Largest symbol, of the value 1; the smallest is its negative."""
         return 1 << (self.bits - 1)
 
     @property
     def layers(self) -> tuple[tuple[int, int], ...]:
-        """Channels into and out of each convolution: L modules that make 2 x 2 x 2 points of one, and the last."""
+        """Input and output channels of each convolution: L modules that double the resolution, and the last."""
         modules = round(math.log2(self.resolution // SIDE))
         widths = [self.features, *(max(OUTPUTS, round(self.channels * share)) for share in _NARROWING[:modules])]
         inner = [(a, 8 * b) for a, b in pairwise(widths)]
@@ -47,15 +47,15 @@ class Shape:
 
     @property
     def tensors(self) -> tuple[tuple[int, ...], ...]:
-        """The shapes of the parameters: weights and biases of every convolution by turns."""
+        """Shapes of the parameters: weights, then biases of each convolution."""
         return tuple(size for a, b in self.layers for size in ((b, a, 3, 3, 3), (b,)))
 
 
 def quantize(values: Float64[np.ndarray, " N"], bits: int) -> Int32[np.ndarray, " N"]:
-    """Symbols of values, clamped to -1 .. 1: 2^N + 1 levels, 0 among them (section A.1, eq. 5)."""
+    """Return symbols of values clamped to -1 .. 1: 2^N + 1 levels including 0 (section A.1, eq. 5)."""
     return np.rint(np.clip(values, -1, 1) * (1 << (bits - 1))).astype(np.int32)
 
 
 def dequantize(symbols: Int32[np.ndarray, " N"], bits: int) -> Float64[np.ndarray, " N"]:
-    """The values of symbols."""
+    """Return the values of symbols."""
     return symbols / float(1 << (bits - 1))

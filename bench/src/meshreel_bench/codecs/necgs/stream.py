@@ -1,7 +1,7 @@
-"""The bytes of a coded set: a head, and streams of integers (`coding.entropy`). In -> out: a record <-> bytes.
+"""Bytes of a coded set: a head, then streams of integers (`coding.entropy`). In -> out: a record <-> bytes.
 
-A checksum refuses what was damaged by chance; what claims more numbers than its bytes can say is refused before memory
-is taken for them, and the largest network that the head can name takes about a GB to run.
+Streams with a wrong checksum, or with more numbers than their bytes can hold, are refused before memory is taken. The
+largest network that the head can describe takes about 1 GB to run.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ _LARGEST = 1e12  # m
 
 @dataclass(frozen=True, slots=True)
 class Coded:
-    """All that a decoder needs; there are symbols of the N frames that are not empty."""
+    """Input of the decoder; symbols are those of the N frames that are not empty."""
 
     shape: Shape
-    trimmed: bool  # surface that is too steep is left out
+    trimmed: bool  # flips of sign far from any surface are left out
     full: Bool[np.ndarray, " T"]  # frames that are not empty
     placement: Placement  # of all frames
     features: Int32[np.ndarray, "N E"]
@@ -40,8 +40,8 @@ class Coded:
 
 @dataclass(frozen=True, slots=True)
 class _Outer:
-    magic: Annotated[bytes, Bytes(8), "what it is"]
-    version: Annotated[int, U8, "a reader refuses any other than 1"]
+    magic: Annotated[bytes, Bytes(8), "NeCGS"]
+    version: Annotated[int, U8, "1"]
     checksum: Annotated[int, U32, "CRC-32 of all that follows"]
     inner: Annotated[bytes, Rest(), "an _Inner"]
 
@@ -52,18 +52,18 @@ class _Inner:
     features: Annotated[int, U8, "C"]
     channels: Annotated[int, U8, "of the first module"]
     bits: Annotated[int, U8, "N"]
-    trimmed: Annotated[int, U8, "1: surface that is too steep is left out"]
+    trimmed: Annotated[int, U8, "1: flips of sign far from any surface are left out"]
     frames: Annotated[int, U32, "T"]
     cell: Annotated[float, F64, "m"]
     anchor: Annotated[tuple[float, ...], Array(3, F64), "m"]
-    full: Annotated[bytes, Blob(U32), "a bit a frame: not empty"]
-    shifts: Annotated[bytes, Blob(U32), "integers: cells, of the frames that are not empty, less those before"]
+    full: Annotated[bytes, Blob(U32), "one bit per frame: not empty"]
+    shifts: Annotated[bytes, Blob(U32), "integers: cells, differences between frames that are not empty"]
     symbols: Annotated[bytes, Blob(U32), "integers: of the features, frame by frame"]
     parameters: Annotated[tuple[bytes, ...], List(U16, Blob(U32)), "integers: of every tensor"]
 
 
 def encode_stream(coded: Coded) -> bytes:
-    """The bytes of a coded set."""
+    """Return the bytes of a coded set."""
     shape, placement = coded.shape, coded.placement
     shifts = np.diff(placement.shifts[coded.full], axis=0, prepend=np.zeros((1, 3), np.int32))
     inner = _Inner(
@@ -85,7 +85,7 @@ def encode_stream(coded: Coded) -> bytes:
 
 
 def decode_stream(data: bytes) -> Coded:
-    """The coded set of bytes. FormatError where they are none."""
+    """Return the coded set. Raises FormatError where the bytes are damaged."""
     outer = unpack_all(_Outer, data)
     if outer.magic != MAGIC or outer.version != VERSION:
         raise FormatError(f"not a NeCGS stream of version {VERSION}: begins with {data[:9]!r}")

@@ -1,18 +1,17 @@
-"""TVMC*: one tracked reference a group and its displacements, both by Draco. In -> out: a sequence <-> bytes.
+"""TVMC*: each group as one tracked reference and its displacements, both coded by Draco. A sequence <-> bytes.
 
-The baseline of the TSMC paper (section 4.2) after "TVMC: Time-Varying Mesh Compression Using Volume-Tracked Reference
-Meshes" (Chen, Hácha, Váša and Dasari, MMSys 2025). Reference and displacements are those of preset `paper`.
+The baseline of the TSMC paper (section 4.2), after "TVMC: Time-Varying Mesh Compression Using Volume-Tracked Reference
+Meshes" (Chen, Hácha, Váša and Dasari, MMSys 2025). References and displacements are those of preset `paper`.
 
 Differs from the publication:
-- It decodes. In the code published with TVMC a frame's displacements are a Draco cloud in the order of a k-d tree, and
-  the evaluation looks each up among the originals; here they keep their order, which costs bytes, and need no original.
-- Points follow the reference's surface, face by face, so that Draco predicts each from a neighbour: fewer bytes.
-- One lattice for all groups and frames: `qp` bits for the widest frame, a step in metres. There each frame has its own.
+- It decodes without the originals. The published code writes displacements in the order of a k-d tree and looks each up
+  among the originals; here they keep their order, which costs bytes.
+- Vertices are ordered along the reference's surface, so that Draco predicts each from a neighbour: fewer bytes.
+- One quantization step in metres for all groups, with `qp` bits for the widest frame; there each frame has its own.
 - Vertices are fitted to the surface with a smooth field; there each jumps to the nearest vertex of the frame.
-- Groups are cut where no reference follows, and frames that none follows are Draco meshes, as in preset `paper`, at the
-  quality that goes with the reference's vertices, whatever `qp`. No group is Draco's because that were cheaper.
-- In a scene each body has references of its own, as in preset `paper`, so that curves differ by the coding alone and
-  a body that comes or goes cuts no other's groups; the paper has one reference of all that moves.
+- Groups are cut, and frames become Draco meshes, where no reference follows them, as in preset `paper`. The quality of
+  these meshes follows from the number of vertices, not from `qp`; Draco meshes are never chosen for their size.
+- Each body of a scene has its own references, so that curves differ from preset `paper` by the coding alone.
 """
 
 from __future__ import annotations

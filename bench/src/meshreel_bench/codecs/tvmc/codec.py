@@ -1,10 +1,9 @@
-"""The codec at an operating point. In -> out: a sequence <-> the bytes of `layout`."""
+"""TVMC* at an operating point. In -> out: a sequence <-> the bytes of `layout`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,69 +16,61 @@ from meshreel.errors import InputError
 from meshreel.types import Mesh, MeshSequence
 
 from ...codec import Progress
+from ..base import TwoSteps
 from ..meshreel import analysis_key, prepared
 from .layout import MAGIC, VERSION, Group, Kind, State, Stream, pack_stream
 from .tracked import MOST_CELLS, encode_tracked
 from .tracking import Tracked, Tracking, Untracked, track_sequence
 from .video import TvmcVideo
 
-LEAST_QP, MOST_QP = 2, 16
+LEAST_QP, MOST_QP = 2, 16  # bits; guesses
 
 
 @dataclass(frozen=True, slots=True)
-class TvmcCodec:
-    """TVMC* with displacements of `qp` bits; everything but `qp` is about the analysis, which points may share."""
+class TvmcCodec(TwoSteps):
+    """TVMC* with displacements of `qp` bits; operating points that differ in `qp` alone share an analysis."""
 
     qp: int = 9  # bits along the longest side of the widest frame's displacements
     vertices: int = 2000  # of the reference, before its subdivision
-    group_size: int = 10  # most frames in a group
+    group_size: int = 10  # largest number of frames in a group
     centers: int = 2000
 
     def __post_init__(self) -> None:
         if not LEAST_QP <= self.qp <= MOST_QP:
             raise InputError(f"qp {self.qp}: give {LEAST_QP} to {MOST_QP} bits")
-        _ = self.encoder_options  # refuses what it does not take
+        _ = self.encoder_options  # raises InputError for invalid options
 
     @property
     def name(self) -> str:
-        """What rows and plots call it."""
+        """The name in rows and plots."""
         return "tvmc"
 
     @property
-    def options(self) -> dict[str, Any]:
-        """The operating point, ready for JSON."""
-        return asdict(self)
-
-    @property
     def encoder_options(self) -> EncoderOptions:
-        """Of preset `paper`, at the quality that has as many vertices: what a reference must reach comes from it."""
+        """Options of preset `paper` at the quality with `vertices` vertices, which sets the target of references."""
         quality = quality_of_vertices(self.vertices)
         options = preset_options("paper", quality=quality, group_size=self.group_size, centers=self.centers)
         assert isinstance(options.method, PaperOptions)
         reference = replace(options.method.reference, vertices=self.vertices)
         return replace(options, method=replace(options.method, reference=reference))
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
-        """The stream. Raises InputError for frames that cannot be used."""
-        return self.code(self.analyse(sequence, progress), progress)
-
     @property
     def analysis_key(self) -> str:
-        """Of preset `paper`, which shares it: all options but `qp`."""
+        """The key of preset `paper`, which shares the analysis; independent of `qp`."""
         return analysis_key(self.encoder_options)
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
-        """An encoder that has found what is tracked. Raises InputError for frames that cannot be used."""
+        """Return an encoder that has tracked the frames. Raises InputError for frames that cannot be used."""
         return prepared(sequence, self.encoder_options, progress)
 
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
-        """The stream of what was tracked."""
+        """Return the stream of an analysed sequence."""
         data, count = self.pack(track_sequence(analysis, self.encoder_options)), len(analysis.sequence)
         Stages(progress, count).add("code", count)
         return data
 
     def pack(self, tracking: Tracking) -> bytes:
-        """The stream of references and displacements that are known."""
+        """Return the stream of tracked groups."""
         seen, step = tracking.seen, self.step(tracking)
         bare = np.array([seen.is_bare(frame) for frame in range(len(seen.diagonals))])
         return pack_stream(
@@ -97,14 +88,14 @@ class TvmcCodec:
         )
 
     def step(self, tracking: Tracking) -> float:
-        """What displacements are multiples of, normalised: the same for all groups, so that still vertices stay."""
-        tracked = [group for group in tracking.groups if isinstance(group, Tracked)]
-        width = max((group.width for group in tracked), default=0.0)
-        largest = max((group.largest for group in tracked), default=0.0)
+        """Return the step of displacements, normalised; one for all groups, so that still vertices stay."""
+        fields = [group.field for group in tracking.groups if isinstance(group, Tracked)]
+        width = max((float(np.ptp(field, axis=0).max()) for field in fields), default=0.0)  # of the widest frame's box
+        largest = max((float(np.abs(field).max()) for field in fields), default=0.0)
         return max(width / (2**self.qp - 1), largest / MOST_CELLS) or 1.0
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
-        """The frames, from the bytes alone, each decoded when asked for."""
+        """Return the frames, from the bytes alone, each decoded on access."""
         return TvmcVideo(data)
 
 

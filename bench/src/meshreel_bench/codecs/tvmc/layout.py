@@ -19,67 +19,67 @@ from meshreel.format.records import Nested, least_size, pack, unpack_all
 
 MAGIC = b"TVMC"
 VERSION = 1
-LONGEST = 1 << 24  # frames: a few bytes must not claim years of empty ones
+LONGEST = 1 << 24  # frames (a guess): a few bytes must not claim years of empty ones
 
 
 class Kind(IntEnum):
-    """How a group is coded."""
+    """Coding of a group."""
 
     TRACKED = 0  # a reference and displacements
-    DRACO = 1  # a Draco mesh a frame
+    DRACO = 1  # one Draco mesh per frame
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """What does not move, from a frame on."""
+    """Background from one frame to the next state."""
 
-    first_frame: Annotated[int, Varint(), "later than that of the state before"]
-    payload: Annotated[bytes, Blob(Varint()), "as a STATIC chunk's: a whole background, or a patch of the one before"]
+    first_frame: Annotated[int, Varint(), "later than that of the previous state"]
+    payload: Annotated[bytes, Blob(Varint()), "as in a STATIC chunk: a background, or a patch of the previous one"]
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Frames of one body."""
+    """Consecutive frames of one body, coded together."""
 
-    first_frame: Annotated[int, Varint(), "not before that of the group before"]
+    first_frame: Annotated[int, Varint(), "not before that of the previous group"]
     frame_count: Annotated[int, U8, "above 0"]
-    kind: Annotated[Kind, Choice(U8, Kind), "what the payload is"]
+    kind: Annotated[Kind, Choice(U8, Kind), "format of the payload"]
     payload: Annotated[bytes, Blob(Varint()), "a TrackedPayload, or that of a group of form DRACO"]
 
 
 @dataclass(frozen=True, slots=True)
 class TrackedPayload:
-    """A reference and, a frame each, where its vertices are."""
+    """A reference and the displacements of its vertices in each frame."""
 
     levels: Annotated[int, U8, "midpoint subdivisions of the decoded reference"]
     spacing: Annotated[float, F64, "of the reference's lattice, above 0: decoded vertices are rounded to multiples"]
     reference: Annotated[bytes, Blob(Varint()), "a Draco mesh"]
-    displacements: Annotated[tuple[bytes, ...], List(U8, Blob(Varint())), "a Draco cloud of points a frame"]
+    displacements: Annotated[tuple[bytes, ...], List(U8, Blob(Varint())), "one Draco point cloud per frame"]
 
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """All of a sequence. A frame is the state of its time and the groups that it is in; without either, empty."""
+    """A sequence. A frame shows the state of its time and the groups that contain it; with neither it is empty."""
 
     magic: Annotated[bytes, Bytes(4), "TVMC"]
     version: Annotated[int, U8, "1"]
     frame_count: Annotated[int, U32, "of the sequence"]
     origin: Annotated[tuple[float, ...], Array(3, F64), "of normalised coordinates, m"]
     scale: Annotated[float, F64, "m, the unit of normalised coordinates"]
-    step: Annotated[float, F64, "of the displacements, normalised, above 0: they are whole multiples of it"]
+    step: Annotated[float, F64, "quantization step of the displacements, normalised, above 0"]
     bare: Annotated[tuple[int, ...], List(Varint(), Varint()), "lengths of runs of frames with and without background"]
     states: Annotated[tuple[State, ...], List(Varint(), Nested(State)), "the background"]
-    groups: Annotated[tuple[Group, ...], List(Varint(), Nested(Group)), "what moves"]
+    groups: Annotated[tuple[Group, ...], List(Varint(), Nested(Group)), "the moving bodies"]
 
 
 def pack_stream(stream: Stream) -> bytes:
-    """The bytes of a stream."""
+    """Return the bytes of a stream."""
     data = pack(stream)
     return data + pack(Checksum(zlib.crc32(data)))
 
 
 def unpack_stream(data: bytes) -> Stream:
-    """The stream that fills `data`. FormatError where it is damaged, of another version, or breaks a law."""
+    """Return the stream that fills `data`. Raises FormatError where it is damaged, of another version or invalid."""
     size = len(data) - least_size(Checksum)
     if data[: len(MAGIC)] != MAGIC:
         raise FormatError(f"no TVMC* stream: it begins with {data[:4]!r}")
@@ -106,7 +106,7 @@ def _check_numbers(stream: Stream) -> None:
 
 
 def _check_states(stream: Stream) -> None:
-    """Later and later; the first is whole, and no state has more patches behind it than a .reel file's."""
+    """Check that states are in order, the first is whole, and chains of patches are no longer than in .reel files."""
     firsts = [state.first_frame for state in stream.states]
     if any(a >= b for a, b in pairwise([-1, *firsts, stream.frame_count])):
         raise FormatError(f"states of the background from frames {firsts} on")
@@ -118,7 +118,7 @@ def _check_states(stream: Stream) -> None:
 
 
 def _check_groups(stream: Stream) -> None:
-    """In order of their first frames, of as many frames as an encoder's, and no more in a frame than tracks."""
+    """Check the order of groups, their lengths, and the number of groups that share a frame."""
     first, ends = 0, list[int]()
     for number, group in enumerate(stream.groups):
         if not first <= group.first_frame <= stream.frame_count - group.frame_count:
@@ -132,10 +132,10 @@ def _check_groups(stream: Stream) -> None:
 
 
 def is_patch(state: State) -> bool:
-    """True where a state changes the one before, False where it is whole."""
+    """Return whether a state is a patch of the previous one."""
     return state.payload[:1] == bytes([Form.PATCH])
 
 
 def is_bare(stream: Stream, frame: int) -> bool:
-    """True where a frame is shown without the background."""
+    """Return whether a frame is shown without the background."""
     return bool(np.searchsorted(np.cumsum(stream.bare), frame, side="right") % 2 == 1) if stream.bare else False

@@ -1,6 +1,6 @@
-"""What a TVMC* stream is made of, before a step is chosen: references, displacements, the background.
+"""Rate-independent content of a TVMC* stream: references, displacements, the background.
 
-In: an encoder that found the spans, the options of preset `paper`. Out: Tracking; it does not depend on the rate.
+In: an encoder that has tracked the frames, options of preset `paper`. Out: Tracking.
 """
 
 from __future__ import annotations
@@ -24,26 +24,16 @@ from meshreel.encoder.target import target_of
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """Frames that one reference follows."""
+    """A group of frames that one reference follows."""
 
     first_frame: int
     reference: CodedReference
     field: Float64[np.ndarray, "V T 3"]  # displacements of its base, normalised
 
-    @property
-    def width(self) -> float:
-        """The longest side of the box of a frame's displacements, the widest frame's."""
-        return float(np.ptp(self.field, axis=0).max())
-
-    @property
-    def largest(self) -> float:
-        """The largest magnitude of a displacement's coordinate."""
-        return float(np.abs(self.field).max())
-
 
 @dataclass(frozen=True, slots=True)
 class Untracked:
-    """Frames that none follows, as Draco meshes."""
+    """A group of frames that no reference follows, as Draco meshes."""
 
     first_frame: int
     frame_count: int
@@ -52,17 +42,17 @@ class Untracked:
 
 @dataclass(frozen=True, slots=True)
 class Tracking:
-    """What is known of a sequence; groups are in the order of their first frames."""
+    """A tracked sequence."""
 
     seen: Survey
-    states: list[Static]  # of the background; none: everything may move
-    groups: list[Tracked | Untracked]  # of frames with surface
+    states: list[Static]  # of the background; empty: everything may move
+    groups: list[Tracked | Untracked]  # of frames with surface, in the order of their first frames
 
 
 def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
-    """The groups of a sequence, of each body of a scene. Raises InputError for frames that cannot be used.
+    """Return the groups of each body of a sequence; reuses the analysis of a prepared encoder.
 
-    Spans that the encoder prepared are not looked for again.
+    Raises InputError for frames that cannot be used.
     """
     sequence, parts, groups = encoder.sequence, encoder.parts(options), list[Tracked | Untracked]()
     assert isinstance(options.method, PaperOptions), "references are those of the paper's recipe"
@@ -76,7 +66,7 @@ def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
 
 
 def _groups(interval: Interval, found: Sequence[FoundGroup], options: PaperOptions) -> Iterator[Tracked | Untracked]:
-    """The groups of an interval."""
+    """Yield the groups of an interval."""
     first = interval.first_frame
     for group in found:
         if group.fitted is None:

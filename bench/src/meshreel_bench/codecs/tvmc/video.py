@@ -1,10 +1,9 @@
-"""The decoder: frames of a TVMC* stream by number, from nothing but the bytes."""
+"""Decoder of TVMC* streams. In: bytes. Out: frames, decoded on access."""
 
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
-from typing import overload
+from collections.abc import Iterator
 
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.intra import decode_intra
@@ -14,40 +13,31 @@ from meshreel.errors import FormatError
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement
 
+from ..base import DecodedFrames
 from .layout import Group, Kind, is_bare, is_patch, unpack_stream
 from .tracked import decode_tracked
 
 
-class TvmcVideo(Sequence[Mesh]):
-    """The frames; the groups of the last one and its background are kept."""
+class TvmcVideo(DecodedFrames):
+    """Frames of a stream; the groups and the background of the last one are kept."""
 
     def __init__(self, data: bytes) -> None:
-        """Raises FormatError where the stream is damaged; a group's payload is looked at when it is asked for."""
+        """Read all but the payloads. Raises FormatError where the stream is damaged."""
         self.stream = unpack_stream(data)
         self._place = Placement(self.stream.scale, self.stream.origin)
         self._firsts = [group.first_frame for group in self.stream.groups]
         self._decoded: dict[int, list[Mesh]] = {}  # of the groups of the last frame, by number
-        self._background: tuple[int, Mesh] = (-1, Mesh.empty())  # the last state, and its number
+        self._background: tuple[int, Mesh] = (-1, Mesh.empty())  # the last state after its number
 
     def __len__(self) -> int:
         return self.stream.frame_count
 
-    @overload
-    def __getitem__(self, index: int) -> Mesh: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[Mesh]: ...
-    def __getitem__(self, index: int | slice) -> Mesh | list[Mesh]:
-        """A frame in metres: the background, then the bodies. Raises FormatError where its bytes are damaged."""
-        if isinstance(index, slice):
-            return [self[number] for number in range(*index.indices(len(self)))]
-        frame = range(len(self))[index]
-        return self._place.of(concatenate([*self._still(frame), *self._moving(frame)]))
-
-    def __iter__(self) -> Iterator[Mesh]:
-        return (self[number] for number in range(len(self)))
+    def frame(self, number: int) -> Mesh:
+        """Return a frame in metres: the background, then the bodies. Raises FormatError where its bytes are damaged."""
+        return self._place.of(concatenate([*self._still(number), *self._moving(number)]))
 
     def _moving(self, frame: int) -> Iterator[Mesh]:
-        """The bodies of a frame, normalised."""
+        """Return the bodies of a frame, normalised."""
         near = range(bisect_left(self._firsts, frame - MOST_FRAMES + 1), bisect_right(self._firsts, frame))
         groups = [number for number in near if frame < self._end(number)]
         before, self._decoded, size = self._decoded, {}, 0
@@ -69,7 +59,7 @@ class TvmcVideo(Sequence[Mesh]):
             raise FormatError(f"group {number}, from frame {group.first_frame} on: {error}") from error
 
     def _still(self, frame: int) -> Iterator[Mesh]:
-        """The background of a frame, normalised, where it has one."""
+        """Yield the background of a frame, normalised, if it has one."""
         states = self.stream.states
         number = bisect_right([state.first_frame for state in states], frame) - 1
         if number < 0 or is_bare(self.stream, frame):
