@@ -67,3 +67,8 @@ def test_at_least_one_key_is_tried_and_no_more_than_there_are_places_for(keys):
 
 def test_many_centers_bring_the_samples_they_need():
     assert preset_options("paper", centers=20_000).method.track.samples >= 80_000
+
+
+def test_the_recipe_names_the_preset_that_a_file_records() -> None:
+    assert EncoderOptions(method=PaperOptions()).preset == "paper"
+    assert EncoderOptions(method=LayersOptions()).preset == "best"

@@ -67,7 +67,7 @@ def shared_options(options: EncoderOptions) -> EncoderOptions:
     """
     if isinstance(options.method, PaperOptions):
         plain = EncoderOptions()
-        return replace(options, method=_shared(options.method), preset=plain.preset, quality=plain.quality)
+        return replace(options, method=_shared(options.method), quality=plain.quality)
     return EncoderOptions(scene=options.scene)
 
 

@@ -89,19 +89,23 @@ class SceneOptions:
 
 @dataclass(frozen=True, slots=True)
 class EncoderOptions:
-    """How to encode. `quality` and `preset` name what the other fields were made from; a file records them."""
+    """Options of the encoder: a recipe, and for scenes how they are taken apart."""
 
     method: MethodOptions = field(default_factory=LayersOptions)
     scene: SceneOptions | None = field(default_factory=SceneOptions)  # None: no background is looked for
     key_interval: float = 4.0  # s, at most, from one random-access point to the next; of a scene in both recipes
-    quality: float = 50.0  # 0 to 100
-    preset: str = "best"
+    quality: float = 50.0  # 0 to 100, which the other options were made from; a file records it
 
     def __post_init__(self) -> None:
         if not 0 <= self.quality <= 100:
             raise InputError(f"quality must be in 0 to 100, got {self.quality:g}")
         if not 0 < self.key_interval <= MOST_SECONDS:
             raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0 and at most {MOST_SECONDS}")
+
+    @property
+    def preset(self) -> str:
+        """Name of the recipe: `paper` or `best`; a file records it."""
+        return "paper" if isinstance(self.method, PaperOptions) else "best"
 
 
 def _check_group_size(size: int) -> None:

@@ -46,7 +46,7 @@ def preset_options(
     method = layers_options(float(quality)) if preset == "best" else paper_options(float(quality), centers, basis_size)
     if group_size is not None:
         method = replace(method, group_size=group_size)
-    options = EncoderOptions(method, quality=float(quality), preset=preset)
+    options = EncoderOptions(method, quality=float(quality))
     return options if key_interval is None else replace(options, key_interval=key_interval)
 
 
