@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import operator
 import zlib
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Annotated, Any
+from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float64
@@ -18,6 +17,7 @@ from meshreel.format.records import pack, unpack_all
 from meshreel.types import Mesh, MeshSequence
 
 from ...codec import Progress
+from ..base import DecodedFrames, Options
 from .basis import MOST, basis_of, decode_basis, encode_basis, learned
 from .blobs import join, split
 from .frames import Group, decode_frame, decode_group, encode_group
@@ -48,7 +48,7 @@ class Stream:
 
 
 @dataclass(frozen=True, slots=True)
-class KltTsdfCodec:
+class KltTsdfCodec(Options):
     """TSDF blocks by KLT; see the package."""
 
     cells: float = 128.0  # of the grid along the diagonal of the sequence's bounding box
@@ -69,13 +69,8 @@ class KltTsdfCodec:
 
     @property
     def name(self) -> str:
-        """What rows and plots call it."""
+        """The name in rows and plots."""
         return "klt_tsdf"
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """The operating point, ready for JSON."""
-        return asdict(self)
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """The stream. Raises InputError where a frame has more blocks than a decoder takes."""
@@ -123,7 +118,7 @@ def _reported(mesh: Mesh, number: int, total: int, progress: Progress | None) ->
 
 
 @dataclass(slots=True)
-class Video(Sequence[Mesh]):
+class Video(DecodedFrames):
     """The frames of a stream; the group of the last one is kept."""
 
     stream: Stream
@@ -134,9 +129,7 @@ class Video(Sequence[Mesh]):
     def __len__(self) -> int:
         return self.stream.frames
 
-    def __getitem__(self, index: int) -> Mesh:  # type: ignore[override]
-        """Return a frame, m. Raises FormatError where its bytes are damaged."""
-        number = range(len(self))[operator.index(index)]
+    def frame(self, number: int) -> Mesh:
         which, inside = divmod(number, self.stream.group)
         if self._last is None or self._last[0] != which:
             count = min(self.stream.group, len(self) - which * self.stream.group)
