@@ -9,7 +9,7 @@ import pytest
 
 import meshreel
 from meshreel.analysis.follow.embedded import EmbeddedOptions
-from meshreel.coding.group import payload_parts
+from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.coding.layers.patches import decode_patches
 from meshreel.encoder import tails
 from meshreel.encoder.options import EncoderOptions
@@ -47,18 +47,18 @@ def noisy(mesh: Mesh, frames: int = 6) -> np.ndarray:
 
 
 def test_where_the_template_fits_there_is_no_layer() -> None:
-    assert find_tails([BALL] * 6, meshes(noisy(BALL), BALL.faces), SIZE) is None
+    assert find_tails([BALL] * 6, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0) is None
 
 
 def test_a_perfect_template_has_no_tails() -> None:
     places = np.repeat(BALL.vertices[None], 2, axis=0)
-    assert find_tails([BALL] * 2, meshes(places, BALL.faces), SIZE) is None
+    assert find_tails([BALL] * 2, meshes(places, BALL.faces), SIZE, noise=0.0) is None
 
 
 def test_surface_that_is_not_there_any_more_is_dropped() -> None:
     template = both(BALL, knob())
     frames = [template] * 3 + [BALL] * 3
-    found = find_tails(frames, meshes(noisy(template), template.faces), SIZE)
+    found = find_tails(frames, meshes(noisy(template), template.faces), SIZE, noise=0.0)
     assert found is not None
     for t, frame in enumerate(found.frames):
         assert len(frame.faces) == (len(template.faces) if t < 3 else len(BALL.faces))
@@ -67,7 +67,7 @@ def test_surface_that_is_not_there_any_more_is_dropped() -> None:
 
 def test_surface_that_is_new_is_added() -> None:
     frames = [BALL] * 5 + [both(BALL, knob())]
-    found = find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE)
+    found = find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, noise=0.0)
     assert found is not None
     assert [len(frame.faces) > len(BALL.faces) for frame in found.frames] == [False] * 5 + [True]
     plain = [Mesh(places, BALL.faces) for places in noisy(BALL)]
@@ -76,12 +76,12 @@ def test_surface_that_is_new_is_added() -> None:
 
 def test_without_shares_nothing_is_added() -> None:
     frames = [BALL] * 5 + [both(BALL, knob())]
-    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, TailOptions(shares=())) is None
+    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, TailOptions(shares=()), noise=0.0) is None
 
 
 def test_where_bytes_are_dear_nothing_is_sent() -> None:
     frames = [BALL] * 5 + [both(BALL, knob(0.004, 0.32))]
-    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, TailOptions(exchange=1e9)) is None
+    assert find_tails(frames, meshes(noisy(BALL), BALL.faces), SIZE, TailOptions(exchange=1e9), noise=0.0) is None
 
 
 def sheet(step: float = 0.05) -> Mesh:
@@ -100,7 +100,7 @@ def test_on_a_template_that_fits_almost_exactly_the_lattice_is_as_fine_as_there_
     frames = [flat] * 3 + [both(flat, knob(at=0.45))]
     places = np.repeat(flat.vertices[None], 4, axis=0)
     places = places + noise * np.random.default_rng(0).normal(size=places.shape)
-    found = find_tails(frames, meshes(places, flat.faces), SIZE)
+    found = find_tails(frames, meshes(places, flat.faces), SIZE, noise=0.0)
     assert (found is None) == (noise == 1e-9)  # there a byte is worth nothing
     if found is not None:
         decoded = decode_patches(found.record, 4, len(flat.faces)).apply(places, flat.faces)
@@ -112,7 +112,7 @@ def test_a_mask_that_pays_is_kept_where_a_patch_beside_it_does_not(monkeypatch: 
     frames = [both(BALL, knob(at=-0.4)), template, BALL]
     places = noisy(template, 3)
     monkeypatch.setattr(tails._Search, "holds", lambda _, tried: all(mesh.is_empty for mesh in tried.parts.meshes))
-    found = find_tails(frames, meshes(places, template.faces), SIZE)
+    found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
     assert found is not None and found.record.dropped and not found.record.mesh
 
 
@@ -122,7 +122,7 @@ def test_it_is_never_worse_than_what_the_bytes_are_worth(size: int, scale: float
     template = both(BALL, knob(scale))
     frames = [both(BALL, knob(scale, -0.4))] * 2 + [template] * 4
     places = noisy(template)
-    found = find_tails(frames, meshes(places, template.faces), size)
+    found = find_tails(frames, meshes(places, template.faces), size, noise=0.0)
     assert found is not None
     before = measure(frames, [Mesh(p, template.faces) for p in places]).distance ** 2
     after = measure(frames, found.frames).distance ** 2
@@ -134,13 +134,13 @@ def test_the_frames_are_those_that_the_record_decodes_to() -> None:
     template = both(BALL, knob())
     frames = [both(BALL, knob(at=-0.4)), template, BALL]
     places = noisy(template, 3)
-    found = find_tails(frames, meshes(places, template.faces), SIZE)
+    found = find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0)
     assert found is not None and found.record.mesh and found.record.dropped
     decoded = decode_patches(found.record, 3, len(template.faces)).apply(places, template.faces)
     for mine, theirs in zip(decoded, found.frames, strict=True):
         np.testing.assert_array_equal(mine.vertices, theirs.vertices)
         np.testing.assert_array_equal(mine.faces, theirs.faces)
-    assert find_tails(frames, meshes(places, template.faces), SIZE).record == found.record  # type: ignore[union-attr]
+    assert find_tails(frames, meshes(places, template.faces), SIZE, noise=0.0).record == found.record  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshL
     patient = EmbeddedOptions(lost=1.0)  # else the frame with the knob is a group of its own
     encode(sequence, tmp_path / "with.reel", options=options(embedded=patient))
     patched = meshreel.open(tmp_path / "with.reel")
-    assert payload_parts(patched.reader.read_chunk(0))["patches"] > 0
+    assert payload_bytes_by_purpose(patched.reader.read_chunk(0))["patches"] > 0
     levels = len(patched.reader.chunks[0].layers) - 2
     plain = patched.at(levels)
     assert {len(mesh.faces) for mesh in plain} == {len(patched[1].faces)}
@@ -184,4 +184,4 @@ def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshL
 
 def test_tails_can_be_switched_off(sequence: MeshList, tmp_path) -> None:
     encode(sequence, tmp_path / "without.reel", options=options(tails=None))
-    assert "patches" not in payload_parts(meshreel.open(tmp_path / "without.reel").reader.read_chunk(0))
+    assert "patches" not in payload_bytes_by_purpose(meshreel.open(tmp_path / "without.reel").reader.read_chunk(0))

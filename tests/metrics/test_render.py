@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from meshreel.metrics.render import Window, look, render_normals, window_of
+from meshreel.metrics.render import Crop, crop_of, look, render_normals
 from meshreel.metrics.viewpoints import Box, ViewOptions, parallel_views_around, views_around
 from meshreel.types import Mesh
 
@@ -13,7 +13,7 @@ SMALL = ViewOptions(160, 120)
 def test_a_sphere_seen_from_the_front_shows_its_analytic_normals():
     body = sphere(levels=5)
     camera = views_around(Box.of([body]), SMALL)[0]
-    view = look(body, camera, Window(0, 120, 0, 160))
+    view = look(body, camera, Crop(0, 120, 0, 160))
     assert np.degrees(np.arccos(np.clip((view.normals * view.points).sum(axis=1), -1, 1))).max() < 3
     assert np.allclose(np.linalg.norm(view.points, axis=1), 1, atol=5e-3)
     eye = -camera.extrinsic[:3, :3].T @ camera.extrinsic[:3, 3]
@@ -45,20 +45,20 @@ def test_the_nearest_surface_is_seen_and_the_picture_is_not_mirrored():
     assert np.allclose(image[32, 48], [0.5, 0.5, 0])
 
 
-def test_a_window_shows_the_same_pixels_as_the_whole_picture():
+def test_a_crop_shows_the_same_pixels_as_the_whole_picture():
     body = noisy(moved(sphere(levels=3), (0.4, 0.1, 0)), 0.02)
     for camera in views_around(Box(np.full(3, -2.0), np.full(3, 2.0)), SMALL):
-        full = look(body, camera, Window(0, 120, 0, 160))
-        window = window_of([body], camera)
-        part = look(body, camera, window)
+        full = look(body, camera, Crop(0, 120, 0, 160))
+        crop = crop_of([body], camera)
+        part = look(body, camera, crop)
         assert part.covered.sum() == full.covered.sum() > 100
-        assert np.array_equal(full.colors[window.top : window.bottom, window.left : window.right], part.colors)
+        assert np.array_equal(full.colors[crop.top : crop.bottom, crop.left : crop.right], part.colors)
 
 
 def test_a_camera_inside_the_mesh_sees_it_on_every_pixel():
     camera = views_around(Box(np.full(3, -1.0), np.full(3, 1.0)), SMALL)[0]
     room = sphere(radius=50)
-    assert look(room, camera, window_of([room], camera)).covered.all()
+    assert look(room, camera, crop_of([room], camera)).covered.all()
 
 
 def test_coordinates_around_a_million_give_the_same_picture():

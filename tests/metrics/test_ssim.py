@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from meshreel.metrics import render
-from meshreel.metrics.render import Window, look, render_normals
+from meshreel.metrics.render import Crop, look, render_normals
 from meshreel.metrics.ssim import ssim_map, ssim_normals
 from meshreel.metrics.viewpoints import Box, ViewOptions, parallel_views_around, views_around
 from meshreel.types import Mesh
@@ -36,7 +36,7 @@ def test_the_masked_form_is_the_mean_over_pixels_that_either_mesh_covers():
     cameras = _views(a)
     expected = []
     for camera in cameras:
-        views = [look(m, camera, Window(0, 120, 0, 160)) for m in (a, b)]
+        views = [look(m, camera, Crop(0, 120, 0, 160)) for m in (a, b)]
         covered = np.pad((views[0].covered | views[1].covered)[3:-3, 3:-3], 3)
         scores = ssim_map(*(v.colors.astype(float) for v in views))
         expected.append(scores[covered].mean())

@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
-from ..coding.group import payload_parts
+from ..coding.group import payload_bytes_by_purpose
 from ..container.reader import Chunk, ReelReader
 from ..container.sources import FileSource
 from ..errors import FormatError
@@ -87,7 +87,7 @@ def _describe_group(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, A
     row |= {"first_frame": chunk.first_frame, "frames": chunk.frame_count}
     row |= {"form": chunk.form.name.lower(), "bytes": chunk.size, "layers": len(chunk.layers) - 1}
     row["predicted"] = reader.group_before(chunk) is not None
-    return row | _contents(reader, chunk, there, payload_parts)
+    return row | _contents(reader, chunk, there, payload_bytes_by_purpose)
 
 
 def _shown(reader: ReelReader) -> dict[int, list[tuple[int, int]]]:

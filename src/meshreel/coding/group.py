@@ -17,7 +17,7 @@ from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh, Placement
 from .intra import decode_empty, decode_intra
-from .layers.coder import LayersState, layers_parts, place_layers, read_layers
+from .layers.coder import LayersState, layers_bytes_by_purpose, place_layers, read_layers
 from .layers.patches import decode_patches
 from .mesh import check_growth, check_step, decode_mesh
 from .paper.displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
@@ -97,17 +97,17 @@ def _decode_laplacian(record: LaplacianGroup, components: int | None) -> list[Me
     return [Mesh(np.ascontiguousarray(base.vertices + field[:, t]), base.faces) for t in range(field.shape[1])]
 
 
-def payload_parts(data: bytes) -> dict[str, int]:
+def payload_bytes_by_purpose(data: bytes) -> dict[str, int]:
     """Return the bytes of a payload by purpose. Raises FormatError on damaged bytes."""
     form = data[0] if data else None
     if form == Form.LAPLACIAN:
         record = unpack_all(LaplacianGroup, data)
         head, *components = layer_sizes(record.displacements)
-        parts = {"reference": len(record.reference), "basis": head, "displacements": sum(components)}
+        sizes = {"reference": len(record.reference), "basis": head, "displacements": sum(components)}
     elif form == Form.LAYERS:
-        parts = layers_parts(data)
+        sizes = layers_bytes_by_purpose(data)
     elif form == Form.DRACO:
-        parts = {"draco": sum(len(mesh) for mesh in unpack_all(DracoGroup, data).meshes)}
+        sizes = {"draco": sum(len(mesh) for mesh in unpack_all(DracoGroup, data).meshes)}
     else:
-        parts = {}
-    return parts | {"group head": len(data) - sum(parts.values())}
+        sizes = {}
+    return sizes | {"group head": len(data) - sum(sizes.values())}

@@ -1,6 +1,6 @@
 """Writer of a .reel file, which appears whole or not at all. A header and payloads -> a file, or its bytes.
 
-The head names every chunk and comes first, so chunks wait in an unnamed temporary file beside the target: memory stays
+The head names every chunk and comes first, so chunks wait in an unnamed temporary file beside the output: memory stays
 flat, and a process that is killed leaves nothing under the final name.
 """
 
@@ -36,12 +36,12 @@ class Sink(Protocol):
 class ReelWriter:
     """Context manager that writes a file: chunks are added by `add_*`, and the file appears when the block succeeds.
 
-    The target is a path, or a Sink such as io.BytesIO. Raises InputError where the target cannot be written (no such
+    The output is a path, or a Sink such as io.BytesIO. Raises InputError where the output cannot be written (no such
     folder, disk full), where no frame was added, or where a value cannot be stored.
     """
 
-    def __init__(self, target: str | Path | Sink, header: Header) -> None:
-        self._target = Path(target) if isinstance(target, str | Path) else target
+    def __init__(self, output: str | Path | Sink, header: Header) -> None:
+        self._output = Path(output) if isinstance(output, str | Path) else output
         self.header = header  # may be replaced until the block ends, to store measured values as metadata
         self._entries: list[IndexEntry] = []
         self._checks = IndexChecks()
@@ -60,17 +60,17 @@ class ReelWriter:
         return self._checks.groups[track] if track < len(self._checks.groups) else None
 
     def __enter__(self) -> ReelWriter:
-        with _as_input_error(self._target):
+        with _as_input_error(self._output):
             pack(self.header)
             check_header(self.header, len(self.header.intervals) + 1)  # now, not when all is encoded
             parse_metadata(self.header.metadata)
-            self._spool = _open_spool(self._target)
+            self._spool = _open_spool(self._output)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
         try:
             if kind is None:
-                with _as_input_error(self._target):
+                with _as_input_error(self._output):
                     self._finish()
         finally:
             with suppress(OSError):
@@ -117,7 +117,7 @@ class ReelWriter:
             number = self._checks.add(entry)
         except FormatError as error:
             raise InputError(f"a file that no reader would take: {error}") from error
-        with _as_input_error(self._target):
+        with _as_input_error(self._output):
             self._spool.write(payload)
         self._entries.append(entry)
         return number
@@ -127,22 +127,22 @@ class ReelWriter:
         check_header(self.header, self.frame_count)
         head = pack_head(self.header, Index(tuple(self._entries)))
         if self._spool.seek(0, os.SEEK_END) != sum(layer.size for entry in self._entries for layer in entry.layers):
-            raise InputError(f"{self._target}: a chunk could not be written, encode again")
+            raise InputError(f"{self._output}: a chunk could not be written, encode again")
         self._spool.seek(0)
-        if not isinstance(self._target, Path):
-            _copy(head, self._spool, self._target)
+        if not isinstance(self._output, Path):
+            _copy(head, self._spool, self._output)
             return
-        partial = self._target.with_name(f".{uuid.uuid4().hex}.tmp")  # short enough wherever the final name is
+        partial = self._output.with_name(f".{uuid.uuid4().hex}.tmp")  # short enough wherever the final name is
         try:
             with partial.open("xb") as file:
                 _copy(head, self._spool, file)
                 os.fsync(file.fileno())
-            partial.replace(self._target)
+            partial.replace(self._output)
         finally:
             partial.unlink(missing_ok=True)
 
 
-def check_target(path: Path) -> None:
+def check_output(path: Path) -> None:
     """Raise InputError where no file can be written at a path, before minutes are spent on encoding."""
     with _as_input_error(path):
         _open_spool(path).close()
@@ -156,18 +156,18 @@ def pack_head(header: Header, index: Index) -> bytes:
     return data + pack(Checksum(zlib.crc32(data)))
 
 
-def _open_spool(target: Path | Sink) -> IO[bytes]:
-    if not isinstance(target, Path):
+def _open_spool(output: Path | Sink) -> IO[bytes]:
+    if not isinstance(output, Path):
         return tempfile.TemporaryFile()
-    if target.is_dir():
+    if output.is_dir():
         raise IsADirectoryError(None, "is a folder, name a file")
-    return tempfile.TemporaryFile(dir=target.parent)
+    return tempfile.TemporaryFile(dir=output.parent)
 
 
-def _copy(head: bytes, spool: IO[bytes], target: Sink) -> None:
-    target.write(head)
-    shutil.copyfileobj(spool, target)
-    target.flush()
+def _copy(head: bytes, spool: IO[bytes], output: Sink) -> None:
+    output.write(head)
+    shutil.copyfileobj(spool, output)
+    output.flush()
 
 
 def _form(payload: bytes) -> Form:
@@ -187,9 +187,9 @@ def _layers(payload: bytes, ends: Sequence[int]) -> tuple[Layer, ...]:
 
 
 @contextmanager
-def _as_input_error(target: Path | Sink) -> Iterator[None]:
-    """Turn errors inside the block, which the caller can mend, into an InputError that names the target."""
-    name = target if isinstance(target, Path) else "the output"
+def _as_input_error(output: Path | Sink) -> Iterator[None]:
+    """Turn errors inside the block, which the caller can mend, into an InputError that names the output."""
+    name = output if isinstance(output, Path) else "the output"
     try:
         yield
     except OSError as error:

@@ -253,7 +253,7 @@ def _with_tails(
     decoded = [Mesh(positions, faces) for positions in encoded.positions]
     if options.tails is None:
         return _Shown(payload, layers, decoded)
-    found = find_tails(group.frames, decoded, len(payload), options.tails, group.noise)
+    found = find_tails(group.frames, decoded, len(payload), options.tails, noise=group.noise)
     if found is None:
         return _Shown(payload, layers, decoded)
     payload += pack(found.record)

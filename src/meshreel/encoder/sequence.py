@@ -22,7 +22,7 @@ from ..analysis.scene.probe import is_scene
 from ..analysis.scene.segmentation import SegmentOptions
 from ..analysis.survey import Survey, survey
 from ..coding.background import decode_background
-from ..container.writer import ReelWriter, check_target
+from ..container.writer import ReelWriter, check_output
 from ..decoder.video import open as open_video
 from ..errors import InputError
 from ..format.layout import Form, Header
@@ -127,7 +127,7 @@ class Encoder:
         """Encode the sequence as the function `encode` does, with the same errors."""
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
-        check_target(Path(path))
+        check_output(Path(path))
         job, parts = self._job(options), self.parts(options)
         return _encode_bodies(job, Path(path)) if parts is None else _encode_scene(job, Path(path), parts)
 

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float64, Int32, Int64
 from ..coding import entropy
 from ..coding.layers.patches import Patches, encode_patches, encode_runs, reach
 from ..coding.mesh import encode_mesh
-from ..coding.steps import level_of, step_of
+from ..coding.steps import rung_of, step_of
 from ..errors import InputError
 from ..format.layout import LayersPatches
 from ..format.records import pack
@@ -65,7 +65,8 @@ def find_tails(
     decoded: Sequence[Mesh],
     size: int,
     options: TailOptions = TailOptions(),
-    noise: float = 0.0,
+    *,
+    noise: float,
 ) -> Tails | None:
     """Find the layer of patches that lowers squared error + price x bytes most; None where none does.
 
@@ -80,7 +81,7 @@ def find_tails(
         return None
     price = options.exchange * len(frames) * usual / size
     usual = max(usual, noise**2)
-    search = _Search(shown, faces, usual, price, options, _step_level(frames, options.lattice * usual**0.5))
+    search = _Search(shown, faces, usual, price, options, _rung(frames, options.lattice * usual**0.5))
     best, least = None, search.cost(None)
     better = list[_Coded]()  # each than those before it
     for dropped in search.masks():
@@ -116,7 +117,7 @@ class _Search:
     usual: float  # mean squared distance without the tails
     price: float  # of a byte, squared distances summed over the frames
     options: TailOptions
-    step_level: int  # of the patches' lattice
+    rung: int  # of the patches' lattice
 
     @property
     def nothing(self) -> Bool[np.ndarray, "T F"]:
@@ -125,7 +126,7 @@ class _Search:
 
     def coded(self, dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh]) -> _Coded:
         """Return a mask and patches as a decoder sees them."""
-        record, decoded = encode_patches(dropped, meshes, self.step_level)
+        record, decoded = encode_patches(dropped, meshes, self.rung)
         return _Coded(record, Patches(dropped, decoded), len(pack(record)))
 
     def cost(self, tried: _Coded | None) -> float:
@@ -194,31 +195,31 @@ class _Search:
         mesh = clean(Mesh(frame.original.vertices, frame.original.faces[faces]))
         for share in self.options.shares:
             small = decimate(mesh, max(4, round(share * len(mesh.vertices))))
-            step = step_of(self.step_level)
+            step = step_of(self.rung)
             small = clean(Mesh(np.rint(small.vertices / step) * step, small.faces))
-            if not small.is_empty and _within(np.abs(small.vertices).max(axis=0), self.step_level, len(self.frames)):
+            if not small.is_empty and _within(np.abs(small.vertices).max(axis=0), self.rung, len(self.frames)):
                 yield small
 
     def _worth(
         self, frame: _Frame, squared: Float64[np.ndarray, " N"], samples: Int64[np.ndarray, " n"], patch: Mesh
     ) -> float:
-        size = max(len(encode_mesh(patch, step_of(self.step_level))) - DRACO_HEAD, LEAST_BYTES)
+        size = max(len(encode_mesh(patch, step_of(self.rung))) - DRACO_HEAD, LEAST_BYTES)
         near = _squared(Surface(patch), frame.points[samples])[0]
         gain = frame.weights[samples] @ np.maximum(squared[samples] - near, 0.0)
         return float(gain / 2 - self.price * size)
 
 
-def _step_level(frames: Sequence[Mesh], step: float) -> int:
-    """Return the level of the wanted lattice, or of the finest lattice that holds every part of the frames."""
-    level = level_of(step)
+def _rung(frames: Sequence[Mesh], step: float) -> int:
+    """Return the rung of the wanted lattice, or of the finest lattice that holds every part of the frames."""
+    rung = rung_of(step)
     far = np.max([np.abs(frame.vertices).max(axis=0) for frame in frames], axis=0)
-    while level > 0 and not _within(far, level, len(frames)):
-        level -= 1
-    return level
+    while rung > 0 and not _within(far, rung, len(frames)):
+        rung -= 1
+    return rung
 
 
-def _within(far: Float64[np.ndarray, " 3"], step_level: int, frames: int) -> bool:
-    across, elsewhere = reach(step_level, frames)
+def _within(far: Float64[np.ndarray, " 3"], rung: int, frames: int) -> bool:
+    across, elsewhere = reach(rung, frames)
     return bool(far[0] <= across and far[1:].max() <= elsewhere)
 
 
@@ -227,7 +228,7 @@ class _Frame:
 
     def __init__(self, original: Mesh, decoded: Mesh) -> None:
         self.original, self.decoded = original, decoded
-        self.target = Surface(original)
+        self.surface = Surface(original)
         self.points, areas = _samples(original)
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
         weights = np.concatenate([shares, 0.75 * areas])
@@ -291,7 +292,7 @@ class _Frame:
 
     def _apart(self, mesh: Mesh) -> tuple[Float64[np.ndarray, " F"], Float64[np.ndarray, " F"]]:
         points, areas = _samples(mesh)
-        return areas, _of_faces(_squared(self.target, points)[0], mesh.faces)
+        return areas, _of_faces(_squared(self.surface, points)[0], mesh.faces)
 
 
 def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, " F"]]:

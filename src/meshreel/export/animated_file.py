@@ -23,7 +23,7 @@ from ..types import Mesh, Up
 from .animated_glb import animated_glb
 from .animated_usd import EXTENSIONS, animated_usd
 from .frames import Part
-from .shapes import Animation, AnimationWriter, Points, Shape, check_target
+from .shapes import Animation, AnimationWriter, Points, Shape, check_output
 
 MOST_FRAMES = 64  # of a shape, which are in memory together; viewers limit the morph targets of a mesh (guess)
 _FAR = 8.0  # diagonals; coordinates that far from the origin are stored relative to the center (guess)
@@ -84,7 +84,7 @@ def export(
 
 
 def _writer(path: Path, animation: Animation) -> AbstractContextManager[AnimationWriter]:
-    check_target(path)
+    check_output(path)
     extension = path.suffix.lower()
     if extension == ".glb":
         return animated_glb(path, animation)

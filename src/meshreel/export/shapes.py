@@ -105,7 +105,7 @@ def unit_normals(points: Points) -> Float32[np.ndarray, "V 3"]:
     return normals
 
 
-def check_target(path: Path) -> None:
+def check_output(path: Path) -> None:
     """Raise InputError if a file of this name cannot be written, before minutes are spent on it."""
     if path.is_dir():
         raise InputError(f"{path}: is a folder, name a file")

@@ -107,13 +107,6 @@ class Chosen(DerivedSequence):
         return self._source[self._numbers[index]]
 
 
-class Backwards(Chosen):
-    """The frames from the last to the first."""
-
-    def __init__(self, source: MeshSequence) -> None:
-        super().__init__(source, range(len(source))[::-1])
-
-
 class ChosenParts(Chosen):
     """Chosen faces of some frames; `choose` selects them by a frame's number in the source and its mesh."""
 

@@ -21,7 +21,7 @@ from ..geometry.closest_points import Surface
 from ..io.write import replacing
 from ..types import UP_AXES, Mesh, check_up
 from .distance import surface_errors
-from .render import View, Window, look
+from .render import Crop, View, look
 from .surface_samples import box_center, used_surface
 from .viewpoints import Box, ViewOptions, views_around
 
@@ -113,7 +113,7 @@ def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator
         factor = 1000.0 if options.unit == "mm" else 100 / (measured.diagonal or 1.0)
         label = f"frame {frame}\nD2 {measured.d2_psnr_paper:.1f} dB\nnormals {measured.angle:.1f}°"
         for camera in cameras:
-            whole = Window(0, camera.height, 0, camera.width)
+            whole = Crop(0, camera.height, 0, camera.width)
             seen = look(mesh, camera, whole)
             yield SheetRow(label, seen, look(other, camera, whole), factor * error_at_pixels(seen, other))
 
@@ -133,7 +133,7 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    height, width = rows[0].original.window.shape
+    height, width = rows[0].original.crop.shape
     size = np.array([_LEFT + 3 * (width + _GAP) + _RIGHT, _TOP + len(rows) * (height + _GAP)])
     limit = options.limit or _limit(rows)
     figure = Figure(figsize=tuple(size / _DPI), dpi=_DPI)
@@ -159,7 +159,7 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
 
 
 def _heat_map(axis: Any, row: SheetRow, limit: float) -> Any:
-    backdrop = np.ones((*row.original.window.shape, 3))
+    backdrop = np.ones((*row.original.crop.shape, 3))
     backdrop[row.decoded.covered & ~row.original.covered] = _INVENTED
     axis.imshow(backdrop)
     errors = np.ma.masked_array(np.zeros(row.original.covered.shape), mask=~row.original.covered)

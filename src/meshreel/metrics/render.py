@@ -25,8 +25,8 @@ BACKGROUND = 1.0  # white
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
-    """A rectangle of pixels: rows top to bottom, columns left to right, ends excluded."""
+class Crop:
+    """Crop of a picture, a rectangle of pixels: rows top to bottom, columns left to right, ends excluded."""
 
     top: int
     bottom: int
@@ -41,9 +41,9 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Surface that one camera sees in one window."""
+    """Surface that one camera sees in one crop."""
 
-    window: Window
+    crop: Crop
     covered: Bool[np.ndarray, "H W"]
     mesh: Mesh
     corners: Int32[np.ndarray, "N 3"]  # vertices of the faces that the covered pixels see, row by row
@@ -57,7 +57,7 @@ class View:
 
     @property
     def colors(self) -> Float32[np.ndarray, "H W 3"]:
-        """The normal-colored picture of the window, 0 to 1."""
+        """The normal-colored picture of the crop, 0 to 1."""
         image = np.full((*self.covered.shape, 3), BACKGROUND, dtype=np.float32)
         image[self.covered] = (self.normals + 1) / 2
         return image
@@ -66,35 +66,35 @@ class View:
 def render_normals(mesh: Mesh, camera: Camera) -> Float32[np.ndarray, "H W 3"]:
     """Render the whole normal-colored picture, RGB 0 to 1."""
     image = np.full((camera.height, camera.width, 3), BACKGROUND, dtype=np.float32)
-    view = look(mesh, camera, window_of([mesh], camera))
-    w = view.window
-    image[w.top : w.bottom, w.left : w.right] = view.colors
+    view = look(mesh, camera, crop_of([mesh], camera))
+    crop = view.crop
+    image[crop.top : crop.bottom, crop.left : crop.right] = view.colors
     return image
 
 
-def window_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Window:
-    """Return the window of all pixels that can see a mesh, widened by `border` pixels and clipped to the image."""
-    full = Window(0, camera.height, 0, camera.width)
+def crop_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Crop:
+    """Return the crop of all pixels that can see a mesh, widened by `border` pixels and clipped to the image."""
+    full = Crop(0, camera.height, 0, camera.width)
     vertices = np.concatenate([m.vertices for m in meshes])
     if len(vertices) == 0:
-        return Window(0, 0, 0, 0)
+        return Crop(0, 0, 0, 0)
     pixels = camera.project(_to_camera(vertices, camera))
     if not np.isfinite(pixels).all():  # something reaches behind the eye: no rectangle bounds it
         return full
     limits = np.array([camera.width, camera.height])
     low = np.clip(np.floor(pixels.min(axis=0)) - border, 0, limits).astype(int)
     high = np.clip(np.ceil(pixels.max(axis=0)) + border, 0, limits).astype(int)
-    return Window(int(low[1]), int(high[1]), int(low[0]), int(high[0]))
+    return Crop(int(low[1]), int(high[1]), int(low[0]), int(high[0]))
 
 
-def look(mesh: Mesh, camera: Camera, window: Window) -> View:
-    """Return the camera's view of the mesh in the window."""
-    return Visible(mesh).look(Pixels(camera, window))
+def look(mesh: Mesh, camera: Camera, crop: Crop) -> View:
+    """Return the camera's view of the mesh in the crop."""
+    return Visible(mesh).look(Pixels(camera, crop))
 
 
 @runtime_checkable
 class Picture(Protocol):
-    """Normals as colors in a window."""
+    """Normals as colors in a crop."""
 
     @property
     def covered(self) -> Bool[np.ndarray, "H W"]:
@@ -112,21 +112,21 @@ class Looked(Protocol):
     """A mesh that can be rendered repeatedly."""
 
     def look(self, pixels: Pixels) -> Picture:
-        """What a camera sees of it in a window."""
+        """What a camera sees of it in a crop."""
         ...
 
 
 class Pixels:
-    """Window of a camera, with the rays through its pixels, which all meshes rendered there share."""
+    """Crop of a camera's picture, with the rays through its pixels, which all meshes rendered there share."""
 
-    def __init__(self, camera: Camera, window: Window) -> None:
-        self.camera, self.window = camera, window
+    def __init__(self, camera: Camera, crop: Crop) -> None:
+        self.camera, self.crop = camera, crop
 
     @cached_property
     def rays(self) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray, "N 3"]]:
         """Origins and unit directions of the rays in the camera frame, row by row."""
-        window = self.window
-        rows, columns = np.mgrid[window.top : window.bottom, window.left : window.right]
+        crop = self.crop
+        rows, columns = np.mgrid[crop.top : crop.bottom, crop.left : crop.right]
         return self.camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
 
 
@@ -138,15 +138,15 @@ class Visible:
         self._normals = welded_normals(self.mesh)
 
     def look(self, pixels: Pixels) -> View:
-        """What a camera sees of it in a window."""
-        mesh, window = self.mesh, pixels.window
-        if mesh.is_empty or 0 in window.shape:
-            covered, nothing = np.zeros(window.shape, dtype=bool), np.zeros((0, 3))
-            return View(window, covered, mesh, nothing.astype(np.int32), nothing, nothing)
+        """What a camera sees of it in a crop."""
+        mesh, crop = self.mesh, pixels.crop
+        if mesh.is_empty or 0 in crop.shape:
+            covered, nothing = np.zeros(crop.shape, dtype=bool), np.zeros((0, 3))
+            return View(crop, covered, mesh, nothing.astype(np.int32), nothing, nothing)
         hit, faces, weights = _cast(_to_camera(mesh.vertices, pixels.camera), mesh.faces, *pixels.rays)
         corners = mesh.faces[faces]
         normals = interpolate(self._normals, corners, weights)
-        return View(window, hit.reshape(window.shape), mesh, corners, weights, normals)
+        return View(crop, hit.reshape(crop.shape), mesh, corners, weights, normals)
 
 
 def _to_camera(vertices: Float64[np.ndarray, "V 3"], camera: Camera) -> Float64[np.ndarray, "V 3"]:

@@ -2,7 +2,7 @@
 
 Two meshes and cameras -> NormalSsim, by scikit-image: 7 x 7 uniform windows, three channels, data range 1, its 3-pixel
 border left out. The white background scores 1 and inflates the whole-picture form; the masked form is the mean over
-pixels that either mesh covers. Only the window around the meshes is rendered: outside, SSIM is 1 by definition.
+pixels that either mesh covers. Only the crop around the meshes is rendered: outside, SSIM is 1 by definition.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..types import Mesh
-from .render import Looked, Pixels, Visible, window_of
+from .render import Looked, Pixels, Visible, crop_of
 from .viewpoints import Camera
 
 _SIDE = 7  # pixels, side of the SSIM window
@@ -39,8 +39,8 @@ def ssim_normals(
     `seen` prepares the original for rendering; pass a caching function to render the same original only once.
     """
     pair = seen(original), Visible(decoded)
-    windows = [window_of([original, decoded], camera, border=2 * _SIDE) for camera in cameras]
-    scores = [_ssim_view(*pair, Pixels(camera, window)) for camera, window in zip(cameras, windows, strict=True)]
+    crops = [crop_of([original, decoded], camera, border=2 * _SIDE) for camera in cameras]
+    scores = [_ssim_view(*pair, Pixels(camera, crop)) for camera, crop in zip(cameras, crops, strict=True)]
     whole = tuple(score[0] for score in scores)
     masked = tuple(score[1] for score in scores)
     counted = [value for value in masked if value is not None]
@@ -48,12 +48,12 @@ def ssim_normals(
 
 
 def _ssim_view(original: Looked, decoded: Looked, pixels: Pixels) -> tuple[float, float | None]:
-    camera, window = pixels.camera, pixels.window
+    camera, crop = pixels.camera, pixels.crop
     a, b = original.look(pixels), decoded.look(pixels)
     interior = np.zeros((camera.height, camera.width), dtype=bool)
     interior[BORDER:-BORDER, BORDER:-BORDER] = True
-    inside = interior[window.top : window.bottom, window.left : window.right]
-    if min(window.shape) < _SIDE:  # the meshes are out of this picture or at its very edge
+    inside = interior[crop.top : crop.bottom, crop.left : crop.right]
+    if min(crop.shape) < _SIDE:  # the meshes are out of this picture or at its very edge
         return 1.0, None
     scores = ssim_map(a.colors.astype(np.float64), b.colors.astype(np.float64))
     outside = int(interior.sum()) - int(inside.sum())

@@ -72,7 +72,7 @@ def _picture(mesh: Mesh, up: str) -> bytes:
     from PIL import Image
 
     from ..geometry.raycast import Rays
-    from ..metrics.render import Window, look
+    from ..metrics.render import Crop, look
     from ..metrics.viewpoints import Box, ViewOptions, views_around
 
     box, rays = Box.of([mesh]), Rays(mesh)
@@ -81,7 +81,7 @@ def _picture(mesh: Mesh, up: str) -> bytes:
         seen = rays.look(camera)
         shown.append(int((seen.faces >= 0).sum()) - 2 * int(rays.backs(camera, seen).sum()))
     best = int(np.argmax(shown)) if max(shown) > 2 * shown[0] else 0
-    view = look(mesh, views_around(box, ViewOptions(WIDTH, HEIGHT, FIELD, up=up))[best], Window(0, HEIGHT, 0, WIDTH))
+    view = look(mesh, views_around(box, ViewOptions(WIDTH, HEIGHT, FIELD, up=up))[best], Crop(0, HEIGHT, 0, WIDTH))
     picture = np.dstack([view.colors, view.covered])
     out = io.BytesIO()
     Image.fromarray((255 * picture).round().astype(np.uint8)).save(out, "PNG")

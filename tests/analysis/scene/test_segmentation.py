@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from meshreel.analysis.scene import labelling
 from meshreel.analysis.scene.labelling import ByPlace, without_islands
+from meshreel.analysis.scene.masks import Masker
 from meshreel.analysis.scene.places import PlacesOptions
 from meshreel.analysis.scene.segmentation import SegmentOptions, segment, segment_by
 from meshreel.analysis.scene.settle import Rest
@@ -200,8 +201,10 @@ def test_labels_of_a_frame_are_found_once_and_only_the_last_are_kept(rolling, mo
     assert np.array_equal(found.moving(0, ROLLING[0]), first) and len(asked) == 4  # forgotten for the third
 
 
-class Right:
+class Right(Masker):
     """A masker that calls what is at x > 1.2 m moving; it must see all frames first."""
+
+    observes = True
 
     def __init__(self) -> None:
         self.observed: list[int] = []

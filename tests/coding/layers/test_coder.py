@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from meshreel.coding.group import continue_group, decode_group, payload_parts
+from meshreel.coding.group import continue_group, decode_group, payload_bytes_by_purpose
 from meshreel.coding.layers import coder
 from meshreel.coding.layers.coder import EncodedLayers, LayerCodingOptions, decode_layers, encode_layers
 from meshreel.coding.reference_mesh import CodedReference, code_reference
@@ -220,7 +220,7 @@ def test_the_error_for_an_invalid_option_names_it(name: str, value: object) -> N
 
 
 def test_the_bytes_of_a_payload_are_listed_by_purpose() -> None:
-    parts = payload_parts(CODED.payload)
+    parts = payload_bytes_by_purpose(CODED.payload)
     assert list(parts) == ["base mesh", "base motion", "level 1", "level 2", "group head"]
     assert sum(parts.values()) == len(CODED.payload)
     assert parts["base mesh"] == len(BALL.data) and parts["level 2"] == CODED.layers[2] - CODED.layers[1]

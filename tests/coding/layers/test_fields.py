@@ -12,7 +12,7 @@ from meshreel.coding.entropy import encode_integers
 from meshreel.coding.layers import fields, orthonormal
 from meshreel.coding.layers.fields import Rate, SurfaceWeight, decode_field, encode_field
 from meshreel.coding.layers.graph import hierarchy, siblings
-from meshreel.coding.steps import LEVELS
+from meshreel.coding.steps import RUNGS
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import CodedField
 from meshreel.format.records import pack, unpack
@@ -115,7 +115,7 @@ def test_zeros_cost_next_to_nothing() -> None:
     assert len(stream) < 6
 
 
-@pytest.mark.parametrize("change", [{"columns": 13}, {"step_level": LEVELS}, {"columns": 2**60}, {"symbols": b""}])
+@pytest.mark.parametrize("change", [{"columns": 13}, {"step_level": RUNGS}, {"columns": 2**60}, {"symbols": b""}])
 def test_absurd_records_are_refused(change: dict[str, object]) -> None:
     coded = encode_field(trajectories(), GRAPH, Rate(72, 0.1), ROUND)
     with pytest.raises(FormatError):
@@ -126,7 +126,7 @@ def test_absurd_records_are_refused(change: dict[str, object]) -> None:
 
 def test_trajectories_too_long_for_the_step_are_refused() -> None:
     with pytest.raises(InputError, match="too long"):
-        encode_field(1e4 * trajectories(), GRAPH, Rate(LEVELS - 1, 0.1))
+        encode_field(1e4 * trajectories(), GRAPH, Rate(RUNGS - 1, 0.1))
 
 
 @settings(max_examples=300, deadline=None)

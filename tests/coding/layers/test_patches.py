@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from meshreel import _core
-from meshreel.coding.group import continue_group, decode_group, payload_parts
+from meshreel.coding.group import continue_group, decode_group, payload_bytes_by_purpose
 from meshreel.coding.layers.coder import encode_layers
 from meshreel.coding.layers.patches import (
     Patches,
@@ -135,7 +135,7 @@ def test_the_next_group_is_predicted_as_if_nothing_were_patched() -> None:
 
 
 def test_the_parts_of_a_payload_are_all_its_bytes() -> None:
-    parts = payload_parts(PAYLOAD)
+    parts = payload_bytes_by_purpose(PAYLOAD)
     assert sum(parts.values()) == len(PAYLOAD)
     assert parts["dropped faces"] == len(RECORD.dropped) and parts["patches"] == len(RECORD.mesh)
 

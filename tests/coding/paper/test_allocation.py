@@ -20,8 +20,8 @@ def test_the_steps_follow_the_option() -> None:
         choice = allocate(
             FIELD, system, entropy.causal_neighbours(BASE.faces, len(FIELD)), DisplacementOptions(step=step)
         )
-        assert choice.levels.size > 0
-        assert all(0.65 < step_of(level) / step < 1.55 for level in choice.levels.tolist())  # half an octave around it
+        assert choice.rungs.size > 0
+        assert all(0.65 < step_of(rung) / step < 1.55 for rung in choice.rungs.tolist())  # half an octave around it
 
 
 def test_components_below_the_step_are_dropped() -> None:
@@ -29,7 +29,7 @@ def test_components_below_the_step_are_dropped() -> None:
     options = DisplacementOptions(step=1e-3)
     system = laplacian.System(BASE, np.array([0, 5], np.int32))
     choice = allocate(noise, system, entropy.causal_neighbours(BASE.faces, len(FIELD)), options)
-    assert len(choice.levels) == 0
+    assert len(choice.rungs) == 0
 
 
 def test_components_are_as_many_as_the_motion_has() -> None:
@@ -38,7 +38,7 @@ def test_components_are_as_many_as_the_motion_has() -> None:
     strong = int((basis.energies > 1e-3**2).sum())
     system = laplacian.System(BASE, np.array([0, 5], np.int32))
     choice = allocate(field, system, entropy.causal_neighbours(BASE.faces, len(field)), DisplacementOptions(step=1e-3))
-    assert 1 <= len(choice.levels) <= strong + 2
+    assert 1 <= len(choice.rungs) <= strong + 2
 
 
 def test_the_chosen_number_of_components_is_no_worse_than_any_fixed_one() -> None:

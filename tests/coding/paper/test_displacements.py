@@ -13,7 +13,7 @@ from meshreel.coding import entropy
 from meshreel.coding.paper import displacements
 from meshreel.coding.paper.allocation import DisplacementOptions
 from meshreel.coding.paper.displacements import decode_displacements, encode_displacements, layer_sizes
-from meshreel.coding.steps import LEVELS, level_of, step_of
+from meshreel.coding.steps import RUNGS, rung_of, step_of
 from meshreel.errors import FormatError, InputError
 from meshreel.format import records
 from meshreel.format.layout import AnchorRule, Component, DisplacementHead
@@ -151,7 +151,7 @@ def test_absurd_heads_are_refused(change: dict[str, int]) -> None:
         decode_displacements(records.pack(dataclasses.replace(head, **change)) + DATA[offset:], BASE)
 
 
-@pytest.mark.parametrize("change", [{"basis_bits": 31}, {"step_level": LEVELS}, {"deltas_size": 2**60}])
+@pytest.mark.parametrize("change", [{"basis_bits": 31}, {"step_level": RUNGS}, {"deltas_size": 2**60}])
 def test_absurd_components_are_refused(change: dict[str, int]) -> None:
     head, offset = records.unpack(DisplacementHead, DATA)
     components = (dataclasses.replace(head.components[0], **change), *head.components[1:])
@@ -209,9 +209,9 @@ def test_displacements_that_are_not_normalised_are_refused() -> None:
 
 
 def test_the_ladder_of_steps_is_exact_and_falls_by_the_eighth_root_of_two() -> None:
-    for level in range(LEVELS):
-        assert math.isclose(step_of(level), 2 ** (-level / 8), rel_tol=1e-9)
-        assert level_of(step_of(level)) == level
+    for rung in range(RUNGS):
+        assert math.isclose(step_of(rung), 2 ** (-rung / 8), rel_tol=1e-9)
+        assert rung_of(step_of(rung)) == rung
 
 
 def test_the_head_takes_less_than_half_of_a_payload() -> None:

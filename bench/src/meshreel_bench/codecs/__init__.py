@@ -5,9 +5,7 @@ In: the name of a codec and its operating point. Out: a Codec.
 
 from __future__ import annotations
 
-import sys
 from importlib.metadata import EntryPoint, entry_points
-from pathlib import Path
 from typing import Any
 
 from meshreel.errors import InputError
@@ -37,16 +35,6 @@ def codec_version(name: str) -> str | None:
     if entry is None or entry.dist is None or entry.module.partition(".")[0] == __name__.partition(".")[0]:
         return None
     return f"{entry.dist.name} {entry.dist.version}"
-
-
-def source_of(name: str) -> Path | None:
-    """Return the file or the folder of a codec whose module is loaded, else None."""
-    entry = _entry(name)
-    module = None if entry is None else sys.modules.get(entry.module)
-    file = getattr(module, "__file__", None)
-    if file is None:
-        return None
-    return Path(file).parent if hasattr(module, "__path__") else Path(file)
 
 
 def _entry(name: str) -> EntryPoint | None:

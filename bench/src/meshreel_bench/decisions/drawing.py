@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from meshreel.geometry.closest_points import Surface
-from meshreel.metrics.render import Window, look
+from meshreel.metrics.render import Crop, look
 from meshreel.metrics.viewpoints import Box, OrthographicCamera, parallel_views_around
 from meshreel.types import Mesh
 
@@ -79,7 +79,7 @@ def camera_for(meshes: list[Mesh], size: int, view: int = 0) -> OrthographicCame
 def shaded(mesh: Mesh, camera: OrthographicCamera, colors: Float64[np.ndarray, "V 3"] | None = None) -> np.ndarray:
     """A mesh under a lamp beside the camera: grey, or colors of its vertices."""
     camera = _finer(camera)
-    view = look(mesh, camera, Window(0, camera.height, 0, camera.width))
+    view = look(mesh, camera, Crop(0, camera.height, 0, camera.width))
     picture = np.ones((camera.height, camera.width, 3))
     turned = view.normals @ camera.extrinsic[:3, :3].T * [1, -1, -1]
     light = 0.45 + 0.55 * np.abs(turned @ LIGHT)
@@ -91,12 +91,12 @@ def shaded(mesh: Mesh, camera: OrthographicCamera, colors: Float64[np.ndarray, "
 def normal_colored(mesh: Mesh, camera: OrthographicCamera) -> np.ndarray:
     """A mesh in the colors of its normals, as in the paper."""
     camera = _finer(camera)
-    return _averaged(look(mesh, camera, Window(0, camera.height, 0, camera.width)).colors)
+    return _averaged(look(mesh, camera, Crop(0, camera.height, 0, camera.width)).colors)
 
 
 def heat(mesh: Mesh, camera: OrthographicCamera, other: Mesh) -> np.ma.MaskedArray:
     """Distance from what the camera sees of a mesh to the surface of another one; masked where nothing is seen."""
-    view = look(mesh, camera, Window(0, camera.height, 0, camera.width))
+    view = look(mesh, camera, Crop(0, camera.height, 0, camera.width))
     distances = np.ma.masked_array(np.zeros(view.covered.shape), mask=~view.covered)
     distances[view.covered] = np.linalg.norm(Surface(other).closest(view.points).points - view.points, axis=1)
     return distances

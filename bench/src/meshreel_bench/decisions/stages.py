@@ -18,7 +18,7 @@ from meshreel.analysis.reference.track import track_centers
 from meshreel.analysis.survey import survey
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
-from meshreel.coding.group import decode_group, encode_group, payload_parts
+from meshreel.coding.group import decode_group, encode_group, payload_bytes_by_purpose
 from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.encoder.options import PaperOptions
 from meshreel.geometry.topology import vertex_normals
@@ -57,7 +57,7 @@ class Stages:
     @property
     def parts(self) -> dict[str, int]:
         """Bytes of the group's payload by what they are for."""
-        return payload_parts(self.payload)
+        return payload_bytes_by_purpose(self.payload)
 
 
 def story(first: int = FIRST, count: int = COUNT) -> MeshList:

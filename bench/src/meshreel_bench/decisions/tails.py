@@ -74,7 +74,7 @@ def with_tails(
     frames: Sequence[Mesh], plain: list[Mesh], size: int, options: TailOptions | None
 ) -> tuple[list[Mesh], int]:
     """Return the frames of a group as shown, and the bytes of its patches."""
-    found = options and find_tails(frames, plain, size, options)
+    found = options and find_tails(frames, plain, size, options, noise=0.0)
     return (found.frames, len(pack(found.record))) if found else (plain, 0)
 
 

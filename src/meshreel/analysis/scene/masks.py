@@ -22,18 +22,31 @@ CAMERAS = "cameras.json"  # file name: Open3D's pinhole camera JSON, beside the 
 
 @runtime_checkable
 class Masker(Protocol):
-    """Source of masks: for each pixel of each view, whether the surface that it sees moves."""
+    """Source of masks: for each pixel of each view, whether the surface that it sees moves. Inherit from it."""
+
+    views: tuple[PinholeCamera, ...] | None = None  # cameras of the masks; None: those that the scene is segmented with
+    observes: bool = False  # whether `foresee` and `observe` must be called before the first masks
+
+    def foresee(self, moments: Sequence[Sequence[Seen]]) -> None:
+        """Learn what all views see at a few moments, to choose a reference view; called once, before `observe`."""
+        del moments
+
+    def observe(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> None:
+        """Learn what the views see of a frame; called for every frame in order, before the first masks."""
+        del frame, seen, views
 
     def masks(self, frame: int, seen: Sequence[Seen], views: Sequence[PinholeCamera]) -> Bool[np.ndarray, "X H W"]:
         """Return the masks of one frame in the order of the views; True: moving."""
         ...
 
 
-class ImageMasks:
+class ImageMasks(Masker):
     """Masks made by another tool: `cameras.json`, and view00/frame_00000.png for each view and frame.
 
     Pixels are object numbers; 0 means still.
     """
+
+    views: tuple[PinholeCamera, ...]
 
     def __init__(self, folder: Path, frames: int) -> None:
         """Read every file of `frames` frames. Raises InputError if one is missing, damaged or of another size."""

@@ -22,6 +22,7 @@ from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Seen
 from .hypotheses import Hypotheses, HypothesisOptions, Tracked, hypotheses, moving_in_views, reference_view, tour
+from .masks import Masker
 from .pictures import normal_picture
 
 AUTOMATIC = ("person", "animal", "vehicle", "object")  # default prompts, whatever may move: a guess
@@ -39,11 +40,13 @@ class Sam3Options:
     hypotheses: HypothesisOptions = field(default_factory=HypothesisOptions)
 
 
-class Sam3Masks:
-    """A Masker that observes the reference view in every frame before it makes masks: two passes over the frames.
+class Sam3Masks(Masker):
+    """Masker that observes the reference view in every frame before it makes masks: two passes over the frames.
 
     Masks are kept, one bit per pixel, so that further encodes of the same sequence do not run the model again.
     """
+
+    observes = True
 
     def __init__(self, path: Path, prompts: Sequence[str] | None = None, options: Sam3Options = Sam3Options()) -> None:
         """Load the weights in the folder `path`. Raises InputError if they or the extra `sam3` are missing."""

@@ -88,18 +88,13 @@ def _faces_away(mesh: Mesh) -> bool:
 
 
 def segment_by(masker: Masker, frames: MeshSequence, options: SegmentOptions = SegmentOptions()) -> ByMasks:
-    """Segment a scene by the masks of `masker`.
-
-    A masker that must see every frame before its first mask has a method `observe`; one that must see a few frames
-    before that, to choose a reference view, has a method `foresee`. Both are optional.
-    """
+    """Segment a scene by the masks of `masker`, which sees every frame before its first mask where it `observes`."""
     chosen = _to_see(frames)
-    views = _looking(getattr(masker, "views", None), frames, chosen) or _views(frames, chosen, options)
-    if foresee := getattr(masker, "foresee", None):
-        foresee([looks(frames[number], views) for number in chosen[:: max(1, len(chosen) // _PROBES)]])
-    if observe := getattr(masker, "observe", None):
+    views = _looking(masker.views, frames, chosen) or _views(frames, chosen, options)
+    if masker.observes:
+        masker.foresee([looks(frames[number], views) for number in chosen[:: max(1, len(chosen) // _PROBES)]])
         for number in range(len(frames)):
-            observe(number, looks(frames[number], views), views)
+            masker.observe(number, looks(frames[number], views), views)
     return ByMasks(masker, views, edge_length(frames, chosen), options.threshold, options.island)
 
 

@@ -21,7 +21,7 @@ from ...geometry.subdivision import frames_of, heights, refine, subdivide
 from ...types import Mesh, Placement
 from ..mesh import check_growth, check_step, decode_mesh
 from ..reference_mesh import CodedReference
-from ..steps import LEVELS, level_of, step_of
+from ..steps import RUNGS, rung_of, step_of
 from .details import Shown, decode_last, decode_level, encode_level
 from .fields import Rate
 from .graph import Connectivity, connectivity
@@ -43,7 +43,7 @@ class LayerCodingOptions:
     tangential: float = 0.4  # weight of squared errors of the base's vertices along the surface, 0 to 1
 
     def __post_init__(self) -> None:
-        finest, coarsest = step_of(LEVELS - 1), step_of(0)
+        finest, coarsest = step_of(RUNGS - 1), step_of(0)
         if not self.detail_ratios or min(self.detail_ratios) <= 0:
             raise InputError(f"detail ratios {self.detail_ratios}: give one or more, above 0")
         if not self.curvatures or not all(0 <= share <= 255 for share in self.curvatures):
@@ -64,10 +64,10 @@ class LayerCodingOptions:
         """Return the step for frames at this RMS distance from the truth: below the noise there is nothing to code."""
         return math.hypot(self.step, NOISY_STEP * noise)
 
-    def rate(self, level: int, noise: float = 0.0) -> Rate:
+    def rate(self, level: int, noise: float) -> Rate:
         """Return step and price of a level; 0 is the base."""
         ratio = 1.0 if level == 0 else self.detail_ratios[min(level, len(self.detail_ratios)) - 1]
-        return Rate(level_of(self.step_above(noise) * ratio), self.price)
+        return Rate(rung_of(self.step_above(noise) * ratio), self.price)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ def encode_layers(
     head = LayersGroup(
         Form.LAYERS, origin, frames, levels, reference.step, data, Presence(field.has_mean), field.record
     )
-    parts = [pack(head)]
+    layers = [pack(head)]
     scalars: list[Float64[np.ndarray, "T _"]] = []
     faces = base.faces
     for number in range(1, levels + 1):
@@ -129,12 +129,12 @@ def encode_layers(
         curvature = options.curvature(number)
         aim = heights(positions[:, : level.count], known, level, curvature)
         coded = encode_level(aim, level, options.rate(number, noise), curvature, _before(previous, number))
-        parts.append(pack(coded.record))
+        layers.append(pack(coded.record))
         scalars.append(coded.scalars)
         known, faces = refine(known, level, coded.scalars, curvature), level.faces
     last = known[-1, : len(base.vertices)].copy()
     state = LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))
-    return EncodedLayers(b"".join(parts), tuple(accumulate(map(len, parts))), known, state)
+    return EncodedLayers(b"".join(layers), tuple(accumulate(map(len, layers))), known, state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,18 +228,18 @@ class _Room:
         return _Room(block[:size].reshape(frames, vertices, 3), rows.reshape(-1, 3))
 
 
-def layers_parts(data: bytes) -> dict[str, int]:
+def layers_bytes_by_purpose(data: bytes) -> dict[str, int]:
     """Return the bytes of a payload by purpose. Raises FormatError on damaged bytes."""
     head, offset = unpack(LayersGroup, data)
-    parts = {"base mesh": len(head.base), "base motion": len(head.motion.basis) + len(head.motion.symbols)}
+    sizes = {"base mesh": len(head.base), "base motion": len(head.motion.basis) + len(head.motion.symbols)}
     for number in range(1, head.levels + 1):
         start = offset
         _, offset = unpack(LayersLevel, data, offset)
-        parts[f"level {number}"] = offset - start
+        sizes[f"level {number}"] = offset - start
     if offset < len(data):
         patches = unpack_all(LayersPatches, data[offset:])
-        parts |= {"dropped faces": len(patches.dropped), "patches": len(patches.mesh)}
-    return parts
+        sizes |= {"dropped faces": len(patches.dropped), "patches": len(patches.mesh)}
+    return sizes
 
 
 def _base(head: LayersGroup, previous: LayersState | None) -> Mesh:

@@ -32,13 +32,13 @@ MOST_WEIGHT = 1e9  # steps, largest weight: its prediction residual, at most twi
 class Rate:
     """Quantiser step of a field, and the price of its bits."""
 
-    step_level: int
+    rung: int  # of the ladder of quantiser steps
     price: float  # of a bit, in squared steps
 
     @property
     def step(self) -> float:
         """Quantiser step, in the field's unit."""
-        return step_of(self.step_level)
+        return step_of(self.rung)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def encode_field(
         kept = kept[pays]
         coded = _Columns(centered, _only(basis, kept), graph, rate, surface)
     packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
-    record = CodedField(len(kept), rate.step_level, packed, coded.stream)
+    record = CodedField(len(kept), rate.rung, packed, coded.stream)
     decoded = decode_field(record, graph, width, has_mean)
     return EncodedField(record, has_mean, decoded, 8 * len(packed), 8 * len(coded.stream))
 

@@ -19,7 +19,7 @@ from ...format.layout import LayersPatches
 from ...types import Mesh, Placement
 from .. import entropy
 from ..mesh import check_growth, decode_mesh, encode_mesh
-from ..steps import LEVELS, step_of
+from ..steps import RUNGS, step_of
 
 MOST_CELLS = 1 << 20  # of the lattice, over all frames: as many as Draco's float32 positions can resolve
 
@@ -64,30 +64,30 @@ class Patches:
         return shown
 
 
-def reach(step_level: int, frames: int) -> tuple[float, float]:
+def reach(rung: int, frames: int) -> tuple[float, float]:
     """Return how far from 0 the meshes of `frames` frames may reach: along x, where they lie in a row; and in y, z."""
-    step = step_of(step_level)
+    step = step_of(rung)
     return (MOST_CELLS // frames // 2 - 0.75) * step, (MOST_CELLS // 2 - 0.75) * step
 
 
 def encode_patches(
-    dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh], step_level: int
+    dropped: Bool[np.ndarray, "T F"], meshes: Sequence[Mesh], rung: int
 ) -> tuple[LayersPatches, tuple[Mesh, ...]]:
     """Encode patches; return the record and the meshes as they decode.
 
     Raises InputError if the meshes need more cells than Draco can resolve.
     """
     runs = encode_runs(dropped)
-    width, side_by_side = _set_out(meshes, step_of(step_level))
-    data = encode_mesh(side_by_side, step_of(step_level))
-    record = LayersPatches(len(runs), entropy.encode_integers(runs), step_level, width, data)
+    width, side_by_side = _set_out(meshes, step_of(rung))
+    data = encode_mesh(side_by_side, step_of(rung))
+    record = LayersPatches(len(runs), entropy.encode_integers(runs), rung, width, data)
     return record, _taken_in(record, len(meshes))
 
 
 def decode_patches(record: LayersPatches, frames: int, faces: int) -> Patches:
     """Decode the patches of a group whose finest level has `faces` faces. Raises FormatError on damaged records."""
-    if record.step_level >= LEVELS:
-        raise FormatError(f"patches: step level {record.step_level}, there are {LEVELS}")
+    if record.step_level >= RUNGS:
+        raise FormatError(f"patches: step level {record.step_level}, there are {RUNGS}")
     if record.runs > 2 * faces + frames * (faces + 1) + 2:
         raise FormatError(f"patches: {record.runs} runs over {frames} frames of {faces} faces")
     runs = entropy.decode_integers(record.dropped, record.runs)

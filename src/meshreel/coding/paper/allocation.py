@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...format.layout import AnchorRule
 from ...geometry.topology import components
 from .. import entropy, klt
-from ..steps import LEVELS, level_of, step_of
+from ..steps import RUNGS, rung_of, step_of
 from . import quantize
 from .laplacian import System
 
@@ -38,7 +38,7 @@ class DisplacementOptions:
     dead_zone: float | None = None  # plain rounding, up from this fraction of a step, .5 to 1; None: shaped rounding
 
     def __post_init__(self) -> None:
-        finest, coarsest = step_of(LEVELS - 1), step_of(0)
+        finest, coarsest = step_of(RUNGS - 1), step_of(0)
         if not finest <= self.step <= coarsest:
             raise InputError(f"step {self.step}: give a fraction of the diagonal in {finest:.2g} .. {coarsest:g}")
         if self.basis_size is not None and self.basis_size < 0:
@@ -79,7 +79,7 @@ class Allocation:
     """Choices of the encoder: the basis as transmitted, and each component's step and symbols."""
 
     basis: klt.BasisSymbols
-    levels: Int64[np.ndarray, " M"]  # of each component's step
+    rungs: Int64[np.ndarray, " M"]  # each component's
 
 
 def allocate(
@@ -92,21 +92,21 @@ def allocate(
     else:
         kept = basis.energies > (0.4 * options.step) ** 2
     coded = _Components(field, _only(basis, kept), system, options)
-    ladder = [np.full(coded.count, level_of(options.step) + offset) for offset in LADDER]
-    values = np.array([coded.value(coded.rounded(levels), levels, neighbours) for levels in ladder])
-    levels = np.choose(values.argmin(axis=0), ladder) if coded.count else ladder[0]
+    ladder = [np.full(coded.count, rung_of(options.step) + offset) for offset in LADDER]
+    values = np.array([coded.value(coded.rounded(rungs), rungs, neighbours) for rungs in ladder])
+    rungs = np.choose(values.argmin(axis=0), ladder) if coded.count else ladder[0]
     pays = values.min(axis=0) < coded.dropped() if options.basis_size is None else np.ones(coded.count, dtype=bool)
     if not pays.all():
         kept[kept] = pays
-        coded, levels = _Components(field, _only(basis, kept), system, options), levels[pays]
-    return Allocation(coded.basis, levels)
+        coded, rungs = _Components(field, _only(basis, kept), system, options), rungs[pays]
+    return Allocation(coded.basis, rungs)
 
 
 def round_deltas(
-    deltas: Float64[np.ndarray, "R M"], levels: Int64[np.ndarray, " M"], system: System, options: DisplacementOptions
+    deltas: Float64[np.ndarray, "R M"], rungs: Int64[np.ndarray, " M"], system: System, options: DisplacementOptions
 ) -> Int32[np.ndarray, "R M"]:
     """Round deltas to symbols; a symbol's price comes from how large its column's symbols are."""
-    steps, vertices = steps_of(levels), system.vertices
+    steps, vertices = steps_of(rungs), system.vertices
     if options.dead_zone is not None:
         return quantize.forward(deltas, steps, options.dead_zone)
     price = options.price * (options.step / steps) ** 2  # of a bit, in the component's own squared steps
@@ -128,15 +128,15 @@ class _Components:
         self.weights = klt.forward(field, klt.dequantize(self.basis))
         self.deltas = system.forward(self.weights)
 
-    def rounded(self, levels: Int64[np.ndarray, " M"]) -> Int32[np.ndarray, "R M"]:
-        """Return the symbols at a step level for each component."""
-        return round_deltas(self.deltas, levels, self.system, self.options)
+    def rounded(self, rungs: Int64[np.ndarray, " M"]) -> Int32[np.ndarray, "R M"]:
+        """Return the symbols at a rung for each component."""
+        return round_deltas(self.deltas, rungs, self.system, self.options)
 
     def value(
-        self, symbols: Int32[np.ndarray, "R M"], levels: Int64[np.ndarray, " M"], neighbours: entropy.Neighbours
+        self, symbols: Int32[np.ndarray, "R M"], rungs: Int64[np.ndarray, " M"], neighbours: entropy.Neighbours
     ) -> Float64[np.ndarray, " M"]:
         """Distortion + price * rate of each component: the basis is orthonormal, so they add."""
-        error = self.system.inverse(symbols * steps_of(levels)) - self.weights
+        error = self.system.inverse(symbols * steps_of(rungs)) - self.weights
         bits = entropy.weights_cost(symbols[: self.vertices], neighbours)
         bits += np.log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
         bits += np.log2(2.0 * np.abs(self.basis.vectors) + 1).sum(axis=1)
@@ -151,8 +151,8 @@ def _only(basis: klt.Basis, kept: Bool[np.ndarray, " C"]) -> klt.Basis:
     return klt.Basis(basis.mean, np.ascontiguousarray(basis.vectors[:, kept]), basis.energies[kept])
 
 
-def steps_of(levels: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
-    return np.array([step_of(level) for level in levels.tolist()], dtype=np.float64)
+def steps_of(rungs: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
+    return np.array([step_of(rung) for rung in rungs.tolist()], dtype=np.float64)
 
 
 def _slopes(symbols: Float64[np.ndarray, "V M"] | Int32[np.ndarray, "V M"]) -> Float64[np.ndarray, " M"]:

@@ -15,7 +15,7 @@ from ...format import records
 from ...format.layout import Component, DisplacementHead
 from ...types import Mesh
 from .. import entropy, klt
-from ..steps import LEVELS
+from ..steps import RUNGS
 from . import laplacian, quantize
 from .allocation import Allocation, DisplacementOptions, allocate, alternatives, cost, round_deltas, steps_of
 
@@ -48,9 +48,9 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
         raise FormatError(f"displacements: {head.frames} frames of {vertices} vertices exceed {MOST_NUMBERS} numbers")
     neighbours = entropy.causal_neighbours(base.faces, vertices)
     anchors = laplacian.anchors(head.anchor_rule, head.anchor_count, base.faces, vertices)
-    parts = _streams(data, offset, head.components[:count])
-    rounded = entropy.decode_weights([deltas for _, deltas in parts], vertices, neighbours)
-    fixed = [entropy.decode_integers(stream, len(anchors)) for stream, _ in parts]
+    streams = _streams(data, offset, head.components[:count])
+    rounded = entropy.decode_weights([stream for _, stream in streams], vertices, neighbours)
+    fixed = [entropy.decode_integers(stream, len(anchors)) for stream, _ in streams]
     symbols = np.concatenate([rounded, np.array(fixed, dtype=np.int32).reshape(count, len(anchors)).T])
     steps = steps_of(np.array([component.step_level for component in head.components[:count]], dtype=np.int64))
     try:
@@ -83,13 +83,14 @@ def _encode(field: Float64[np.ndarray, "V T 3"], base: Mesh, options: Displaceme
     system = laplacian.System(base, anchors, options.anchor_weight)
     neighbours = entropy.causal_neighbours(base.faces, vertices)
     choice = allocate(field, system, neighbours, options)
-    basis, steps = klt.dequantize(choice.basis), steps_of(choice.levels)
+    basis, steps = klt.dequantize(choice.basis), steps_of(choice.rungs)
 
     weights = klt.forward(field, basis)  # eq. 8
     deltas = system.forward(weights)  # eq. 12
-    symbols = round_deltas(deltas, choice.levels, system, options)
-    fixed = [entropy.encode_integers(column) for column in symbols[vertices:].T]
-    streams = list(zip(fixed, entropy.encode_weights(symbols[:vertices], neighbours), strict=True))
+    symbols = round_deltas(deltas, choice.rungs, system, options)
+    rounded, fixed = symbols[:vertices], symbols[vertices:]
+    anchor_streams = [entropy.encode_integers(column) for column in fixed.T]
+    streams = list(zip(anchor_streams, entropy.encode_weights(rounded, neighbours), strict=True))
 
     error = klt.inverse(system.inverse(quantize.inverse(symbols, steps)), basis) - field
     payload = records.pack(_head(field.shape[1], choice, streams, options)) + b"".join(map(b"".join, streams))
@@ -100,14 +101,14 @@ def _head(
     frames: int, choice: Allocation, streams: list[tuple[bytes, bytes]], options: DisplacementOptions
 ) -> DisplacementHead:
     """Return the head of the streams of each component's anchors and deltas."""
-    parts = zip(choice.basis.bits[1:].tolist(), choice.levels.tolist(), streams, strict=True)
+    coded = zip(choice.basis.bits[1:].tolist(), choice.rungs.tolist(), streams, strict=True)
     return DisplacementHead(
         frames=frames,
         anchor_rule=options.anchor_rule,
         anchor_count=options.anchor_count or 0,
         anchor_weight=options.anchor_weight,
         mean_bits=int(choice.basis.bits[0]),
-        components=tuple(Component(bits, level, len(fixed), len(deltas)) for bits, level, (fixed, deltas) in parts),
+        components=tuple(Component(bits, rung, len(fixed), len(deltas)) for bits, rung, (fixed, deltas) in coded),
         basis=entropy.encode_integers(np.append(choice.basis.mean, choice.basis.vectors).astype(np.int32)),
     )
 
@@ -120,8 +121,8 @@ def _read_head(data: bytes) -> tuple[DisplacementHead, int]:
     if head.anchor_weight < 1 or head.mean_bits > MOST_BITS:
         raise FormatError(f"displacements: anchor weight {head.anchor_weight}, {head.mean_bits} bits for the mean")
     for component in head.components:
-        if component.basis_bits > MOST_BITS or component.step_level >= LEVELS:
-            raise FormatError(f"displacements: {component.basis_bits} bits, level {component.step_level}")
+        if component.basis_bits > MOST_BITS or component.step_level >= RUNGS:
+            raise FormatError(f"displacements: {component.basis_bits} bits, step level {component.step_level}")
     return head, offset
 
 
@@ -136,15 +137,15 @@ def _read_basis(head: DisplacementHead, count: int) -> klt.Basis:
 
 def _streams(data: bytes, offset: int, components: tuple[Component, ...]) -> list[tuple[bytes, bytes]]:
     """Cut the streams of each component's anchors and deltas out of a payload."""
-    parts = []
+    streams = []
     for number, component in enumerate(components):
         middle = offset + component.anchors_size
         end = middle + component.deltas_size
         if end > len(data):
             raise FormatError(f"displacements: component {number} ends at byte {end} of {len(data)}; truncated")
-        parts.append((data[offset:middle], data[middle:end]))
+        streams.append((data[offset:middle], data[middle:end]))
         offset = end
-    return parts
+    return streams
 
 
 def _size(component: Component) -> int:
