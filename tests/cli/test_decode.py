@@ -63,7 +63,7 @@ def test_a_frame_that_is_lost_has_no_file_of_a_run_before(run, tmp_path):
 
 
 @pytest.mark.parametrize("only", ["all", "background", "moving"])
-def test_of_a_scene_all_or_what_moves_or_what_does_not(run, tmp_path, only):
+def test_decode_writes_a_whole_scene_or_only_its_background_or_its_bodies(run, tmp_path, only):
     arguments = [] if only == "all" else ["--only", only]
     assert run("decode", SCENE, "-o", tmp_path, *arguments, "--json").row["frames"] == 14
     video = meshreel.open(SCENE)

@@ -37,7 +37,7 @@ def test_an_unknown_command_is_reported(run):
     assert failed(run("encod"), "encod")
 
 
-def test_a_ctrl_c_is_130_and_one_line(run, monkeypatch):
+def test_ctrl_c_exits_with_130_and_prints_one_line(run, monkeypatch):
     def interrupted(_):
         raise KeyboardInterrupt
 

@@ -21,13 +21,13 @@ SMALL_OR_ANY = st.one_of(st.integers(-3, 3), st.integers(-3000, 3000), INT32)
 
 
 @given(st.lists(SMALL_OR_ANY, max_size=60))
-def test_integers_survive(values: list[int]) -> None:
+def test_integers_survive_a_round_trip(values: list[int]) -> None:
     array = np.array(values, np.int32)
     assert np.array_equal(entropy.decode_integers(entropy.encode_integers(array), len(array)), array)
 
 
 @given(hnp.arrays(np.int32, st.tuples(st.integers(0, 40), st.integers(0, 4)), elements=SMALL_OR_ANY), st.data())
-def test_weights_survive_on_any_faces(symbols: np.ndarray, data: st.DataObject) -> None:
+def test_weights_survive_a_round_trip_on_any_faces(symbols: np.ndarray, data: st.DataObject) -> None:
     count = len(symbols)
     index = st.integers(0, max(count - 1, 0))
     shape = st.tuples(st.integers(0, 50 if count else 0), st.just(3))
@@ -43,9 +43,9 @@ def test_extreme_values_cost_their_bits_and_no_more() -> None:
     assert len(data) <= 1000 * 33 / 8 * 1.02
 
 
-def test_one_symbol_is_a_few_bytes_and_nothing_is_nothing() -> None:
-    nobody = entropy.causal_neighbours(np.zeros((0, 3), np.int32), 1)
-    streams = entropy.encode_weights(np.array([[0, 1, -5]], np.int32), nobody)
+def test_one_symbol_takes_a_few_bytes_and_an_empty_array_none() -> None:
+    no_neighbours = entropy.causal_neighbours(np.zeros((0, 3), np.int32), 1)
+    streams = entropy.encode_weights(np.array([[0, 1, -5]], np.int32), no_neighbours)
     assert max(map(len, streams)) <= 3
     assert entropy.encode_integers(np.zeros(0, np.int32)) == b""
 

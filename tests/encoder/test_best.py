@@ -62,7 +62,7 @@ def test_processes_give_the_same_bytes(written, tmp_path):
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
 
 
-def test_no_more_runs_are_read_than_there_are_workers_and_one(tmp_path):
+def test_at_most_one_interval_more_than_workers_is_submitted_at_once(tmp_path):
     class Waiting(ThreadPoolExecutor):
         most = now = 0
 
@@ -86,17 +86,19 @@ def test_no_more_runs_are_read_than_there_are_workers_and_one(tmp_path):
 
 def test_more_empty_frames_than_a_group_holds_are_more_groups(tmp_path, monkeypatch):
     monkeypatch.setattr("meshreel.encoder.forms.MOST_EMPTY", 100)
-    told: dict[str, int] = {}
+    reported: dict[str, int] = {}
     frames = MeshList((Mesh.empty(),) * 150, frame_rate=30.0)
     options = replace(OPTIONS, key_interval=600.0)
-    summary = encode(frames, tmp_path / "a.reel", options=options, progress=lambda s, done, _: told.update({s: done}))
+    summary = encode(
+        frames, tmp_path / "a.reel", options=options, progress=lambda s, done, _: reported.update({s: done})
+    )
     assert [group.frame_count for group in summary.groups] == [100, 50]
-    assert told == {"survey": 150, "code": 150}
+    assert reported == {"survey": 150, "code": 150}
     with meshreel.open(tmp_path / "a.reel") as video:
         assert len(video) == 150 and video[120].is_empty
 
 
-def test_what_the_summary_says_is_what_is_measured_on_the_file(written):
+def test_the_summary_agrees_with_measurements_of_the_file(written):
     path, summary = written
     with meshreel.open(path) as video:
         row = compare_sequences(BALLS, video, ComparisonOptions(ssim=False)).to_row()

@@ -28,36 +28,36 @@ def with_basis(size: int) -> EncoderOptions:
 
 
 @pytest.fixture
-def looked(monkeypatch):
-    """The windows that were looked at, by number of frames."""
+def analysed(monkeypatch):
+    """Numbers of frames of the intervals that were analysed, in order."""
     seen, find = list[int](), paper.find_groups
     monkeypatch.setattr(job, "find_groups", lambda some, *rest: seen.append(len(some.frames)) or find(some, *rest))
     return seen
 
 
-def test_a_prepared_encoder_looks_at_each_window_once_and_writes_the_bytes_of_one_that_is_not(looked, tmp_path):
+def test_a_prepared_encoder_analyses_each_interval_once_and_writes_the_bytes_of_an_unprepared_one(analysed, tmp_path):
     sequence = MeshList((*BODY, Mesh.empty()))
     prepared = Encoder(sequence)
     prepared.prepare(with_basis(1))
-    assert looked == [2, 2]  # the empty frame is no window to look at
+    assert analysed == [2, 2]  # the empty frame is not analysed
     for size in (1, 2):
         prepared.encode(tmp_path / "prepared.reel", with_basis(size))
-        assert looked == [2, 2]
+        assert analysed == [2, 2]
         encode(sequence, tmp_path / "alone.reel", options=with_basis(size))
         assert (tmp_path / "prepared.reel").read_bytes() == (tmp_path / "alone.reel").read_bytes()
-        looked[2:] = []
+        analysed[2:] = []
 
 
-def test_an_encoder_that_was_prepared_for_other_options_looks_again(looked, tmp_path):
+def test_an_encoder_that_was_prepared_for_other_options_analyses_again(analysed, tmp_path):
     prepared = Encoder(MeshList(BODY))
     prepared.prepare(PAPER)
     prepared.encode(tmp_path / "a.reel", with_method(PAPER, group_size=4))
-    assert looked == [2, 2, 4]
+    assert analysed == [2, 2, 4]
 
 
 @pytest.mark.parametrize("codec", ["meshreel", "tvmc"])
-def test_the_bodies_of_a_noisy_scene_are_looked_at_once_and_as_noisy_ones(codec, monkeypatch, tmp_path):
-    """Whoever codes them: what `prepare` kept is what `encode` asks for."""
+def test_bodies_of_a_noisy_scene_are_analysed_once_with_their_noise(codec, monkeypatch, tmp_path):
+    """`encode` and the tracking of TVMC reuse the analyses that `prepare` kept."""
     noises, find = list[float](), paper.find_groups
     monkeypatch.setattr(
         job, "find_groups", lambda interval, *rest: noises.append(interval.noise) or find(interval, *rest)
@@ -65,38 +65,38 @@ def test_the_bodies_of_a_noisy_scene_are_looked_at_once_and_as_noisy_ones(codec,
     options, rolling = quick_scene("paper", group_size=2), with_room([ball(0.5 + 0.35 * t) for t in range(4)])
     prepared = Encoder(MeshList(tuple(rolling)))
     prepared.prepare(options)
-    looked = len(noises)
-    assert looked >= 2 and min(noises) > 0
+    analysed = len(noises)
+    assert analysed >= 2 and min(noises) > 0
     for _ in range(2):
         if codec == "meshreel":
             prepared.encode(tmp_path / "a.reel", options)
         else:
             assert track_sequence(prepared, options).groups
-    assert len(noises) == looked
+    assert len(noises) == analysed
 
 
-def test_with_workers_nothing_is_looked_at_ahead(looked):
+def test_with_workers_nothing_is_analysed_ahead(analysed):
     class Elsewhere(encoding.Executor):
         pass
 
     Encoder(MeshList(BODY), Elsewhere()).prepare(PAPER)
-    assert looked == []
+    assert analysed == []
 
 
-def test_spans_that_are_kept_are_those_that_are_found():
+def test_kept_groups_are_those_that_find_groups_returns():
     store, ball = GroupStore(), list(deforming_sphere(3, levels=2))
     groups = replace(PAPER.method.groups, depth=1)
     options = replace(PAPER.method, target=Fidelity(1e-7, 1.0, 1e-7), groups=groups)  # never reached
     store.keep(Interval(ball), options)
     kept, found = store.find(Interval(ball), options), paper.find_groups(Interval(ball), options)
-    assert [len(span.frames) for span in kept] == [len(span.frames) for span in found] and len(kept) > 1
+    assert [len(group.frames) for group in kept] == [len(group.frames) for group in found] and len(kept) > 1
     for ours, theirs in zip(kept, found, strict=True):
         assert all(a is b for a, b in zip(ours.frames, theirs.frames, strict=True))
         assert (ours.fitted is None) == (theirs.fitted is None)
 
 
 @pytest.mark.parametrize("preset", ["paper", "best"])
-def test_what_decides_about_a_rate_alone_is_not_shared(preset):
+def test_options_that_affect_the_rate_alone_are_not_shared(preset):
     options = quick(preset)
     displacements = replace(options.method.displacements, step=0.05)
     rates = with_method(replace(options, quality=3.0), displacements=displacements)

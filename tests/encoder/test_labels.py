@@ -1,4 +1,4 @@
-"""Labels of faces: every face of a body has its number in all frames, and what is of no body has none."""
+"""Labels of faces: every face of a body has its number in all frames, and faces of no body have none."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ COUNT = len(SMALL.faces)
 
 
 def labels(*frames: Mesh) -> list[list[int]]:
-    """The numbers of the pieces of each frame, which are as large as `SMALL`; segments of two frames."""
+    """The numbers of the pieces of each frame, which are as large as `SMALL`; key intervals have two frames."""
     found = []
     for mesh, label in zip(frames, label_frames(MeshList(frames, 1.0), ALL, OPTIONS), strict=True):
         assert label.moving.all() and len(label.moving) == len(label.bodies) == len(mesh.faces)
@@ -24,11 +24,11 @@ def labels(*frames: Mesh) -> list[list[int]]:
     return found
 
 
-def test_a_body_keeps_its_number_over_segments_whatever_the_order_of_faces() -> None:
+def test_a_body_keeps_its_number_over_intervals_whatever_the_order_of_faces() -> None:
     assert labels(at(0, 3), at(0, 3), at(3, 0), at(3, 0)) == [[1, 2], [1, 2], [2, 1], [2, 1]]
 
 
-def test_who_enters_late_has_a_number_of_his_own_and_frames_with_nobody_have_none() -> None:
+def test_a_body_that_enters_late_has_a_new_number_and_frames_without_bodies_have_none() -> None:
     assert labels(at(0), at(0), NONE, NONE, at(0, 3), at(0, 3)) == [[1], [1], [], [], [1, 2], [1, 2]]
 
 

@@ -60,7 +60,7 @@ def test_a_key_interval_out_of_range_is_refused(seconds):
 
 
 @pytest.mark.parametrize("keys", [0, -1, 6])
-def test_at_least_one_key_is_tried_and_no_more_than_there_are_places_for(keys):
+def test_a_number_of_keys_outside_1_to_5_is_refused(keys):
     with pytest.raises(InputError, match=f"{keys} keys: give 1 to 5"):
         LayersOptions(keys=keys)
 

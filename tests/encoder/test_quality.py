@@ -85,7 +85,7 @@ def test_a_file_is_measured_in_the_unit_of_the_goal() -> None:
     assert math.exp(Goal(mbps=1).measured(summary, 25.0)) == pytest.approx(1000 * 8 * 25 / 4 / 1e6)
 
 
-def test_a_background_is_too_large_for_a_rate_by_itself_and_for_no_psnr() -> None:
+def test_a_background_alone_can_exceed_a_target_rate_but_no_target_psnr() -> None:
     groups = (GroupSummary(Form.EMPTY, 10, 4, Fidelity(0, 0, 0)),)
     summary = Summary(6000, groups, scene=SceneSummary(5000, 100, 0.001, 60.0, (0, 1), 1))
     assert "5000 bytes, 0.1 Mbps over 0.4 s" in Goal(mbps=0.09).exceeded_by_background(summary, 25.0)
@@ -119,7 +119,7 @@ def test_a_file_meets_the_rate_that_was_asked_for(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("goal", [Goal(psnr=200.0), Goal(mbps=1e-6)])
-def test_a_target_out_of_reach_is_told_and_leaves_nothing(goal: Goal, tmp_path) -> None:
+def test_a_target_out_of_reach_is_an_error_and_leaves_the_folder_as_it_was(goal: Goal, tmp_path) -> None:
     (tmp_path / "a.reel").write_bytes(b"before")
     balls = MeshList(tuple(deforming_sphere(1, levels=1)))
     with pytest.raises(InputError, match=r"a\.reel: no quality gives .*; quality .* gives "):
@@ -128,7 +128,7 @@ def test_a_target_out_of_reach_is_told_and_leaves_nothing(goal: Goal, tmp_path) 
     assert (tmp_path / "a.reel").read_bytes() == b"before"
 
 
-def test_a_place_that_cannot_be_written_is_told_before_anything_is_coded(tmp_path, monkeypatch) -> None:
+def test_a_path_that_cannot_be_written_is_refused_before_anything_is_coded(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("meshreel.encoder.quality.Encoder.encode", lambda *_: pytest.fail("coded"))
     for path in (tmp_path, tmp_path / "none" / "a.reel"):
         with pytest.raises(InputError, match=f"{path}: "):

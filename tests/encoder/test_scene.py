@@ -1,4 +1,4 @@
-"""A scene in a file: what goes in comes out, part by part; tracks over segments; what is lost is said."""
+"""A scene in a file: round trips of its parts, tracks over key intervals, and warnings about lost surface."""
 
 from __future__ import annotations
 
@@ -124,8 +124,8 @@ def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
     stages: dict[str, list[int]] = {}
     encoded(ROLLING, tmp_path / "a.reel")
     with ThreadPoolExecutor(2) as executor:
-        told = lambda stage, done, _: stages.setdefault(stage, []).append(done)  # noqa: E731
-        encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=told)
+        record = lambda stage, done, _: stages.setdefault(stage, []).append(done)  # noqa: E731
+        encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=record)
     assert (tmp_path / "b.reel").read_bytes() == (tmp_path / "a.reel").read_bytes()
     assert {stage: done[-1] for stage, done in stages.items()} == dict.fromkeys(
         ("survey", "segment", "background", "code"), 4
@@ -277,12 +277,12 @@ class AllMoves(ByPlace):
 ALL = AllMoves(CELL, Lattice(np.zeros(3), CELL), np.zeros(0, np.int64), np.zeros(0, bool), Rest.none(0), 0.0)
 
 
-def tracks(frames: list[Mesh], segment: int = 2) -> list[str]:
-    """Of each track, which frames it has a body in; segments of so many frames."""
+def tracks(frames: list[Mesh], interval: int = 2) -> list[str]:
+    """Return which frames of each track have a body, where key intervals have `interval` frames."""
     sequence = MeshList(tuple(frames), 1.0)
     seen = replace(survey(sequence), scale=1.0)
     parts = Parts(seen, ALL, NONE, [], 0.0, 0.0)
-    options = replace(OPTIONS, key_interval=float(segment))
+    options = replace(OPTIONS, key_interval=float(interval))
     coded = encode_bodies(Job(captured(sequence), options, None, Stages(None, len(frames))), parts)
     assert coded.dropped == 0
     assert coded.groups == sorted(coded.groups, key=lambda each: (each.first_frame, each.track))
@@ -313,29 +313,29 @@ def test_one_body_has_one_track():
 
 
 @pytest.mark.usefixtures("plainly")
-def test_who_enters_late_has_a_track_that_was_empty_before():
+def test_a_body_that_enters_late_has_a_track_that_was_empty_before():
     assert tracks([at(0), at(0), at(0), at(0), at(0, 3), at(0, 3)]) == ["xxxxxx", "....xx"]
 
 
 @pytest.mark.usefixtures("plainly")
-def test_who_enters_within_a_segment_is_empty_in_its_first_frames():
+def test_the_track_of_a_body_that_enters_within_an_interval_begins_with_an_empty_frame():
     assert tracks([at(0), at(0, 3), at(0, 3), at(0, 3)]) == ["xxxx", ".xxx"]
 
 
 @pytest.mark.usefixtures("plainly")
-def test_who_leaves_is_empty_from_then_on_and_the_track_is_free_for_another():
+def test_the_track_of_a_body_that_left_is_empty_and_free_for_another_body():
     assert tracks([at(0, 3), at(0, 3), at(0), at(0), at(0), at(0)]) == ["xxxxxx", "xx...."]
     assert tracks([at(0, 3), at(0, 3), at(0), at(0), at(0, 6), at(0, 6)]) == ["xxxxxx", "xx..xx"]
 
 
 @pytest.mark.usefixtures("plainly")
-def test_frames_with_nobody_are_one_track_without_surface():
+def test_frames_without_bodies_are_one_track_without_surface():
     assert tracks([at()] * 4) == ["...."]
     assert tracks([at(0), at(0), at(), at(), at(0), at(0)]) == ["xx..xx"]
 
 
 @pytest.mark.usefixtures("plainly")
-def test_two_that_meet_go_on_in_one_track_and_two_that_part_get_another():
+def test_bodies_that_meet_go_on_in_one_track_and_bodies_that_part_get_another():
     meeting = [at(0, 1.5), at(0.3, 1.2), at(0.46, 1.04), at(0.5, 1.0)]
     assert sorted(tracks(meeting)) == ["xx..", "xxxx"]
     assert tracks([at(1.3, 1.7), at(1.3, 1.7), at(1.0, 2.0), at(1.0, 2.0)]) == ["xxxx", "..xx"]
@@ -350,7 +350,7 @@ def test_a_body_keeps_its_track_whatever_the_order_of_faces():
 @pytest.mark.usefixtures("plainly")
 def test_a_body_with_a_frame_of_faces_without_area_is_coded_as_not_there():
     flat = Mesh.of(np.zeros((3, 3)), [[0, 1, 2]])
-    assert tracks([at(0), flat, at(0), at(0)], segment=4) == ["x.xx"]
+    assert tracks([at(0), flat, at(0), at(0)], interval=4) == ["x.xx"]
 
 
 @pytest.mark.usefixtures("plainly")
@@ -385,7 +385,7 @@ def test_a_background_is_no_finer_than_its_noise_asks_for():
 
 
 @pytest.mark.usefixtures("plainly")
-def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
+def test_taking_a_scene_apart_finds_its_background_and_its_noise():
     sequence = captured(MeshList(tuple(ROLLING)))
     parts = take_apart(sequence, survey(sequence, cleaned=False), OPTIONS.scene, Stages(None, 4))
     assert rms(parts.background.vertices, room()) < NOISE
@@ -395,23 +395,23 @@ def test_taking_apart_says_what_stands_still_and_how_noisy_it_is():
 
 
 @pytest.mark.usefixtures("plainly")
-def test_where_nothing_is_found_to_move_that_is_told(tmp_path):
+def test_a_scene_in_which_nothing_is_found_to_move_gives_a_warning(tmp_path):
     """Two frames of balls that move by less than two cells."""
     _, summary = encoded(small_scene.scene(2), tmp_path / "a.reel")
-    (told,) = summary.warnings
-    assert told.startswith("nothing moves by more than 0.16 m") and "--dynamic-only" in told
+    (warning,) = summary.warnings
+    assert warning.startswith("nothing moves by more than 0.16 m") and "--dynamic-only" in warning
 
 
 @pytest.mark.usefixtures("plainly")
-def test_still_surface_that_is_in_no_part_of_the_file_is_told(tmp_path):
-    """A shelf's worth of leaves, each too small for the background: they stand, and are dropped."""
+def test_still_surface_that_is_in_no_part_of_the_file_gives_a_warning(tmp_path):
+    """Twenty-five still leaves, each too small for the background, are dropped."""
     leaf = Mesh.of(0.1 * np.eye(3) + 0.9, [[0, 1, 2]])
     leaves = concatenate([moved(leaf, (0.25 * k, 0.25 * j, 0)) for k in range(5) for j in range(5)])
     frames = [concatenate([frame, leaves]) for frame in ROLLING]
     _, summary = encoded(frames, tmp_path / "a.reel")
     areas = [face_normals(mesh)[1].sum() for mesh in (leaves, frames[0])]
-    (told,) = [line for line in summary.warnings if "stands still" in line]
-    assert told.startswith(f"{100 * areas[0] / areas[1]:.1f} % of the surface") and "--dynamic-only" in told
+    (warning,) = [line for line in summary.warnings if "stands still" in line]
+    assert warning.startswith(f"{100 * areas[0] / areas[1]:.1f} % of the surface") and "--dynamic-only" in warning
 
 
 def test_a_scene_that_is_not_in_metres_is_refused_with_its_size(tmp_path):

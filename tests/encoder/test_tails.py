@@ -95,7 +95,7 @@ def sheet(step: float = 0.05) -> Mesh:
 
 @pytest.mark.parametrize("axes", [[0, 1, 2], [1, 0, 2]], ids=["along x", "along y"])
 @pytest.mark.parametrize("noise", [1e-9, 3e-7, 2e-6])
-def test_on_a_template_that_fits_almost_exactly_the_lattice_is_as_fine_as_there_is_room_for(noise: float, axes) -> None:
+def test_patches_on_an_almost_exact_template_are_close_to_the_frame(noise: float, axes) -> None:
     flat = Mesh.of(sheet().vertices[:, axes], sheet().faces)
     frames = [flat] * 3 + [both(flat, knob(at=0.45))]
     places = np.repeat(flat.vertices[None], 4, axis=0)
@@ -118,7 +118,7 @@ def test_a_mask_that_pays_is_kept_where_a_patch_beside_it_does_not(monkeypatch: 
 
 @pytest.mark.parametrize("size", [300, 30_000])
 @pytest.mark.parametrize("scale", [0.01, 0.05])
-def test_it_is_never_worse_than_what_the_bytes_are_worth(size: int, scale: float) -> None:
+def test_tails_remove_the_error_that_their_bytes_are_worth(size: int, scale: float) -> None:
     template = both(BALL, knob(scale))
     frames = [both(BALL, knob(scale, -0.4))] * 2 + [template] * 4
     places = noisy(template)
@@ -127,7 +127,9 @@ def test_it_is_never_worse_than_what_the_bytes_are_worth(size: int, scale: float
     before = measure(frames, [Mesh(p, template.faces) for p in places]).distance ** 2
     after = measure(frames, found.frames).distance ** 2
     body = 6 * measure([BALL] * 6, [Mesh(p, BALL.faces) for p in noisy(BALL)]).distance ** 2
-    assert 6 * (before - after) > 0.5 * body * len(pack(found.record)) / size  # half: it counts the body a little less
+    assert (
+        6 * (before - after) > 0.5 * body * len(pack(found.record)) / size
+    )  # half: the search counts the body a little less
 
 
 def test_the_frames_are_those_that_the_record_decodes_to() -> None:

@@ -225,7 +225,7 @@ def test_keys_are_timestamps_and_the_last_frame_lasts(tmp_path):
 
 
 @pytest.mark.parametrize("only", ["all", "background", "moving"])
-def test_of_a_scene_all_or_what_moves_or_what_does_not(tmp_path, only):
+def test_export_writes_a_whole_scene_or_only_its_background_or_its_bodies(tmp_path, only):
     video = meshreel.open(GOLDEN / "scene.reel")
     export(video, tmp_path / "a.glb", options=ExportOptions(only=only))
     for frame, time in enumerate(times(video)):

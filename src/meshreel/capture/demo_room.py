@@ -25,18 +25,21 @@ from .procedural import grid_of_frame
 from .rig import DepthCamera
 from .simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
 
-# All sizes and speeds are chosen for a demo of a minute or two (guess).
-WIDTH = 256  # pixels of a depth picture
-NOISE = 0.3  # of the sensor, see `SensorOptions.noise`
-VOXEL = 0.03  # m, for the fusion of such pictures
-SIZE = (3.0, 1.7, 2.6)  # m, of the room; its origin is the middle of the floor
-_FACE = 0.1  # m, about the side length of the room's faces
-_LOW, _HIGH = (-1.4, 0.0, -1.2), (1.7, 2.3, 1.6)  # m, box of the cameras: inside the walls, outside the open sides
-_CIRCLE, _SPEED = 0.8, 0.8  # m and m/s, of the walk around the middle
-_CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step
-_SOLE = 0.01  # m by which feet would sink into the floor
-_TURN = 0.6  # rad/s, of the child
-_TOUCH = 0.01  # m; each person is meshed alone
+# Sizes and speeds for a demo of a minute or two.
+WIDTH = 256  # pixels of a depth picture (guess)
+NOISE = 0.3  # of the sensor, see `SensorOptions.noise` (guess)
+VOXEL = 0.03  # m, for the fusion of such pictures (guess)
+SIZE = (3.0, 1.7, 2.6)  # m, of the room; its origin is the middle of the floor (guess)
+_FACE = 0.1  # m, about the side length of the room's faces (guess)
+_LOW, _HIGH = (
+    (-1.4, 0.0, -1.2),
+    (1.7, 2.3, 1.6),
+)  # m, box of the cameras: inside the walls, outside the open sides (guess)
+_CIRCLE, _SPEED = 0.8, 0.8  # m and m/s, of the walk around the middle (guess)
+_CYCLE, _STRIDE = 0.9, 0.42  # m walked in a step cycle, m of a step (guess)
+_SOLE = 0.01  # m by which feet would sink into the floor (guess)
+_TURN = 0.6  # rad/s, of the child (guess)
+_TOUCH = 0.01  # m; each person is meshed alone (guess)
 
 Vector = Float64[np.ndarray, " 3"] | tuple[float, float, float]
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lowest and highest corner, m

@@ -16,7 +16,7 @@ Row = tuple[tuple[float, ...], tuple[float, ...], float, float]  # start, end, t
 Vector = Float64[np.ndarray, "3"]
 
 _THIGH, _SHIN, _UPPER_ARM, _FOREARM = 0.43, 0.415, 0.28, 0.25  # m, lengths of an adult's bones (guess)
-_STANCE = 0.6  # share of a step cycle that a foot is on the ground, as in human gait
+_STANCE = 0.6  # share of a step cycle that a foot is on the ground, about as in human gait (guess)
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ from ..types import UP_AXES, UPS, Up
 RIG, SINGLE = "rig.json", "camera.json"
 MOST_PIXELS = 16_384  # of a picture's side (guess)
 RIGID = 1e-3  # largest error of an entry of R R^T (guess)
-FARTHEST = 1e4  # m from the world's origin: fusion has 32-bit coordinates, which are 1 mm apart there
+FARTHEST = 1e4  # m from the world's origin: fusion has 32-bit coordinates, which are 1 mm apart there (guess)
 FOCAL = (0.05, 100.0)  # in sides of the picture; a focal length outside is not in pixels (guess)
 AWAY = 10.0  # sides by which a cropped picture may lie beside its optical axis (guess)
 RATES = (1e-9, 1e9)  # 1/s, the range of a sequence of meshes

@@ -30,7 +30,7 @@ from .encode import describe, summary_row, workers
 from .info import describe_file, rate_table
 
 _QUALITY = preset_options().quality
-_JUDGED = 4  # frames, at most, that are compared with the truth: each takes seconds
+_JUDGED = 4  # frames, at most, that are compared with the truth: each takes seconds (guess)
 
 
 def command(

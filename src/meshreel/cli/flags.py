@@ -39,7 +39,7 @@ class Reading:
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
 class Looking:
-    """Flags for what is compared, and from which cameras."""
+    """Flags for the metrics, cameras and key frames of a comparison."""
 
     ssim: bool = True
     """Also render pictures and compare them by SSIM (some seconds per frame)."""

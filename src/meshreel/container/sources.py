@@ -16,7 +16,7 @@ class Source(Protocol):
 
     @property
     def size(self) -> int:
-        """Number of bytes there are."""
+        """Size of the source in bytes."""
         ...
 
     def get_bytes(self, offset: int, length: int) -> bytes:

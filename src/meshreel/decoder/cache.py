@@ -14,7 +14,7 @@ import numpy as np
 from ..coding.layers.coder import LayersState
 from ..types import Mesh
 
-# Bytes of states that the tracks of a video keep together (a guess): a few bytes of a file can describe groups that
+# Bytes of states that the tracks of a video keep together (guess): a few bytes of a file can describe groups that
 # each take as much memory as a group may.
 MOST_KEPT = 1 << 29
 

@@ -1,4 +1,4 @@
-"""Forms of a group: what both recipes produce, and the choice of the cheaper form.
+"""Forms of a group: coded groups and the choice of the cheaper form.
 
 In -> out: the frames of a group, and a reference that follows them or none -> an EncodedGroup with its fidelity.
 """

@@ -1,6 +1,6 @@
 """Labels of a scene's faces: which faces move, and with which body (paper, section 3.2).
 
-In: frames of a scene, and who says what moves in them. Out: labels, frame by frame; a segment of frames is in memory.
+In: frames of a scene, and its segmentation. Out: labels, frame by frame; the frames of a key interval are in memory.
 """
 
 from __future__ import annotations

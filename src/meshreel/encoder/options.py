@@ -75,12 +75,12 @@ class LayersOptions:
             raise InputError(f"{self.keys} keys: give 1 to {len(PLACES)}")
 
 
-MethodOptions = PaperOptions | LayersOptions  # which of both names the recipe
+MethodOptions = PaperOptions | LayersOptions  # the class names the recipe
 
 
 @dataclass(frozen=True, slots=True)
 class SceneOptions:
-    """How a scene is taken apart into a background and moving bodies."""
+    """Options of the separation of a scene into a background and moving bodies."""
 
     segment: SegmentOptions = field(default_factory=SegmentOptions)
     background: BackgroundOptions = field(default_factory=BackgroundOptions)

@@ -133,7 +133,7 @@ def _change(sequence: MeshSequence, segmentation: Segmentation, frame: int, opti
 
 @dataclass(frozen=True, slots=True)
 class _Measured:
-    """What some frames show of noise and bodies."""
+    """Noise, body sizes and stray surface measured in some frames."""
 
     noise: float  # m, RMS distance of still surface from the background
     deviation: float  # m, the same by the median

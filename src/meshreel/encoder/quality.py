@@ -18,8 +18,8 @@ from .sequence import Encoder
 from .summary import Summary
 
 TRIALS = 8  # whole encodes, at most (guess)
-FIRST_QUALITY = 50.0
-DIGITS = 4  # significant digits of a tried quality: a file records all of them
+FIRST_QUALITY = 50.0  # middle of the scale (guess)
+DIGITS = 4  # significant digits of a tried quality: a file records all of them (guess)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,11 @@ from typing import Any, NoReturn
 from ..errors import FormatError
 from .layout import ChunkKind, Form, Header, Index, IndexEntry
 
-# Limits of the format, stated in FORMAT.md; the values are guesses with room to spare.
-LARGEST = 1e15  # of the numbers in a header: keeps everything computed from them finite
-SMALLEST = 1e-15  # of a rate or scale
-MOST_TRACKS = 256  # a frame needs a group of each track
-MOST_CHANGES = 255  # patches on one background: random access decodes all of them
+# Limits of the format, stated in FORMAT.md, with room to spare.
+LARGEST = 1e15  # of the numbers in a header: keeps everything computed from them finite (guess)
+SMALLEST = 1e-15  # of a rate or scale (guess)
+MOST_TRACKS = 256  # a frame needs a group of each track (guess)
+MOST_CHANGES = 255  # patches on one background: random access decodes all of them (guess)
 
 
 def check_header(header: Header, frame_count: int) -> None:

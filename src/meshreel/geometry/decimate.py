@@ -14,10 +14,10 @@ from ..errors import InputError
 from ..types import Mesh
 from .topology import border_edges, clean
 
-# Size of the bounding box's diagonal for each library, in its own unit; found by trial, not recorded as rows.
-CLOSED_DIAGONAL = 10.0  # here AGGRESSION 4 reaches the target and loses nothing; at 1 and at 1000 it may not
-OPEN_DIAGONAL = 100.0  # below it Open3D takes whole regions for flat
-AGGRESSION = 4.0  # of fast-simplification; see CLOSED_DIAGONAL
+# Size of the bounding box's diagonal for each library, in its own unit; found by trial, without recorded rows.
+CLOSED_DIAGONAL = 10.0  # here AGGRESSION 4 reaches the target and loses nothing; at 1 and at 1000 it may not (guess)
+OPEN_DIAGONAL = 100.0  # below it Open3D takes whole regions for flat (guess)
+AGGRESSION = 4.0  # of fast-simplification; see CLOSED_DIAGONAL (guess)
 BOUNDARY_WEIGHT = 10.0  # of planes on open borders against planes of faces (guess)
 ROUNDS = 3  # corrections of the number of faces: a collapse takes one face at a border and two elsewhere (guess)
 _ONE_AT_A_TIME = threading.Lock()  # fast-simplification keeps its mesh in static variables

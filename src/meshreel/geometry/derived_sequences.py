@@ -39,7 +39,7 @@ def captured(sequence: MeshSequence) -> CapturedSequence:
 
 
 class DerivedSequence(MeshSequence):
-    """A sequence of as many frames as its source, with the same capabilities; here also the same frames."""
+    """Base class of sequences derived frame by frame; by itself, the source with all capabilities."""
 
     def __init__(self, source: MeshSequence) -> None:
         self._source = source

@@ -76,7 +76,7 @@ def reconstruct(
 
 @contextmanager
 def _without_leaf_warnings() -> Iterator[None]:
-    """Filter Open3D's warnings about octree leaves out of what is written to standard error meanwhile.
+    """Suppress Open3D's warnings about octree leaves on standard error.
 
     There are thousands of them, they concern nothing that a user could change, and no setting of Open3D ends them.
     """

@@ -29,7 +29,7 @@ _PARSERS: dict[str, Callable[[bytes], Polygons]] = {
     ".off": parse_off,
 }
 EXTENSIONS = tuple(_PARSERS)
-FARTHEST = 1e12  # m, largest coordinate: beyond it the spacing of float64 exceeds 0.1 mm
+FARTHEST = 1e12  # m, largest coordinate: beyond it the spacing of float64 exceeds 0.1 mm (guess)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,7 @@ from .npz import Archive
 
 CAPTURED = "capture.json"  # in a folder that `meshreel capture` wrote: how the frames were made
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
-# Ratio of the diagonals of two frames (guess): above that of a person who crouches, or of a second one who enters.
-_SUSPICIOUS_RATIO = 20.0
+_SUSPICIOUS_RATIO = 20.0  # of two frames' diagonals; a person who crouches or enters changes it less (guess)
 
 
 @dataclass(frozen=True, slots=True)

@@ -112,7 +112,7 @@ class Looked(Protocol):
     """A mesh that can be rendered repeatedly."""
 
     def look(self, pixels: Pixels) -> Picture:
-        """What a camera sees of it in a crop."""
+        """Render the mesh in a crop of a camera's image."""
         ...
 
 
@@ -138,7 +138,7 @@ class Visible:
         self._normals = welded_normals(self.mesh)
 
     def look(self, pixels: Pixels) -> View:
-        """What a camera sees of it in a crop."""
+        """Render the mesh in a crop of a camera's image."""
         mesh, crop = self.mesh, pixels.crop
         if mesh.is_empty or 0 in crop.shape:
             covered, nothing = np.zeros(crop.shape, dtype=bool), np.zeros((0, 3))

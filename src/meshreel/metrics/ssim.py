@@ -17,7 +17,7 @@ from ..types import Mesh
 from .render import Looked, Pixels, Visible, crop_of
 from .viewpoints import Camera
 
-_SIDE = 7  # pixels, side of the SSIM window
+_SIDE = 7  # pixels, side of the SSIM window: scikit-image's default
 BORDER = _SIDE // 2
 
 

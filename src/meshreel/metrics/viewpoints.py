@@ -28,12 +28,12 @@ class Camera(Protocol):
 
     @property
     def width(self) -> int:
-        """Of the picture, pixels."""
+        """Width of the picture, pixels."""
         ...
 
     @property
     def height(self) -> int:
-        """Of the picture, pixels."""
+        """Height of the picture, pixels."""
         ...
 
     @property

@@ -15,8 +15,8 @@ from ..decoder.video import open as open_video
 from ..errors import MeshreelError
 from ..types import Mesh
 
-WIDTH, HEIGHT = 480, 360  # pixels
-FIELD = 30.0  # degrees, vertical
+WIDTH, HEIGHT = 480, 360  # pixels (guess)
+FIELD = 30.0  # degrees, vertical (guess)
 MOST_POSTERS = 256  # in memory (guess)
 LOOKED_AT = 30  # frames that are searched for a surface (guess)
 

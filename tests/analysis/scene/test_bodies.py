@@ -42,12 +42,12 @@ def test_pieces_that_touch_in_one_frame_are_one_body_in_the_whole_interval():
     assert len(find_bodies(frames[:2], CELL).meshes) == 2
 
 
-def test_one_that_leaves_and_another_that_comes_are_two():
+def test_a_body_that_leaves_and_one_that_comes_later_are_two_bodies():
     frames = [at(0), at(0.1), NONE, at(5), at(5.1)]
     assert str(walls(find_bodies(frames, CELL).meshes)) == str([[0.0, 0.1, *[np.nan] * 3], [*[np.nan] * 3, 5.0, 5.1]])
 
 
-def test_one_that_jumps_is_two():
+def test_a_body_that_jumps_is_two_bodies():
     assert len(find_bodies([at(0), at(3)], CELL).meshes) == 2
 
 
@@ -60,7 +60,7 @@ def test_bits_go_to_the_nearest_body(where):
     assert sizes == ([len(BIT.faces), 0] if where == 0 else [0, len(BIT.faces)]) and found.dropped == 0
 
 
-def test_the_smallest_of_too_many_are_part_of_the_nearest():
+def test_the_smallest_of_too_many_bodies_become_part_of_the_nearest():
     bodies = [[at(0), at(0.1)], [at(4.5, mesh=BIT), NONE], [at(5), at(5)], [NONE, at(1, mesh=BIT)]]
     found = at_most(bodies, 2)
     assert [[len(mesh.faces) for mesh in body] for body in found] == [
@@ -70,7 +70,7 @@ def test_the_smallest_of_too_many_are_part_of_the_nearest():
     assert at_most(bodies, 4) == bodies and at_most([], 4) == []
 
 
-def test_bits_far_from_all_are_dropped_and_counted():
+def test_bits_far_from_all_bodies_are_dropped_and_counted():
     frames = [concatenate([at(0), at(4, mesh=BIT)]), at(0), at(0), concatenate([at(0), at(0, 4, mesh=BIT)])]
     found = find_bodies(frames, CELL)
     assert len(found.meshes) == 1 and found.dropped == 2 * len(BIT.faces)

@@ -106,14 +106,14 @@ def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
         rooms.append(decode_change(state.payload, rooms[-1]))
     first, between, last = (place.of(room) for room in rooms)
     here, there = (np.array([x, 0.4, 1.0]) for x in (0.5, 1.8))  # the middle of the box's lid
-    assert apart(first, here) < 0.03 < 0.15 < apart(first, there)
-    assert min(apart(between, here), apart(between, there)) > 0.15
-    assert apart(last, there) < 0.03 < 0.15 < apart(last, here)
-    assert max(apart(room, np.array([1.2, 0.0, 1.5])) for room in (first, between, last)) < 0.01
+    assert distance_to(first, here) < 0.03 < 0.15 < distance_to(first, there)
+    assert min(distance_to(between, here), distance_to(between, there)) > 0.15
+    assert distance_to(last, there) < 0.03 < 0.15 < distance_to(last, here)
+    assert max(distance_to(room, np.array([1.2, 0.0, 1.5])) for room in (first, between, last)) < 0.01
 
 
 def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: ByPlace) -> None:
-    """Who joins then waits for the next whole one, and patches after it count in its faces."""
+    """A viewer who joins in between waits for the next whole background; patches after it refer to its faces."""
     gone, came = found.rest.changes
     room = BackgroundOptions(refresh=gone / 4.0)
     parts = take_apart(captured(scene), survey(scene), SceneOptions(OPTIONS), Stages(None, FRAMES))
@@ -124,12 +124,12 @@ def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: B
     here, there = (np.array([x, 0.4, 1.0]) for x in (0.5, 1.8))
     for state in states:
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
-        assert (apart(place.of(mesh), here) < 0.03) == (state.frame < gone)
-        assert (apart(place.of(mesh), there) < 0.03) == (state.frame >= came)
-        assert apart(place.of(mesh), np.array([1.2, 0.0, 1.5])) < 0.01
+        assert (distance_to(place.of(mesh), here) < 0.03) == (state.frame < gone)
+        assert (distance_to(place.of(mesh), there) < 0.03) == (state.frame >= came)
+        assert distance_to(place.of(mesh), np.array([1.2, 0.0, 1.5])) < 0.01
 
 
-def test_what_comes_to_stand_where_nothing_stood_is_a_background_of_its_own(scene: MeshList) -> None:
+def test_surface_that_settles_without_a_background_is_a_whole_background(scene: MeshList) -> None:
     options = SceneOptions(OPTIONS)
     parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
     states = encode_static(replace(parts, background=Mesh.empty()), FRAMES, 4.0, options.background)
@@ -138,11 +138,11 @@ def test_what_comes_to_stand_where_nothing_stood_is_a_background_of_its_own(scen
     assert not decode_background(states[0].payload).is_empty
 
 
-def apart(mesh: Mesh, point: np.ndarray) -> float:
+def distance_to(mesh: Mesh, point: np.ndarray) -> float:
     return float(np.linalg.norm(Surface(mesh).closest(point[None]).points - point))
 
 
 @pytest.mark.parametrize("wrong", [{"rest": 0.0}, {"share": 0.0}, {"least": -1.0}])
-def test_options_are_checked(wrong: dict[str, float]) -> None:
+def test_options_out_of_range_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match="change of the room"):
         SettleOptions(**wrong)

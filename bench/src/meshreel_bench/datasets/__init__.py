@@ -55,7 +55,7 @@ PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dataset:
-    """A sequence and what is known of it."""
+    """Sequence with its cameras and, where it is simulated, its scene."""
 
     sequence: MeshSequence
     cameras: tuple[PinholeCamera, ...] = ()  # where it was seen from; none: look from around it
@@ -100,7 +100,7 @@ class Store:
         return Dataset(_open_files(name, self.data, frames, self.own))
 
     def digest(self, name: str) -> str | None:
-        """Return what a sequence of one's own consists of, and how it is read; None for those of the benchmark.
+        """Return a digest of a user's sequence and its options of reading; None for benchmark data.
 
         Raises InputError where it is missing.
         """
@@ -153,7 +153,7 @@ def _open_files(name: str, data: Path, frames: int | None, own: SequenceOptions 
 
 
 def _found(name: str, data: Path) -> Path:
-    """Where the files of a sequence are."""
+    """Return the path of a sequence's file, folder or pattern of files."""
     path = next((p for p in _places(name, data) if p.exists() or is_pattern(name)), None)
     if path is None:
         where = f"at that path or below {data}" if _is_path(name) else f"below {data}"

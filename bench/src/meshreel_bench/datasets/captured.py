@@ -37,7 +37,7 @@ class Captured(Frames):
 
     @property
     def cameras(self) -> tuple[PinholeCamera, ...]:
-        """Where it was seen from."""
+        """Cameras of the capture."""
         return tuple(camera.view for camera in self._recording.rig.cameras)
 
     @property

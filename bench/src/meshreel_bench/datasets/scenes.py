@@ -75,7 +75,7 @@ class SceneData:
         return np.unpackbits(bits, count=faces).astype(bool)
 
     def background(self, source: str = TRUE) -> Mesh:
-        """What stands, fused over time from what the rig's cameras measured of it, as the encoder does."""
+        """Background fused over time from the rig's depth, as the encoder fuses it."""
         path = self.folder / "background" / f"depth-{_kept_as(source)}.ply"
         return _kept_mesh(path, lambda: self._fused(source))
 
@@ -115,7 +115,7 @@ def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) ->
 
 
 def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
-    """Writes the rig and the truth of a scene."""
+    """Write the rig and the truth of a scene."""
     if name == PROCEDURAL:
         room = demo_room.RoomOptions(PROCEDURAL_FRAMES if frames is None else frames)
         demo_room.record_room(rig, room)
@@ -125,7 +125,7 @@ def _simulate(name: str, rig: Path, data: Path, frames: int | None) -> None:
 
 @cache
 def _kept_as(source: str) -> str:
-    """The name that labels are kept under: what the encoder finds, by the code that found it."""
+    """Cache name of the labels; for those that the encoder finds, it depends on the code of the segmentation."""
     if source != FOUND:
         return source
     digest = hashlib.sha256(repr(SegmentOptions()).encode())
@@ -136,7 +136,7 @@ def _kept_as(source: str) -> str:
 
 
 def _find_labels(meshes: MeshSequence, path: Path) -> None:
-    """Writes what the encoder finds to move, a bit a face, by frame."""
+    """Write the encoder's labels of moving faces, a bit a face, by frame."""
     found = segment(meshes)
     labels = {f"frame_{k:05}": np.packbits(found.moving(k, meshes[k])) for k in range(len(meshes))}
     make_folder(path.parent)

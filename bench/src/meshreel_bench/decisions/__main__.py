@@ -1,4 +1,4 @@
-"""`python -m meshreel_bench.decisions NAME...`: measure decisions anew, and rewrite the tables of docs/decisions.
+"""`python -m meshreel_bench.decisions NAME...`: measure decisions again, and rewrite the tables of docs/decisions.
 
 Without a name only the tables are written, from the rows that are there. Decisions on captured bodies take half an hour
 each, those on procedural frames minutes.

@@ -56,7 +56,7 @@ class Stages:
 
     @property
     def parts(self) -> dict[str, int]:
-        """Bytes of the group's payload by what they are for."""
+        """Bytes of the group's payload by purpose."""
         return payload_bytes_by_purpose(self.payload)
 
 

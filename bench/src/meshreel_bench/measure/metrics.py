@@ -35,7 +35,7 @@ PerFrame = dict[str, list[float | None]]
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Frames of a sequence, and what a codec made of them."""
+    """Original and decoded frames of a sequence."""
 
     known: Dataset
     numbers: Sequence[int]

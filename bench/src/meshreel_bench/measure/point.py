@@ -1,4 +1,4 @@
-"""What is measured of a point: rate of all bytes, metrics of decoded frames, times of both directions.
+"""Measurement of a point: rate of all bytes, metrics of decoded frames, times of both directions.
 
 In: a point, and where its sequence is. Out: its row. Bodies are judged by all frames, scenes by some. A codec is given
 all frames, or those of a sampled point alone; the rate is then theirs. Two names stand in a codec's place: `captured`

@@ -22,7 +22,7 @@ _LIVE: set[BaseProcess] = set()
 
 
 class WorkerError(Exception):
-    """Reason why a process has not yielded what it was asked for."""
+    """Failure of a measuring process."""
 
 
 def in_fresh_process(task: Callable[..., Iterator[Any]], *about: object, limit_s: float | None = None) -> Iterator[Any]:
@@ -69,7 +69,7 @@ def _received(here: Connection, process: BaseProcess, limit_s: float | None) -> 
 
 
 def _answer(there: Connection, task: Callable[..., Iterator[Any]], about: tuple[object, ...]) -> None:
-    """Run the task in the fresh process; what codecs print goes where errors go."""
+    """Run the task in the fresh process; its standard output goes to standard error."""
     os.dup2(2, 1)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:

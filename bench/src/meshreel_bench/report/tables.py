@@ -237,7 +237,7 @@ def _nearest(rows: Sequence[Row], wanted: float, measure: Measure | None) -> dic
 
 
 def _distance(row: Row, wanted: float, measure: Measure | None) -> float:
-    """Return how far a row is from what is wanted, in units of what is near."""
+    """Return the distance of a row from the wanted rate or value, in units of NEAR or NEAR_DB."""
     if measure is None:
         return abs(log(row.mbps / wanted)) / log(NEAR)
     return abs((value(row, measure.key) or 0.0) - wanted) / NEAR_DB

@@ -24,8 +24,8 @@ from .shape import doubtful, strongest_components, turned_laplacian
 from .system import Problem, Template, solve
 
 FOLLOWED = 6e-4  # RMS noise from which the second fit trusts the coherent positions more than the frames (decision 16)
-NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit the noise
-GATE = 6.0  # RMS distances of the noise that a pair may be apart at least: three standard deviations
+NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit it (decision 16)
+GATE = 6.0  # RMS distances of the noise that a pair may be apart at least: three standard deviations (guess)
 Coherence = Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]
 
 

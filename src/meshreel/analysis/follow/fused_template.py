@@ -20,8 +20,8 @@ from ...types import Mesh
 from ..fit.match import ON_BORDER, FrameSurface, interpolated_scalar
 from .embedded import Motion
 
-SHALLOWEST, DEEPEST = 4, 10  # limits of the octree's depth: guesses
-ROOM = 1.1  # width of Poisson's octree, in widths of the points
+SHALLOWEST, DEEPEST = 4, 10  # limits of the octree's depth (guess)
+ROOM = 1.1  # width of Poisson's octree, in widths of the points: Open3D's default
 
 
 @dataclass(frozen=True, slots=True)

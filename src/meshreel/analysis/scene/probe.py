@@ -14,13 +14,13 @@ from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Frames, Mesh, evenly
 from ..survey import check
 
-# All of these are guesses, set between captured rooms and captured bodies.
-PROBES = 4  # frames inspected, spread over the sequence
-SHARE = 0.6  # smallest share of a frame's surface that stands still in a scene
-CELLS = 200  # cells along a frame's diagonal: 4 cm in a room
-BORDER = 1.0  # diagonals, smallest length of the borders of an open surface; the holes of a captured body have less
-UNLIKE = 30.0  # largest ratio of the sizes of two frames that can show one room
-COARSEST = 32  # smallest number of median edge lengths along the diagonal of a captured room
+# Set between captured rooms and captured bodies.
+PROBES = 4  # frames inspected, spread over the sequence (guess)
+SHARE = 0.6  # smallest share of a frame's surface that stands still in a scene (guess)
+CELLS = 200  # cells along a frame's diagonal: 4 cm in a room (guess)
+BORDER = 1.0  # diagonals, least length of the borders of an open surface; holes of a captured body have less (guess)
+UNLIKE = 30.0  # largest ratio of the sizes of two frames that can show one room (guess)
+COARSEST = 32  # smallest number of median edge lengths along the diagonal of a captured room (guess)
 
 
 def is_scene(frames: Frames) -> bool:

@@ -75,7 +75,10 @@ def decode_last(
     previous: Float64[np.ndarray, " E"] | None,
     shown: Shown,
 ) -> Float64[np.ndarray, " E"]:
-    """As `decode_level`, of a last level, whose vertices it places. FormatError where they are not finite, too."""
+    """Decode the last level into `shown.positions`, placed by `shown.place`; return the last frame's scalars.
+
+    Raises FormatError as `decode_level` does, and where a position is not finite.
+    """
     place = None if shown.place is None else shown.place.numbers
     return _core.decode_last_level(record, near.core, known, previous, place, shown.positions)
 

@@ -76,7 +76,7 @@ def cost(distortion: float, size: int, options: DisplacementOptions) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Allocation:
-    """Choices of the encoder: the basis as transmitted, and each component's step and symbols."""
+    """Choices of the encoder: the basis as transmitted, and the rung of each component's step."""
 
     basis: klt.BasisSymbols
     rungs: Int64[np.ndarray, " M"]  # each component's
@@ -85,12 +85,12 @@ class Allocation:
 def allocate(
     field: Float64[np.ndarray, "V T 3"], system: System, neighbours: entropy.Neighbours, options: DisplacementOptions
 ) -> Allocation:
-    """Choose the components, steps and symbols that minimise distortion + price * rate."""
+    """Choose the components and steps that minimise distortion + price * rate."""
     basis = klt.fit(field)
     if options.basis_size is not None:
         kept = np.arange(len(basis.energies)) < options.basis_size
     else:
-        kept = basis.energies > (0.4 * options.step) ** 2
+        kept = basis.energies > (0.4 * options.step) ** 2  # weaker components are not tried (guess)
     coded = _Components(field, _only(basis, kept), system, options)
     ladder = [np.full(coded.count, rung_of(options.step) + offset) for offset in LADDER]
     values = np.array([coded.value(coded.rounded(rungs), rungs, neighbours) for rungs in ladder])
@@ -152,6 +152,7 @@ def _only(basis: klt.Basis, kept: Bool[np.ndarray, " C"]) -> klt.Basis:
 
 
 def steps_of(rungs: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:
+    """Return the quantiser step of each rung."""
     return np.array([step_of(rung) for rung in rungs.tolist()], dtype=np.float64)
 
 
