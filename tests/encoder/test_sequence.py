@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+import subprocess
+import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -262,3 +264,27 @@ def test_a_path_that_cannot_be_written_is_refused_before_anything_is_read(tmp_pa
 
     with pytest.raises(InputError, match="cannot be written"):
         encode(Unread((Mesh.empty(),) * 3), tmp_path / "nowhere" / "x.reel")
+
+
+def test_vertices_that_repeat_a_position_are_welded_as_the_command_line_does(tmp_path):
+    soup = Mesh.of(BALL.vertices[BALL.faces].reshape(-1, 3), np.arange(3 * len(BALL.faces)).reshape(-1, 3))
+    for name, mesh in (("whole", BALL), ("soup", soup)):
+        encode([mesh] * 2, tmp_path / f"{name}.reel", options=paper())
+    with meshreel.open(tmp_path / "soup.reel") as video, meshreel.open(tmp_path / "whole.reel") as whole:
+        assert [group.form for group in video.reader.groups] == [group.form for group in whole.reader.groups]
+        assert video.background(0).is_empty and surface_errors(BALL, video[0]).symmetric_rms < 0.01 * BALL.diagonal
+
+
+def test_warnings_of_an_encode_reach_a_python_user(tmp_path):
+    repeated = Mesh.of(BALL.vertices, [*BALL.faces, BALL.faces[0]])
+    with pytest.warns(UserWarning, match="1 faces|2 faces"):
+        summary = encode([repeated] * 2, tmp_path / "a.reel", options=paper())
+    assert summary.warnings
+
+
+@pytest.mark.parametrize("wrong", ["method='paper'", "scene=False"])
+def test_options_of_other_types_are_refused_at_once(wrong):
+    """In a process of its own, whose arguments no test's type checker looks at first."""
+    script = f"import meshreel; meshreel.EncoderOptions({wrong})"
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert said.returncode == 1 and f"InputError: {wrong.replace('=', ' ')}: give" in said.stderr

@@ -61,7 +61,7 @@ def make_app() -> App:
         app.command(f"meshreel.cli.{name}:command", name=name, help=text)
     added = {entry.name: entry.value for entry in entry_points(group=PLUGINS) if entry.name not in COMMANDS}
     for name, where in added.items():
-        app.command(where, name=name)
+        app.command(where, name=name, help=BENCH)
     if "bench" not in added:
         app.command("meshreel.cli.no_bench:command", name="bench", help=BENCH)
     return app

@@ -99,6 +99,10 @@ class EncoderOptions:
     def __post_init__(self) -> None:
         if not 0 <= self.quality <= 100:
             raise InputError(f"quality must be in 0 to 100, got {self.quality:g}")
+        if not isinstance(self.method, MethodOptions):
+            raise InputError(f"method {self.method!r}: give PaperOptions or LayersOptions, or use preset_options")
+        if self.scene is not None and not isinstance(self.scene, SceneOptions):
+            raise InputError(f"scene {self.scene!r}: give SceneOptions, or None where nothing stands still")
         if not 0 < self.key_interval <= MOST_SECONDS:
             raise InputError(f"key interval {self.key_interval:g}: give seconds, above 0 and at most {MOST_SECONDS}")
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future
@@ -27,7 +28,7 @@ from ..decoder.video import open as open_video
 from ..errors import InputError
 from ..format.layout import Form, Header
 from ..geometry.closest_points import distances
-from ..geometry.derived_sequences import captured
+from ..geometry.derived_sequences import Welded, captured
 from ..geometry.topology import drop_unreferenced
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, Up, as_sequence, evenly
@@ -65,9 +66,10 @@ def encode(
 ) -> Summary:
     """Encode meshes as a .reel file at `path`, which appears only when it is complete.
 
-    `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`). `options` replace quality and preset;
-    make them with `preset_options`. Most of a scene stands still: it becomes a background and bodies. With an executor,
-    intervals are encoded side by side, to the same bytes; memory then holds an interval for each worker and one more.
+    `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`, which also takes a frame rate); vertices
+    at equal positions are welded. `options` replace quality and preset; make them with `preset_options`. Most of a
+    scene stands still: it becomes a background and bodies. With an executor, intervals are encoded side by side, to
+    the same bytes; memory then holds an interval for each worker and one more. Warns of surface that the file lacks.
     Raises InputError for frames that cannot be used, before anything is encoded.
     """
     if options is None:
@@ -75,7 +77,10 @@ def encode(
     elif (quality, preset) != (QUALITY, PRESET):
         text = f"options and quality {quality:g}, preset {preset!r}: options already have both"
         raise InputError(f"{text}; leave quality and preset out, or give preset_options(preset, quality) as options")
-    return Encoder(as_sequence(sequence), executor, progress).encode(path, options)
+    summary = Encoder(Welded(as_sequence(sequence)), executor, progress).encode(path, options)
+    for text in summary.warnings:
+        warnings.warn(text, stacklevel=2)
+    return summary
 
 
 class Encoder:
@@ -180,8 +185,8 @@ def _encode_scene(job: Job, path: Path, parts: Parts) -> Summary:
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
-    warnings = (*_warnings(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
-    return Summary(path.stat().st_size, tuple(groups), warnings, scene)
+    texts = (*_warnings(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
+    return Summary(path.stat().st_size, tuple(groups), texts, scene)
 
 
 def _added_in_order(

@@ -15,7 +15,7 @@ from jaxtyping import Bool
 
 from ..types import Mesh, MeshSequence, Up
 from .depth import DepthFrames, DepthPicture
-from .topology import part_of
+from .topology import part_of, weld
 
 
 @runtime_checkable
@@ -77,6 +77,17 @@ class Upright(DerivedSequence):
     def up(self) -> Up:
         """The axis that points up."""
         return self._up or super().up
+
+
+class Welded(DerivedSequence):
+    """The same frames with vertices at equal positions merged: UV seams would pass for open borders."""
+
+    def __getitem__(self, index: int) -> Mesh:
+        mesh = self._source[index]
+        faces = mesh.faces
+        if faces.size and (faces.min() < 0 or faces.max() >= len(mesh.vertices)):
+            return mesh  # the survey refuses it with the number of its frame
+        return weld(mesh)
 
 
 class TurnedOver(DerivedSequence):

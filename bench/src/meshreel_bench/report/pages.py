@@ -112,6 +112,7 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
     """Return what to believe, three plots and one table."""
     made = {
         "{verdicts}": _kept_promises(parts),
+        "{reproducing}": ["The numbers of the paper beside ours: [reproducing.md](reproducing.md)."] if paper else [],
         "{plots}": [
             line
             for part, name in _shown(parts)
@@ -128,6 +129,8 @@ def _kept_promises(parts: Sequence[Part]) -> list[str]:
     """Return how many targets are met, and those that are not."""
     found = [verdict for part in parts for verdict in verdicts(part.study, part.rows) if verdict.met is not None]
     missed = [verdict for verdict in found if not verdict.met]
+    if not found:
+        return ["No target was measured."]
     if not missed:
         return [f"All {len(found)} targets that were measured are met."]
     head = f"Of {len(found)} targets {len(found) - len(missed)} are met. Missed:"
