@@ -110,6 +110,7 @@ def _plot_name(part: Part, sequence: str) -> str:
 
 def _first_page(parts: Sequence[Part]) -> list[str]:
     """Return what to believe, three plots and one table."""
+    paper = reproducing_page([row for part in parts if part.name == OPEN for row in part.rows])
     made = {
         "{verdicts}": _kept_promises(parts),
         "{reproducing}": ["The numbers of the paper beside ours: [reproducing.md](reproducing.md)."] if paper else [],
