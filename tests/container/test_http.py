@@ -24,6 +24,7 @@ class Server(ThreadingHTTPServer):
     def __init__(self, data: bytes, ranges: bool = True) -> None:
         super().__init__(("127.0.0.1", 0), Handler)
         self.data, self.ranges, self.asked = data, ranges, list[str]()
+        self.extra = b""  # behind each range
 
     @property
     def url(self) -> str:
@@ -37,7 +38,7 @@ class Handler(BaseHTTPRequestHandler):
         self.server.asked.append(asked)
         first, last = (int(number) for number in asked.removeprefix("bytes=").split("-"))
         if self.server.ranges:
-            part = data[first : last + 1]
+            part = data[first : last + 1] + self.server.extra
             self.send_response(206)
             self.send_header("Content-Range", f"bytes {first}-{first + len(part) - 1}/{len(data)}")
         else:
@@ -103,8 +104,18 @@ def test_a_server_that_stops_answering_by_range_is_an_input_error(serve):
         source.get_bytes(FIRST_REQUEST, 10)
 
 
+def test_a_server_that_sends_more_than_the_range_is_an_input_error(serve):
+    server = serve(LONG)
+    source = HttpSource(server.url)
+    server.extra = b"more"
+    with pytest.raises(InputError, match=f"without bytes {FIRST_REQUEST}"):
+        source.get_bytes(FIRST_REQUEST, 10)
+
+
 def test_a_url_of_another_file_or_without_a_server_names_the_url(serve):
     with pytest.raises(FormatError, match=r"http://127.0.0.1:\d+/a.reel: not a \.reel file"):
         meshreel.open(serve(LONG).url)
+    with pytest.raises(InputError, match=r"http://\[: cannot be read"):
+        meshreel.open("http://[")
     with pytest.raises(InputError, match=r"127.0.0.1:1/a\.reel: cannot be read .*; check the address"):
         meshreel.open("http://127.0.0.1:1/a.reel")

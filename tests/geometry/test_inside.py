@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.geometry.inside import Samples, interior_samples, winding_inside
+from meshreel.geometry.inside import Samples, interior_samples, winding_inside, winding_numbers
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
@@ -122,3 +122,7 @@ def test_winding_separates_inside_from_outside_and_accepts_an_empty_query() -> N
     queries = np.array([[0, 0, 0], [0.29, 0, 0], [0.31, 0, 0], [5.0, 5, 5]])
     assert winding_inside(sphere(), queries).tolist() == [True, True, False, False]
     assert winding_inside(sphere(), np.zeros((0, 3))).shape == (0,)
+
+
+def test_nothing_lies_inside_a_mesh_without_faces():
+    assert winding_numbers(Mesh.of(OCTAHEDRON.vertices, []), np.zeros((2, 3))).tolist() == [0.0, 0.0]

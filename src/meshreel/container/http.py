@@ -12,7 +12,7 @@ from ..errors import InputError
 from .reader import FIRST_REQUEST
 
 _TIMEOUT = 30.0  # s without an answer (guess)
-_RANGE = re.compile(r"bytes (\d+)-\d+/(\d+)")
+_RANGE = re.compile(r"bytes (\d{1,18})-\d{1,18}/(\d{1,18})", re.ASCII)
 
 
 class HttpSource:
@@ -41,17 +41,17 @@ class HttpSource:
 
     def _request(self, offset: int, length: int) -> tuple[bytes, int]:
         """Return the bytes of a range, or all bytes if the server has no ranges, and the size of the file."""
-        request = Request(self._url, headers={"Range": f"bytes={offset}-{offset + length - 1}"})
         try:
+            request = Request(self._url, headers={"Range": f"bytes={offset}-{offset + length - 1}"})
             with urlopen(request, timeout=_TIMEOUT) as answer:
-                data: bytes = answer.read()
-                found = _RANGE.fullmatch(answer.headers.get("Content-Range", ""))
                 is_whole = answer.status == HTTPStatus.OK
+                data: bytes = answer.read(None if is_whole else length + 1)  # an answer by range may not end
+                found = _RANGE.fullmatch(answer.headers.get("Content-Range", ""))
         except (URLError, HTTPException, OSError, ValueError) as error:
             reason = getattr(error, "reason", None) or error
             raise InputError(f"{self._url}: cannot be read ({reason}); check the address") from error
         if is_whole and offset == 0:
             return data, len(data)
-        if found is None or int(found[1]) != offset:
+        if found is None or int(found[1]) != offset or len(data) > length:
             raise InputError(f"{self._url}: the server answered without bytes {offset} ...; open it again")
         return data, int(found[2])

@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool
 
-from ..types import Mesh, MeshSequence, Up
+from ..types import Mesh, MeshSequence, Up, check_up
 from .depth import DepthFrames, DepthPicture
 from .topology import part_of, weld
 
@@ -34,8 +34,13 @@ class CapturedSequence(MeshSequence, Protocol):
 
 
 def captured(sequence: MeshSequence) -> CapturedSequence:
-    """Return the sequence with its capabilities; without them, y points up and no depth is known."""
-    return sequence if isinstance(sequence, CapturedSequence) else DerivedSequence(sequence)
+    """Return the sequence with its capabilities; without them, y points up and no depth is known.
+
+    Raises InputError where the sequence names an up axis that there is not.
+    """
+    known = sequence if isinstance(sequence, CapturedSequence) else DerivedSequence(sequence)
+    check_up(known.up)
+    return known
 
 
 class DerivedSequence(MeshSequence):

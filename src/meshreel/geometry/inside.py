@@ -61,8 +61,8 @@ def winding_numbers(mesh: Mesh, queries: Float64[np.ndarray, "N 3"]) -> Float64[
     """
     import igl
 
-    if len(queries) == 0:
-        return np.zeros(0)
+    if len(queries) == 0 or mesh.is_empty:  # without faces igl reads behind its arrays
+        return np.zeros(len(queries))
     return np.atleast_1d(igl.fast_winding_number(mesh.vertices, mesh.faces.astype(np.int64), queries))
 
 
