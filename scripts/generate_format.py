@@ -1,11 +1,13 @@
-"""Makes FORMAT.md's tables and the player's reader of records from meshreel.format.layout; with --check changes nothing
-and fails where they are stale.
+"""Makes the generated files anew: FORMAT.md's tables and the player's reader of records from meshreel.format.layout, the
+table of docs/reliability.md from its rows. With --check it changes nothing and fails where one is stale.
 """
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
+
+import reliability
 
 from meshreel.format.describe import fill_tables
 from meshreel.format.layout import PAYLOADS, RECORDS
@@ -21,6 +23,7 @@ def made() -> dict[Path, str]:
     return {
         DOCUMENT: fill_tables(DOCUMENT.read_text(encoding="utf-8"), RECORDS + PAYLOADS),
         MODULE: typescript(RECORDS + PAYLOADS),
+        reliability.PAGE: reliability.filled(),
     }
 
 
