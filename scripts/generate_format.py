@@ -1,5 +1,5 @@
-"""Makes the generated files anew: FORMAT.md's tables and the player's reader of records from meshreel.format.layout, the
-table of docs/reliability.md from its rows. With --check it changes nothing and fails where one is stale.
+"""Makes the generated files anew, or with --check changes nothing and fails where one is stale: FORMAT.md's tables and
+the player's reader of records from meshreel.format.layout, the table of docs/reliability.md from its rows.
 """
 
 from __future__ import annotations
