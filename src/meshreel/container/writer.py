@@ -1,19 +1,19 @@
 """Writer of a .reel file, which appears whole or not at all. A header and payloads -> a file, or its bytes.
 
-The head names every chunk and comes first, so chunks wait in an unnamed temporary file beside the output: memory stays
-flat, and a process that is killed leaves nothing under the final name.
+The head names every chunk and comes first, so chunks wait: where they are stored already, or in a temporary file that
+ends with the process. Memory stays flat, and a process that is killed leaves nothing under the final name.
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import shutil
 import tempfile
-import uuid
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Protocol, runtime_checkable
@@ -22,6 +22,8 @@ from ..errors import FormatError, InputError
 from ..format.checks import IndexChecks, check_header, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, IndexEntry, Layer, Preamble
 from ..format.records import least_size, pack
+from ..io.unfinished import sync_folder, unfinished
+from .sources import Stream
 
 
 @runtime_checkable
@@ -31,6 +33,24 @@ class Sink(Protocol):
     def write(self, data: bytes, /) -> Any: ...
 
     def flush(self) -> Any: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A payload in an open file, which is read when it is needed."""
+
+    file: Stream
+    offset: int
+    size: int
+
+    def __len__(self) -> int:
+        return self.size
+
+    def read(self) -> bytes:
+        """Return the payload; fewer bytes where the file has lost some."""
+        self.file.seek(self.offset)
+        data: bytes = self.file.read(self.size)
+        return data
 
 
 class ReelWriter:
@@ -43,7 +63,9 @@ class ReelWriter:
     def __init__(self, output: str | Path | Sink, header: Header) -> None:
         self._output = Path(output) if isinstance(output, str | Path) else output
         self.header = header  # may be replaced until the block ends, to store measured values as metadata
+        self.size = 0  # bytes of the whole file, known when the block has ended
         self._entries: list[IndexEntry] = []
+        self._chunks: list[Stored] = []
         self._checks = IndexChecks()
 
     @property
@@ -64,7 +86,7 @@ class ReelWriter:
             pack(self.header)
             check_header(self.header, len(self.header.intervals) + 1)  # now, not when all is encoded
             parse_metadata(self.header.metadata)
-            self._spool = _open_spool(self._output)
+            self._spool = _open_spool(self._output)  # for chunks that are in memory
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
@@ -89,7 +111,7 @@ class ReelWriter:
         self,
         first_frame: int,
         frame_count: int,
-        payload: bytes,
+        payload: bytes | Stored,
         layers: Sequence[int] = (),
         depends_on: Sequence[int] = (),
         track: int = 0,
@@ -98,7 +120,8 @@ class ReelWriter:
 
         Add groups in the order of their first frame, then of their track. `layers` are the ends of the payload's
         layers, bytes, ascending to its length; without any it is one layer. `depends_on` are the numbers of the static
-        chunk that the frames are shown with and, for a predicted group, of the previous group of its track.
+        chunk that the frames are shown with and, for a predicted group, of the previous group of its track. A payload
+        that is stored must stay so until the block ends.
         """
         if track < 0 or first_frame != self.frames_of(track):
             raise InputError(
@@ -107,39 +130,50 @@ class ReelWriter:
             )
         if frame_count < 1:
             raise InputError(f"group at frame {first_frame}: {frame_count} frames, add at least one")
-        form = _form(payload)
-        entry = IndexEntry(ChunkKind.GROUP, form, frame_count, track, tuple(depends_on), _layers(payload, layers))
+        data = payload if isinstance(payload, bytes) else payload.read()
+        entry = IndexEntry(ChunkKind.GROUP, _form(data), frame_count, track, tuple(depends_on), _layers(data, layers))
         return self._add(entry, payload)
 
-    def _add(self, entry: IndexEntry, payload: bytes) -> int:
+    def _add(self, entry: IndexEntry, payload: bytes | Stored) -> int:
         pack(entry)  # refuses what does not fit its field
         try:
             number = self._checks.add(entry)
         except FormatError as error:
             raise InputError(f"a file that no reader would take: {error}") from error
-        with _as_input_error(self._output):
-            self._spool.write(payload)
         self._entries.append(entry)
+        with _as_input_error(self._output):
+            self._chunks.append(payload if isinstance(payload, Stored) else self._kept(payload))
         return number
+
+    def _kept(self, payload: bytes) -> Stored:
+        kept = Stored(self._spool, self._spool.seek(0, os.SEEK_END), len(payload))
+        self._spool.write(payload)
+        return kept
 
     def _finish(self) -> None:
         self._checks.finish()
         check_header(self.header, self.frame_count)
         head = pack_head(self.header, Index(tuple(self._entries)))
-        if self._spool.seek(0, os.SEEK_END) != sum(layer.size for entry in self._entries for layer in entry.layers):
-            raise InputError(f"{self._output}: a chunk could not be written, encode again")
-        self._spool.seek(0)
         if not isinstance(self._output, Path):
-            _copy(head, self._spool, self._output)
+            self._copy(head, self._output)
             return
-        partial = self._output.with_name(f".{uuid.uuid4().hex}.tmp")  # short enough wherever the final name is
-        try:
-            with partial.open("xb") as file:
-                _copy(head, self._spool, file)
-                os.fsync(file.fileno())
-            partial.replace(self._output)
-        finally:
-            partial.unlink(missing_ok=True)
+        with unfinished(self._output) as file:
+            self._copy(head, file)
+            os.fsync(file.fileno())
+        sync_folder(self._output.parent)
+
+    def _copy(self, head: bytes, output: Sink) -> None:
+        """Write the head and the chunks, each of which must still be what was added."""
+        output.write(head)
+        if len(self._chunks) != len(self._entries):
+            raise InputError(f"{self._output}: a chunk could not be written, encode again")
+        for entry, chunk in zip(self._entries, self._chunks, strict=True):
+            data, ends = chunk.read(), list(accumulate(layer.size for layer in entry.layers))
+            if len(data) != len(chunk) or _layers(data, ends) != entry.layers:
+                raise InputError(f"{self._output}: a chunk could not be written, encode again")
+            output.write(data)
+        output.flush()
+        self.size = len(head) + sum(map(len, self._chunks))
 
 
 def check_output(path: Path) -> None:
@@ -162,12 +196,6 @@ def _open_spool(output: Path | Sink) -> IO[bytes]:
     if output.is_dir():
         raise IsADirectoryError(None, "is a folder, name a file")
     return tempfile.TemporaryFile(dir=output.parent)
-
-
-def _copy(head: bytes, spool: IO[bytes], output: Sink) -> None:
-    output.write(head)
-    shutil.copyfileobj(spool, output)
-    output.flush()
 
 
 def _form(payload: bytes) -> Form:

@@ -6,9 +6,8 @@ In: a mesh and a path, whose extension selects the format. Out: a file that `ope
 from __future__ import annotations
 
 import json
-import uuid
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -17,7 +16,9 @@ from jaxtyping import UInt8
 
 from ..errors import InputError
 from ..types import Mesh
+from .unfinished import unfinished
 
+_WAIT = 10.0  # s, for another process that writes the same file: a mesh takes less (guess)
 _TOLERANCE = 1e-6  # of the diagonal: largest rounding error of a float32 coordinate (guess)
 
 
@@ -68,18 +69,16 @@ def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> N
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that takes its final name at the end of the block; after a failure, nothing is left behind."""
-    temporary = path.with_name(f".{uuid.uuid4().hex}.part")  # unique: two processes may write one name
+    """Open a file that takes its final name at the end of the block; after a failure, nothing is left behind.
+
+    Where another process writes the same file, wait for its end; the later one stays.
+    """
     try:
-        with temporary.open("wb") as file:
+        with unfinished(path, _WAIT) as file:
             yield file
-        temporary.replace(path)
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"{path}: cannot be written ({reason}); free space, or choose another folder") from None
-    finally:
-        with suppress(OSError):
-            temporary.unlink()
 
 
 def _pack_ply(mesh: Mesh, colors: UInt8[np.ndarray, "V 3"] | None = None) -> bytes:
