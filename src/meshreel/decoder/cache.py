@@ -1,22 +1,26 @@
 """Cache of one track: the last group decoded, and the states from which the next groups of its chain continue.
 
-In: decoded meshes and states. Out: the same, within a bound on memory. Values are replaced as a whole and never
-changed, so that threads can share a track without a lock.
+In: decoded meshes and states, and what was refused. Out: the same, within a bound on memory. Values are replaced as a
+whole and never changed, so that threads can share a track without a lock.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..coding.layers.coder import LayersState
+from ..container.reader import Chunk
+from ..errors import FormatError
 from ..types import Mesh
 
 # Bytes of states that the tracks of a video keep together (guess): a few bytes of a file can describe groups that
 # each take as much memory as a group may.
 MOST_KEPT = 1 << 29
+MOST_REFUSALS = 4096  # chunks of a track (guess); frames that follow one another are mostly of one group
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,39 @@ class CachedStates:
             return CachedStates({number: state}, 0 if state is None else state.nbytes_beyond(None))
         self.known[number] = state
         return CachedStates(self.known, self.nbytes + size)
+
+
+class Refusals:
+    """Chunks whose bytes are damaged though their checksums match, so that no frame more decodes them again.
+
+    What could not be read is not among them: a file may grow, and a network may come back.
+    """
+
+    def __init__(self) -> None:
+        self._messages: dict[int, str] = {}  # by chunk; those that need a refused chunk have its message
+
+    @contextmanager
+    def of(self, chunk: Chunk) -> Iterator[None]:
+        """Remember a FormatError of decoding a chunk, and raise it with the name of the chunk."""
+        try:
+            yield
+        except FormatError as error:
+            self._keep(chunk, f"{chunk}: {error}")
+            raise FormatError(f"{chunk}: {error}") from error
+
+    def check(self, chunk: Chunk, *dependents: Chunk) -> None:
+        """Raise the FormatError of a refused chunk again, and remember it for those that need this chunk."""
+        message = self._messages.get(chunk.number)
+        if message is None:
+            return
+        for dependent in dependents:
+            self._keep(dependent, message)
+        raise FormatError(message)
+
+    def _keep(self, chunk: Chunk, message: str) -> None:
+        self._messages[chunk.number] = message
+        while len(self._messages) > MOST_REFUSALS:
+            self._messages.pop(next(iter(self._messages)), None)  # the oldest
 
 
 def memory_of(meshes: Sequence[Mesh]) -> int:

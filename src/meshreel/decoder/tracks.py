@@ -15,7 +15,7 @@ from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
 from ..format.layout import Form
 from ..types import Frames, Mesh, Placement
-from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, memory_of, read_only
+from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
 
 MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes: the groups of one frame take no more memory than the largest legal group
 
@@ -31,6 +31,7 @@ class Track(Frames):
         self._place = placement(reader)
         self._group = NO_GROUP
         self._states = CachedStates({})
+        self._refusals = Refusals()
 
     def __len__(self) -> int:
         return self.reader.frame_count
@@ -52,7 +53,9 @@ class Track(Frames):
             return group
         chain = [chunk]
         states = self._states
+        self._refusals.check(chunk)
         while (before := self.reader.group_before(chain[-1])) is not None and before.number not in states.known:
+            self._refusals.check(before, *chain)
             chain.append(before)
         state = None if before is None else states.known[before.number]
         states = CachedStates({}) if before is None else states.copy()
@@ -67,11 +70,10 @@ class Track(Frames):
 
     def _decode(self, chunk: Chunk, before: LayersState | None) -> tuple[list[Mesh], LayersState | None]:
         payload = self.reader.read_chunk(chunk.number, None if self.layers is None else self.layers + 1)
-        try:
+        with self._refusals.of(chunk):
             meshes, state = continue_group(payload, chunk.frame_count, self.layers, before, self._place)
-        except FormatError as error:
-            raise FormatError(f"{chunk}: {error}") from error
-        return [read_only(mesh) for mesh in meshes], state
+        shown = {id(mesh): read_only(mesh) for mesh in meshes}  # the frames of an empty group are one mesh
+        return [shown[id(mesh)] for mesh in meshes], state
 
 
 class Background:
@@ -81,6 +83,7 @@ class Background:
         self.reader = reader
         self._place = placement(reader)
         self._last: tuple[int, Mesh] = (-1, Mesh.empty())  # chunk and mesh; replaced as a whole, as other threads do
+        self._refusals = Refusals()
 
     def of_frame(self, frame: int) -> Mesh | None:
         """Return the background of a frame in metres, None if the frame has none.
@@ -99,8 +102,11 @@ class Background:
         """Decode a state, starting from the last one decoded if the state is that one or was changed from it."""
         known, mesh = self._last
         chain = [chunk]
+        self._refusals.check(chunk)
         while chain[-1].number != known and chain[-1].depends_on:
-            chain.append(self.reader.chunks[chain[-1].depends_on[0]])
+            before = self.reader.chunks[chain[-1].depends_on[0]]
+            self._refusals.check(before, *chain)
+            chain.append(before)
         if chain[-1].number == known:
             chain.pop()
         for link in reversed(chain):
@@ -112,12 +118,10 @@ class Background:
 
     def _decode(self, chunk: Chunk, before: Mesh) -> Mesh:
         payload = self.reader.read_chunk(chunk.number)
-        try:
+        with self._refusals.of(chunk):
             if chunk.form == Form.PATCH:
                 return decode_change(payload, before, self._place)
             return decode_background(payload, self._place)
-        except FormatError as error:
-            raise FormatError(f"{chunk}: {error}") from error
 
 
 def placement(reader: ReelReader) -> Placement:

@@ -25,8 +25,8 @@ export function checkPayload(name: string, form: number, payload: Uint8Array, la
 export class Video {
   readonly head: Head;
   private readonly place: Placement;
-  private readonly groups = new Map<number, Continued>();
-  private readonly states = new Map<number, Mesh>();
+  private readonly groups = new Map<number, Continued | FormatError>();
+  private readonly states = new Map<number, Mesh | FormatError>();
 
   constructor(
     private readonly tools: Tools,
@@ -48,24 +48,20 @@ export class Video {
   }
 
   private decoded(chunk: Chunk): Continued {
-    const known = this.groups.get(chunk.number);
-    if (known !== undefined) return known;
-    const before = this.head.groupBefore(chunk);
-    const previous = before === null ? null : this.decoded(before).state;
-    const count = this.layers === null ? chunk.layers.length : this.layers + 1;
-    const { layers, place } = this;
-    const made = continueGroup(this.tools, this.payload(chunk, count), { frameCount: chunk.frameCount, layers, previous, place });
-    this.groups.set(chunk.number, made);
-    return made;
+    return once(this.groups, chunk, () => {
+      const before = this.head.groupBefore(chunk);
+      const previous = before === null ? null : this.decoded(before).state;
+      const count = this.layers === null ? chunk.layers.length : this.layers + 1;
+      const { layers, place } = this;
+      return continueGroup(this.tools, this.payload(chunk, count), { frameCount: chunk.frameCount, layers, previous, place });
+    });
   }
 
   private state(chunk: Chunk): Mesh {
-    const known = this.states.get(chunk.number);
-    if (known !== undefined) return known;
-    const before = this.head.changedFrom(chunk);
-    const mesh = decodeStatic(this.tools, this.payload(chunk, chunk.layers.length), before && this.state(before), this.place);
-    this.states.set(chunk.number, mesh);
-    return mesh;
+    return once(this.states, chunk, () => {
+      const before = this.head.changedFrom(chunk);
+      return decodeStatic(this.tools, this.payload(chunk, chunk.layers.length), before && this.state(before), this.place);
+    });
   }
 
   private payload(chunk: Chunk, count: number): Uint8Array {
@@ -75,4 +71,20 @@ export class Video {
     checkPayload(describe(chunk), chunk.form, payload, layers);
     return payload;
   }
+}
+
+/** What a chunk decodes to, made once; where it is damaged its error is kept, so that no frame more decodes it again. */
+function once<T extends object>(known: Map<number, T | FormatError>, chunk: Chunk, make: () => T): T {
+  let made = known.get(chunk.number);
+  if (made === undefined) {
+    try {
+      made = make();
+    } catch (error) {
+      if (!(error instanceof FormatError)) throw error;
+      made = error;
+    }
+    known.set(chunk.number, made);
+  }
+  if (made instanceof FormatError) throw made;
+  return made;
 }
