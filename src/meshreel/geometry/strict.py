@@ -1,0 +1,100 @@
+"""Algebra and elementary functions whose bits depend neither on the processor nor on the number of threads.
+
+BLAS and LAPACK sum in an order of their own for each processor and number of threads, and NumPy's exp, log2 and angles
+differ between processors. What an encode computes becomes bytes, so it is computed here, in core/. NumPy's `+ - * /`,
+`sqrt`, `sum` and `einsum` without `optimize` are the same everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from jaxtyping import Float, Float64
+
+from .. import _core
+
+Array = Float64[np.ndarray, "..."]
+
+
+def products(a: Array, b: Array) -> Array:
+    """Return `a @ b` of two matrices, or of two batches of as many matrices, summed in order."""
+    if a.ndim == 2:
+        return _core.products(_plain(a)[None], _plain(b)[None])[0]
+    return _core.products(_plain(a), _plain(b))
+
+
+def dot(a: Array, b: Array) -> float:
+    """Return the sum of the products of the numbers of two arrays of one shape."""
+    return float((a * b).sum())
+
+
+def norm(a: Array) -> float:
+    """Return the root of the sum of squares of all numbers of an array."""
+    return math.sqrt(dot(a, a))
+
+
+def inverses(matrices: Float64[np.ndarray, "N n n"]) -> Float64[np.ndarray, "N n n"]:
+    """Invert each matrix; one that has no inverse becomes numbers that are not finite."""
+    return _core.inverses(_plain(matrices))
+
+
+def determinants(matrices: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, " N"]:
+    """Return the determinant of each matrix."""
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrices, 0, 2)
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+
+
+def eigen(matrix: Float64[np.ndarray, "n n"]) -> tuple[Float64[np.ndarray, " n"], Float64[np.ndarray, "n n"]]:
+    """Return eigenvalues, in ascending order, and eigenvectors, in columns, of a symmetric matrix."""
+    values, vectors = _core.eigen(_plain(matrix)[None])
+    return values[0], vectors[0]
+
+
+def nearest_rotations(
+    matrices: Float64[np.ndarray, "N 3 3"],
+) -> tuple[Float64[np.ndarray, "N 3 3"], Float64[np.ndarray, "N 2"]]:
+    """Return the rotation nearest to each matrix, and the two largest singular values of the matrix.
+
+    The rotation's quaternion is an eigenvector (Horn 1987). It is not unique where the second value is 0.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(matrices, 0, 2)
+    rows = [
+        [xx + yy + zz, zy - yz, xz - zx, yx - xy],
+        [zy - yz, xx - yy - zz, xy + yx, xz + zx],
+        [xz - zx, xy + yx, yy - xx - zz, yz + zy],
+        [yx - xy, xz + zx, yz + zy, zz - xx - yy],
+    ]
+    values, vectors = _core.eigen(np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0)))
+    sizes = np.stack([values[:, 3] + values[:, 2], values[:, 3] + values[:, 1]], axis=1) / 2
+    return rotations_of(vectors[:, :, 3]), sizes
+
+
+def rotations_of(quaternions: Float64[np.ndarray, "N 4"]) -> Float64[np.ndarray, "N 3 3"]:
+    """Return the rotations of unit quaternions (w, x, y, z)."""
+    w, x, y, z = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0))
+
+
+def exp(x: Float[np.ndarray, "..."]) -> Array:
+    """Return e to the power of each number."""
+    return _core.exp(_plain(x).reshape(-1)).reshape(x.shape)
+
+
+def log2(x: Float[np.ndarray, "..."]) -> Array:
+    """Return the binary logarithm of each number; exact for powers of two."""
+    return _core.log2(_plain(x).reshape(-1)).reshape(x.shape)
+
+
+def angle(y: Array, x: Array) -> Array:
+    """Return the angle of each point (x, y) with the x-axis, rad; neither is negative."""
+    return _core.angle(_plain(y).reshape(-1), _plain(x).reshape(-1)).reshape(y.shape)
+
+
+def _plain(a: Float[np.ndarray, "..."]) -> Array:
+    return np.ascontiguousarray(a, dtype=np.float64)
