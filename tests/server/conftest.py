@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 import threading
 
 import pytest
@@ -13,6 +14,7 @@ import uvicorn
 from starlette.testclient import TestClient
 
 from meshreel.server.app import make_app
+from meshreel.server.connections import Limits
 from meshreel.server.library import Library
 from meshreel.server.run import ServerOptions, run
 from tests.golden import GOLDEN
@@ -62,7 +64,7 @@ def live(monkeypatch):
         servers.append(self)
         made(self, *arguments)
 
-    def start(app, options=ServerOptions()):
+    def start(app, options=ServerOptions(), limits=Limits()):
         told: list[str] = []
         heard = threading.Event()
 
@@ -70,11 +72,12 @@ def live(monkeypatch):
             told.extend(found)
             heard.set()
 
-        threads.append(threading.Thread(target=run, args=(app, options, tell)))
+        threads.append(threading.Thread(target=run, args=(app, options, tell, limits)))
         threads[-1].start()
         assert heard.wait(60)
         return told[0]
 
+    start.servers = servers
     monkeypatch.setattr(uvicorn.Server, "__init__", remember)
     yield start
     for server in servers:
@@ -82,3 +85,15 @@ def live(monkeypatch):
     for thread in threads:
         thread.join(60)
     assert not any(thread.is_alive() for thread in threads)
+
+
+@pytest.fixture
+def painter(monkeypatch):
+    """Replaces what draws posters: `poster(path)`, whose source is given, in a process as it is otherwise."""
+
+    def replace(source):
+        quick = "import sys\nsys.modules['open3d'] = None\n"  # nothing here needs it, and it takes seconds
+        program = f"{quick}from meshreel.server import painter\n{source}\npainter.poster = poster\npainter.main()\n"
+        monkeypatch.setattr("meshreel.server.posters.PAINTER", (sys.executable, "-P", "-c", program))
+
+    return replace

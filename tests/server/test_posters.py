@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import sys
-import threading
+import time
 import urllib.request
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-import meshreel.server.posters as posters
+from meshreel.server import painter as pictures
+from meshreel.server import posters
 from meshreel.server.app import make_app
 from meshreel.server.library import Library
 from meshreel.types import Mesh
@@ -19,46 +22,85 @@ from meshreel.types import Mesh
 POSTER = "/posters/walk.reel.png"
 
 
-def test_a_poster_is_drawn_once_until_its_file_changes(client, folder, monkeypatch):
-    drawn = []
-    monkeypatch.setattr(posters, "_picture", lambda mesh, _: drawn.append(mesh) or b"picture")
+CALLS = "import itertools\ncount = itertools.count(1)\ndef poster(path): return b'%d' % next(count)"
+HANG = "import re\ndef poster(path): re.match('(a+)+$', 'a' * 64 + 'b')"  # in one call, which lets no other thread run
+FILL = "def poster(path): return bytes(3 * 2**30)"
+
+
+def test_a_poster_is_drawn_once_until_its_file_changes(client, folder, painter):
+    painter(CALLS)
     first = client.get(POSTER)
     tag = first.headers["etag"]
-    assert first.content == client.get(POSTER).content == b"picture"
+    assert first.content == client.get(POSTER).content == b"1"
     unchanged = client.get(POSTER, headers={"If-None-Match": tag})
     assert (unchanged.status_code, unchanged.content, unchanged.headers["etag"]) == (304, b"", tag)
-    assert len(drawn) == 1
     scene = (folder.parent / "outside.reel").read_bytes()
     (folder / "walk.reel").write_bytes(scene)
     changed = client.get(POSTER, headers={"If-None-Match": tag})
-    assert changed.status_code == 200 and changed.headers["etag"] != tag and len(drawn) == 2
+    assert changed.status_code == 200 and changed.headers["etag"] != tag and changed.content == b"2"
 
 
-def test_without_a_renderer_there_is_a_plain_tile_that_is_not_kept(client, monkeypatch):
-    monkeypatch.setitem(sys.modules, "PIL", None)
+def test_without_a_renderer_there_is_a_plain_tile_that_is_not_kept(client, painter):
+    painter("import sys\nsys.modules['PIL'] = None\nposter = painter.poster")
     tile = client.get(POSTER)
     assert tile.headers["content-type"] == "image/svg+xml" and tile.headers["cache-control"] == "no-store"
     assert "etag" not in tile.headers
 
 
-def test_no_more_posters_are_kept_than_said(folder, monkeypatch):
-    monkeypatch.setattr(posters, "_picture", lambda *_: b"picture")
+def test_no_more_posters_are_kept_than_said(painter, monkeypatch):
+    painter(CALLS)
     monkeypatch.setattr(posters, "MOST_POSTERS", 2)
     kept = posters.Posters()
     for tag in "abcd":
-        kept.of(folder / "walk.reel", tag)
+        asyncio.run(kept.of(Path("walk.reel"), tag))
     assert [tag for _, tag in kept._known] == ["c", "d"]
 
 
-def test_files_are_answered_however_many_wait_for_a_poster(live, folder, player, monkeypatch):
-    begun, go_on = threading.Event(), threading.Event()
+@pytest.mark.parametrize(
+    "fault",
+    [HANG, "def poster(path): __import__('os').abort()", "def poster(path): raise KeyError"]
+    + ["def poster(path): __import__('os').write(3, b'x')", "def poster(path): return bytes(2**21)"]
+    + [pytest.param(FILL, marks=pytest.mark.skipif(sys.platform != "linux", reason="no limit of memory is kept to"))],
+    ids=["never ends", "crashes", "raises", "answers out of turn", "answers too much", "takes all memory"],
+)
+def test_a_file_that_breaks_the_painter_has_a_plain_tile_and_others_have_theirs(painter, monkeypatch, folder, fault):
+    painter(f"{fault}\nbad = poster\ndef poster(path): return bad(path) if path.name == 'walk.reel' else b'good'")
+    monkeypatch.setattr(posters, "PATIENCE", 0.5)
+    drawn, began = posters.Posters(), time.monotonic()
+    for _ in range(20):  # a second trial would take its time again
+        assert asyncio.run(drawn.of(folder / "walk.reel", "tag")) is None
+    assert asyncio.run(drawn.of(folder / "cut.reel", "tag")) == b"good"
+    assert time.monotonic() - began < 20
+    drawn.close()
+    assert asyncio.run(drawn.of(folder / "walk.reel", "tag")) is None
 
-    def slow(*_):
-        begun.set()
-        assert go_on.wait(60)
-        return b"picture"
 
-    monkeypatch.setattr(posters, "_poster", slow)
+def test_more_posters_than_said_wait_for_none(painter, monkeypatch, folder):
+    painter(HANG)
+    monkeypatch.setattr(posters, "MOST_WAITING", 2)
+    monkeypatch.setattr(posters, "LONGEST_WAIT", 0.2)
+
+    async def ask():
+        drawn = posters.Posters()
+        try:
+            for tag in "abc":
+                assert await drawn.of(folder / "walk.reel", tag) is None
+            assert len(drawn._drawn) == 2
+        finally:
+            drawn.close()
+
+    asyncio.run(ask())
+
+
+def test_files_are_answered_however_many_wait_for_a_poster(live, folder, player, painter):
+    gate = folder.parent / "gate"
+    painter(f"""
+import pathlib, time
+def poster(path):
+    while not pathlib.Path({str(gate)!r}).exists():
+        time.sleep(0.01)
+    return b"picture"
+""")
     address = live(make_app(Library(folder), player))
 
     def fetch(path):
@@ -68,11 +110,12 @@ def test_files_are_answered_however_many_wait_for_a_poster(live, folder, player,
     with ThreadPoolExecutor(64) as pool:
         waiting = [pool.submit(fetch, "posters/walk.reel.png") for _ in range(60)]  # more than a server has threads
         try:
-            assert begun.wait(60)
-            assert fetch("files/walk.reel") == (folder / "walk.reel").read_bytes()
-            assert not any(poster.done() for poster in waiting)
+            time.sleep(1)
+            began = time.monotonic()
+            assert fetch("files/walk.reel") == (folder / "walk.reel").read_bytes() and fetch("style.css")
+            assert time.monotonic() - began < 1 and not any(poster.done() for poster in waiting)
         finally:
-            go_on.set()
+            gate.touch()
         assert {poster.result(60) for poster in waiting} == {b"picture"}
 
 
@@ -84,8 +127,8 @@ def test_a_room_is_seen_from_where_it_is_open(towards):
     corners = np.array([[-1, 0, 0], [1, 0, 0], [1, 0.5, 0], [-1, 2, 0]], dtype=np.float64)
     faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
     wall = Mesh.of(corners, faces if towards > 0 else faces[:, ::-1])
-    picture = np.asarray(image.open(io.BytesIO(posters._picture(wall, "y"))))
-    assert picture.shape == (posters.HEIGHT, posters.WIDTH, 4) and set(np.unique(picture[..., 3])) == {0, 255}
+    picture = np.asarray(image.open(io.BytesIO(pictures.picture(wall, "y"))))
+    assert picture.shape == (pictures.HEIGHT, pictures.WIDTH, 4) and set(np.unique(picture[..., 3])) == {0, 255}
     left, right = np.split(picture[..., 3] > 0, 2, axis=1)
     assert (left.sum() > 1.5 * right.sum()) if towards > 0 else (right.sum() > 1.5 * left.sum())
 
@@ -96,8 +139,8 @@ def test_a_poster_stands_on_its_feet():
     corners = np.array([[-2, 0, 0], [2, 0, 0], [0, 1, 0.1], [0, 1, -0.1]], dtype=np.float64)  # broad feet at y = 0
     hut = Mesh.of(corners, np.array([[0, 1, 2], [1, 0, 3], [0, 2, 3], [2, 1, 3]], dtype=np.int32))
     turned = {"y": corners, "-y": corners * [1, -1, -1], "z": corners[:, [0, 2, 1]] * [1, -1, 1]}
-    pictures = [image.open(io.BytesIO(posters._picture(Mesh.of(v, hut.faces), up))) for up, v in turned.items()]
-    shapes = [np.asarray(picture)[..., 3] > 0 for picture in pictures]
+    drawn = [image.open(io.BytesIO(pictures.picture(Mesh.of(v, hut.faces), up))) for up, v in turned.items()]
+    shapes = [np.asarray(picture)[..., 3] > 0 for picture in drawn]
     for shape in shapes:
         rows = np.flatnonzero(shape.any(axis=1))
         assert shape[rows[-4:]].sum() > 5 * shape[rows[:4]].sum()

@@ -1,16 +1,12 @@
-"""ASGI application of the server. In: a library of files and the folder of the built player. Out: HTTP responses.
-
-Files are sent whole or by range, with an ETag and without compression, which would not make a .reel file smaller.
-"""
+"""ASGI application of the server. In: a library of files and the folder of the built player. Out: HTTP responses."""
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Sequence
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 
-import anyio
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
@@ -19,32 +15,19 @@ from starlette.middleware import Middleware
 from starlette.middleware.cors import CORSMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
-from starlette.responses import FileResponse, HTMLResponse, PlainTextResponse, Response
-from starlette.routing import Mount, Route
-from starlette.staticfiles import NotModifiedResponse, StaticFiles
-from starlette.types import Scope
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
+from starlette.staticfiles import NotModifiedResponse
 
+from .. import __version__
 from ..errors import InputError
-from .library import Library, as_text
-from .pages import PLAIN, POLICY, STYLE, gallery_page, player_page
-from .posters import Posters, poster_tag
+from . import files
+from .assets import FRESH, PAGE, SAFE, Asset, Player, is_unchanged
+from .library import Facts, Library, as_text
+from .pages import PLAIN, STYLE, gallery_page, player_page
+from .posters import Posters
 
-# Not from the system, whose list may be wrong (on Windows, it is in the registry) or missing.
-TYPES = {
-    ".css": "text/css",
-    ".html": "text/html",
-    ".js": "text/javascript",
-    ".json": "application/json",
-    ".png": "image/png",
-    ".svg": "image/svg+xml",
-    ".txt": "text/plain",
-    ".wasm": "application/wasm",
-}
-BYTES = "application/octet-stream"  # .reel files and unknown types
 EXPOSED = ("Accept-Ranges", "Content-Length", "Content-Range", "ETag")
-SAFE = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
-FRESH = SAFE | {"Cache-Control": "no-cache"}  # browsers may keep it, but must revalidate it
-PAGE = FRESH | {"Content-Security-Policy": POLICY}
 _ORIGIN = re.compile(r"\*|https?://[^\s/?#@]+")
 
 
@@ -61,17 +44,26 @@ def make_app(
     "*" allows all of them. `/` plays the file of a library with `only` one, otherwise it is a gallery; `/watch/NAME`
     plays a file and `/files/NAME` sends it. Raises InputError for a malformed origin.
     """
-    pages = _Pages(library)
+    built, posters, style = Player(player or built_player()), Posters(), Asset.of(STYLE.encode(), "text/css")
+    pages = _Pages(library, built, posters)
     routes = [
         Route("/", pages.home),
         Route("/watch/{name:path}", pages.watch),
-        Route("/posters/{name:path}.png", _PosterRoute(library).poster),
-        Route("/style.css", lambda _: Response(STYLE, media_type="text/css", headers=FRESH)),
-        Mount("/player", _Static(directory=player or built_player(), check_dir=False)),
-        Mount("/files", _ReelFiles(library)),
+        Route("/files/{name:path}", pages.file),
+        Route("/posters/{name:path}.png", pages.poster),
+        Route("/style.css", lambda request: style.answer(request.headers, FRESH)),
+        Route("/player/{path:path}", built.answer),
     ]
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        try:
+            yield
+        finally:
+            posters.close()
+
     middleware = [Middleware(TrustedHostMiddleware, allowed_hosts=hosts, www_redirect=False), *_cors(cors)]
-    return Starlette(routes=routes, middleware=middleware, exception_handlers={OSError: _gone})
+    return Starlette(routes=routes, middleware=middleware, exception_handlers={OSError: _gone}, lifespan=lifespan)
 
 
 def _cors(origins: Sequence[str]) -> list[Middleware]:
@@ -92,82 +84,59 @@ def _cors(origins: Sequence[str]) -> list[Middleware]:
     ]
 
 
-class _Static(StaticFiles):
-    """Files of a folder, with the types above and revalidation, so that a new build shows at once."""
-
-    def file_response(
-        self,
-        full_path: str | os.PathLike[str],
-        stat_result: os.stat_result,
-        scope: Scope,
-        status_code: int = 200,
-    ) -> Response:
-        media = TYPES.get(Path(full_path).suffix.lower(), BYTES)
-        headers = PAGE if media == "text/html" else FRESH
-        response = FileResponse(full_path, status_code, headers, media, stat_result=stat_result)
-        if self.is_not_modified(response.headers, Headers(scope=scope)):
-            return NotModifiedResponse(response.headers)
-        return response
-
-
-class _ReelFiles(_Static):
-    """The files of a library, and no others in its folder."""
-
-    def __init__(self, library: Library) -> None:
-        super().__init__(directory=library.folder, check_dir=False)
-        self._library = library
-
-    def lookup_path(self, path: str) -> tuple[str, os.stat_result | None]:
-        found = self._library.path_of(path.replace(os.sep, "/"))
-        if found is None:
-            return "", None
-        try:  # here, because a response that has begun cannot become an error
-            with found.open("rb") as file:
-                return str(found), os.fstat(file.fileno())
-        except PermissionError as error:
-            raise HTTPException(403, f"cannot be read: {error.strerror}") from error
-
-
 class _Pages:
-    def __init__(self, library: Library) -> None:
-        self._library = library
+    def __init__(self, library: Library, player: Player, posters: Posters) -> None:
+        self._library, self._player, self._posters = library, player, posters
+        self._facts = Facts(library)
 
-    async def home(self, _: Request) -> Response:
+    async def home(self, request: Request) -> Response:
         """Return the player of the only file, or the gallery."""
         if self._library.only is not None:
-            return HTMLResponse(player_page(self._library.only), headers=PAGE)
-        return HTMLResponse(await run_in_threadpool(self._gallery), headers=PAGE)
+            return await run_in_threadpool(self._watch, request, self._library.only)
+        return await run_in_threadpool(self._gallery, request)
 
     async def watch(self, request: Request) -> Response:
         """Return the page that plays one file."""
         name = request.path_params["name"]
-        if await run_in_threadpool(self._library.path_of, name) is None:
-            raise HTTPException(404, f"there is no file {name}")
-        return HTMLResponse(player_page(name), headers=PAGE)
+        await self._path(name)
+        return await run_in_threadpool(self._watch, request, name)
 
-    def _gallery(self) -> str:
-        title = as_text(self._library.folder.resolve().name) or "meshreel"
-        return gallery_page(title, [self._library.entry(name) for name in self._library.names()])
-
-
-class _PosterRoute:
-    def __init__(self, library: Library) -> None:
-        self._library, self._posters = library, Posters()
-        self._one = anyio.CapacityLimiter(1)  # posters are drawn one at a time, in a thread of their own
+    async def file(self, request: Request) -> Response:
+        """Return a file, or ranges of it."""
+        path = await self._path(request.path_params["name"])
+        try:
+            opened = await run_in_threadpool(files.OpenFile.of, path)
+        except PermissionError as error:
+            raise HTTPException(403, f"cannot be read: {error.strerror}") from error
+        return files.answer(opened, request.headers, request.method == "HEAD")
 
     async def poster(self, request: Request) -> Response:
         """Return the poster of a file, or a plain tile if it has none."""
-        path = await run_in_threadpool(self._library.path_of, request.path_params["name"])
-        if path is None:
-            raise HTTPException(404, "there is no such file")
-        tag = await run_in_threadpool(poster_tag, path)
+        path = await self._path(request.path_params["name"])
+        tag = await run_in_threadpool(files.tag_of, path)
         if tag is None:
             return _plain()
-        headers = Headers(FRESH | {"ETag": tag})
-        if StaticFiles().is_not_modified(headers, request.headers):
-            return NotModifiedResponse(headers)
-        picture = await anyio.to_thread.run_sync(self._posters.of, path, tag, limiter=self._one)
+        headers = FRESH | {"ETag": f'{tag[:-1]}-{__version__}"'}
+        if is_unchanged(request.headers, Headers(headers)):
+            return NotModifiedResponse(Headers(headers))
+        picture = await self._posters.of(path, tag)
         return _plain() if picture is None else Response(picture, media_type="image/png", headers=headers)
+
+    async def _path(self, name: str) -> Path:
+        path = await run_in_threadpool(self._library.path_of, name)
+        if path is None:
+            raise HTTPException(404, f"there is no file {name}")
+        return path
+
+    def _watch(self, request: Request, name: str) -> Response:
+        edition, _ = self._player.load()
+        page = player_page(name, f"/player/{edition}" if edition else "/player")
+        return Asset.of(page.encode(), "text/html").answer(request.headers, PAGE)
+
+    def _gallery(self, request: Request) -> Response:
+        title = as_text(self._library.folder.resolve().name) or "meshreel"
+        page = gallery_page(title, self._facts.entries())
+        return Asset.of(page.encode(), "text/html").answer(request.headers, PAGE)
 
 
 def _plain() -> Response:

@@ -1,4 +1,6 @@
-"""Library of served .reel files: those in a folder and its subfolders, or one file. It is read again on each request.
+"""Library of served .reel files: those in a folder and its subfolders, or one file.
+
+The folder is listed for each request.
 
 In: a folder. Out: names with slashes, and for each file its length and rate, or why it cannot be read.
 """
@@ -6,6 +8,7 @@ In: a folder. Out: names with slashes, and for each file its length and rate, or
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +19,9 @@ from ..io.file_names import is_text
 
 SUFFIX = ".reel"
 HIDDEN = "."  # first character of hidden names
+RECENT = 3.0  # s; the coarsest times of file systems are 2 s apart (FAT)
+
+Version = tuple[int, int, int]  # size in bytes; mtime and ctime in ns
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +100,38 @@ class Library:
         lost, whole = len(reader.missing), len(reader.chunks)
         cut = f"{lost} of {whole} chunks are missing: the file is truncated" if lost else ""
         return Entry(name, reader.size, reader.frame_count, reader.duration, cut)
+
+
+class Facts:
+    """Facts of all files of a library. A head is read again only when the version of its file is another."""
+
+    def __init__(self, library: Library) -> None:
+        self._library = library
+        self._known: dict[str, tuple[Version | None, Entry]] = {}
+
+    def entries(self) -> list[Entry]:
+        """Return the facts of the files that exist now, in the order of their names."""
+        entries: dict[str, tuple[Version | None, Entry]] = {}
+        for name in self._library.names():
+            version = self._version(name)
+            known = self._known.get(name)
+            is_known = known is not None and version is not None and known[0] == version
+            entries[name] = known if known and is_known else (version, self._library.entry(name))
+        self._known = entries
+        return [entry for _, entry in entries.values()]
+
+    def _version(self, name: str) -> Version | None:
+        """Return the version of a file; None if it has changed just now, and may again without another time."""
+        try:
+            found = (self._library.folder / name).stat()
+        except OSError:
+            return None
+        return version_of(found) if time.time() - max(found.st_mtime, found.st_ctime) > RECENT else None
+
+
+def version_of(found: os.stat_result) -> Version:
+    """Return what changes with a file, without a look at its contents. (On Windows, ctime is when it was made.)"""
+    return found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 def as_text(name: str) -> str:

@@ -58,12 +58,15 @@ PLAIN = (
 )
 
 
-def player_page(name: str) -> str:
-    """Return the page that plays one file in the whole window; its script reads the other parameters of the URL."""
+def player_page(name: str, player: str) -> str:
+    """Return the page that plays one file in the whole window; its script reads the other parameters of the URL.
+
+    `player` is the address of the player's folder.
+    """
     source = escape(f"/files/{quote(name)}")
-    head = _HEAD.format(title=escape(f"{name} · meshreel"), style="/player/page.css")
+    head = _HEAD.format(title=escape(f"{name} · meshreel"), style=f"{player}/page.css")
     return (
-        f'{head}<script type="module" src="/player/page.js"></script>\n</head>\n<body>\n'
+        f'{head}<script type="module" src="{player}/page.js"></script>\n</head>\n<body>\n'
         f'<meshreel-player src="{source}" controls autoplay loop></meshreel-player>\n'
         "<noscript>The player needs JavaScript.</noscript>\n</body>\n</html>\n"
     )

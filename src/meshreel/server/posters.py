@@ -1,88 +1,124 @@
-"""Posters: a PNG of the normals of the first frame with a surface. In: the path of a file. Out: cached bytes."""
+"""Posters, drawn one at a time by a process that can be killed. In: the path of a file. Out: cached bytes of a PNG."""
 
 from __future__ import annotations
 
-import io
+import asyncio
+import json
+import os
+import struct
+import subprocess
+import sys
 import threading
 from collections import OrderedDict
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
-import numpy as np
+from .painter import PATIENCE, SIZE
 
-from .. import __version__
-from ..decoder.video import Video
-from ..decoder.video import open as open_video
-from ..errors import MeshreelError
-from ..types import Mesh
-
-WIDTH, HEIGHT = 480, 360  # pixels (guess)
-FIELD = 30.0  # degrees, vertical (guess)
+PAINTER = (sys.executable, "-P", "-m", "meshreel.server.painter")  # -P: no module is from the folder that is served
+ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}  # the server needs the other cores
 MOST_POSTERS = 256  # in memory (guess)
-LOOKED_AT = 30  # frames that are searched for a surface (guess)
+MOST_WAITING = 32  # different posters at once (guess); the tiles of others stay plain
+LONGEST_WAIT = 30.0  # s of a request for its turn and its poster (guess); later, its tile stays plain
+START = 60.0  # s until the process is ready (guess)
+LARGEST = 2**20  # bytes of a PNG: more than its pixels have
 
-
-def poster_tag(path: Path) -> str | None:
-    """Return the ETag of a poster, which changes with the file and the version of meshreel; None without a file."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return f'"{found.st_mtime_ns:x}-{found.st_size:x}-{__version__}"'
+Poster = tuple[Path, str]  # path and ETag
 
 
 class Posters:
-    """Cache of posters, one for each version of a file. Threads may share it; two may draw the same poster."""
+    """Cache of posters, one for each version of a file. A file that has none is not tried again."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[tuple[Path, str], bytes | None] = OrderedDict()
-        self._lock = threading.Lock()
+        self._painter = _Painter()
+        self._known: OrderedDict[Poster, bytes | None] = OrderedDict()
+        self._drawn: dict[Poster, Future[bytes | None]] = {}
+        self._lock = threading.RLock()  # a callback of what is done already runs within it
+        self._thread = ThreadPoolExecutor(1, "posters")
 
-    def of(self, path: Path, tag: str) -> bytes | None:
-        """Return a PNG, None for damaged and empty files and without the renderer (extra `encode`)."""
-        version = (path, tag)
+    async def of(self, path: Path, tag: str) -> bytes | None:
+        """Return a PNG; None where there is none, or none yet because too many are waited for."""
+        wanted = (path, tag)
         with self._lock:
-            if version in self._known:
-                self._known.move_to_end(version)
-                return self._known[version]
-        picture = _poster(path)
-        with self._lock:
-            self._known[version] = picture
-            while len(self._known) > MOST_POSTERS:
-                self._known.popitem(last=False)
-        return picture
-
-
-def _poster(path: Path) -> bytes | None:
-    try:
-        with open_video(path) as video:
-            mesh = _first(video)
-            return None if mesh is None else _picture(mesh, video.reader.up)
-    except (MeshreelError, OSError, ModuleNotFoundError):
+            if wanted in self._known:
+                self._known.move_to_end(wanted)
+                return self._known[wanted]
+            drawing = self._drawn.get(wanted)
+            if drawing is None and len(self._drawn) < MOST_WAITING:
+                drawing = self._drawn[wanted] = self._thread.submit(self._painter.draw, path)
+                drawing.add_done_callback(partial(self._keep, wanted))
+        if drawing is None:
+            return None
+        with suppress(TimeoutError):  # the poster is drawn all the same, for later requests
+            return await asyncio.wait_for(asyncio.shield(asyncio.wrap_future(drawing)), LONGEST_WAIT)
         return None
 
+    def close(self) -> None:
+        """Kill the process; whoever waits gets None."""
+        self._painter.close()
+        self._thread.shutdown(wait=False)
 
-def _first(video: Video) -> Mesh | None:
-    """Return the first frame with a surface, None if the first LOOKED_AT have none."""
-    frames = (video[index] for index in range(min(len(video), LOOKED_AT)))
-    return next((mesh for mesh in frames if not mesh.is_empty), None)
+    def _keep(self, drawn: Poster, drawing: Future[bytes | None]) -> None:
+        with self._lock:
+            self._drawn.pop(drawn, None)
+            self._known[drawn] = drawing.result()
+            while len(self._known) > MOST_POSTERS:
+                self._known.popitem(last=False)
 
 
-def _picture(mesh: Mesh, up: str) -> bytes:
-    """Return an upright PNG with a transparent background, from the front unless another side shows twice as much."""
-    from PIL import Image
+class _Painter:
+    """The process, started when it is needed first, and again after it was killed. For one thread, but for `close`."""
 
-    from ..geometry.raycast import Rays
-    from ..metrics.render import Crop, look
-    from ..metrics.viewpoints import Box, ViewOptions, views_around
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[bytes] | None = None
+        self._is_closed, self._lock = False, threading.Lock()
 
-    box, rays = Box.of([mesh]), Rays(mesh)
-    shown = []  # in each of the four views, pixels with the fronts of faces less those with backs: walls from outside
-    for camera in views_around(box, ViewOptions(WIDTH // 4, HEIGHT // 4, FIELD, up=up)):
-        seen = rays.look(camera)
-        shown.append(int((seen.faces >= 0).sum()) - 2 * int(rays.backs(camera, seen).sum()))
-    best = int(np.argmax(shown)) if max(shown) > 2 * shown[0] else 0
-    view = look(mesh, views_around(box, ViewOptions(WIDTH, HEIGHT, FIELD, up=up))[best], Crop(0, HEIGHT, 0, WIDTH))
-    picture = np.dstack([view.colors, view.covered])
-    out = io.BytesIO()
-    Image.fromarray((255 * picture).round().astype(np.uint8)).save(out, "PNG")
-    return out.getvalue()
+    def draw(self, path: Path) -> bytes | None:
+        """Return a PNG, None if there is none, the process dies of it, or it takes too long."""
+        process = self._process or self._start()
+        picture = process and self._ask(process, json.dumps(str(path)).encode() + b"\n", PATIENCE)
+        return picture or None
+
+    def close(self) -> None:
+        """Kill the process, and start none again; from any thread."""
+        with self._lock:
+            self._is_closed = True
+            if self._process is not None:
+                self._process.kill()
+
+    def _start(self) -> subprocess.Popen[bytes] | None:
+        pipe = subprocess.PIPE
+        with self._lock:
+            if self._is_closed:
+                return None
+            self._process = process = subprocess.Popen(
+                PAINTER, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=os.environ | ONE_THREAD
+            )
+        return None if self._ask(process, b"", START) is None else process
+
+    def _ask(self, process: subprocess.Popen[bytes], line: bytes, limit: float) -> bytes | None:
+        """Return the answer of the process to a line, None if it dies or exceeds the limit, upon which it is killed."""
+        assert process.stdin is not None and process.stdout is not None
+        timer = threading.Timer(limit, process.kill)
+        timer.daemon = True
+        timer.start()
+        try:
+            process.stdin.write(line)
+            process.stdin.flush()
+            (size,) = SIZE.unpack(process.stdout.read(SIZE.size))
+            answer = process.stdout.read(min(size, LARGEST))
+            if len(answer) == size:
+                return answer
+        except (OSError, struct.error):  # it is dead
+            pass
+        finally:
+            timer.cancel()
+        self._process = None
+        process.kill()
+        process.wait()
+        process.stdout.close()
+        with suppress(OSError):  # what it has not read
+            process.stdin.close()
+        return None

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
+import math
 import socket
 import ssl
 from collections.abc import Callable, Iterator
@@ -17,6 +17,7 @@ from cyclopts import Parameter
 from starlette.applications import Starlette
 
 from ..errors import InputError
+from .connections import Connection, Limits, Server, is_news, room_for_files
 
 LOCAL = ("localhost", "127.0.0.1", "::1")
 EVERYWHERE = ("0.0.0.0", "::")
@@ -49,26 +50,30 @@ class ServerOptions:
         return tuple(map(_bracketed, LOCAL)) if self.host in LOCAL else ("*",)
 
 
-def run(app: Starlette, options: ServerOptions, announce: Callable[[list[str]], None]) -> None:
+def run(
+    app: Starlette, options: ServerOptions, announce: Callable[[list[str]], None], limits: Limits = Limits()
+) -> None:
     """Serve until SIGINT or SIGTERM. `announce` gets the addresses as soon as the server listens.
 
     Raises InputError if the host is unknown or the port is taken.
     """
-    logging.getLogger("uvicorn.error").addFilter(_is_news)
+    logging.getLogger("uvicorn.error").addFilter(is_news)
     with _listening(options) as listener:
         encryption = _encryption(listener.getsockname()[0]) if options.https else None
         config = uvicorn.Config(
             app,
-            lifespan="off",
+            http=Connection,
+            lifespan="on",
             ws="none",
             log_level="error",
             access_log=False,
             server_header=False,
             timeout_graceful_shutdown=PATIENCE,
+            timeout_keep_alive=math.ceil(limits.request),
             ssl_context_factory=(lambda *_: encryption) if encryption else None,
         )
         announce(addresses(options, listener.getsockname()[1]))
-        uvicorn.Server(config).run(sockets=[listener])
+        Server(config, room_for_files(limits)).run(sockets=[listener])
 
 
 def addresses(options: ServerOptions, port: int) -> list[str]:
@@ -130,9 +135,3 @@ def _own_addresses() -> list[str]:
     except OSError:
         pass
     return [address for address in found if not address.startswith("127.")]
-
-
-def _is_news(record: logging.LogRecord) -> bool:
-    """Return whether a log record reports an error other than responses that end with the server."""
-    cancelled = record.exc_info is not None and isinstance(record.exc_info[1], asyncio.CancelledError)
-    return not cancelled and "timeout graceful shutdown exceeded" not in record.getMessage()

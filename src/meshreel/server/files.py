@@ -1,0 +1,212 @@
+"""Answers from .reel files: whole or by ranges (RFC 9110), never mixed from two versions. In: a file. Out: a response.
+
+An open file is what is sent, whatever its name leads to by now. Where it changes meanwhile, the connection is closed.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from email.utils import formatdate
+from hashlib import blake2b
+from pathlib import Path
+from secrets import token_hex
+from typing import BinaryIO
+
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import Headers
+from starlette.responses import Response, StreamingResponse
+from starlette.staticfiles import NotModifiedResponse
+from starlette.types import Receive, Scope, Send
+
+from ..container.reader import FIRST_REQUEST
+from ..errors import FormatError
+from ..format.layout import Checksum, Preamble
+from ..format.records import least_size, unpack
+from .assets import BYTES, FRESH, SUM, is_unchanged
+from .library import Version, version_of
+
+LOG = logging.getLogger(__name__)
+PIECE = 65_536  # bytes that are read and sent at once (guess)
+MOST_RANGES = 100  # in a request (guess): whoever asks for more gets the whole file
+_RANGE = re.compile(r"(\d*)-(\d*)", re.ASCII)
+_MOST_DIGITS = 18  # of a number of bytes that may exist
+
+
+@dataclass(frozen=True, slots=True)
+class OpenFile:
+    """A file that is open for reading, with its facts from then."""
+
+    file: BinaryIO
+    found: os.stat_result
+    tag: str  # ETag
+
+    @staticmethod
+    def of(path: Path) -> OpenFile:
+        """Open a file and read its tag. Raises OSError."""
+        file = path.open("rb", buffering=0)
+        try:
+            found = os.fstat(file.fileno())
+            return OpenFile(file, found, f'"{_sum(file, version_of(found))}"')
+        except BaseException:
+            file.close()
+            raise
+
+    def read(self, piece: range) -> bytes | None:
+        """Return bytes of the file; None if it is not what it was, or not readable any more."""
+        try:
+            self.file.seek(piece.start)
+            data = self.file.read(len(piece))
+            now = os.fstat(self.file.fileno())
+        except OSError:
+            return None
+        is_same = (now.st_size, now.st_mtime_ns) == (self.found.st_size, self.found.st_mtime_ns)
+        return data if is_same and len(data) == len(piece) else None
+
+
+def tag_of(path: Path) -> str | None:
+    """Return the ETag of a file, None if it cannot be read."""
+    try:
+        opened = OpenFile.of(path)
+    except OSError:
+        return None
+    opened.file.close()
+    return opened.tag
+
+
+def _sum(file: BinaryIO, version: Version) -> str:
+    """Return a sum over a version of a file and its head, whose index has a checksum of every layer.
+
+    Files of equal size and time differ in it, unless they differ within the layers alone: then one of them is damaged.
+    """
+    head = file.read(FIRST_REQUEST)
+    try:
+        size = unpack(Preamble, head)[0].head_size
+    except FormatError:
+        size = 0  # not a .reel file
+    if size > len(head):  # the checksum of the head is at its end
+        file.seek(size - least_size(Checksum))
+        head += file.read(least_size(Checksum))
+    return blake2b(repr(version).encode() + head, digest_size=SUM).hexdigest()
+
+
+def answer(opened: OpenFile, asked: Headers, is_head: bool) -> Response:
+    """Return the response to a request with the headers `asked`; it closes the file."""
+    size, modified = opened.found.st_size, opened.found.st_mtime
+    dates = {"Last-Modified": formatdate(modified, usegmt=True)}
+    headers = Headers(FRESH | dates | {"ETag": opened.tag, "Accept-Ranges": "bytes"})
+    if is_unchanged(asked, headers):
+        opened.file.close()
+        return NotModifiedResponse(headers)
+    ranges = None if is_head or not _is_current(asked, headers, modified) else _asked_ranges(asked, size)
+    if ranges == []:
+        opened.file.close()
+        return Response(status_code=416, headers={**headers, "Content-Range": f"bytes */{size}"})
+    return _FileResponse(opened, dict(headers), ranges, is_head)
+
+
+def _is_current(asked: Headers, headers: Headers, modified: float) -> bool:
+    """Return whether If-Range allows ranges. A date within the last second does not tell two versions apart."""
+    stated = asked.get("if-range")
+    is_old = time.time() - modified > 1
+    return stated is None or stated == headers["etag"] or (is_old and stated == headers["last-modified"])
+
+
+def _asked_ranges(asked: Headers, size: int) -> list[range] | None:
+    stated = asked.getlist("range")
+    return parse_ranges(stated[0], size) if len(stated) == 1 else None
+
+
+def parse_ranges(text: str, size: int) -> list[range] | None:
+    """Return the ranges of a header Range in a file of `size` bytes, joined where they touch.
+
+    None where the header is to be ignored: of another unit, malformed, or of too many ranges. Without a range that
+    begins within the file, the list is empty.
+    """
+    unit, _, listed = text.partition("=")
+    items = [item for item in (item.strip(" \t") for item in listed.split(",")) if item]
+    if unit.lower() != "bytes" or not 0 < len(items) <= MOST_RANGES or (size == 0 and items[0][0] == "-"):
+        return None
+    found: list[range] = []
+    for item in items:
+        parts = _RANGE.fullmatch(item)
+        if parts is None or item == "-":
+            return None
+        first, last = (_number(digits) for digits in parts.groups())
+        if not parts[1]:
+            first, last = max(size - last, 0), size
+        elif not parts[2]:
+            last = size
+        elif last < first:
+            return None
+        _join(found, range(first, min(last + 1, size)))
+    return found
+
+
+def _number(digits: str) -> int:
+    digits = digits.lstrip("0")
+    return int(digits or "0") if len(digits) <= _MOST_DIGITS else sys.maxsize
+
+
+def _join(found: list[range], one: range) -> None:
+    """Add a range to a list, in place of those that it overlaps or touches."""
+    if not one:
+        return
+    for other in [other for other in found if other.start <= one.stop and one.start <= other.stop]:
+        found.remove(other)
+        one = range(min(one.start, other.start), max(one.stop, other.stop))
+    found.append(one)
+
+
+class _FileResponse(StreamingResponse):
+    """A file in pieces. Where it changes, the response stays incomplete, upon which uvicorn closes the connection."""
+
+    def __init__(self, opened: OpenFile, headers: dict[str, str], ranges: list[range] | None, is_head: bool) -> None:
+        size = opened.found.st_size
+        parts: list[bytes | range] = [range(size)] if ranges is None else [*ranges]
+        if ranges is not None and len(ranges) == 1:
+            headers["Content-Range"] = _content_range(ranges[0], size)
+        elif ranges is not None:
+            boundary = token_hex(13)  # 104 random bits, which no file has
+            headers["Content-Type"] = f"multipart/byteranges; boundary={boundary}"
+            parts = _multipart(ranges, size, boundary)
+        headers["Content-Length"] = str(sum(map(len, parts)))
+        self._opened, self._parts = opened, [] if is_head else parts
+        super().__init__((), 200 if ranges is None else 206, headers, BYTES)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._opened.file.close()
+
+    async def stream_response(self, send: Send) -> None:
+        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+        for piece in (piece for part in self._parts for piece in _pieces(part)):
+            data = piece if isinstance(piece, bytes) else await run_in_threadpool(self._opened.read, piece)
+            if data is None:
+                LOG.warning("%r has changed while it was sent: closed the connection", self._opened.file.name)
+                return
+            await send({"type": "http.response.body", "body": data, "more_body": True})
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+
+def _pieces(part: bytes | range) -> Iterator[bytes | range]:
+    return iter([part]) if isinstance(part, bytes) else (part[at : at + PIECE] for at in range(0, len(part), PIECE))
+
+
+def _multipart(ranges: list[range], size: int, boundary: str) -> list[bytes | range]:
+    parts: list[bytes | range] = []
+    for one in ranges:
+        head = f"--{boundary}\r\nContent-Type: {BYTES}\r\nContent-Range: {_content_range(one, size)}\r\n\r\n"
+        parts += [(("\r\n" if parts else "") + head).encode(), one]
+    return [*parts, f"\r\n--{boundary}--\r\n".encode()]
+
+
+def _content_range(one: range, size: int) -> str:
+    return f"bytes {one.start}-{one.stop - 1}/{size}"

@@ -1,0 +1,116 @@
+"""Program that draws posters, the normals of the first frame with a surface. In: paths, as lines of JSON. Out: PNGs.
+
+It runs as a process of its own, so that a hostile file costs no more than limits of memory and time. It ends with the
+server: when its input ends, and on POSIX by an alarm, even where a library never returns.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import struct
+import sys
+from contextlib import suppress
+from pathlib import Path
+from queue import SimpleQueue
+from threading import Thread
+
+import numpy as np
+
+from ..decoder.video import Video
+from ..decoder.video import open as open_video
+from ..errors import MeshreelError
+from ..types import Mesh
+
+WIDTH, HEIGHT = 480, 360  # pixels (guess)
+FIELD = 30.0  # degrees, vertical (guess)
+LOOKED_AT = 30  # frames that are searched for a surface (guess)
+MEMORY = 2**31  # bytes (guess); drawing 1.6 M faces takes 0.8e9 (measured)
+PATIENCE = 10  # s for a poster (guess); drawing 1.6 M faces takes 3 (measured)
+SIZE = struct.Struct("<I")  # bytes of the picture that follows; 0 for none
+
+
+def main() -> None:
+    """Draw a poster for each line, until input ends. An empty answer at the start says that all is ready."""
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # libraries that print must not disturb the answers
+    with suppress(ModuleNotFoundError):  # without the renderer there are no posters
+        import open3d  # noqa: F401  (before the limits: it takes seconds and is no fault of a file)
+    _limit_memory()
+    paths: SimpleQueue[str] = SimpleQueue()
+    Thread(target=_read, args=(paths,), daemon=True).start()
+    _answer(out, b"")
+    while True:
+        path = paths.get()
+        _set_alarm(PATIENCE + 1)  # the server is earlier, if it lives
+        picture = poster(Path(path))
+        _set_alarm(0)
+        _answer(out, picture or b"")
+
+
+def _read(paths: SimpleQueue[str]) -> None:
+    for line in sys.stdin.buffer:
+        paths.put(json.loads(line))
+    os._exit(0)  # the server has ended
+
+
+def _answer(out: io.BufferedWriter, picture: bytes) -> None:
+    out.write(SIZE.pack(len(picture)) + picture)
+    out.flush()
+
+
+def _limit_memory() -> None:
+    with suppress(ModuleNotFoundError, OSError, ValueError):  # Windows has no such limit, macOS does not keep to it
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _set_alarm(seconds: float) -> None:
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+
+
+def poster(path: Path) -> bytes | None:
+    """Return a PNG, None for damaged and empty files and without the renderer (extra `encode`)."""
+    try:
+        with open_video(path) as video:
+            mesh = _first(video)
+            return None if mesh is None else picture(mesh, video.reader.up)
+    except (MeshreelError, OSError, ModuleNotFoundError):
+        return None
+
+
+def _first(video: Video) -> Mesh | None:
+    """Return the first frame with a surface, None if the first LOOKED_AT have none."""
+    frames = (video[index] for index in range(min(len(video), LOOKED_AT)))
+    return next((mesh for mesh in frames if not mesh.is_empty), None)
+
+
+def picture(mesh: Mesh, up: str) -> bytes:
+    """Return an upright PNG with a transparent background, from the front unless another side shows twice as much."""
+    from PIL import Image
+
+    from ..geometry.raycast import Rays
+    from ..metrics.render import Crop, look
+    from ..metrics.viewpoints import Box, ViewOptions, views_around
+
+    box, rays = Box.of([mesh]), Rays(mesh)
+    shown = []  # in each of the four views, pixels with the fronts of faces less those with backs: walls from outside
+    for camera in views_around(box, ViewOptions(WIDTH // 4, HEIGHT // 4, FIELD, up=up)):
+        seen = rays.look(camera)
+        shown.append(int((seen.faces >= 0).sum()) - 2 * int(rays.backs(camera, seen).sum()))
+    best = int(np.argmax(shown)) if max(shown) > 2 * shown[0] else 0
+    view = look(mesh, views_around(box, ViewOptions(WIDTH, HEIGHT, FIELD, up=up))[best], Crop(0, HEIGHT, 0, WIDTH))
+    pixels = np.dstack([view.colors, view.covered])
+    out = io.BytesIO()
+    Image.fromarray((255 * pixels).round().astype(np.uint8)).save(out, "PNG")
+    return out.getvalue()
+
+
+if __name__ == "__main__":
+    main()
