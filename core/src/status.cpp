@@ -19,6 +19,17 @@ const char* mr_message(int status) {
         case MR_BAD_SYMBOLS: return "the symbols of a field are truncated or damaged";
         case MR_NO_PREVIOUS: return "a level that is counted from a group which is not at hand, or not to this level";
         case MR_NOT_FINITE: return "vertices that are not finite";
+        case MR_NOT_DRACO: return "no Draco data of version 2.2";
+        case MR_DRACO_CLOUD: return "a point cloud where a mesh belongs";
+        case MR_DRACO_SEQUENTIAL: return "a mesh in sequential coding, not in edgebreaker's";
+        case MR_DRACO_METADATA: return "metadata, which no mesh of a stream has";
+        case MR_DRACO_TRAVERSAL: return "a traversal of faces that is neither standard nor by valence";
+        case MR_DRACO_CLAIMS: return "more faces or points than so few bytes may claim";
+        case MR_DRACO_STEPS: return "vertices of many faces that are joined again and again";
+        case MR_DRACO_ATTRIBUTES: return "attributes other than one of positions: three quantised 32-bit floats";
+        case MR_DRACO_PREDICTION: return "positions that are not predicted by wrapped parallelograms";
+        case MR_DRACO_LATTICE: return "a lattice that is not finite, or of more than 30 bits";
+        case MR_BAD_DRACO: return "parts that do not fit its bytes, or counts that contradict each other";
         default: return "an unknown status";
     }
 }

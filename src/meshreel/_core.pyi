@@ -5,6 +5,10 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Float64, Int32, Int64, UInt8
 
+# bind_draco.cpp
+
+def check_draco(meshes: list[bytes]) -> None: ...
+
 # bind_dense.cpp
 
 def products(a: Float64[np.ndarray, "N r k"], b: Float64[np.ndarray, "N k c"]) -> Float64[np.ndarray, "N r c"]: ...

@@ -26,6 +26,18 @@ enum mr_status {
     MR_BAD_SYMBOLS,   // the symbols of a field: see MR_BAD_STREAM
     MR_NO_PREVIOUS,   // a level is counted from another group, which the caller does not have
     MR_NOT_FINITE,    // decoded vertices
+    // Draco bytes that no encoder of this format wrote:
+    MR_NOT_DRACO,         // nor of the one version
+    MR_DRACO_CLOUD,       // not a mesh
+    MR_DRACO_SEQUENTIAL,  // not edgebreaker
+    MR_DRACO_METADATA,
+    MR_DRACO_TRAVERSAL,
+    MR_DRACO_CLAIMS,  // more faces or points than its bytes may claim
+    MR_DRACO_STEPS,   // faces that are joined again and again
+    MR_DRACO_ATTRIBUTES,
+    MR_DRACO_PREDICTION,
+    MR_DRACO_LATTICE,
+    MR_BAD_DRACO,  // its parts do not fit its bytes, or its counts each other
 };
 
 // A status in words, without a full stop.

@@ -7,16 +7,16 @@ encoder must continue from its decoded bytes. The empty mesh is the empty string
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from .. import _core
 from ..errors import FormatError, InputError
 from ..types import Mesh
 
 MAX_BITS = 21  # bits per coordinate that Draco's float32 positions can hold
-COMPRESSION_LEVEL = 7  # from the paper
-EDGEBREAKER = 1  # Draco's number of the method
-MOST_PER_BYTE = 20_000  # vertices or faces per byte; a flat, regular grid reaches a thousand: a guess with a margin
+COMPRESSION_LEVELS = (7, 5)  # the paper's; the highest at which each face costs a bit, whatever the mesh is like
 MAX_FACES = 64_000_000  # faces or vertices of a group: a limit of memory, a guess
 
 
@@ -25,6 +25,27 @@ def encode_mesh(mesh: Mesh, step: float) -> bytes:
 
     Raises InputError if the extent needs more than 21 bits at that step.
     """
+    return encode_meshes([mesh], step)[0]
+
+
+def encode_meshes(meshes: Sequence[Mesh], step: float) -> tuple[bytes, ...]:
+    """Encode meshes that are decoded together, as `encode_mesh`.
+
+    Large, flat, regular meshes take so few bytes that no reader would believe these (`check_claims`); they are coded
+    plainly.
+    """
+    for level in COMPRESSION_LEVELS:
+        coded = tuple(_encode_draco(mesh, step, level) for mesh in meshes)
+        try:
+            check_claims(coded)
+        except FormatError as error:
+            refused = error
+            continue
+        return coded
+    raise InputError(f"a mesh of {max(len(mesh.faces) for mesh in meshes)} faces: {refused}; simplify it")
+
+
+def _encode_draco(mesh: Mesh, step: float, level: int) -> bytes:
     if mesh.is_empty:
         return b""
     import DracoPy
@@ -43,7 +64,7 @@ def encode_mesh(mesh: Mesh, step: float) -> bytes:
             mesh.vertices,
             mesh.faces,
             quantization_bits=bits,
-            compression_level=COMPRESSION_LEVEL,
+            compression_level=level,
             quantization_range=float((2**bits - 1) * step),
             quantization_origin=low,
         )
@@ -59,7 +80,7 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
         return Mesh.empty()
     import DracoPy
 
-    _check_claims(data)
+    check_claims([data])
     try:
         decoded = DracoPy.decode(bytes(data))
         with np.errstate(all="ignore"):  # a step near 0, which no encoder uses, is refused below
@@ -74,24 +95,15 @@ def decode_mesh(data: bytes, step: float) -> Mesh:
     return mesh
 
 
-def _check_claims(data: bytes) -> None:
-    """Raise FormatError if the head of Draco bytes claims more than they can hold, before Draco allocates memory.
+def check_claims(meshes: Sequence[bytes]) -> None:
+    """Raise FormatError for Draco meshes of kinds that no encoder writes, or that claim more than their bytes may.
 
-    The head, by Draco's bitstream specification: "DRACO", version (2 bytes), geometry type, method, flags (2); then the
-    traversal (edgebreaker only), and the numbers of vertices and faces as varints.
+    Draco takes memory for what is claimed before it knows better. The rules are in FORMAT.md ("A mesh").
     """
-    if len(data) > 10 and data[10] & 0x80:
-        raise FormatError("damaged Draco data: it has metadata, which no mesh of a stream has")
-    start = 12 if len(data) > 8 and data[8] == EDGEBREAKER else 11
-    for _ in range(2):
-        count, shift = 0, 0
-        while start < len(data):
-            count |= (data[start] & 0x7F) << shift
-            shift, start = shift + 7, start + 1
-            if not data[start - 1] & 0x80 or shift > 63:
-                break
-        if count > MOST_PER_BYTE * len(data):
-            raise FormatError(f"damaged Draco data: {len(data)} bytes that claim {count} vertices or faces")
+    try:
+        _core.check_draco([bytes(mesh) for mesh in meshes])
+    except FormatError as error:
+        raise FormatError(f"damaged Draco data ({sum(map(len, meshes))} bytes): {error}") from error
 
 
 def check_growth(mesh: Mesh, levels: int, frames: int = 1) -> None:

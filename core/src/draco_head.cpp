@@ -1,0 +1,105 @@
+#include <algorithm>
+#include <cstring>
+
+#include "draco_faces.h"
+#include "draco_reader.h"
+#include "guarded.h"
+#include "meshreel/draco.h"
+
+// Facts about the bytes: Draco's bitstream specification, version 2.2.
+
+namespace meshreel {
+namespace {
+
+// Faces, or points, that Draco meshes decoded together may claim: some, and more for each of their bytes. Each takes
+// some 60 bytes of memory. Real meshes have at most 6 faces a byte, and those of the standard traversal 8, whatever
+// they are.
+constexpr uint64_t kFree = 1 << 17, kPerByte = 16;
+constexpr uint64_t kMost = 64'000'000;  // MAX_FACES of coding/mesh.py
+// Corners that Draco may rename, at some 13 ns each. Real meshes have less than one a face.
+constexpr uint64_t kFreeSteps = 1 << 24, kStepsPerFace = 64;
+
+constexpr uint8_t kBegin[] = {'D', 'R', 'A', 'C', 'O', 2, 2};
+constexpr uint8_t kMesh = 1, kEdgebreaker = 1;
+constexpr uint8_t kPositions = 0, kFloat32 = 9, kQuantised = 2;
+constexpr int kMostBits = 30;  // of a coordinate
+
+uint64_t most_of(uint64_t bytes) { return bytes < kMost ? std::min(kFree + kPerByte * bytes, kMost) : kMost; }
+
+int check_kind(DracoReader& in) {
+    const uint8_t* begin = in.take(sizeof kBegin);
+    if (!begin || std::memcmp(begin, kBegin, sizeof kBegin) != 0) return MR_NOT_DRACO;
+    if (in.byte() != kMesh) return MR_DRACO_CLOUD;
+    if (in.byte() != kEdgebreaker) return MR_DRACO_SEQUENTIAL;
+    const uint8_t low = in.byte(), high = in.byte();
+    return (low | high) != 0 ? MR_DRACO_METADATA : MR_OK;
+}
+
+int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most) {
+    const auto traversal = static_cast<DracoTraversal>(in.byte());
+    claims.points = in.varint(), claims.faces = in.varint();
+    const uint8_t attributes = in.byte();  // with seams of their own
+    claims.symbols = in.varint(), claims.splits = in.varint();
+    if (!in.good()) return MR_BAD_DRACO;
+    if (traversal != DracoTraversal::Standard && traversal != DracoTraversal::ByValence) return MR_DRACO_TRAVERSAL;
+    if (attributes != 0) return MR_DRACO_ATTRIBUTES;
+    if (claims.faces > most || claims.points > most || claims.splits > most - claims.points) return MR_DRACO_CLAIMS;
+    if (claims.symbols > claims.faces) return MR_BAD_DRACO;
+    uint64_t steps = 0;
+    if (!read_draco_faces(in, traversal, claims, steps)) return MR_BAD_DRACO;
+    return steps <= kFreeSteps + kStepsPerFace * claims.faces ? MR_OK : MR_DRACO_STEPS;
+}
+
+int check_attributes(DracoReader& in) {
+    constexpr uint8_t decoders = 1, no_seams = 0xff, of_points = 0, depth_first = 0, attributes = 1, plain = 0;
+    constexpr uint8_t sole[] = {decoders, no_seams, of_points, depth_first, attributes, kPositions, kFloat32, 3, plain};
+    const uint8_t* found = in.take(sizeof sole);
+    if (!found || std::memcmp(found, sole, sizeof sole) != 0) return MR_DRACO_ATTRIBUTES;
+    in.varint();  // its name
+    return in.byte() == kQuantised ? MR_OK : MR_DRACO_ATTRIBUTES;
+}
+
+bool is_finite(const uint8_t* number) {  // a 32-bit float
+    return (number[3] & 0x7f) != 0x7f || (number[2] & 0x80) == 0;
+}
+
+int check_positions(DracoReader& in, const DracoClaims& claims) {
+    constexpr uint8_t parallelogram = 1, wrapped = 1, compressed = 1;
+    if (in.byte() != parallelogram || in.byte() != wrapped || in.byte() != compressed) return MR_DRACO_PREDICTION;
+    in.symbols(claims.points, 3, DracoReader::kAnyValue, nullptr);
+    in.take(8);                            // bounds of the wrapping
+    const uint8_t* numbers = in.take(16);  // the lattice's corner and its width
+    const uint8_t bits = in.byte();
+    if (!in.at_end()) return MR_BAD_DRACO;
+    for (int k = 0; k < 4; ++k)
+        if (!is_finite(numbers + 4 * k)) return MR_DRACO_LATTICE;
+    return bits >= 1 && bits <= kMostBits ? MR_OK : MR_DRACO_LATTICE;
+}
+
+int check_mesh(const mr_bytes& mesh, DracoClaims& claims, uint64_t most) {
+    DracoReader in(mesh.data, mesh.size);
+    int status = check_kind(in);
+    if (status == MR_OK) status = read_connectivity(in, claims, most);
+    if (status == MR_OK) status = check_attributes(in);
+    if (status == MR_OK) status = check_positions(in, claims);
+    return status;
+}
+
+}  // namespace
+}  // namespace meshreel
+
+int mr_check_draco(const mr_bytes* meshes, size_t count) {
+    using namespace meshreel;
+    uint64_t bytes = 0, faces = 0, points = 0;
+    for (size_t k = 0; k < count; ++k) bytes += meshes[k].size;
+    const uint64_t most = most_of(bytes);
+    for (size_t k = 0; k < count; ++k) {
+        if (meshes[k].size == 0) continue;  // the empty mesh
+        DracoClaims claims{};
+        const int status = guarded(MR_NO_MEMORY, MR_BAD_DRACO, [&] { return check_mesh(meshes[k], claims, most); });
+        if (status != MR_OK) return status;
+        faces += claims.faces, points += claims.points + claims.splits;
+        if (faces > most || points > most) return MR_DRACO_CLAIMS;
+    }
+    return MR_OK;
+}
