@@ -8,9 +8,11 @@ import sys
 import pytest
 from starlette.testclient import TestClient
 
+from meshreel.container.sources import FileSource
 from meshreel.errors import InputError
+from meshreel.server import library
 from meshreel.server.app import make_app
-from meshreel.server.library import Library
+from meshreel.server.library import Facts, Library
 from tests.server.conftest import ODD
 
 BYTES_AS_NAMES = sys.platform == "linux"
@@ -114,3 +116,35 @@ def test_one_file_is_served_whatever_its_suffix(folder, player):
     client = TestClient(make_app(Library.of_file(folder / "walk.bin"), player))
     assert client.get("/files/walk.bin").status_code == 200
     assert client.get("/files/cut.reel").status_code == client.get("/files/secret.txt").status_code == 404
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Names of the files whose heads were read."""
+    names: list[str] = []
+    monkeypatch.setattr(library, "FileSource", lambda path: names.append(path.name) or FileSource(path))
+    return names
+
+
+def test_a_gallery_of_500_files_reads_the_heads_of_changed_files_alone(folder, opened, monkeypatch):
+    monkeypatch.setattr(library, "RECENT", -1.0)  # nothing counts as changed just now
+    for number in range(500):
+        (folder / f"{number}.reel").write_bytes(b"none")
+    facts = Facts(Library(folder))
+    first = facts.entries()
+    assert len(opened) == len(first) == 504
+    opened.clear()
+    assert facts.entries() == first and opened == []
+    old = (folder / "7.reel").stat()
+    (folder / "7.reel").write_bytes((folder / "cut.reel").read_bytes())
+    (folder / "8.reel").unlink()
+    (folder / "9.reel").rename(folder / "renamed.reel")
+    os.utime(folder / "7.reel", ns=(old.st_atime_ns, old.st_mtime_ns))
+    changed = {entry.name: entry for entry in facts.entries()}
+    assert opened == ["7.reel", "renamed.reel"] and "truncated" in changed["7.reel"].error
+    assert "8.reel" not in changed and len(changed) == 503
+
+
+def test_a_file_that_may_change_without_another_time_is_read_again(folder, opened):
+    facts = Facts(Library.of_file(folder / "walk.reel"))
+    assert facts.entries() == facts.entries() and opened == ["walk.reel", "walk.reel"]

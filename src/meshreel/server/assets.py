@@ -18,6 +18,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.staticfiles import NotModifiedResponse, StaticFiles
 
+from .library import Version, version_of
 from .pages import POLICY
 
 # Not from the system, whose list may be wrong (on Windows, it is in the registry) or missing.
@@ -88,14 +89,14 @@ class Player:
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._lock = folder, threading.Lock()
-        self._seen: list[tuple[str, int, int]] = []
+        self._seen: list[tuple[str, Version]] = []
         self._edition, self._files = "", dict[str, Asset]()
 
     def load(self) -> tuple[str, dict[str, Asset]]:
         """Return the edition and the files by name; "" and none where the player is not built."""
         with self._lock:
             files = sorted(path for path in self._folder.glob("*") if path.is_file())
-            seen = [(path.name, (found := path.stat()).st_size, found.st_mtime_ns) for path in files]
+            seen = [(path.name, version_of(path.stat())) for path in files]
             if seen != self._seen:
                 self._files = {path.name: Asset.of(path.read_bytes(), _type(path)) for path in files}
                 sums = "".join(f"{name} {asset.digest}\n" for name, asset in self._files.items())

@@ -1,7 +1,7 @@
 """Program that draws posters, the normals of the first frame with a surface. In: paths, as lines of JSON. Out: PNGs.
 
 It runs as a process of its own, so that a hostile file costs no more than limits of memory and time. It ends with the
-server: when its input ends, and on POSIX by an alarm, even where a library never returns.
+server: when its input ends; if a library never returns, Linux kills it at once, and other POSIX systems by an alarm.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ def main() -> None:
     """Draw a poster for each line, until input ends. An empty answer at the start says that all is ready."""
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # libraries that print must not disturb the answers
+    _end_with_parent()
     with suppress(ModuleNotFoundError):  # without the renderer there are no posters
         import open3d  # noqa: F401  (before the limits: it takes seconds and is no fault of a file)
     _limit_memory()
@@ -67,6 +68,14 @@ def _limit_memory() -> None:
 
         resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _end_with_parent() -> None:
+    """Ask Linux to kill this process when the thread of the server that started it ends."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL))  # 1: PR_SET_PDEATHSIG of linux/prctl.h
 
 
 def _set_alarm(seconds: float) -> None:
