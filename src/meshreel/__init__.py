@@ -9,15 +9,15 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .decoder.video import Video, open
 from .errors import FormatError, InputError, MeshreelError
-from .types import Mesh, MeshList, MeshSequence, as_sequence
 
 if TYPE_CHECKING:
+    from .decoder.video import Video, open
     from .encoder.options import EncoderOptions
     from .encoder.presets import preset_options
     from .encoder.sequence import encode
     from .io.sequence import SequenceOptions, open_sequence
+    from .types import Mesh, MeshList, MeshSequence, as_sequence
 
 __version__ = "0.1.0"
 
@@ -38,8 +38,10 @@ __all__ = [
     "preset_options",
 ]
 
-# Imported on first use, so that decoding never imports the encoder.
+# Imported on first use: decoding never imports the encoder, and the command line heeds Ctrl-C before NumPy is loaded.
 _LATER = {
+    **dict.fromkeys(("Video", "open"), ".decoder.video"),
+    **dict.fromkeys(("Mesh", "MeshList", "MeshSequence", "as_sequence"), ".types"),
     "EncoderOptions": ".encoder.options",
     "SequenceOptions": ".io.sequence",
     "encode": ".encoder.sequence",

@@ -240,6 +240,6 @@ def test_any_name_that_a_file_may_have_can_be_the_output(run, tmp_path):
 
 
 def test_a_size_that_no_header_holds_is_reported_before_anything_is_coded(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("meshreel.encoder.sequence.encode_interval", lambda *_: pytest.fail("coded"))
+    monkeypatch.setattr("meshreel.encoder.recipe.encode_interval", lambda *_: pytest.fail("coded"))
     obj(tmp_path, "f0.obj", TRIANGLE.replace("1", "1e12") + "f 1 2 3\n")
     assert failed(run("encode", tmp_path, "-o", tmp_path / "a.reel", "--scale", "1e9"), "Header.scale")

@@ -124,5 +124,5 @@ def test_a_reader_that_leaves_is_no_error():
 
 @pytest.mark.parametrize("arguments", [(), ("run", "figure6", "-o", "rows.jsonl", "--jobs", "2")])
 def test_without_the_bench_its_command_names_the_distribution(run, monkeypatch, arguments):
-    monkeypatch.setattr("meshreel.cli.entry_points", lambda **_: [])
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: [])
     assert failed(run("bench", *arguments), "pip install meshreel-bench")

@@ -163,9 +163,11 @@ def test_preset_paper_has_scenes_too(tmp_path):
 
 @pytest.mark.parametrize("preset", ["paper", "best"])
 def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, monkeypatch, tmp_path):
-    noises, coded = [], scene._coded_intervals
+    noises, coded = [], scene.encode_intervals
     monkeypatch.setattr(
-        scene, "_coded_intervals", lambda some, job: noises.extend(i.noise for i in some) or coded(some, job)
+        scene,
+        "encode_intervals",
+        lambda job, some, stages: noises.extend(i.noise for i in some) or coded(job, some, stages),
     )
     video, _ = encoded(ROLLING, tmp_path / "a.reel", quick_scene(preset, group_size=1))
     assert noises

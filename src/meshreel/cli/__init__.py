@@ -1,7 +1,8 @@
 """The command line `meshreel capture|segment|encode|decode|export|info|compare|play|serve|bench|demo`.
 
 Errors take one line on standard error and exit code 2; `--debug` shows the traceback. The module of a command is
-imported when the command is called, so that `decode` and `info` work without the extra `encode`.
+imported when the command is called, so that `decode` and `info` work without the extra `encode`. This module imports
+nothing heavy, so that Ctrl-C is heeded from the first moment.
 """
 
 from __future__ import annotations
@@ -12,21 +13,21 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from importlib.metadata import entry_points
 from types import FrameType
-from typing import NoReturn
-
-from cyclopts import App, CycloptsError, MissingArgumentError
+from typing import TYPE_CHECKING, NoReturn
 
 from .. import __version__
 from ..errors import MeshreelError
+
+if TYPE_CHECKING:
+    from cyclopts import App, MissingArgumentError
 
 FAILED = 2
 INTERRUPTED = 130  # 128 + SIGINT, as shells have it
 TERMINATED = 143  # 128 + SIGTERM
 PIPE_CLOSED = 141  # 128 + SIGPIPE
+_STOPPED = {False: "interrupted", True: "terminated"}  # by whether it was SIGTERM
 
 COMMANDS = {
     "capture": "Fuse recordings of depth cameras into one mesh per frame.",
@@ -55,6 +56,10 @@ PLUGINS = "meshreel.commands"  # entry points by which other distributions add c
 
 def make_app() -> App:
     """Return the parser of the command line, with the commands that other distributions add."""
+    from importlib.metadata import entry_points
+
+    from cyclopts import App
+
     help = "Compression of time-varying meshes."
     app = App(name="meshreel", help=help, version=__version__, suppress_keyboard_interrupt=False)
     for name, text in COMMANDS.items():
@@ -78,34 +83,49 @@ def run_app(make: Callable[[], App], arguments: Sequence[str] | None = None) -> 
     Without `arguments` it takes those of the process and exits with the code.
     """
     tokens = list(sys.argv[1:] if arguments is None else arguments)
-    stopped: list[int] = []
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a file name that the terminal cannot show is no error
-    try:
-        with _signals_raise(stopped):
-            make()(tokens, exit_on_error=False, print_error=False, result_action="return_value")
-        code = 0
-    except KeyboardInterrupt:
-        code = _report("interrupted", INTERRUPTED)
-    except Terminated:
-        code = _report("terminated", TERMINATED)
-    except BrokenPipeError:  # the reader of our output is gone
-        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  (or the interpreter complains at its end)
-        code = PIPE_CLOSED
-    except Exception as error:
-        if stopped:  # a signal during the import of a compiled module becomes an ImportError
-            code = _report(*(("terminated", TERMINATED) if signal.SIGTERM in stopped else ("interrupted", INTERRUPTED)))
-        elif "--debug" in tokens:
-            raise
-        else:
-            code = _report(f"error: {one_line(error)}", FAILED)
+    signals = _Signals(raises=arguments is not None)
+    with signals.heeded(lasting=arguments is None):
+        code = _run(make, tokens, signals)
     if arguments is None:
         sys.exit(code)
     return code
 
 
+def _run(make: Callable[[], App], tokens: list[str], signals: _Signals) -> int:
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file name that the terminal cannot show is no error
+    try:
+        command, bound, _ = make().parse_args(tokens, exit_on_error=False, print_error=False)
+        with signals.raised():
+            command(*bound.args, **bound.kwargs)
+        return 0
+    except (KeyboardInterrupt, Terminated) as error:
+        return _stopped(signal.SIGTERM if isinstance(error, Terminated) else signal.SIGINT, error)
+    except BrokenPipeError:  # the reader of our output is gone
+        sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115  (or the interpreter complains at its end)
+        return PIPE_CLOSED
+    except Exception as error:
+        if signals.heard:  # a signal during the import of a compiled module becomes an ImportError
+            return _stopped(signals.heard[-1], error)
+        if "--debug" in tokens:
+            raise
+        return _report(f"error: {one_line(error)}", FAILED)
+
+
 def one_line(error: Exception) -> str:
     """Return what went wrong and what to do, without line breaks."""
+    return _noted(_text_of(error), error)
+
+
+def _noted(text: str, error: BaseException) -> str:
+    return "; ".join([text, *getattr(error, "__notes__", ())])
+
+
+def _text_of(error: Exception) -> str:
+    from concurrent.futures.process import BrokenProcessPool
+
+    from cyclopts import CycloptsError, MissingArgumentError
+
     if isinstance(error, ImportError) and isinstance(error.__cause__, ModuleNotFoundError):
         error = error.__cause__  # raised by the import of the command's module
     text = " ".join(str(error).split()) or type(error).__name__
@@ -140,21 +160,48 @@ def _report(text: str, code: int) -> int:
     return code
 
 
-@contextmanager
-def _signals_raise(stopped: list[int]) -> Iterator[None]:
-    """Turn SIGINT and SIGTERM into exceptions and append their numbers to `stopped`."""
+def _stopped(number: int, error: BaseException) -> int:
+    terminated = number == signal.SIGTERM
+    return _report(_noted(_STOPPED[terminated], error), TERMINATED if terminated else INTERRUPTED)
 
-    def stop(number: int, _frame: FrameType | None) -> NoReturn:
-        stopped.append(number)
-        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
 
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread may set handlers
-        return
-    heard = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, stop) for number in heard}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+class _Signals:
+    """SIGINT and SIGTERM: exceptions while a command runs; while modules are loaded, they end the process.
+
+    In the middle of an import, an exception may be lost, or come out as another one with a traceback.
+    """
+
+    def __init__(self, raises: bool) -> None:
+        self.heard: list[int] = []
+        self.raises = raises
+
+    @contextmanager
+    def heeded(self, lasting: bool) -> Iterator[None]:
+        """Heed signals in the block and, if `lasting`, to the end of the process."""
+        if threading.current_thread() is not threading.main_thread():
+            yield  # only the main thread may set handlers
+            return
+        heard = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not signal.SIG_IGN]
+        before = {number: signal.signal(number, self._stop) for number in heard}
+        try:
+            yield
+        finally:
+            for number, handler in {} if lasting else before.items():
+                signal.signal(number, handler)
+
+    @contextmanager
+    def raised(self) -> Iterator[None]:
+        """Turn signals into exceptions in the block."""
+        before, self.raises = self.raises, True
+        try:
+            yield
+        finally:
+            self.raises = before
+
+    def _stop(self, number: int, _frame: FrameType | None) -> NoReturn:
+        self.heard.append(number)
+        terminated = number == signal.SIGTERM
+        if not self.raises:
+            os.write(2, f"meshreel: {_STOPPED[terminated]}\n".encode())
+            os._exit(TERMINATED if terminated else INTERRUPTED)
+        raise Terminated if terminated else KeyboardInterrupt

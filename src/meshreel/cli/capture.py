@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from ..capture.fusion import FusionOptions
 from ..capture.recording import Recording, open_recording
 from ..errors import InputError
+from ..io.differences import first_difference
 from ..io.sequence import CAPTURED
 from ..io.write import frame_names, make_folder, replacing, write_mesh
 from .console import Common
@@ -113,22 +114,10 @@ def _started(output: Path, made: dict[str, Any], names: list[str]) -> set[str]:
             raise InputError(f"{path}: cannot be read ({error}); delete the folder, or choose another") from None
         if before != (now := json.loads(json.dumps(made))):
             text = f"{output}: holds frames of another rig or of other options"
-            raise InputError(f"{text} ({_difference(before, now)}); choose another folder")
+            raise InputError(f"{text} ({first_difference(before, now)}); choose another folder")
     elif any(output.glob("frame_*")):
         raise InputError(f"{output}: holds frames without a {CAPTURED}; choose another folder")
     else:
         with replacing(path) as file:
             file.write((json.dumps(made, indent=1) + "\n").encode())
     return set(names) - there
-
-
-def _difference(before: Any, now: Any, name: str = "") -> str:
-    """Return the first entry in which two records differ, and the beginning of both values."""
-    if isinstance(before, dict) and isinstance(now, dict):
-        key = next(key for key in {**now, **before} if key not in now or key not in before or before[key] != now[key])
-        return _difference(before.get(key), now.get(key), f"{name}.{key}" if name else key)
-    if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        number = next(number for number, pair in enumerate(zip(before, now, strict=True)) if pair[0] != pair[1])
-        return _difference(before[number], now[number], f"{name}[{number}]")
-    values = [json.dumps(value) for value in (before, now)]
-    return f"{name} {values[0]:.60}, now {values[1]:.60}"

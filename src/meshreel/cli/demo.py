@@ -26,8 +26,9 @@ from ..metrics.scene_comparison import compare_with_truth
 from ..types import MeshSequence
 from .compare import truth_table
 from .console import Common, StageBars, called_as
-from .encode import describe, summary_row, workers
+from .encode import describe, summary_row
 from .info import describe_file, rate_table
+from .workers import workers
 
 _QUALITY = preset_options().quality
 _JUDGED = 4  # frames, at most, that are compared with the truth: each takes seconds (guess)
@@ -67,7 +68,7 @@ def command(
     file, picture = output / "demo.reel", output / "demo.png"
     with common.stages(frames) as progress, workers(jobs) as executor:
         capture = _captured(output / "rig", room, progress)
-        summary = encode(capture, file, options=options, executor=executor, progress=progress)
+        summary = encode(capture, file, options=options, executor=executor, progress=progress, resume=False)
         with open_video(file) as video:
             truth = _judged(output / "rig", capture, video, progress)
             write_sheet(capture, video, picture, SheetOptions(frames=_spread(frames, 3), height=360, unit="mm"))

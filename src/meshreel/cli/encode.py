@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import math
-import multiprocessing
-import signal
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -23,6 +18,7 @@ from ..errors import InputError
 from .console import Common
 from .flags import Reading
 from .sources import Masking, open_source
+from .workers import workers
 
 DEFAULT_QUALITY = preset_options().quality
 
@@ -107,6 +103,7 @@ def command(
     parting: Parting = Parting(),
     masking: Masking = Masking(),
     jobs: int = 1,
+    resume: bool | None = None,
     common: Common = Common(),
 ) -> None:
     """Encode a sequence of meshes into one .reel file.
@@ -123,6 +120,9 @@ def command(
         The .reel file to write; it appears only when it is complete.
     jobs
         Number of intervals to encode side by side; the file is the same.
+    resume
+        Continue an encode that was stopped, from the intervals that OUTPUT.part has: give the same inputs and options.
+        --no-resume starts over. By default, what could be continued is an error.
     """
     if output.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
@@ -141,9 +141,9 @@ def command(
     with common.stages(len(sequence)) as progress, workers(jobs) as executor:
         encoder = Encoder(sequence, executor, progress, masker)
         if goal is None:
-            summary = encoder.encode(output, options)
+            summary = encoder.encode(output, options, resume)
         else:
-            summary, quality = encode_to(encoder, output, goal, options_at)
+            summary, quality = encode_to(encoder, output, goal, options_at, resume)
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
     if summary.scene is None and parting.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
@@ -223,28 +223,3 @@ def _reached(row: dict[str, Any]) -> str:
         return f"quality {row['quality']:g}"
     some = "" if row["scene"] is None else f" in {len(row['scene']['measured_frames'])} frames"
     return f"quality {row['quality']:g}, D2-PSNR {psnr:.2f} dB{some}"
-
-
-@contextmanager
-def workers(jobs: int) -> Iterator[Executor | None]:
-    """Start processes that encode `jobs` intervals at a time, none for one job; an interrupt ends them at once."""
-    if jobs == 1:
-        yield None
-        return
-    # Spawned, not forked: the progress display and Open3D have threads, which a fork would lose.
-    context = multiprocessing.get_context("spawn")
-    executor = ProcessPoolExecutor(jobs, mp_context=context, initializer=_ignore_interrupts)
-    try:
-        yield executor
-    except BaseException:
-        executor.shutdown(wait=False, cancel_futures=True)
-        for child in multiprocessing.active_children():
-            child.terminate()
-        raise
-    executor.shutdown()
-
-
-def _ignore_interrupts() -> None:
-    """Let the parent process handle Ctrl-C, and SIGTERM end a worker without a message."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -60,8 +60,10 @@ class ReelWriter:
     folder, disk full), where no frame was added, or where a value cannot be stored.
     """
 
-    def __init__(self, output: str | Path | Sink, header: Header) -> None:
+    def __init__(self, output: str | Path | Sink, header: Header, name: str = "the output") -> None:
+        """Write to `output`; `name` is what error messages call a Sink."""
         self._output = Path(output) if isinstance(output, str | Path) else output
+        self._name = str(self._output) if isinstance(self._output, Path) else name
         self.header = header  # may be replaced until the block ends, to store measured values as metadata
         self.size = 0  # bytes of the whole file, known when the block has ended
         self._entries: list[IndexEntry] = []
@@ -82,7 +84,7 @@ class ReelWriter:
         return self._checks.groups[track] if track < len(self._checks.groups) else None
 
     def __enter__(self) -> ReelWriter:
-        with _as_input_error(self._output):
+        with _as_input_error(self._name):
             pack(self.header)
             check_header(self.header, len(self.header.intervals) + 1)  # now, not when all is encoded
             parse_metadata(self.header.metadata)
@@ -92,7 +94,7 @@ class ReelWriter:
     def __exit__(self, kind: type[BaseException] | None, error: object, trace: TracebackType | None) -> None:
         try:
             if kind is None:
-                with _as_input_error(self._output):
+                with _as_input_error(self._name):
                     self._finish()
         finally:
             with suppress(OSError):
@@ -141,7 +143,7 @@ class ReelWriter:
         except FormatError as error:
             raise InputError(f"a file that no reader would take: {error}") from error
         self._entries.append(entry)
-        with _as_input_error(self._output):
+        with _as_input_error(self._name):
             self._chunks.append(payload if isinstance(payload, Stored) else self._kept(payload))
         return number
 
@@ -159,27 +161,20 @@ class ReelWriter:
             return
         with unfinished(self._output) as file:
             self._copy(head, file)
-            os.fsync(file.fileno())
         sync_folder(self._output.parent)
 
     def _copy(self, head: bytes, output: Sink) -> None:
         """Write the head and the chunks, each of which must still be what was added."""
         output.write(head)
         if len(self._chunks) != len(self._entries):
-            raise InputError(f"{self._output}: a chunk could not be written, encode again")
+            raise InputError(f"{self._name}: a chunk could not be written, encode again")
         for entry, chunk in zip(self._entries, self._chunks, strict=True):
             data, ends = chunk.read(), list(accumulate(layer.size for layer in entry.layers))
             if len(data) != len(chunk) or _layers(data, ends) != entry.layers:
-                raise InputError(f"{self._output}: a chunk could not be written, encode again")
+                raise InputError(f"{self._name}: a chunk could not be written, encode again")
             output.write(data)
         output.flush()
         self.size = len(head) + sum(map(len, self._chunks))
-
-
-def check_output(path: Path) -> None:
-    """Raise InputError where no file can be written at a path, before minutes are spent on encoding."""
-    with _as_input_error(path):
-        _open_spool(path).close()
 
 
 def pack_head(header: Header, index: Index) -> bytes:
@@ -215,9 +210,8 @@ def _layers(payload: bytes, ends: Sequence[int]) -> tuple[Layer, ...]:
 
 
 @contextmanager
-def _as_input_error(output: Path | Sink) -> Iterator[None]:
+def _as_input_error(name: str) -> Iterator[None]:
     """Turn errors inside the block, which the caller can mend, into an InputError that names the output."""
-    name = output if isinstance(output, Path) else "the output"
     try:
         yield
     except OSError as error:

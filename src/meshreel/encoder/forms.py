@@ -15,6 +15,7 @@ from ..coding.group import decode_group, encode_group
 from ..coding.intra import encode_empty
 from ..coding.paper.displacements import DisplacementOptions
 from ..coding.reference_mesh import CodedReference
+from ..container.writer import Stored
 from ..format.layout import Form
 from ..types import Mesh
 from .draco import IntraOptions, cheapest_intra, finest_intra
@@ -36,6 +37,7 @@ class EncodedGroup:
     fidelity: Fidelity
     predicted: bool = False  # from the group before
     key: int | None = None  # the frame, counted in the group, whose surface the others follow
+    stored: Stored | None = None  # where the payload is, in place of `payload`, of a group that a journal has
 
 
 def laplacian(

@@ -16,6 +16,9 @@ class Interval:
     noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture
     first_frame: int = 0  # its number in the sequence
     track: int = 0
+    surface: str = (
+        ""  # digest of the frames; empty where they are whole frames of the sequence, which has their digests
+    )
 
     @property
     def stop(self) -> int:

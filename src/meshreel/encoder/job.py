@@ -10,6 +10,7 @@ import numpy as np
 
 from ..geometry.derived_sequences import CapturedSequence
 from .interval import Interval
+from .journal import Journal
 from .options import EncoderOptions, PaperOptions, SceneOptions
 from .paper import Fitted, FoundGroup, find_groups
 from .progress import Stages
@@ -52,6 +53,7 @@ class Job:
     executor: Executor | None
     stages: Stages
     store: GroupStore = field(default_factory=GroupStore)
+    journal: Journal | None = None  # of the output; None where groups are not kept
 
     @property
     def scene(self) -> SceneOptions:

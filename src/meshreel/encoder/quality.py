@@ -7,12 +7,14 @@ linear, so that a few secant steps are enough.
 from __future__ import annotations
 
 import math
-import uuid
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from ..io.unfinished import unfinished
+from ..io.write import check_apart
+from .journal import Journal
 from .options import EncoderOptions
 from .sequence import Encoder
 from .summary import Summary
@@ -74,33 +76,39 @@ class Goal:
 
 
 def encode_to(
-    encoder: Encoder, path: str | Path, goal: Goal, options_at: Callable[[float], EncoderOptions]
+    encoder: Encoder,
+    path: str | Path,
+    goal: Goal,
+    options_at: Callable[[float], EncoderOptions],
+    resume: bool | None = None,
 ) -> tuple[Summary, float]:
     """Write a file that meets the goal; return its summary and the quality that met it.
 
     `options_at` makes the options of a quality from 0 to 100. Raises InputError, and leaves no file, where no quality
-    meets the goal: at once where a scene's background alone is more than the rate.
+    meets the goal: at once where a scene's background alone is more than the rate. A search that was stopped begins
+    again: `resume` may not be True, and is otherwise that of `encode`.
     """
     search, path = Search(goal), Path(path)
-    if path.is_dir() or not path.parent.is_dir():
-        raise InputError(f"{path}: cannot be written: {'is a folder' if path.is_dir() else 'no such folder'}")
-    partial = path.with_name(f".{uuid.uuid4().hex}.tmp")
-    try:
+    if resume:
+        text = f"{path}: a search for a target begins again, it cannot continue"
+        raise InputError(f"{text}; leave --resume (resume=True) out, or give the quality in place of the target")
+    check_apart(path, encoder.sequence.files)
+    with Journal(path, resume, lasting=False) as journal, unfinished(path) as file:
         for _ in range(TRIALS):
             quality = search.next()
             if quality is None:
                 break
-            summary = encoder.encode(partial, options_at(quality))
+            journal.restart()
+            file.seek(0)
+            file.truncate()
+            summary = encoder.encode_into(file, options_at(quality), journal)
             value = goal.measured(summary, encoder.frame_rate)
             if abs(value - goal.wanted) <= goal.tolerance:
-                partial.replace(path)
                 return summary, quality
             if over := goal.exceeded_by_background(summary, encoder.frame_rate):
                 raise InputError(f"{path}: {over}")
             search.learn(quality, value)
-    finally:
-        partial.unlink(missing_ok=True)
-    raise InputError(f"{path}: no quality gives {goal.text_of(goal.wanted)}; {search.found()}")
+        raise InputError(f"{path}: no quality gives {goal.text_of(goal.wanted)}; {search.found()}")
 
 
 class Search:

@@ -1,7 +1,7 @@
 """The chunks of a scene: its background once, and each moving body as groups of its own track (paper, section 3.2).
 
 In: a job, the parts of its scene. Out: the payloads of the file, in the order of time. A key interval is read once; in
-memory are its moving surface and the bytes of all groups so far.
+memory is its moving surface.
 
 Normalised coordinates have the middle of the scene's box as origin and the size of what moves as unit, so that a
 quality means the same for a person in a room as for one alone.
@@ -9,7 +9,7 @@ quality means the same for a person in a room as for one alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -24,13 +24,15 @@ from ..coding.background import decode_background, decode_change, encode_backgro
 from ..format.checks import MOST_TRACKS
 from ..geometry.closest_points import distances
 from ..geometry.decimate import decimate, decimate_faces
+from ..geometry.derived_sequences import digest
 from ..types import Mesh, MeshSequence, Placement
 from .forms import EncodedGroup, empty_groups
 from .interval import Interval
 from .job import Job
 from .options import EncoderOptions
 from .parts import Change, Parts
-from .recipe import encode_apart, encode_interval, longest_interval
+from .progress import Stages
+from .recipe import encode_intervals, longest_interval
 
 # Of the background's vertices, tried in order (decision 0019).
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)
@@ -122,16 +124,28 @@ def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
     tracks, found = Tracks(parts.segmentation.cell, job.scene.bodies), list[TrackGroup]()
     for frames in key_intervals(job.sequence, parts.segmentation, job.options):
         intervals = track_intervals(job, parts, frames, tracks)
-        done, count = 0, sum(len(interval.frames) for interval in intervals)
-        for interval, groups in zip(intervals, _coded_intervals(intervals, job), strict=True):
+        stages = _StagesOfTracks(job.stages, len(frames), sum(len(interval.frames) for interval in intervals))
+        for interval, groups in zip(intervals, encode_intervals(job, intervals, stages), strict=True):
             first = interval.first_frame
             for group in groups:
                 found.append(TrackGroup(interval.track, first, group))
                 first += group.frame_count
-                before, done = done, done + group.frame_count  # frames of all tracks count as frames of the scene
-                job.stages.add("code", done * len(frames) // count - before * len(frames) // count)
         found += tracks.late(frames)
     return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
+
+
+class _StagesOfTracks(Stages):
+    """Counts coded frames of all tracks of a key interval as frames of the scene."""
+
+    def __init__(self, stages: Stages, frames: int, count: int) -> None:
+        self._stages, self._frames, self._count, self._coded = stages, frames, count, 0
+
+    def add(self, stage: str, count: int) -> None:
+        """Count `count` further frames of a track; stages before the last are not told."""
+        if stage == "code":
+            before, self._coded = self._coded, self._coded + count
+            done, told = (coded * self._frames // self._count for coded in (self._coded, before))
+            self._stages.add("code", done - told)
 
 
 def scene_intervals(job: Job, parts: Parts) -> Iterator[Interval]:
@@ -152,16 +166,8 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
         normalised = [parts.seen.normalise(mesh) for mesh in meshes]
         for cut in _cut(normalised, frames, parts.seen, longest):
             some = normalised[cut.start : cut.stop]
-            found.append(Interval(some, parts.body_noise, frames.start + cut.start, track))
+            found.append(Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some)))
     return found
-
-
-def _coded_intervals(intervals: Sequence[Interval], job: Job) -> Iterator[Iterable[EncodedGroup]]:
-    """Yield the groups of each interval, in order."""
-    method = job.options.method
-    if job.executor is None:
-        return (encode_interval(interval, method, None, job.store.find) for interval in intervals)
-    return job.executor.map(encode_apart, intervals, [method] * len(intervals))
 
 
 def key_intervals(sequence: MeshSequence, segmentation: Segmentation, options: EncoderOptions) -> Iterator[range]:

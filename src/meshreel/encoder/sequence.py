@@ -11,9 +11,10 @@ import math
 import warnings
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -23,23 +24,25 @@ from ..analysis.scene.probe import is_scene
 from ..analysis.scene.segmentation import SegmentOptions
 from ..analysis.survey import Survey, survey
 from ..coding.background import decode_background
-from ..container.writer import ReelWriter, check_output
+from ..container.writer import ReelWriter
 from ..decoder.video import open as open_video
 from ..errors import InputError
 from ..format.layout import Form, Header
 from ..geometry.closest_points import distances
-from ..geometry.derived_sequences import Welded, captured
+from ..geometry.derived_sequences import Unchanging, Welded, captured
 from ..geometry.topology import drop_unreferenced
+from ..io.unfinished import unfinished
+from ..io.write import check_apart
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, Up, as_sequence, evenly
-from .forms import EncodedGroup
 from .interval import Interval, NormalisedFrames
 from .job import GroupStore, Job
+from .journal import Journal, made_of
 from .options import EncoderOptions, PaperOptions
 from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
-from .recipe import encode_apart, encode_interval, longest_interval
+from .recipe import encode_intervals, longest_interval
 from .scene import (
     Static,
     TrackGroup,
@@ -63,6 +66,7 @@ def encode(
     options: EncoderOptions | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
+    resume: bool | None = None,
 ) -> Summary:
     """Encode meshes as a .reel file at `path`, which appears only when it is complete.
 
@@ -71,13 +75,17 @@ def encode(
     scene stands still: it becomes a background and bodies. With an executor, intervals are encoded side by side, to
     the same bytes; memory then holds an interval for each worker and one more. Warns of surface that the file lacks.
     Raises InputError for frames that cannot be used, before anything is encoded.
+
+    The intervals that are done are kept in `NAME.part` beside the output until it is complete. After an encode that was
+    stopped, `resume=True` continues with the next interval, to the same bytes; False starts over; None raises
+    InputError where there is something to continue.
     """
     if options is None:
         options = preset_options(preset, quality)
     elif (quality, preset) != (QUALITY, PRESET):
         text = f"options and quality {quality:g}, preset {preset!r}: options already have both"
         raise InputError(f"{text}; leave quality and preset out, or give preset_options(preset, quality) as options")
-    summary = Encoder(Welded(as_sequence(sequence)), executor, progress).encode(path, options)
+    summary = Encoder(Welded(as_sequence(sequence)), executor, progress).encode(path, options, resume)
     for text in summary.warnings:
         warnings.warn(text, stacklevel=2)
     return summary
@@ -97,7 +105,7 @@ class Encoder:
 
         The attribute `progress` may be replaced between encodes.
         """
-        self.sequence, self._executor, self._masker = captured(sequence), executor, masker
+        self.sequence, self._executor, self._masker = Unchanging(captured(sequence)), executor, masker
         self.progress = progress
         self.store = GroupStore()  # groups that `prepare` found
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
@@ -128,13 +136,21 @@ class Encoder:
         """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
         return self._parts(self._job(options)) if self._is_scene(options) else None
 
-    def encode(self, path: str | Path, options: EncoderOptions) -> Summary:
+    def encode(self, path: str | Path, options: EncoderOptions, resume: bool | None = None) -> Summary:
         """Encode the sequence as the function `encode` does, with the same errors."""
+        path = Path(path)
+        check_apart(path, self.sequence.files)
+        with Journal(path, resume) as journal, unfinished(path) as file:
+            return self.encode_into(file, options, journal)
+
+    def encode_into(self, file: BinaryIO, options: EncoderOptions, journal: Journal) -> Summary:
+        """Encode the sequence into an open, empty file; its groups wait in the journal."""
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
-        check_output(Path(path))
-        job, parts = self._job(options), self.parts(options)
-        return _encode_bodies(job, Path(path)) if parts is None else _encode_scene(job, Path(path), parts)
+        job, parts = replace(self._job(options), journal=journal), self.parts(options)
+        seen = survey(job.sequence, job.stages) if parts is None else parts.seen
+        journal.begin(made_of(self.sequence, options, self._masker))
+        return _encode_bodies(job, file, seen) if parts is None else _encode_scene(job, file, parts)
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence))
@@ -156,37 +172,46 @@ class Encoder:
         return self._scene[2]
 
 
-def _encode_bodies(job: Job, path: Path) -> Summary:
+def _encode_bodies(job: Job, file: BinaryIO, seen: Survey) -> Summary:
     """Encode a sequence in which everything may move."""
     sequence, options = job.sequence, job.options
-    seen = survey(sequence, job.stages)
     groups: list[GroupSummary] = []
-    with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
-        for encoded in _encoded_intervals(job, seen):
+    with _writer(job, file, seen) as writer:
+        for encoded in encode_intervals(job, _body_intervals(job, seen), job.stages):
             for group in encoded:
                 each = TrackGroup(0, writer.frame_count, group)
                 groups.append(_added(writer, each, [], seen.diagonal))
         writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups) | _upright(sequence.up))
-    return Summary(path.stat().st_size, tuple(groups), _warnings(seen))
+    return Summary(writer.size, tuple(groups), _warnings(seen), continued=_continued(job))
 
 
-def _encode_scene(job: Job, path: Path, parts: Parts) -> Summary:
+def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     """Encode a scene with a background."""
     sequence, options, seen = job.sequence, job.options, parts.seen
     states = encode_static(parts, len(sequence), sequence.frame_rate, job.scene.background)
-    with ReelWriter(path, make_header(sequence.frame_rate, seen, {})) as writer:
+    with _writer(job, file, seen) as writer:
         coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
         writer.header = make_header(sequence.frame_rate, seen, metadata | _upright(sequence.up))
     measured = evenly(len(sequence), MEASURED)
-    psnr = _measured(sequence, path, seen.diagonal, measured)
+    psnr = _measured(sequence, file, seen.diagonal, measured)
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
     texts = (*_warnings(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
-    return Summary(path.stat().st_size, tuple(groups), texts, scene)
+    return Summary(writer.size, tuple(groups), texts, scene, _continued(job))
+
+
+def _writer(job: Job, file: BinaryIO, seen: Survey) -> ReelWriter:
+    """Return a writer to a file, which errors call by the name of the output."""
+    name = "the output" if job.journal is None else str(job.journal.output)
+    return ReelWriter(file, make_header(job.sequence.frame_rate, seen, {}), name)
+
+
+def _continued(job: Job) -> int:
+    return 0 if job.journal is None else job.journal.continued
 
 
 def _added_in_order(
@@ -206,16 +231,16 @@ def _added_in_order(
 def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float) -> GroupSummary:
     """Write a group of a track, with the chunk of the background that its frames are shown with."""
     group, track, last = each.group, each.track, writer.last_of(each.track)
-    before = [last] if group.predicted and last is not None else []
-    writer.add_group(each.first_frame, group.frame_count, group.payload, group.layers, (*static, *before), track)
+    before, payload = [last] if group.predicted and last is not None else [], group.stored or group.payload
+    writer.add_group(each.first_frame, group.frame_count, payload, group.layers, (*static, *before), track)
     key = None if group.key is None else each.first_frame + group.key
     fidelity = group.fidelity.scaled(unit)
-    return GroupSummary(group.form, group.frame_count, len(group.payload), fidelity, group.predicted, key, track)
+    return GroupSummary(group.form, group.frame_count, len(payload), fidelity, group.predicted, key, track)
 
 
-def _measured(sequence: MeshSequence, path: Path, diagonal: float, numbers: Sequence[int]) -> float:
+def _measured(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:
     """Return the mean d2_psnr_paper, dB, over some frames of a file."""
-    with open_video(path) as video:
+    with open_video(file) as video:
         found = []
         for number in numbers:
             points, shown = drop_unreferenced(sequence[number]).vertices, video[number]
@@ -274,23 +299,6 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
     )
 
 
-def _encoded_intervals(job: Job, seen: Survey) -> Iterator[Iterable[EncodedGroup]]:
-    """Yield the groups of each interval, in order; with an executor, as many intervals ahead as it has workers."""
-    method, executor, stages = job.options.method, job.executor, job.stages
-    if executor is None:
-        for interval in _body_intervals(job, seen):
-            yield encode_interval(interval, method, stages, job.store.find)
-        return
-    ahead = getattr(executor, "_max_workers", 8)
-    waiting: deque[tuple[int, Future[list[EncodedGroup]]]] = deque()
-    for interval in _body_intervals(job, seen):
-        waiting.append((len(interval.frames), executor.submit(encode_apart, interval.in_memory(), method)))
-        if len(waiting) > ahead:
-            yield _arrived(waiting, stages)
-    while waiting:
-        yield _arrived(waiting, stages)
-
-
 def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
     """Yield the intervals of a sequence, of a scene where there are parts."""
     if parts is None:
@@ -302,13 +310,6 @@ def _body_intervals(job: Job, seen: Survey) -> Iterator[Interval]:
     """Yield the intervals of a sequence that is no scene."""
     for numbers in seen.intervals(longest_interval(job.options, job.sequence.frame_rate)):
         yield Interval(NormalisedFrames(job.sequence, seen, numbers), first_frame=numbers.start)
-
-
-def _arrived(waiting: deque[tuple[int, Future[list[EncodedGroup]]]], stages: Stages) -> list[EncodedGroup]:
-    count, future = waiting.popleft()
-    groups = future.result()
-    stages.add("code", count)
-    return groups
 
 
 def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:

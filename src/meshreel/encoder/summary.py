@@ -41,6 +41,7 @@ class Summary:
     groups: tuple[GroupSummary, ...]
     warnings: tuple[str, ...] = ()  # about surface that was not kept, a line each
     scene: SceneSummary | None = None  # of a scene with a background
+    continued: int = 0  # intervals that an earlier run, which was stopped, had done
 
     @property
     def frame_count(self) -> int:

@@ -6,13 +6,16 @@ A sequence may know which axis points up and the depth pictures behind its meshe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import hashlib
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool
 
+from ..errors import InputError
 from ..types import Mesh, MeshSequence, Up, check_up
 from .depth import DepthFrames, DepthPicture
 from .topology import part_of, weld
@@ -64,11 +67,52 @@ class DerivedSequence(MeshSequence):
         """The depth pictures of the frames; None where the source knows none."""
         return getattr(self._source, "depth", None)
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that the frames are read from; none where the source names none."""
+        return getattr(self._source, "files", ())
+
+    def name(self, index: int) -> str:
+        """Return the name of a frame in error messages."""
+        named = getattr(self._source, "name", None)
+        return f"frame {index}" if named is None else named(index)
+
     def __len__(self) -> int:
         return len(self._source)
 
     def __getitem__(self, index: int) -> Mesh:
         return self._source[index]
+
+
+class Unchanging(DerivedSequence):
+    """The same frames; raises InputError for a frame that is not what it was when it was read first."""
+
+    def __init__(self, source: MeshSequence) -> None:
+        super().__init__(source)
+        self._digests: dict[int, str] = {}
+
+    def __getitem__(self, index: int) -> Mesh:
+        mesh = super().__getitem__(index)
+        now = digest([mesh])
+        if self._digests.setdefault(index, now) != now:
+            text = f"{self.name(index)}: has changed while it was encoded"
+            raise InputError(f"{text}; encode again when nothing writes to it any more")
+        return mesh
+
+    @property
+    def digests(self) -> list[str]:
+        """The digest of each frame that has been read."""
+        return [self._digests[index] for index in sorted(self._digests)]
+
+
+def digest(meshes: Iterable[Mesh]) -> str:
+    """Return a text of 16 characters that differs where meshes do."""
+    found = hashlib.sha256()
+    for mesh in meshes:
+        for array in (mesh.vertices, mesh.faces):
+            found.update(f"{array.shape}".encode())
+            found.update(np.ascontiguousarray(array).data)
+    return found.hexdigest()[:16]
 
 
 class Upright(DerivedSequence):
@@ -115,6 +159,10 @@ class Chosen(DerivedSequence):
         """The depth pictures of the chosen frames; None where the source knows none."""
         known = super().depth
         return None if known is None else _ChosenDepth(known, self._numbers)
+
+    def name(self, index: int) -> str:
+        """Return the name of a frame in error messages."""
+        return super().name(self._numbers[index])
 
     def __len__(self) -> int:
         return len(self._numbers)

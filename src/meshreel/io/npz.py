@@ -28,7 +28,7 @@ class Archive:
     """Frames of an .npz file."""
 
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, self.paths = path, (path,)
         self._stream: IO[bytes] | None = None
         try:
             with zipfile.ZipFile(path) as archive:

@@ -103,6 +103,11 @@ class FileSequence(MeshSequence):
         """Warnings about the frames read so far, one line each; complete after the last frame."""
         return tuple(_warnings(self._seen, self._remarks))
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that the frames are read from."""
+        return self._frames.paths
+
     def __len__(self) -> int:
         return len(self._chosen)
 

@@ -33,27 +33,45 @@ def part_of(path: Path, hidden: bool = True) -> Path:
 
 
 @contextmanager
-def unfinished(path: Path, wait: float = 0.0) -> Iterator[BinaryIO]:
-    """Open a file that takes the name `path` at the end of the block, and is removed where the block fails."""
+def unfinished(path: Path, wait: float = 0.0, durable: bool = True) -> Iterator[BinaryIO]:
+    """Open a file that takes the name `path` at the end of the block, and is removed where the block fails.
+
+    A `durable` one is on the disk by then, whatever the power does. Raises InputError where it cannot be written.
+    """
     name = part_of(path)
-    file = claim(name, path, wait)
+    with cannot_be_written(path):
+        file = claim(name, path, wait)
     try:
-        file.truncate(0)
+        with cannot_be_written(path):
+            file.truncate(0)
         yield file
-        file.flush()
-        if os.name == "nt":  # which renames no open file
-            file.close()
-        name.replace(path)
+        with cannot_be_written(path):
+            file.flush()
+            if durable:
+                sync(file)
+            if os.name == "nt":  # which renames no open file
+                file.close()
+            name.replace(path)
     except BaseException:
         discard(file, name)
         raise
     file.close()
 
 
+@contextmanager
+def cannot_be_written(path: Path) -> Iterator[None]:
+    """Turn an OSError inside the block into an InputError that names the output and what to do."""
+    try:
+        yield
+    except OSError as error:
+        reason = error.strerror or error
+        raise InputError(f"{path}: cannot be written ({reason}); free space, or choose another folder") from error
+
+
 def claim(name: Path, output: Path, wait: float = 0.0) -> BinaryIO:
     """Open an unfinished file of an output, new or left by a dead process, and lock it.
 
-    Raises InputError where a living process has it for longer than `wait` seconds, and OSError where it cannot be made.
+    Raises InputError where a living process has it for longer than `wait` seconds, OSError where it cannot be made.
     """
     until = time.monotonic() + wait
     while True:
@@ -84,6 +102,12 @@ def discard(file: BinaryIO, name: Path) -> None:
     if os.name == "nt":
         with suppress(OSError):
             name.unlink()
+
+
+def sync(file: BinaryIO) -> None:
+    """Return when what was written to a file is on the disk."""
+    file.flush()
+    os.fsync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:

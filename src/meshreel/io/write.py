@@ -16,7 +16,7 @@ from jaxtyping import UInt8
 
 from ..errors import InputError
 from ..types import Mesh
-from .unfinished import unfinished
+from .unfinished import cannot_be_written, unfinished
 
 _WAIT = 10.0  # s, for another process that writes the same file: a mesh takes less (guess)
 _TOLERANCE = 1e-6  # of the diagonal: largest rounding error of a float32 coordinate (guess)
@@ -42,6 +42,13 @@ def make_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{path}: cannot be made a folder ({error.strerror}); choose another") from None
+
+
+def check_apart(output: Path, inputs: Iterable[Path]) -> None:
+    """Raise InputError where an output is one of the inputs: by the same name, another case of it, or a link."""
+    for path in inputs if output.exists() else ():
+        if path.exists() and path.samefile(output):
+            raise InputError(f"{output}: is the input {path}, which the output would replace; choose another name")
 
 
 def write_mesh(mesh: Mesh, path: Path) -> None:
@@ -73,12 +80,8 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
     Where another process writes the same file, wait for its end; the later one stays.
     """
-    try:
-        with unfinished(path, _WAIT) as file:
-            yield file
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"{path}: cannot be written ({reason}); free space, or choose another folder") from None
+    with unfinished(path, _WAIT, durable=False) as file, cannot_be_written(path):
+        yield file
 
 
 def _pack_ply(mesh: Mesh, colors: UInt8[np.ndarray, "V 3"] | None = None) -> bytes:

@@ -1,0 +1,66 @@
+"""Worker processes of commands, which Ctrl-C in the terminal reaches only through the command itself.
+
+Imports nothing heavy: each worker imports this module before it can heed its parent's end.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+import sys
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing.context import SpawnContext, SpawnProcess
+
+from ..encoder.worker import end_with_parent
+
+_BLOCKS = hasattr(signal, "pthread_sigmask")
+_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of Linux's prctl
+
+
+@contextmanager
+def workers(jobs: int) -> Iterator[Executor | None]:
+    """Start processes that encode `jobs` intervals at a time, none for one job; an interrupt ends them at once."""
+    if jobs == 1:
+        yield None
+        return
+    executor = ProcessPoolExecutor(jobs, mp_context=_Context(), initializer=_begin)
+    try:
+        yield executor
+    except BaseException:
+        executor.shutdown(wait=False, cancel_futures=True)
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise
+    executor.shutdown()
+
+
+class _Process(SpawnProcess):
+    """A worker that is deaf to Ctrl-C from its first moment: it inherits that the signal is blocked."""
+
+    def start(self) -> None:
+        """Start the process."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if _BLOCKS else set()
+        try:
+            super().start()
+        finally:
+            if _BLOCKS:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Context(SpawnContext):
+    """Spawned, not forked: the progress display and Open3D have threads, which a fork would lose."""
+
+    Process = _Process
+
+
+def _begin() -> None:
+    """Let the parent heed Ctrl-C, and let SIGTERM and the parent's end end a worker without a message."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if sys.platform == "linux":  # at once, too, where a library holds Python's lock for seconds
+        import ctypes
+
+        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+    end_with_parent()
