@@ -18,6 +18,7 @@ from meshreel.server import posters
 from meshreel.server.app import make_app
 from meshreel.server.library import Library
 from meshreel.types import Mesh
+from tests.coding.draco_bombs import cloud, reel_of
 
 POSTER = "/posters/walk.reel.png"
 
@@ -117,6 +118,38 @@ def poster(path):
         finally:
             gate.touch()
         assert {poster.result(60) for poster in waiting} == {b"picture"}
+
+
+@pytest.mark.parametrize("method", ["sequential", "kd-tree"])
+def test_a_bomb_that_draco_believes_costs_its_limits_and_the_server_answers(
+    live, folder, player, painter, monkeypatch, method
+):
+    """The bomb goes to Draco as it is, as it did before its claims were read."""
+    (folder / "walk.reel").write_bytes(cloud(200_000_000, method))
+    painter("import DracoPy\ndef poster(path): DracoPy.decode(path.read_bytes())")
+    monkeypatch.setattr(posters, "PATIENCE", 2.0)
+    address, seconds = live(make_app(Library(folder), player)), []
+
+    def fetch(path):
+        began = time.monotonic()
+        with urllib.request.urlopen(f"{address}{path}", timeout=60) as answer:
+            kind = answer.headers["content-type"]
+        return kind, time.monotonic() - began
+
+    with ThreadPoolExecutor(1) as pool:
+        poster = pool.submit(fetch, "posters/walk.reel.png")
+        while not poster.done():
+            seconds.append(fetch("style.css")[1])
+            time.sleep(0.05)
+    kind, took = poster.result()
+    assert kind == "image/svg+xml" and took < 2 + 8  # the process starts within some of them
+    assert len(seconds) > 3 and max(seconds) < 1
+    assert fetch("posters/walk.reel.png")[1] < 1  # it is not tried again
+
+
+def test_a_hostile_file_in_a_folder_that_is_served_has_a_plain_tile(client, folder):
+    (folder / "walk.reel").write_bytes(reel_of(cloud(200_000_000, "kd-tree")))
+    assert client.get(POSTER).headers["content-type"] == "image/svg+xml"
 
 
 @pytest.mark.parametrize("towards", [1, -1])
