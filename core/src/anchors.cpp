@@ -65,11 +65,15 @@ int64_t mr_farthest_anchors(const int32_t* faces, int64_t face_count, int64_t ve
         for (int32_t& h : hops)
             if (h == INT_MAX) h = 0;  // no face uses it: its own row of L determines it
         while (found < count) {
-            const auto far = std::max_element(hops.begin(), hops.end());
-            if (far == hops.end() || *far == 0) break;
-            const int32_t v = static_cast<int32_t>(far - hops.begin());
-            add_source(g, v, hops, queue);
-            out[found++] = v;
+            const int32_t far = hops.empty() ? 0 : *std::max_element(hops.begin(), hops.end());
+            if (far == 0) break;
+            // The first of the farthest, again and again: no vertex comes to be as far as these. Each distance is
+            // searched once, and there are at most 2 sqrt(V): a source that is far has many vertices to itself.
+            for (int32_t v = 0; v < vertices && found < count; ++v) {
+                if (hops[v] != far) continue;
+                add_source(g, v, hops, queue);
+                out[found++] = v;
+            }
         }
         std::sort(out, out + found);
         return MR_OK;

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from ..errors import FormatError
+from ..format.budget import Size, change_cost, check_cost
 from ..format.layout import Form, StaticPatch
 from ..format.records import pack, unpack_all
 from ..geometry.topology import concatenate, part_of
@@ -61,6 +62,7 @@ def decode_change(data: bytes, before: Mesh, place: Placement | None = None) -> 
     kept = part_of(before, ~dropped) if dropped.any() else before
     added = decode_mesh(record.mesh, record.step)
     check_growth(added, 0)
+    check_cost(change_cost(Size.of(before), Size.of(added)), len(data), "background")
     after = concatenate([kept, added if place is None else place.of(added)])
     check_growth(after, 0)
     return after

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import FormatError
+from ..format.budget import Size, check_cost, laplacian_cost
 from ..format.layout import DracoGroup, Form, LaplacianGroup, LayersPatches
 from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
@@ -20,7 +21,7 @@ from .intra import decode_empty, decode_intra
 from .layers.coder import LayersState, layers_bytes_by_purpose, place_layers, read_layers
 from .layers.patches import decode_patches
 from .mesh import check_growth, check_step, decode_mesh
-from .paper.displacements import DisplacementOptions, decode_displacements, encode_displacements, frames_of, layer_sizes
+from .paper.displacements import DisplacementOptions, claims_of, decode_displacements, encode_displacements, layer_sizes
 from .reference_mesh import CodedReference
 
 
@@ -70,7 +71,7 @@ def _decode_alone(data: bytes, form: int | None, frame_count: int, layers: int |
     if form == Form.DRACO:
         return decode_intra(data)
     if form == Form.LAPLACIAN:
-        return _decode_laplacian(unpack_all(LaplacianGroup, data), layers)
+        return _decode_laplacian(unpack_all(LaplacianGroup, data), len(data), layers)
     raise FormatError(f"group form {form} is not known to this reader")
 
 
@@ -88,13 +89,22 @@ def _decode_layers(
     return patches.apply(decoded.positions, decoded.faces, place, decoded.spare), decoded.state
 
 
-def _decode_laplacian(record: LaplacianGroup, components: int | None) -> list[Mesh]:
+def _decode_laplacian(record: LaplacianGroup, size: int, components: int | None) -> list[Mesh]:
     check_step(record.step)
     reference = decode_mesh(record.reference, record.step)
-    check_growth(reference, record.levels, frames_of(record.displacements))
+    _check_growth(record, reference, size)
     base = subdivide_midpoint(reference, record.levels)
     field = decode_displacements(record.displacements, base, components)
     return [Mesh(np.ascontiguousarray(base.vertices + field[:, t]), base.faces) for t in range(field.shape[1])]
+
+
+def _check_growth(record: LaplacianGroup, reference: Mesh, size: int) -> None:
+    """Raise FormatError if a group, of which `size` bytes are at hand, grows beyond the limits."""
+    frames, components = claims_of(record.displacements)
+    check_growth(reference, record.levels, frames)
+    corners = np.bincount(reference.faces.reshape(-1)).astype(np.float64)
+    cost = laplacian_cost(Size.of(reference, record.levels), frames, components, int(corners @ corners))
+    check_cost(cost, size, "laplacian")
 
 
 def payload_bytes_by_purpose(data: bytes) -> dict[str, int]:

@@ -9,28 +9,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..errors import FormatError
+from ..format.budget import Size, check_cost, draco_cost
 from ..format.layout import DracoGroup, EmptyGroup, Form
 from ..format.records import pack, unpack_all
 from ..geometry.topology import subdivide_midpoint
 from ..types import Mesh
-from .mesh import check_growth, check_step, decode_mesh, encode_mesh
+from .mesh import check_claims, check_growth, check_step, decode_mesh, encode_meshes
 
 
 def encode_intra(meshes: Sequence[Mesh], step: float, levels: int) -> bytes:
     """Encode the frames of a group as Draco meshes on a lattice of spacing `step` (normalised units)."""
-    return pack(DracoGroup(Form.DRACO, levels, step, tuple(encode_mesh(mesh, step) for mesh in meshes)))
+    return pack(DracoGroup(Form.DRACO, levels, step, encode_meshes(meshes, step)))
 
 
 def decode_intra(data: bytes) -> list[Mesh]:
     """Decode the frames of a `draco` group, in normalised units. Raises FormatError on any other or damaged payload."""
     record = unpack_all(DracoGroup, data)
     check_step(record.step)
-    meshes = []
-    for frame in record.meshes:
-        mesh = decode_mesh(frame, record.step)
-        check_growth(mesh, record.levels, len(record.meshes))
-        meshes.append(subdivide_midpoint(mesh, record.levels))
-    return meshes
+    check_claims(record.meshes)  # of all frames together
+    meshes = [decode_mesh(frame, record.step) for frame in record.meshes]
+    for mesh in meshes:
+        check_growth(mesh, record.levels, len(meshes))
+    check_cost(draco_cost([Size.of(mesh, record.levels) for mesh in meshes]), len(data), "draco")
+    return [subdivide_midpoint(mesh, record.levels) for mesh in meshes]
 
 
 def encode_empty() -> bytes:

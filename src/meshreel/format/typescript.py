@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from enum import IntEnum
 
+from .budget import LIMITS
 from .kinds import Array, Blob, Bytes, Choice, Kind, List, Number, Rest, Text, Varint
 from .layout import MAGIC, VERSION
 from .records import Nested, record_fields
 
 HEAD = """\
-// Made from src/meshreel/format/layout.py by scripts/generate. Do not edit.
+// Made from src/meshreel/format/layout.py and budget.py by scripts/generate. Do not edit.
 
 import {
   array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint,
@@ -20,14 +22,17 @@ import type { Kind } from "./records.ts";
 
 
 def typescript(records: Sequence[type]) -> str:
-    """Return a module with every enumeration and every record; a record follows the records that are its fields."""
+    """Return a module with all limits, enumerations and records; a record follows the records that are its fields."""
     enumerations: dict[str, type[IntEnum]] = {}
     done: dict[str, str] = {}
     for record in records:
         _declare(record, enumerations, done)
     magic = ", ".join(str(byte) for byte in MAGIC)
     parts = [HEAD, f"export const MAGIC = [{magic}] as const;\nexport const VERSION = {VERSION};\n"]
-    parts += [_enumeration(values) for values in enumerations.values()]
+    parts.append(_constants("LIMITS", {_camel(name): value for name, value in asdict(LIMITS).items()}))
+    parts += [
+        _constants(values.__name__, {value.name: value.value for value in values}) for values in enumerations.values()
+    ]
     return "\n".join([*parts, *done.values()])
 
 
@@ -60,9 +65,9 @@ def _parts(kind: Kind) -> list[Kind]:
     return [kind]
 
 
-def _enumeration(values: type[IntEnum]) -> str:
-    members = "\n".join(f"  {value.name}: {value.value}," for value in values)
-    return f"export const {values.__name__} = {{\n{members}\n}} as const;\n"
+def _constants(name: str, values: dict[str, int]) -> str:
+    members = "\n".join(f"  {key}: {value}," for key, value in values.items())
+    return f"export const {name} = {{\n{members}\n}} as const;\n"
 
 
 def _type(kind: Kind) -> str:

@@ -44,7 +44,7 @@ def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
 
     Old vertices come first, in order; new ones follow in the order of the sorted edges.
     """
-    for _ in range(levels):
+    for _ in range(levels if len(mesh.faces) else 0):
         edges, face_edges = unique_edges(mesh.faces)
         e = (face_edges + len(mesh.vertices)).astype(np.int32)
         a, b, c = mesh.faces.T

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float64, Int32
 
 from ...errors import FormatError, InputError
+from ...format.budget import Size, check_cost, layers_cost
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ...format.records import pack, unpack, unpack_all
 from ...geometry.subdivision import frames_of, heights, refine, subdivide
@@ -190,6 +191,7 @@ def place_layers(
     head = records.head
     previous = previous if head.origin == Origin.PREVIOUS else None
     base = _base(head, previous)
+    check_cost(layers_cost(Size.of(base, len(records.layers) - 1), head.frames), records.end, "layers")
     known = decode_trajectories(records.layers[0], base, head.frames)
     last = np.ascontiguousarray(known[:, :, -1])
     faces, room = base.faces, _Room.of(head.frames, 0, 0)

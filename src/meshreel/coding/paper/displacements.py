@@ -62,9 +62,10 @@ def decode_displacements(data: bytes, base: Mesh, components: int | None = None)
     return klt.inverse(weights, _read_basis(head, count))  # eq. 9
 
 
-def frames_of(data: bytes) -> int:
-    """Return the number of frames that the head of a payload claims."""
-    return _read_head(data)[0].frames
+def claims_of(data: bytes) -> tuple[int, int]:
+    """Return the numbers of frames and of components that the head of a payload claims."""
+    head = _read_head(data)[0]
+    return head.frames, len(head.components)
 
 
 def layer_sizes(data: bytes) -> list[int]:

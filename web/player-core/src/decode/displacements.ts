@@ -16,9 +16,10 @@ import { LEVELS, stepOf } from "./steps.ts";
 const MOST_BITS = 30;
 const MOST_NUMBERS = 2 ** 29;
 
-/** Frames of a payload, from its head alone. */
-export function framesOf(data: Uint8Array): number {
-  return readHead(data)[0].frames;
+/** Frames and components that the head of a payload claims. */
+export function claimsOf(data: Uint8Array): [number, number] {
+  const [head] = readHead(data);
+  return [head.frames, head.components.length];
 }
 
 /** V x T x 3 displacements from at most `components` components; `data` may end behind these. */

@@ -3,6 +3,7 @@
 import type { DecoderModule } from "draco3d";
 
 import { FormatError } from "../errors.ts";
+import { changeCost, checkCost, dracoCost, elementsOf, laplacianCost } from "../format/budget.ts";
 import { DracoGroup, EmptyGroup, Form, LaplacianGroup, LayersPatches, StaticPatch } from "../format/layout.gen.ts";
 import { EMPTY, concatenate, faceCount, placed, vertexCount, without } from "../mesh.ts";
 import type { Mesh, Placement } from "../mesh.ts";
@@ -10,11 +11,11 @@ import { unpackAll } from "../format/records.ts";
 import type { Core } from "../wasm/memory.ts";
 import { ofMeshes } from "./decoded.ts";
 import type { DecodedGroup } from "./decoded.ts";
-import { decodeDisplacements, framesOf } from "./displacements.ts";
+import { claimsOf, decodeDisplacements } from "./displacements.ts";
 import { decodeIntegers } from "./entropy.ts";
 import { placeLayers, readLayers } from "./layers.ts";
 import type { LayersState } from "./layers.ts";
-import { checkGrowth, checkStep, decodeMesh, subdivideMidpoint } from "./mesh.ts";
+import { checkClaims, checkGrowth, checkStep, decodeMesh, subdivideMidpoint } from "./mesh.ts";
 import { decodePatches, fillRuns } from "./patches.ts";
 
 /** What decodes: the compiled core, and Draco. */
@@ -66,7 +67,7 @@ function decodeAlone(tools: Tools, data: Uint8Array, { frameCount, layers, place
     case Form.DRACO:
       return { group: ofMeshes(decodeIntra(tools, data).map((mesh) => placed(mesh, place))), state: null };
     case Form.LAPLACIAN:
-      return { group: decodeLaplacian(tools, unpackAll(LaplacianGroup, data), layers, place), state: null };
+      return { group: decodeLaplacian(tools, data, layers, place), state: null };
     default:
       throw new FormatError(`group form ${data[0]} is not known to this player`);
   }
@@ -75,18 +76,20 @@ function decodeAlone(tools: Tools, data: Uint8Array, { frameCount, layers, place
 function decodeIntra({ core, draco }: Tools, data: Uint8Array): Mesh[] {
   const record = unpackAll(DracoGroup, data);
   checkStep(record.step);
-  return record.meshes.map((frame) => {
-    const mesh = decodeMesh(draco, frame, record.step);
-    checkGrowth(mesh, record.levels, record.meshes.length);
-    return subdivideMidpoint(core, mesh, record.levels);
-  });
+  checkClaims(core, record.meshes); // of all frames together
+  const meshes = record.meshes.map((frame) => decodeMesh(core, draco, frame, record.step));
+  for (const mesh of meshes) checkGrowth(mesh, record.levels, meshes.length);
+  checkCost(dracoCost(meshes.map((mesh) => elementsOf(mesh, record.levels))), data.length, "draco");
+  return meshes.map((mesh) => subdivideMidpoint(core, mesh, record.levels));
 }
 
-function decodeLaplacian({ core, draco }: Tools, record: LaplacianGroup, layers: number | null, place: Placement): DecodedGroup {
+function decodeLaplacian({ core, draco }: Tools, data: Uint8Array, layers: number | null, place: Placement): DecodedGroup {
+  const record = unpackAll(LaplacianGroup, data);
   checkStep(record.step);
-  const reference = decodeMesh(draco, record.reference, record.step);
-  const frameCount = framesOf(record.displacements);
+  const reference = decodeMesh(core, draco, record.reference, record.step);
+  const [frameCount, components] = claimsOf(record.displacements);
   checkGrowth(reference, record.levels, frameCount);
+  checkCost(laplacianCost(reference, record.levels, frameCount, components), data.length, "laplacian");
   const base = subdivideMidpoint(core, reference, record.levels);
   const field = decodeDisplacements(core, record.displacements, base, layers);
   const count = vertexCount(base);
@@ -106,18 +109,20 @@ function decodeLaplacian({ core, draco }: Tools, record: LaplacianGroup, layers:
 export function decodeStatic(tools: Tools, data: Uint8Array, before: Mesh | null, place: Placement): Mesh {
   if (data[0] === Form.PATCH) {
     if (before === null) throw new FormatError("background: a patch of a state that is not at hand");
-    return decodeChange(tools, unpackAll(StaticPatch, data), before, place);
+    return decodeChange(tools, data, before, place);
   }
   const meshes = decodeIntra(tools, data);
   if (meshes.length !== 1) throw new FormatError(`background: ${meshes.length} meshes, a state has one`);
   return placed(meshes[0], place);
 }
 
-function decodeChange({ core, draco }: Tools, record: StaticPatch, before: Mesh, place: Placement): Mesh {
+function decodeChange({ core, draco }: Tools, data: Uint8Array, before: Mesh, place: Placement): Mesh {
+  const record = unpackAll(StaticPatch, data);
   checkStep(record.step);
   const kept = keptOf(core, record, before);
-  const added = decodeMesh(draco, record.mesh, record.step);
+  const added = decodeMesh(core, draco, record.mesh, record.step);
   checkGrowth(added, 0);
+  checkCost(changeCost(before, added), data.length, "background");
   const after = concatenate([kept, placed(added, place)]);
   checkGrowth(after, 0);
   return after;

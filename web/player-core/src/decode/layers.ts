@@ -4,6 +4,7 @@
 import type { DecoderModule } from "draco3d";
 
 import { FormatError } from "../errors.ts";
+import { checkCost, layersCost } from "../format/budget.ts";
 import { LayersGroup, LayersLevel, Origin } from "../format/layout.gen.ts";
 import { unpack } from "../format/records.ts";
 import { vertexCount } from "../mesh.ts";
@@ -51,8 +52,9 @@ export function readLayers(data: Uint8Array, levels: number | null): LayersRecor
 export function placeLayers(core: Core, draco: DecoderModule, records: LayersRecords, previous: LayersState | null, place: Placement): DecodedLayers {
   const { head, layers } = records;
   if (head.origin !== Origin.PREVIOUS) previous = null;
-  const base = baseOf(draco, head, previous);
+  const base = baseOf(core, draco, head, previous);
   const frames = head.frames;
+  checkCost(layersCost(base, layers.length - 1, frames), records.end, "layers");
   let rows = decodeMotion(core, layers[0], base, frames);
   const last = lastOf(rows, vertexCount(base), frames);
   const scalars: Float64Array[] = [];
@@ -76,11 +78,11 @@ export function placeLayers(core: Core, draco: DecoderModule, records: LayersRec
   return { faces, positions, state: { faces: base.faces, base: last, scalars, finer } };
 }
 
-function baseOf(draco: DecoderModule, head: LayersGroup, previous: LayersState | null): Mesh {
+function baseOf(core: Core, draco: DecoderModule, head: LayersGroup, previous: LayersState | null): Mesh {
   checkStep(head.step);
   if (head.frames === 0) throw new FormatError("layers: a group of 0 frames");
   let base: Mesh;
-  if (head.origin === Origin.ALONE) base = decodeMesh(draco, head.base, head.step);
+  if (head.origin === Origin.ALONE) base = decodeMesh(core, draco, head.base, head.step);
   else if (previous === null) throw new FormatError("layers: a group that is predicted from one which is not at hand");
   else if (head.base.length > 0) throw new FormatError(`layers: a base mesh of ${head.base.length} bytes in a group that has another's`);
   else base = { vertices: previous.base, faces: previous.faces };

@@ -1,4 +1,4 @@
-// Made from src/meshreel/format/layout.py by scripts/generate. Do not edit.
+// Made from src/meshreel/format/layout.py and budget.py by scripts/generate. Do not edit.
 
 import {
   array, blob, bytes, choice, f32, f64, i64, list, nested, record, rest, text, u8, u16, u32, varint,
@@ -7,6 +7,23 @@ import type { Kind } from "./records.ts";
 
 export const MAGIC = [82, 69, 69, 76, 13, 10, 26, 10] as const;
 export const VERSION = 1;
+
+export const LIMITS = {
+  free: 201326592,
+  perByte: 8192,
+  together: 134217728,
+  chain: 8,
+  frames: 65535,
+  framesPerByte: 64,
+  frame: 1024,
+  element: 160,
+  shown: 30,
+  moving: 30,
+  solved: 2200,
+  column: 20,
+  pair: 100,
+  number: 40,
+} as const;
 
 export const ChunkKind = {
   STATIC: 1,

@@ -1,0 +1,98 @@
+"""What a chunk may cost to decode: bytes of memory, by the bytes that the chunk has.
+
+Pure arithmetic on numbers that a reader knows before it takes memory; FORMAT.md ("What a file may cost") has it in
+words. A cost is an upper bound of the memory and, at some 2 ns for each byte of it, of the time. The player has the
+same functions in budget.ts, with the numbers of `LIMITS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..errors import FormatError
+from ..types import Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Numbers of the law; costs are in bytes. An element is a face or a vertex of a mesh as it is shown."""
+
+    free: int = 192 << 20  # what any chunk may cost: real groups cost at most a third of it (docs/results)
+    per_byte: int = 8192  # and more for each of its bytes: real groups of that cost need at most a tenth of it
+    together: int = 128 << 20  # memory that the groups of one frame may take, and per_byte more (guess)
+    chain: int = 8  # times as much as a chunk's may the states cost that lead to one of the background (guess)
+    frames: int = 65_535  # of all groups: what one group may have
+    frames_per_byte: int = 64  # and more for each byte of the file: a still group has 2 (guess)
+    frame: int = 1024  # of a frame, whatever is in it
+    # Costs of decoding, from measurement (scripts/worst_files.py), rounded up:
+    element: int = 160  # of the largest mesh of a DRACO group; of a LAYERS group; of a change and what it changes
+    shown: int = 30  # of an element in each frame of a DRACO group
+    moving: int = 30  # of an element in each frame of a LAYERS group
+    solved: int = 2200  # of an element of a LAPLACIAN group, whose least squares fill in
+    column: int = 20  # of an element in each frame and for each component of a LAPLACIAN group
+    pair: int = 100  # of two corners at one vertex of a LAPLACIAN group: a row of the least squares squared
+    number: int = 40  # of a number in the basis of a LAPLACIAN group
+
+
+LIMITS = Limits()
+
+
+class CostlyError(FormatError):
+    """Bytes that would cost more than so many may: a reader refuses them, and an encoder chooses others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """Faces and vertices of a mesh, before its midpoint subdivisions."""
+
+    faces: int
+    vertices: int
+    levels: int = 0
+
+    @classmethod
+    def of(cls, mesh: Mesh, levels: int = 0) -> Size:
+        """Return the size of a mesh that is to be subdivided `levels` times."""
+        return cls(len(mesh.faces), len(mesh.vertices), levels)
+
+    @property
+    def elements(self) -> int:
+        """Faces and vertices, at most, after the subdivisions; exact for a closed surface."""
+        return (self.faces + self.vertices) * 4**self.levels
+
+
+def allowance(size: int) -> int:
+    """Return the cost that a chunk of `size` bytes may have."""
+    return LIMITS.free + LIMITS.per_byte * size
+
+
+def draco_cost(meshes: Sequence[Size]) -> int:
+    """Return the cost of a DRACO group, or of its first frames."""
+    elements = [mesh.elements for mesh in meshes]
+    return LIMITS.frame * len(meshes) + LIMITS.shown * sum(elements) + LIMITS.element * max(elements, default=0)
+
+
+def layers_cost(base: Size, frames: int) -> int:
+    """Return the cost of a LAYERS group with this base mesh and as many levels as are decoded."""
+    products = (base.faces + base.vertices) * frames**2 // 4  # each number of the base's motion is a sum of 3 T
+    return base.elements * (LIMITS.moving * frames + LIMITS.element) + products
+
+
+def laplacian_cost(reference: Size, frames: int, components: int, pairs: int) -> int:
+    """Return the cost of a LAPLACIAN group; `pairs` of corners of faces meet at the vertices of its reference."""
+    numbers = 3 * frames * (1 + components)
+    growing = LIMITS.column * (frames + components) + LIMITS.solved
+    products = numbers // 12  # a multiplication for each vertex and number
+    alone = LIMITS.pair * pairs + LIMITS.number * numbers + LIMITS.frame * frames
+    return reference.elements * (growing + products) + alone
+
+
+def change_cost(before: Size, added: Size) -> int:
+    """Return the cost of a change of the background."""
+    return LIMITS.element * (before.elements + added.elements)
+
+
+def check_cost(cost: int, size: int, what: str) -> None:
+    """Raise CostlyError if decoding costs more than `size` bytes may."""
+    if cost > allowance(size):
+        raise CostlyError(f"{what}: {size} bytes that cost {cost} to decode, over {allowance(size)}")

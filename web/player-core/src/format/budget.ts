@@ -1,0 +1,48 @@
+// What a chunk may cost to decode: bytes of memory, by the bytes that the chunk has. Beside format/budget.py.
+
+import { FormatError } from "../errors.ts";
+import { LIMITS } from "./layout.gen.ts";
+import type { Mesh } from "../mesh.ts";
+
+/** Faces and vertices of a mesh, at most, after its midpoint subdivisions. */
+export function elementsOf({ faces, vertices }: Mesh, levels = 0): number {
+  return ((faces.length + vertices.length) / 3) * 4 ** levels;
+}
+
+/** What a chunk of `size` bytes may cost. */
+export function allowance(size: number): number {
+  return LIMITS.free + LIMITS.perByte * size;
+}
+
+/** A DRACO group of meshes of so many elements. */
+export function dracoCost(elements: readonly number[]): number {
+  const largest = elements.reduce((most, count) => Math.max(most, count), 0);
+  const sum = elements.reduce((total, count) => total + count, 0);
+  return LIMITS.frame * elements.length + LIMITS.shown * sum + LIMITS.element * largest;
+}
+
+/** A LAYERS group with this base mesh and as many levels as are decoded. */
+export function layersCost(base: Mesh, levels: number, frames: number): number {
+  const products = Math.floor((elementsOf(base) * frames ** 2) / 4);
+  return elementsOf(base, levels) * (LIMITS.moving * frames + LIMITS.element) + products;
+}
+
+/** A LAPLACIAN group with this reference mesh. */
+export function laplacianCost(reference: Mesh, levels: number, frames: number, components: number): number {
+  const corners = new Float64Array(reference.vertices.length / 3);
+  for (const vertex of reference.faces) corners[vertex] += 1;
+  const pairs = corners.reduce((sum, count) => sum + count * count, 0);
+  const numbers = 3 * frames * (1 + components);
+  const growing = LIMITS.column * (frames + components) + LIMITS.solved + Math.floor(numbers / 12);
+  return elementsOf(reference, levels) * growing + LIMITS.pair * pairs + LIMITS.number * numbers + LIMITS.frame * frames;
+}
+
+/** A change of the background. */
+export function changeCost(before: Mesh, added: Mesh): number {
+  return LIMITS.element * (elementsOf(before) + elementsOf(added));
+}
+
+/** FormatError where decoding costs more than `size` bytes may. */
+export function checkCost(cost: number, size: number, what: string): void {
+  if (cost > allowance(size)) throw new FormatError(`${what}: ${size} bytes that cost ${cost} to decode, over ${allowance(size)}`);
+}
