@@ -19,7 +19,7 @@ constexpr uint64_t kMost = 64'000'000;  // MAX_FACES of coding/mesh.py
 // Corners that Draco may rename, at some 13 ns each. Real meshes have less than one a face.
 constexpr uint64_t kFreeSteps = 1 << 24, kStepsPerFace = 64;
 
-constexpr uint8_t kBegin[] = {'D', 'R', 'A', 'C', 'O', 2, 2};
+constexpr uint8_t kBegin[] = {'D', 'R', 'A', 'C', 'O'}, kVersion[] = {2, 2};
 constexpr uint8_t kMesh = 1, kEdgebreaker = 1;
 constexpr uint8_t kPositions = 0, kFloat32 = 9, kQuantised = 2;
 constexpr int kMostBits = 30;  // of a coordinate
@@ -29,7 +29,9 @@ uint64_t most_of(uint64_t bytes) { return bytes < kMost ? std::min(kFree + kPerB
 int check_kind(DracoReader& in) {
     const uint8_t* begin = in.take(sizeof kBegin);
     if (!begin || std::memcmp(begin, kBegin, sizeof kBegin) != 0) return MR_NOT_DRACO;
+    const uint8_t* version = in.take(sizeof kVersion);
     if (in.byte() != kMesh) return MR_DRACO_CLOUD;
+    if (!in.good() || std::memcmp(version, kVersion, sizeof kVersion) != 0) return MR_NOT_DRACO;
     if (in.byte() != kEdgebreaker) return MR_DRACO_SEQUENTIAL;
     const uint8_t low = in.byte(), high = in.byte();
     return (low | high) != 0 ? MR_DRACO_METADATA : MR_OK;
@@ -40,13 +42,13 @@ int read_connectivity(DracoReader& in, DracoClaims& claims, uint64_t most) {
     claims.points = in.varint(), claims.faces = in.varint();
     const uint8_t attributes = in.byte();  // with seams of their own
     claims.symbols = in.varint(), claims.splits = in.varint();
-    if (!in.good()) return MR_BAD_DRACO;
+    if (!in.good()) return MR_DRACO_FACES;
     if (traversal != DracoTraversal::Standard && traversal != DracoTraversal::ByValence) return MR_DRACO_TRAVERSAL;
     if (attributes != 0) return MR_DRACO_ATTRIBUTES;
     if (claims.faces > most || claims.points > most || claims.splits > most - claims.points) return MR_DRACO_CLAIMS;
-    if (claims.symbols > claims.faces) return MR_BAD_DRACO;
+    if (claims.symbols > claims.faces) return MR_DRACO_FACES;
     uint64_t steps = 0;
-    if (!read_draco_faces(in, traversal, claims, steps)) return MR_BAD_DRACO;
+    if (!read_draco_faces(in, traversal, claims, steps)) return MR_DRACO_FACES;
     return steps <= kFreeSteps + kStepsPerFace * claims.faces ? MR_OK : MR_DRACO_STEPS;
 }
 

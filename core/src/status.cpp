@@ -25,11 +25,12 @@ const char* mr_message(int status) {
         case MR_DRACO_METADATA: return "metadata, which no mesh of a stream has";
         case MR_DRACO_TRAVERSAL: return "a traversal of faces that is neither standard nor by valence";
         case MR_DRACO_CLAIMS: return "more faces or points than so few bytes may claim";
+        case MR_DRACO_FACES: return "faces or points that are not those it claims";
         case MR_DRACO_STEPS: return "vertices of many faces that are joined again and again";
         case MR_DRACO_ATTRIBUTES: return "attributes other than one of positions: three quantised 32-bit floats";
         case MR_DRACO_PREDICTION: return "positions that are not predicted by wrapped parallelograms";
         case MR_DRACO_LATTICE: return "a lattice that is not finite, or of more than 30 bits";
-        case MR_BAD_DRACO: return "parts that do not fit its bytes, or counts that contradict each other";
+        case MR_BAD_DRACO: return "positions that do not fill its bytes";
         default: return "an unknown status";
     }
 }

@@ -33,11 +33,12 @@ enum mr_status {
     MR_DRACO_METADATA,
     MR_DRACO_TRAVERSAL,
     MR_DRACO_CLAIMS,  // more faces or points than its bytes may claim
+    MR_DRACO_FACES,   // its symbols do not have what it claims
     MR_DRACO_STEPS,   // faces that are joined again and again
     MR_DRACO_ATTRIBUTES,
     MR_DRACO_PREDICTION,
     MR_DRACO_LATTICE,
-    MR_BAD_DRACO,  // its parts do not fit its bytes, or its counts each other
+    MR_BAD_DRACO,  // truncated, damaged, or longer than what it holds
 };
 
 // A status in words, without a full stop.
