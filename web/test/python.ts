@@ -11,6 +11,11 @@ const PYTHON = join(ROOT, process.platform === "win32" ? ".venv/Scripts/python.e
 /** Whether scripts/setup has made an environment. */
 export const hasPython = existsSync(PYTHON);
 
+/** What a module of the sources writes to its standard output. Error where it fails. */
+export function runModule(name: string): Buffer {
+  return execFileSync(PYTHON, ["-m", name], { cwd: ROOT, maxBuffer: 1 << 26 });
+}
+
 /** What a script writes to its standard output. Error where it fails. */
 export function runPython(script: URL, ...values: readonly (string | number)[]): Buffer {
   return execFileSync(PYTHON, [fileURLToPath(script), ...values.map(String)], { maxBuffer: 1 << 26 });

@@ -2,6 +2,7 @@
 
 import type { Decoder, DecoderModule, Mesh as DracoMesh } from "draco3d";
 
+import { joined } from "../bytes.ts";
 import { FormatError } from "../errors.ts";
 import { EMPTY, checkFaces, faceCount, vertexCount } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
@@ -9,14 +10,12 @@ import { subdivide } from "../wasm/layers.ts";
 import { CoreStopped } from "../wasm/memory.ts";
 import type { Core } from "../wasm/memory.ts";
 
-const EDGEBREAKER = 1;
-const MOST_PER_BYTE = 20_000; // vertices or faces; as in coding/mesh.py
 const MAX_FACES = 64_000_000; // as in coding/mesh.py
 
 /** The mesh of Draco bytes, its vertices exact multiples of `step`. FormatError where the bytes are damaged. */
-export function decodeMesh(draco: DecoderModule, data: Uint8Array, step: number): Mesh {
+export function decodeMesh(core: Core, draco: DecoderModule, data: Uint8Array, step: number): Mesh {
   if (data.length === 0) return EMPTY;
-  checkClaims(data);
+  checkClaims(core, [data]);
   const what = `damaged Draco data (${data.length} bytes)`;
   const mesh = decodeDraco(draco, data, what);
   const vertices = mesh.vertices.map((value) => roundHalfEven(value / step) * step);
@@ -83,20 +82,15 @@ function allocated(draco: DecoderModule, size: number): number {
   return place;
 }
 
-/** FormatError where the head of Draco bytes claims more than they can hold: memory is taken for the claim. */
-function checkClaims(data: Uint8Array): void {
-  if (data.length > 10 && data[10] & 0x80) throw new FormatError("damaged Draco data: it has metadata, which no mesh of a stream has");
-  let start = data.length > 8 && data[8] === EDGEBREAKER ? 12 : 11;
-  for (let claim = 0; claim < 2; claim++) {
-    let [count, scale] = [0, 1];
-    while (start < data.length) {
-      const byte = data[start++];
-      count += (byte & 0x7f) * scale;
-      scale *= 128;
-      if (byte < 0x80 || scale > 2 ** 63) break;
-    }
-    if (count > MOST_PER_BYTE * data.length) throw new FormatError(`damaged Draco data: ${data.length} bytes that claim ${count} vertices or faces`);
-  }
+/** FormatError for Draco meshes of kinds that no encoder writes, or that together claim more than their bytes may. */
+export function checkClaims(core: Core, meshes: readonly Uint8Array[]): void {
+  const data = joined(meshes);
+  core.run((arena) => {
+    let place = arena.put(data);
+    const structs = meshes.flatMap(({ length }) => [(place += length) - length, length]); // mr_bytes
+    const status = core.call("mr_check_draco", arena.put(Int32Array.from(structs)), meshes.length);
+    core.check(status, `damaged Draco data (${data.length} bytes): `);
+  });
 }
 
 /** FormatError where subdivision makes an absurd mesh, or frames. */

@@ -23,7 +23,7 @@ export function decodePatches(core: Core, draco: DecoderModule, record: LayersPa
   if (record.stepLevel >= LEVELS) throw new FormatError(`patches: step level ${record.stepLevel}, there are ${LEVELS}`);
   if (record.runs > 2 * faces + frames * (faces + 1) + 2) throw new FormatError(`patches: ${record.runs} runs over ${frames} frames of ${faces} faces`);
   const runs = decodeIntegers(core, record.dropped, record.runs);
-  return { dropped: decodeRuns(runs, frames, faces), meshes: takenIn(draco, record, frames) };
+  return { dropped: decodeRuns(runs, frames, faces), meshes: takenIn(core, draco, record, frames) };
 }
 
 /** The mask; null where nothing is dropped. FormatError where the runs do not fill it. */
@@ -60,9 +60,9 @@ export function fillRuns(runs: Int32Array, count: number): [Uint8Array, number] 
 }
 
 /** The meshes of each frame out of the one in a record, where they lie side by side along x. */
-function takenIn(draco: DecoderModule, record: LayersPatches, frames: number): Mesh[] {
+function takenIn(core: Core, draco: DecoderModule, record: LayersPatches, frames: number): Mesh[] {
   const step = stepOf(record.stepLevel);
-  const mesh = decodeMesh(draco, record.mesh, step);
+  const mesh = decodeMesh(core, draco, record.mesh, step);
   if (faceCount(mesh) === 0) return Array.from({ length: frames }, () => EMPTY);
   checkGrowth(mesh, 0);
   const { width } = record;
