@@ -9,6 +9,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from jaxtyping import Float64
@@ -29,7 +30,7 @@ LEAST = 0.3  # share of pixels with a measurement below which a frame is ignored
 class Recording(MeshSequence):
     """The frames of a rig as a MeshSequence, in world coordinates.
 
-    A frame is fused when it is first read, and kept in a temporary folder as long as this object lives and the disk has
+    A frame is fused when it is first read, and kept in a temporary file as long as this object lives and the disk has
     room (10 MB for half a million faces), since encoding a scene reads it several times. Pass `keep=False` to read each
     frame once.
     """
@@ -89,29 +90,33 @@ class RigDepth:
 
 
 class Kept:
-    """Meshes by number in a temporary folder, which is deleted with this object."""
+    """Meshes by number in a temporary file without a name, which ends with this object or its process."""
 
     def __init__(self) -> None:
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
-        self._files: dict[int, Path] = {}
+        self._file: IO[bytes] | None = None
+        self._places: dict[int, tuple[int, int, int]] = {}  # offset in the file, numbers of vertices and of faces
         self._full = False
 
     def get(self, number: int) -> Mesh | None:
         """Return a kept mesh, or None."""
-        if number not in self._files:
+        if self._file is None or number not in self._places:
             return None
-        with np.load(self._files[number], allow_pickle=False) as arrays:
-            return Mesh(arrays["vertices"], arrays["faces"])
+        offset, vertices, faces = self._places[number]
+        self._file.seek(offset)
+        points = np.frombuffer(bytearray(self._file.read(24 * vertices)), np.float64)
+        corners = np.frombuffer(bytearray(self._file.read(12 * faces)), np.int32)
+        return Mesh(points.reshape(-1, 3), corners.reshape(-1, 3))
 
     def put(self, number: int, mesh: Mesh) -> None:
         """Keep a mesh, unless the disk has no room; then none is kept from now on."""
         if self._full:
             return
         try:
-            self._folder = self._folder or tempfile.TemporaryDirectory(prefix="meshreel-", ignore_cleanup_errors=True)
-            path = Path(self._folder.name) / f"{number}.npz"
-            np.savez(path, vertices=mesh.vertices, faces=mesh.faces)
-            self._files[number] = path
+            self._file = self._file or tempfile.TemporaryFile(prefix="meshreel-")  # noqa: SIM115
+            offset = self._file.seek(0, 2)
+            self._file.write(mesh.vertices.tobytes() + mesh.faces.tobytes())
+            self._file.flush()
+            self._places[number] = (offset, len(mesh.vertices), len(mesh.faces))
         except OSError:  # frames that are read again are then fused again
             self._full = True
 

@@ -23,6 +23,7 @@ from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import DepthPicture
 from ..io.depth_pictures import picture_size, read_depth
 from ..io.file_names import last_number
+from ..io.read import read_file
 from ..io.write import make_folder, replacing
 from ..types import UP_AXES, UPS, Up
 
@@ -322,7 +323,7 @@ def _check_color(folder: Path, camera: DepthCamera) -> None:
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        record = json.loads(path.read_text(encoding="utf-8-sig"))  # some editors begin with a mark
+        record = json.loads(read_file(path).decode("utf-8-sig"))  # some editors begin with a mark
     except (OSError, UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise InputError(f"{path}: cannot be read ({error}); give JSON") from None
     if not isinstance(record, dict):

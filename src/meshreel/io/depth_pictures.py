@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import UInt16
 
 from ..errors import InputError
+from .read import read_file
 from .write import replacing
 
 _DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits per pixel
@@ -22,7 +23,7 @@ def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(read_file(path))) as image:
             if image.mode not in _DEEP:
                 kind = "8 bits a pixel" if image.mode in ("L", "P", "1") else f"mode {image.mode}"
                 raise InputError(f"{path}: a depth picture of {kind}; store depth as 16-bit grayscale PNG")
@@ -49,7 +50,7 @@ def picture_size(path: Path) -> tuple[int, int]:
     from PIL import Image
 
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(read_file(path))) as image:
             return image.size
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise InputError(f"{path}: cannot be read ({error}); delete it, or give a picture") from None

@@ -15,6 +15,7 @@ from jaxtyping import UInt8
 
 from ..errors import InputError
 from .file_names import last_number
+from .read import read_file
 from .write import replacing
 
 _MODES = ("L", "P", "1")  # of Pillow: gray, palette, black and white
@@ -26,7 +27,7 @@ def read_mask(path: Path) -> UInt8[np.ndarray, "H W"]:
     from PIL import Image, UnidentifiedImageError
 
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(read_file(path))) as image:
             if image.mode not in _MODES:
                 raise InputError(f"{path}: a mask of mode {image.mode}; store object numbers as 8-bit gray PNG")
             return np.array(image).astype(np.uint8)
@@ -42,7 +43,7 @@ def is_mask(path: Path) -> bool:
     from PIL import Image
 
     try:
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(read_file(path))) as image:
             return image.mode in _MODES
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
         return False

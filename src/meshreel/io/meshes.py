@@ -19,6 +19,7 @@ from .obj import parse_obj
 from .off import parse_off
 from .ply import parse_ply
 from .polygons import Dropped, Polygons, Unreadable, triangulate
+from .read import read_file
 from .stl import parse_stl
 
 _PARSERS: dict[str, Callable[[bytes], Polygons]] = {
@@ -50,9 +51,7 @@ def read_mesh(path: Path, where: str | None = None) -> Loaded:
     if parse is None:
         raise InputError(f"{where}: {path.suffix or 'no'} extension is not one of {', '.join(EXTENSIONS)}; convert it")
     try:
-        if path.exists() and not path.is_file() and not path.is_dir():
-            raise OSError("it is a pipe or a device, which cannot be read twice")
-        data = path.read_bytes()
+        data = read_file(path)
     except OSError as error:
         raise InputError(
             f"{where}: cannot be read ({error.strerror or error}); check the path and its rights"

@@ -1,0 +1,29 @@
+"""Reader of whole input files: regular files of a bounded size. A folder may hold pipes, devices and sparse files."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+MOST_BYTES = 1 << 30  # of a file: as binary PLY, 20 million vertices and 60 million faces (guess)
+_FLAGS = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NONBLOCK", 0)  # a pipe would wait for its writer
+
+
+def read_file(path: Path) -> bytes:
+    """Return the bytes of a file. Raises OSError, whose text is for users, also for what is no regular file."""
+    number = os.open(path, _FLAGS)
+    try:
+        state = os.fstat(number)
+        if stat.S_ISDIR(state.st_mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if not stat.S_ISREG(state.st_mode):
+            raise OSError("it is a pipe or a device, which cannot be read twice")
+        with os.fdopen(number, "rb", closefd=False) as file:
+            data = b"" if state.st_size > MOST_BYTES else file.read(MOST_BYTES + 1)  # the file may grow meanwhile
+        if max(state.st_size, len(data)) > MOST_BYTES:
+            raise OSError(f"it has {state.st_size} bytes, more than the {MOST_BYTES} that an input file may have")
+        return data
+    finally:
+        os.close(number)
