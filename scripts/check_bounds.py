@@ -1,0 +1,66 @@
+"""Checks that the lower bounds of pyproject.toml are the versions installed in this environment.
+
+`--row` stores what scripts/test-versions counted.
+"""
+
+from __future__ import annotations
+
+import platform
+import re
+import sys
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from importlib.metadata import version
+
+from reliability import ROOT, add_row
+
+EXTRAS = ("encode", "play", "usd")
+FORM = re.compile(r"([\w.-]+)>=([\d.]+)")  # of a requirement that is tested here
+
+
+def untrue(project: dict) -> list[str]:
+    """Return the dependencies whose installed version is not their lower bound, as sentences."""
+    wanted = project["dependencies"] + [one for extra in EXTRAS for one in project["optional-dependencies"][extra]]
+    found = []
+    for requirement in wanted:
+        match = FORM.match(requirement)
+        if match is None:
+            found.append(f"{requirement}: give a lower bound")
+        elif numbers(have := version(match[1])) != numbers(match[2]):
+            found.append(f"{requirement}: together with the others, {have} is the lowest; make it the bound")
+    return found
+
+
+def numbers(release: str) -> list[int]:
+    """Return the numbers of a version without zeros at its end: 2 is 2.0.0."""
+    return [int(number) for number in re.findall(r"\d+", re.sub(r"(\.0)+$", "", release))]
+
+
+def store(which: str, report: str, seconds: float) -> None:
+    """Append a row with the counts of pytest's report."""
+    suite = next(ElementTree.parse(report).getroot().iter("testsuite"))
+    count = {name: int(suite.get(name, "0")) for name in ("tests", "failures", "errors", "skipped")}
+    python = ".".join(platform.python_version_tuple()[:2])
+    add_row(
+        f"With the {which} versions of dependencies, on Python {python}, commands, readers, exports and server work",
+        f"./scripts/test-versions {which} {python}",
+        (count["tests"] - count["skipped"], "tests"),
+        count["failures"] + count["errors"],
+        seconds,
+        f"NumPy {version('numpy')}, SciPy {version('scipy')}, Open3D {version('open3d')}",
+    )
+
+
+def main() -> int:
+    """Return 1 where a bound is not true."""
+    if sys.argv[1:2] == ["--row"]:
+        store(sys.argv[2], sys.argv[3], float(sys.argv[4]))
+        return 0
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for sentence in (found := untrue(project)):
+        print(f"pyproject.toml: {sentence}", file=sys.stderr)
+    return bool(found)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
