@@ -312,6 +312,12 @@ def test_damaged_bytes_give_a_mesh_or_an_input_error_and_nothing_else(tmp_path: 
         assert mesh.is_empty or (mesh.faces.min() >= 0 and mesh.faces.max() < len(mesh.vertices))
 
 
+def test_a_glb_that_draco_would_have_to_decode_is_refused(tmp_path: Path) -> None:
+    data = trimesh.creation.box().export(file_type="glb", extension_draco=True)
+    with pytest.raises(InputError, match=r"compressed with Draco .*write it without"):
+        read(tmp_path, "m.glb", data)
+
+
 def test_a_glb_of_absurd_size_is_refused_before_memory_is_taken(tmp_path: Path) -> None:
     text = b'{"meshes":[{}],"accessors":[{"count":99999999999,"componentType":5126,"type":"VEC3"}]}  '
     words = np.array([2, 20 + len(text), len(text)], "<u4").tobytes()

@@ -16,7 +16,8 @@ from ..errors import FormatError, InputError
 from ..types import Mesh
 
 MAX_BITS = 21  # bits per coordinate that Draco's float32 positions can hold
-COMPRESSION_LEVELS = (7, 5)  # the paper's; the highest at which each face costs a bit, whatever the mesh is like
+COMPRESSION_LEVEL = 7  # from the paper
+PLAIN_LEVEL = 5  # the highest at which each face costs a bit, whatever the mesh is like
 MAX_FACES = 64_000_000  # faces or vertices of a group: a limit of memory, a guess
 
 
@@ -34,7 +35,7 @@ def encode_meshes(meshes: Sequence[Mesh], step: float) -> tuple[bytes, ...]:
     Large, flat, regular meshes take so few bytes that no reader would believe these (`check_claims`); they are coded
     plainly.
     """
-    for level in COMPRESSION_LEVELS:
+    for level in (COMPRESSION_LEVEL, PLAIN_LEVEL):
         coded = tuple(_encode_draco(mesh, step, level) for mesh in meshes)
         try:
             check_claims(coded)

@@ -11,6 +11,7 @@ import numpy as np
 from .polygons import Dropped, Polygons, Unreadable
 
 _DROPS = {"NORMAL": "normals", "TEXCOORD": "texture coordinates", "COLOR": "colors", "JOINTS": "skinning"}
+_DRACO = "KHR_draco_mesh_compression"
 _DENSEST = 64  # values per byte (guess): no mesh compression comes near
 
 
@@ -19,6 +20,8 @@ def parse_glb(data: bytes) -> Polygons:
     tree = _json_chunk(data)
     if not tree.get("meshes"):
         return _joined([], _dropped(tree))
+    if f'"{_DRACO}":' in json.dumps(tree["meshes"]):  # a few bytes could claim any size, and Draco believes them
+        raise Unreadable(f"GLB is compressed with Draco ({_DRACO}); write it without, with `gltf-transform copy` or so")
     import trimesh
 
     try:
