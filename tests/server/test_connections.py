@@ -148,14 +148,16 @@ def test_clients_beyond_the_limit_are_told_so_and_those_before_are_served(live, 
         assert answer_of(fifth).status == 200
 
 
-def test_garbage_within_a_request_that_is_answered_already_breaks_nothing(port, caplog):
+def test_garbage_before_within_and_behind_a_request_breaks_nothing(port, caplog):
+    chunked = BIG.replace(b"Host", b"Transfer-Encoding: chunked\r\nHost")
     with connect(port, 4096) as line:
-        line.sendall(BIG.replace(b"Host", b"Transfer-Encoding: chunked\r\nHost"))
-        time.sleep(0.2)
+        line.sendall(chunked)
+        time.sleep(0.2)  # it is answered already
         line.sendall(b"no length\r\n")
         received(line)
-    with connect(port) as line:
-        assert answer_of(line, b"\x16\x03\x01 no HTTP\r\n\r\n").status == 400
+    for request in (b"\x16\x03\x01 no HTTP\r\n\r\n", chunked + b"no length\r\n"):
+        with connect(port) as line:
+            assert answer_of(line, request).status == 400
     assert [record.getMessage() for record in caplog.records if record.levelno >= logging.ERROR] == []
 
 

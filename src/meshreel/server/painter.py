@@ -29,6 +29,7 @@ FIELD = 30.0  # degrees, vertical (guess)
 LOOKED_AT = 30  # frames that are searched for a surface (guess)
 MEMORY = 2**31  # bytes (guess); drawing 1.6 M faces takes 0.8e9 (measured)
 PATIENCE = 10  # s for a poster (guess); drawing 1.6 M faces takes 3 (measured)
+NICE = 5  # what plays comes before posters (guess)
 SIZE = struct.Struct("<I")  # bytes of the picture that follows; 0 for none
 
 
@@ -37,6 +38,8 @@ def main() -> None:
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # libraries that print must not disturb the answers
     _end_with_parent()
+    if hasattr(os, "nice"):
+        os.nice(NICE)
     with suppress(ModuleNotFoundError):  # without the renderer there are no posters
         import open3d  # noqa: F401  (before the limits: it takes seconds and is no fault of a file)
     _limit_memory()
