@@ -13,7 +13,8 @@
 namespace meshreel {
 namespace {
 
-constexpr size_t kSmall = 1 << 14;  // numbers of a product that stay in the cache while all rows of b pass
+constexpr size_t kRows = 256;       // of a product that stays in the cache while all rows of b pass
+constexpr size_t kSmall = 1 << 16;  // its numbers
 constexpr int kSweeps = 60;         // of Jacobi rotations; 6 to 10 suffice
 
 void product(const double* a, const double* b, size_t rows, size_t inner, size_t columns, double* out) {
@@ -24,7 +25,7 @@ void product(const double* a, const double* b, size_t rows, size_t inner, size_t
         double* sums = out + i * columns;
         for (size_t j = 0; j < columns; ++j) sums[j] += factor * row[j];
     };
-    if (rows * columns <= kSmall) {  // both orders add to each sum in the order of `inner`
+    if (rows <= kRows && rows * columns <= kSmall) {  // both orders add to each sum in the order of `inner`
         for (size_t k = 0; k < inner; ++k)
             for (size_t i = 0; i < rows; ++i) add(i, k);
     } else {

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..geometry.strict import norm
 from ..geometry.topology import clean, drop_unreferenced
 from ..types import Mesh, MeshSequence
 
@@ -40,7 +41,7 @@ class Survey:
     @property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal, m; 1 for a box without extent."""
-        return float(np.linalg.norm(self.high - self.low)) or 1.0
+        return norm(self.high - self.low) or 1.0
 
     @property
     def unit(self) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from .. import _core
+from ..geometry import strict
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +37,7 @@ def fit(field: Float64[np.ndarray, "V T 3"]) -> Basis:
 def fit_about(mean: Float64[np.ndarray, " C"], trajectories: Float64[np.ndarray, "V C"]) -> Basis:
     """Compute the full basis of trajectories of C numbers about a given mean."""
     centered = trajectories - mean
-    energies, vectors = np.linalg.eigh(centered.T @ centered / max(len(trajectories), 1))
+    energies, vectors = strict.eigen(strict.products(centered.T, centered) / max(len(trajectories), 1))
     energies, vectors = np.maximum(energies[::-1], 0.0), vectors[:, ::-1]
     largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(len(mean))] if len(mean) else np.zeros(0)
     return Basis(mean, np.ascontiguousarray(vectors * np.where(largest < 0, -1.0, 1.0)), energies.copy())
@@ -45,8 +46,7 @@ def fit_about(mean: Float64[np.ndarray, " C"], trajectories: Float64[np.ndarray,
 def forward(field: Float64[np.ndarray, "V T 3"], basis: Basis) -> Float64[np.ndarray, "V M"]:
     """Project each vertex's trajectory on the basis by least squares (eqs. 8 and 10)."""
     centered = field.reshape(len(field), len(basis.mean)) - basis.mean
-    gram = basis.vectors.T @ basis.vectors
-    return np.ascontiguousarray(np.linalg.solve(gram, basis.vectors.T @ centered.T).T)
+    return strict.products(centered, _dual(basis.vectors))
 
 
 def inverse(weights: Float64[np.ndarray, "V M"], basis: Basis) -> Float64[np.ndarray, "V T 3"]:
@@ -78,12 +78,19 @@ def quantize(basis: Basis, count: int, step: float) -> BasisSymbols:
         bits.append(_bits_for(float(np.sqrt(basis.energies[k])), step))
         direction = basis.vectors[:, k]
         if k:
-            direction = direction - rounded @ np.linalg.lstsq(rounded, direction, rcond=None)[0]
-        length = float(np.linalg.norm(direction))
+            inside = strict.products(_dual(rounded).T, direction[:, None])
+            direction = direction - strict.products(rounded, inside)[:, 0]
+        length = strict.norm(direction)
         rows[k] = np.rint(direction / (length if length > 0.5 else 1.0) * 2.0 ** bits[-1]).astype(np.int64)
         rounded = np.concatenate([rounded, np.ldexp(rows[k].astype(np.float64), -bits[-1])[:, None]], axis=1)
     mean = np.rint(basis.mean * 2.0 ** bits[0]).astype(np.int64)
     return BasisSymbols(mean, rows, np.array(bits, dtype=np.int64))
+
+
+def _dual(vectors: Float64[np.ndarray, "C M"]) -> Float64[np.ndarray, "C M"]:
+    """Return the vectors whose scalar products with a point are the weights of the given ones nearest to it."""
+    gram = strict.products(vectors.T, vectors)
+    return strict.products(vectors, strict.inverse(gram))
 
 
 def dequantize(symbols: BasisSymbols) -> Basis:
@@ -95,4 +102,4 @@ def dequantize(symbols: BasisSymbols) -> Basis:
 
 def _bits_for(amplitude: float, step: float) -> int:
     """Return the fraction bits, 5 to 24, at which rounding moves `amplitude` by at most 1/32 of a step."""
-    return int(np.clip(np.ceil(np.log2(max(16.0 * amplitude / step, 1.0))), 5, 24))
+    return min(max(strict.ceil_log2(max(16.0 * amplitude / step, 1.0)), 5), 24)

@@ -15,6 +15,7 @@ from ..analysis.reference.track import TrackOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
+from ..geometry.strict import rounded
 from .options import EncoderOptions, LayersOptions, PaperOptions
 from .target import Fidelity
 
@@ -67,7 +68,7 @@ def layers_options(quality: float = 50.0) -> LayersOptions:
     step = motion_step(quality)
     return LayersOptions(
         target=Fidelity(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
-        template=TemplateOptions(error=0.00088 * (step / 0.0012) ** 0.55),
+        template=TemplateOptions(error=rounded(0.00088 * (step / 0.0012) ** 0.55)),
         layers=LayerCodingOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
     )
@@ -75,12 +76,12 @@ def layers_options(quality: float = 50.0) -> LayersOptions:
 
 def motion_step(quality: float) -> float:
     """Quantiser step of the base's motion as a fraction of the diagonal: .0018 at 50, halved every 25 points."""
-    return 0.0018 * 2 ** ((50 - quality) / 25)
+    return rounded(0.0018 * 2 ** ((50 - quality) / 25))
 
 
 def displacement_step(quality: float) -> float:
     """Quantiser step of the displacements as a fraction of the diagonal: .0008 at 50, halved every 25 points."""
-    return 0.0008 * 2 ** ((50 - quality) / 25)
+    return rounded(0.0008 * 2 ** ((50 - quality) / 25))
 
 
 def reference_vertices(quality: float) -> int:

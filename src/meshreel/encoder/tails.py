@@ -22,6 +22,7 @@ from ..format.layout import LayersPatches
 from ..format.records import pack
 from ..geometry.closest_points import Surface
 from ..geometry.decimate import decimate
+from ..geometry.strict import dot
 from ..geometry.topology import clean, components, concatenate, drop_unreferenced, face_normals
 from ..types import Mesh
 
@@ -183,7 +184,7 @@ class _Search:
         chosen = []
         for faces in frame.lost(squared, threshold**2 * self.usual):
             samples = frame.samples_of(faces)
-            if frame.weights[samples] @ squared[samples] < 2 * self.price * LEAST_BYTES:
+            if dot(frame.weights[samples], squared[samples]) < 2 * self.price * LEAST_BYTES:
                 continue
             tried = [(self._worth(frame, squared, samples, small), small) for small in self._reduced(frame, faces)]
             worth, small = max(tried, key=lambda pair: pair[0], default=(0.0, None))
@@ -205,7 +206,7 @@ class _Search:
     ) -> float:
         size = max(len(encode_mesh(patch, step_of(self.rung))) - DRACO_HEAD, LEAST_BYTES)
         near = _squared(Surface(patch), frame.points[samples])[0]
-        gain = frame.weights[samples] @ np.maximum(squared[samples] - near, 0.0)
+        gain = dot(frame.weights[samples], np.maximum(squared[samples] - near, 0.0))
         return float(gain / 2 - self.price * size)
 
 
@@ -235,13 +236,16 @@ class _Frame:
         self.weights = weights / weights.sum()
         self.squared, self.hit = _squared(Surface(decoded), self.points)
         self.areas, self.apart = self._apart(decoded)  # of each decoded face: its area, its mean squared distance
-        self.errors = (float(self.weights @ self.squared), float(self.areas @ self.apart / max(self.areas.sum(), TINY)))
+        self.errors = (
+            dot(self.weights, self.squared),
+            dot(self.areas, self.apart) / max(float(self.areas.sum()), TINY),
+        )
 
     def body(self) -> float:
         """Return the mean squared distance from the frame to the decoded mesh except its farthest 2 %."""
-        order = np.argsort(self.squared)
+        order = np.argsort(self.squared, kind="stable")
         inside = order[: np.searchsorted(np.cumsum(self.weights[order]), BODY)]
-        return float(self.weights[inside] @ self.squared[inside])
+        return dot(self.weights[inside], self.squared[inside])
 
     def gains(self, gone: Bool[np.ndarray, " F"]) -> Float64[np.ndarray, " F"]:
         """Return how much each face lowers the mean of both errors when all these faces are dropped."""
@@ -273,7 +277,7 @@ class _Frame:
             squared[far] = np.minimum(squared[far], _squared(Surface(patch), self.points[far])[0])
             more = self._apart(patch)
             areas, apart = np.concatenate([areas, more[0]]), np.concatenate([apart, more[1]])
-        return float(self.weights @ squared), float(areas @ apart / areas.sum()) if areas.any() else np.inf
+        return dot(self.weights, squared), dot(areas, apart) / float(areas.sum()) if areas.any() else np.inf
 
     def lost(self, squared: Float64[np.ndarray, " N"], limit: float) -> Iterator[Int64[np.ndarray, " S"]]:
         """Yield connected faces, with a rim, that are farther than a squared limit from the decoded mesh."""

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from .strict import inverse, products
 
 _RIGID = 1e-3  # largest error of an entry of R R^T: some tools write few digits (guess)
 _LARGEST = 1e9  # largest number of a matrix: keeps everything computed from it finite (guess)
@@ -42,18 +43,18 @@ class PinholeCamera:
     @property
     def eye(self) -> Float64[np.ndarray, " 3"]:
         """Position of the camera in world coordinates."""
-        return -np.linalg.solve(self.extrinsic[:3, :3], self.extrinsic[:3, 3])
+        return -products(inverse(self.extrinsic[:3, :3]), self.extrinsic[:3, 3:])[:, 0]
 
     def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
         """Return the rays from the eye through image positions: origins and unit directions in the camera frame."""
         homogeneous = np.column_stack([pixels, np.ones(len(pixels))])
-        directions = homogeneous @ np.linalg.inv(self.intrinsic).T
+        directions = products(homogeneous, inverse(self.intrinsic).T)
         return np.zeros_like(directions), directions / np.linalg.norm(directions, axis=1)[:, None]
 
     def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
         """Project points of the camera frame to image positions; points that are not in front give NaN."""
         depth = np.where(points[:, 2:] > 0, points[:, 2:], np.nan)
-        return (points @ self.intrinsic.T)[:, :2] / depth
+        return products(points, self.intrinsic.T)[:, :2] / depth
 
 
 def pinhole_record(camera: PinholeCamera) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float64, Int64
 
 from ..types import Mesh
 from .closest_points import Surface
+from .strict import rounded
 from .topology import components, face_normals, weld
 
 BLOCK = 4  # grid points along a side of a block, which is classified at once where no surface crosses it (guess)
@@ -72,14 +73,18 @@ def _spacing(mesh: Mesh, count: int, generator: np.random.Generator) -> float:
     for pilot in (16_384, 131_072):
         if size.min() <= 0:
             return 0.0
-        step = np.cbrt(size.prod() / pilot)
+        step = _cube_root(size.prod() / pilot)
         shape = np.maximum(np.ceil(size / step), 1).astype(np.int64)
         grid = np.indices(tuple(shape)).reshape(3, -1).T
         inside = winding_inside(mesh, low + (grid + generator.random(grid.shape)) * (size / shape))
         if inside.sum() >= 200:
             break
     cells = count / inside.mean() if inside.any() else np.inf
-    return float(np.cbrt(size.prod() / min(cells, MOST_BLOCKS * BLOCK**3))) if inside.any() else 0.0
+    return _cube_root(size.prod() / min(cells, MOST_BLOCKS * BLOCK**3)) if inside.any() else 0.0
+
+
+def _cube_root(value: float) -> float:
+    return rounded(float(value) ** (1 / 3))
 
 
 def _inside_grid(mesh: Mesh, spacing: float, generator: np.random.Generator) -> Float64[np.ndarray, "N 3"]:

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float32, Float64, Int32
 from ..types import Mesh
 from .cameras import PinholeCamera
 from .closest_points import Surface
+from .strict import inverse, products
 from .topology import face_normals
 
 
@@ -94,7 +95,7 @@ class Rays:
 def _ways(camera: PinholeCamera) -> Iterator[Float64[np.ndarray, "H W"]]:
     """Yield the ray directions of all pixels, one world axis at a time; each goes one metre along the optical axis."""
     columns, rows = np.arange(camera.width) + 0.5, np.arange(camera.height)[:, None] + 0.5
-    for right, down, ahead in np.linalg.inv(camera.extrinsic[:3, :3]) @ np.linalg.inv(camera.intrinsic):
+    for right, down, ahead in products(inverse(camera.extrinsic[:3, :3]), inverse(camera.intrinsic)):
         yield right * columns + (down * rows + ahead)
 
 

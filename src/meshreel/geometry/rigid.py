@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64
 
+from . import strict
+
 DEGENERATE = 1e-10  # share of the largest singular value below which one does not constrain the rotation (guess)
 
 
@@ -22,7 +24,7 @@ def fit_rigid(
     middle_s = np.einsum("ni,nid->nd", share, source)
     middle_t = np.einsum("ni,nid->nd", share, target)
     s, t = source - middle_s[:, None], target - middle_t[:, None]
-    rotations = _nearest_rotations(np.swapaxes(share[..., None] * t, 1, 2) @ s)
+    rotations = _nearest_rotations(strict.products(np.swapaxes(share[..., None] * t, 1, 2), s))
     return rotations, middle_t - np.einsum("nij,nj->ni", rotations, middle_s)
 
 
@@ -30,7 +32,7 @@ def from_rigid(
     rotations: Float64[np.ndarray, "N 3 3"], translations: Float64[np.ndarray, "N 3"]
 ) -> Float64[np.ndarray, "N 8"]:
     """Return the unit dual quaternions of the motions x -> R x + t."""
-    real = _quaternions(rotations)
+    real = quaternions(rotations)
     pure = np.concatenate([np.zeros((len(real), 1)), translations], axis=1)
     return np.concatenate([real, multiply(pure, real) / 2], axis=1)
 
@@ -42,7 +44,7 @@ def blend(motions: Float64[np.ndarray, "N n 8"], weights: Float64[np.ndarray, "N
     """
     real = motions[..., :4]
     sign = np.where(np.einsum("nik,nk->ni", real, real[:, 0]) < 0, -1.0, 1.0)
-    return normalize(np.matmul((weights * sign)[:, None, :], motions)[:, 0])
+    return normalize(strict.products((weights * sign)[:, None, :], motions)[:, 0])
 
 
 def normalize(motions: Float64[np.ndarray, "N 8"]) -> Float64[np.ndarray, "N 8"]:
@@ -78,16 +80,15 @@ def multiply(a: Float64[np.ndarray, "N 4"], b: Float64[np.ndarray, "N 4"]) -> Fl
 
 
 def _nearest_rotations(covariances: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 3 3"]:
-    u, size, vt = np.linalg.svd(covariances)
+    rotations, size = strict.nearest_rotations(covariances)
     open_axis = size[:, 1] <= DEGENERATE * size[:, 0]  # rank 1 or 0: pull the open part towards no rotation
     if open_axis.any():
         pull = np.maximum(size[open_axis, 0], np.finfo(float).tiny)[:, None, None] * 1e-6 * np.eye(3)
-        u[open_axis], _, vt[open_axis] = np.linalg.svd(covariances[open_axis] + pull)
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
-    return u @ vt
+        rotations[open_axis] = strict.nearest_rotations(covariances[open_axis] + pull)[0]
+    return rotations
 
 
-def _quaternions(rotations: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 4"]:
+def quaternions(rotations: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, "N 4"]:
     """Return unit quaternions of rotations, from the largest of w, x, y, z, to avoid a division by a small one."""
     r = rotations
     trace = np.trace(r, axis1=1, axis2=2)

@@ -14,10 +14,10 @@ from jaxtyping import Float, Float64
 
 from .. import _core
 
-Array = Float64[np.ndarray, "..."]
+Array = Float[np.ndarray, "..."]  # of float32 or float64
 
 
-def products(a: Array, b: Array) -> Array:
+def products(a: Array, b: Array) -> Float64[np.ndarray, "..."]:
     """Return `a @ b` of two matrices, or of two batches of as many matrices, summed in order."""
     if a.ndim == 2:
         return _core.products(_plain(a)[None], _plain(b)[None])[0]
@@ -39,6 +39,11 @@ def inverses(matrices: Float64[np.ndarray, "N n n"]) -> Float64[np.ndarray, "N n
     return _core.inverses(_plain(matrices))
 
 
+def inverse(matrix: Float64[np.ndarray, "n n"]) -> Float64[np.ndarray, "n n"]:
+    """Invert one matrix."""
+    return inverses(matrix[None])[0]
+
+
 def determinants(matrices: Float64[np.ndarray, "N 3 3"]) -> Float64[np.ndarray, " N"]:
     """Return the determinant of each matrix."""
     (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(matrices, 0, 2)
@@ -56,23 +61,24 @@ def nearest_rotations(
 ) -> tuple[Float64[np.ndarray, "N 3 3"], Float64[np.ndarray, "N 2"]]:
     """Return the rotation nearest to each matrix, and the two largest singular values of the matrix.
 
-    The rotation's quaternion is an eigenvector (Horn 1987). It is not unique where the second value is 0.
+    The rotation's quaternion is an eigenvector (Horn 1987). It is not unique where the second value is 0, and none for
+    a matrix of zeros.
     """
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(matrices, 0, 2)
-    rows = [
-        [xx + yy + zz, zy - yz, xz - zx, yx - xy],
-        [zy - yz, xx - yy - zz, xy + yx, xz + zx],
-        [xz - zx, xy + yx, yy - xx - zz, yz + zy],
-        [yx - xy, xz + zx, yz + zy, zz - xx - yy],
+    rows = [  # w last: of equal values the last one counts as the largest
+        [xx - yy - zz, xy + yx, xz + zx, zy - yz],
+        [xy + yx, yy - xx - zz, yz + zy, xz - zx],
+        [xz + zx, yz + zy, zz - xx - yy, yx - xy],
+        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
     ]
     values, vectors = _core.eigen(np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0)))
     sizes = np.stack([values[:, 3] + values[:, 2], values[:, 3] + values[:, 1]], axis=1) / 2
-    return rotations_of(vectors[:, :, 3]), sizes
+    return rotations_of(np.roll(vectors[:, :, 3], 1, axis=1)), sizes
 
 
 def rotations_of(quaternions: Float64[np.ndarray, "N 4"]) -> Float64[np.ndarray, "N 3 3"]:
-    """Return the rotations of unit quaternions (w, x, y, z)."""
-    w, x, y, z = quaternions.T
+    """Return the rotations of quaternions (w, x, y, z) of any length above 0."""
+    w, x, y, z = (quaternions / np.sqrt((quaternions**2).sum(axis=1, keepdims=True))).T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
@@ -81,20 +87,31 @@ def rotations_of(quaternions: Float64[np.ndarray, "N 4"]) -> Float64[np.ndarray,
     return np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0))
 
 
-def exp(x: Float[np.ndarray, "..."]) -> Array:
+def exp(x: Array) -> Float64[np.ndarray, "..."]:
     """Return e to the power of each number."""
     return _core.exp(_plain(x).reshape(-1)).reshape(x.shape)
 
 
-def log2(x: Float[np.ndarray, "..."]) -> Array:
+def log2(x: Array) -> Float64[np.ndarray, "..."]:
     """Return the binary logarithm of each number; exact for powers of two."""
     return _core.log2(_plain(x).reshape(-1)).reshape(x.shape)
 
 
-def angle(y: Array, x: Array) -> Array:
+def rounded(value: float) -> float:
+    """Return a number to 12 significant digits: what libraries compute with `**` differs in the last bits."""
+    return float(f"{value:.12g}")
+
+
+def ceil_log2(value: float) -> int:
+    """Return the smallest whole exponent of two whose power is not below a number above 0."""
+    fraction, exponent = math.frexp(value)
+    return exponent - 1 if fraction == 0.5 else exponent
+
+
+def angle(y: Array, x: Array) -> Float64[np.ndarray, "..."]:
     """Return the angle of each point (x, y) with the x-axis, rad; neither is negative."""
     return _core.angle(_plain(y).reshape(-1), _plain(x).reshape(-1)).reshape(y.shape)
 
 
-def _plain(a: Float[np.ndarray, "..."]) -> Array:
+def _plain(a: Array) -> Float64[np.ndarray, "..."]:
     return np.ascontiguousarray(a, dtype=np.float64)

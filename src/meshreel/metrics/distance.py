@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64
 
+from ..geometry.strict import dot
 from ..types import Mesh
 from .normals import WORST_ANGLE, angles
 from .surface_samples import RESOLUTION, Matches, Samples, match, sample_pair, used_surface
@@ -140,10 +141,10 @@ def _one_way(source: Samples, found: Matches) -> OneWayErrors:
     return OneWayErrors(
         point_mse=float(squared[:vertices].mean()),
         plane_mse=float(_plane_squared(found, squared)[:vertices].mean()),
-        rms=float(np.sqrt(source.weights @ squared)),
+        rms=float(np.sqrt(dot(source.weights, squared))),
         hausdorff95=quantile(found.distances, source.weights, 0.95),
         maximum=float(found.distances.max()),
-        angle=float(source.weights @ turned),
+        angle=dot(source.weights, turned),
         vertex_angle=float(turned[:vertices].mean()),
     )
 
@@ -155,7 +156,7 @@ def _plane_squared(found: Matches, squared: Float64[np.ndarray, " N"]) -> Float6
 
 def quantile(values: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"], share: float) -> float:
     """Return the value that this share of the weights does not exceed; N > 0."""
-    order = np.argsort(values)
+    order = np.argsort(values, kind="stable")
     reached = np.cumsum(weights[order])
     return float(values[order[min(np.searchsorted(reached, share * reached[-1]), len(values) - 1)]])
 

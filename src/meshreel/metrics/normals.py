@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
+from ..geometry.strict import angle
 from ..geometry.topology import blend, vertex_normals
 from ..types import Mesh
 
@@ -46,7 +47,7 @@ def angles(a: Float64[np.ndarray, "N 3"], b: Float64[np.ndarray, "N 3"]) -> Floa
     apart = np.linalg.norm(a - b, axis=1)
     along = np.linalg.norm(a + b, axis=1)
     undefined = (~a.any(axis=1)) | (~b.any(axis=1))
-    return np.where(undefined, WORST_ANGLE, np.degrees(2 * np.arctan2(apart, along)))
+    return np.where(undefined, WORST_ANGLE, np.degrees(2 * angle(apart, along)))
 
 
 def _first_at_position(vertices: Float64[np.ndarray, "V 3"]) -> Int64[np.ndarray, " V"] | None:

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
+from ...geometry.strict import exp
 from ...geometry.topology import border_mask, face_normals, unique_edges
 from ...types import Mesh
 from .rows import Rows, no_rows
@@ -79,7 +80,7 @@ def match_borders(template: Border, frame: Border, gate: float, agreement: float
     agree &= np.einsum("nd,nd->n", template.normals[mine], frame.normals[other]) > agreement
     distance = np.linalg.norm(gaps, axis=1) / gate
     keep = agree & (distance < 1)
-    weights = np.exp(-2 * distance[keep] ** 2) / SAMPLES  # about one row per template edge and direction
+    weights = exp(-2 * distance[keep] ** 2) / SAMPLES  # about one row per template edge and direction
     weights *= np.where(np.arange(len(mine)) < len(ahead), 1.0, len(ahead) / len(back))[keep]
     mine, other = np.tile(mine[keep], 2), np.tile(other[keep], 2)
     half = len(mine) // 2

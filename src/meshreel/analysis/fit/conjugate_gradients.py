@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
+from ...geometry.strict import dot
+
 Array = Float64[np.ndarray, "..."]
 Product = Callable[[Array], Array]
 
@@ -27,16 +29,16 @@ def conjugate_gradients(multiply: Product, precondition: Product, right: Array, 
     """Solve multiply(x) = right from x = 0; return the last x if the residual becomes NaN."""
     x, r = np.zeros_like(right), right.copy()
     z = precondition(r)
-    p, rz = z.copy(), float(np.vdot(r, z))
+    p, rz = z.copy(), dot(r, z)
     enough = limits.tolerance**2 * rz
     for _ in range(limits.iterations):
         if not rz > enough:
             break
         product = multiply(p)
-        step = rz / float(np.vdot(p, product))
+        step = rz / dot(p, product)
         x += step * p
         r -= step * product
         z = precondition(r)
-        rz, before = float(np.vdot(r, z)), rz
+        rz, before = dot(r, z), rz
         p = z + rz / before * p
     return x

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...geometry.closest_points import Hits, Surface
+from ...geometry.strict import exp
 from ...geometry.topology import border_edges, face_normals, vertex_normals
 from ...types import Mesh
 from .border import border_sides, match_borders, sample_border
@@ -95,7 +96,7 @@ def _pair_weights(
 ) -> Float64[np.ndarray, " N"]:
     distance = np.linalg.norm(gaps, axis=1) / options.gate
     agree = np.einsum("nd,nd->n", normals, others) > options.agreement
-    return np.where(agree & (distance < 1), np.exp(-2 * distance**2), 0.0)  # sigma = half the gate
+    return np.where(agree & (distance < 1), exp(-2 * distance**2), 0.0)  # sigma = half the gate
 
 
 def interpolated(values: Float64[np.ndarray, "V 3"], faces: np.ndarray, hits: Hits) -> Float64[np.ndarray, "N 3"]:

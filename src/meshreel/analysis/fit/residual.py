@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from ...geometry.closest_points import Surface
+from ...geometry.strict import angle
 from ...geometry.topology import vertex_areas, vertex_normals
 from ...types import Mesh
 from .match import ON_BORDER, FrameSurface, interpolated, interpolated_scalar
@@ -74,4 +75,4 @@ def _rms(distances: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"
 
 def _mean_angle(one: Float64[np.ndarray, "N 3"], other: Float64[np.ndarray, "N 3"]) -> float:
     cosine = np.clip(np.einsum("nd,nd->n", one, other), -1.0, 1.0)
-    return float(np.degrees(np.mean(np.arccos(cosine))))
+    return float(np.degrees(np.mean(2 * angle(np.sqrt(1 - cosine), np.sqrt(1 + cosine)))))

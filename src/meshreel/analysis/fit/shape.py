@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float64
 
+from ...geometry.strict import eigen, nearest_rotations, products
 from ...geometry.topology import face_normals
 from ...types import Mesh
 from .system import Template
@@ -50,9 +51,10 @@ def strongest_components(positions: Float64[np.ndarray, "T V 3"], key: int, coun
     frames, vertices, _ = positions.shape
     field = (positions - positions[key]).transpose(1, 0, 2).reshape(vertices, 3 * frames)
     mean = field.mean(axis=0)
-    _, vectors = np.linalg.eigh((field - mean).T @ (field - mean))
+    centered = field - mean
+    _, vectors = eigen(products(centered.T, centered))
     basis = vectors[:, ::-1][:, :count]
-    kept = (field - mean) @ basis @ basis.T + mean
+    kept = products(products(centered, basis), basis.T) + mean
     return positions[key] + kept.reshape(vertices, frames, 3).transpose(1, 0, 2)
 
 
@@ -67,7 +69,4 @@ def _rotations(
     sums = sums / (np.abs(sums).sum(axis=1, keepdims=True) + 1e-30)
     for _ in range(SPREAD):
         sums -= 0.5 * (template.laplacian @ sums)
-    u, _, vt = np.linalg.svd(sums.reshape(-1, 3, 3))
-    sign = np.ones((template.count, 3))
-    sign[:, 2] = np.linalg.det(u @ vt)
-    return np.einsum("vki,vk,vjk->vij", vt, sign, u)
+    return nearest_rotations(sums.reshape(-1, 3, 3).transpose(0, 2, 1))[0]

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float64, Int32, Int64
 from scipy import sparse
 
+from ...geometry.strict import inverses
 from ...geometry.topology import unique_edges
 from .border import border_sides
 from .conjugate_gradients import Limits, conjugate_gradients
@@ -97,7 +98,7 @@ def _solved(
     blocks = np.zeros((count, 3, 3))
     blocks[rows[on_diagonal]] = matrix.data[on_diagonal]
     blocks[:, range(3), range(3)] += smooth.diagonal()[:, None]
-    inverse = np.linalg.inv(blocks)
+    inverse = inverses(blocks)
     return conjugate_gradients(
         lambda x: (matrix @ x.reshape(-1)).reshape(-1, 3) + smooth @ x,
         lambda r: np.einsum("vij,vj->vi", inverse, r),

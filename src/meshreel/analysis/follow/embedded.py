@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
 from ...errors import InputError
 from ...geometry.closest_points import Surface
+from ...geometry.rigid import quaternions
+from ...geometry.strict import products, rotations_of
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
 from ..fit.conjugate_gradients import Limits
@@ -206,7 +207,7 @@ class Tracker:
         solver = GraphSolver(rest, GraphSolver(few).holds(here, torn))
         carried = self._rounds(solver, Pose.at(here.positions), surface, self.options.coarse, torn)
         positions = moved(pose.positions, here.positions, self._nodes_by_few, carried)
-        return Pose(rotation(self._nodes_by_few, carried) @ pose.rotations, positions)
+        return Pose(products(rotation(self._nodes_by_few, carried), pose.rotations), positions)
 
     def _rounds(self, solver: GraphSolver, pose: Pose, surface: SampledSurface, stage: Stage, torn: float) -> Pose:
         o = self.options
@@ -285,9 +286,9 @@ def _planes(rest: RestGraph, pose: Pose, surface: SampledSurface, gate: float) -
 
 def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:
     """Continue from pose `last` by `ratio` times the step from `first` to it."""
-    turn = Rotation.from_matrix(last.rotations @ first.rotations.transpose(0, 2, 1)).as_rotvec()
-    rotations = Rotation.from_rotvec(ratio * turn).as_matrix() @ last.rotations
-    return Pose(rotations, last.positions + ratio * (last.positions - first.positions))
+    turn = quaternions(products(last.rotations, first.rotations.transpose(0, 2, 1)))
+    turns = rotations_of(turn * [1, ratio, ratio, ratio])  # the tangent of half the angle grows; exact for a ratio of 1
+    return Pose(products(turns, last.rotations), last.positions + ratio * (last.positions - first.positions))
 
 
 def _gaps(surface: Surface, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:

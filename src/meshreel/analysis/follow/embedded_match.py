@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
+from ...geometry.strict import exp
 from ..fit.match import FrameSurface
 from .embedded_graph import area_samples
 from .embedded_solve import Planes
@@ -56,7 +57,7 @@ class SampledSurface:
     ) -> Float64[np.ndarray, " N"]:
         """Return Gaussian weights of pairs by their distances, in gates; sigma is half a gate."""
         agree = np.einsum("nd,nd->n", planes, normals) > self._agreement
-        return np.where(agree & (distance < 1), np.exp(-2 * distance**2), 0.0)
+        return np.where(agree & (distance < 1), exp(-2 * distance**2), 0.0)
 
 
 def _kept(

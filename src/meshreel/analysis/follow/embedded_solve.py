@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
 from scipy import sparse
-from scipy.spatial.transform import Rotation
 
+from ...geometry.strict import determinants, inverses, nearest_rotations, products, rotations_of
 from ..fit.conjugate_gradients import Limits, conjugate_gradients
 from .embedded_graph import Binding
 
@@ -73,9 +73,9 @@ def unmoved(
     """Move bound points from a pose back to rest; also return False for points whose motion has no inverse."""
     blended = _affine(nodes, binding, pose)
     linear, offsets = blended[:, :, :3].copy(), points - blended[:, :, 3]
-    known = np.abs(np.linalg.det(linear)) > FLATTEST
+    known = np.abs(determinants(linear)) > FLATTEST
     linear[~known] = np.eye(3)
-    return np.linalg.solve(linear, offsets[:, :, None])[:, :, 0], known
+    return products(inverses(linear), offsets[:, :, None])[:, :, 0], known
 
 
 def _affine(nodes: Float64[np.ndarray, "N 3"], binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 4"]:
@@ -95,9 +95,7 @@ def turned(vectors: Float64[np.ndarray, "P 3"], binding: Binding, pose: Pose) ->
 
 def rotation(binding: Binding, pose: Pose) -> Float64[np.ndarray, "P 3 3"]:
     """Return the rotation nearest to the blend of the nodes' rotations at each bound point."""
-    u, _, vt = np.linalg.svd(_blend(pose.rotations.reshape(-1, 9), binding).reshape(-1, 3, 3))
-    u[:, :, 2] *= np.where(np.linalg.det(u @ vt) < 0, -1.0, 1.0)[:, None]
-    return u @ vt
+    return nearest_rotations(_blend(pose.rotations.reshape(-1, 9), binding).reshape(-1, 3, 3))[0]
 
 
 def _blend(rows: Float64[np.ndarray, "N n"], binding: Binding) -> Float64[np.ndarray, "P n"]:
@@ -160,7 +158,8 @@ class GraphSolver:
         turn = x[:, :3]
         angle = np.linalg.norm(turn, axis=1, keepdims=True)
         turn = turn * np.minimum(1.0, LARGEST_TURN / np.maximum(angle, 1e-12))
-        return Pose(Rotation.from_rotvec(turn).as_matrix() @ pose.rotations, pose.positions + x[:, 3:])
+        turns = rotations_of(np.concatenate([np.ones((count, 1)), turn / 2], axis=1))  # right to third order
+        return Pose(products(turns, pose.rotations), pose.positions + x[:, 3:])
 
     def holds(self, pose: Pose, torn: float) -> Float64[np.ndarray, " E"]:
         """Return the weight of each edge: 1 for one as at rest, a quarter for one off by `torn` of its length."""
@@ -173,7 +172,7 @@ class GraphSolver:
         rest = self.rest
         indices, weights = rest.binding.indices[planes.samples], rest.binding.weights[planes.samples]
         arms = rest.points[planes.samples][:, None] - rest.nodes[indices]
-        arms = np.matmul(pose.rotations[indices], arms[..., None])[..., 0]
+        arms = np.einsum("nkij,nkj->nki", pose.rotations[indices], arms)
         root = np.sqrt(planes.weights)
         place = np.einsum("nk,nkd->nd", weights, arms + pose.positions[indices])
         miss = root * (planes.values - np.einsum("nd,nd->n", planes.normals, place))
@@ -235,10 +234,10 @@ def _solved(
     limits: Limits,
 ) -> Float64[np.ndarray, " M"]:
     """Solve (rows^T rows + prior) x = right, preconditioned by the inverse of the nodes' blocks of that matrix."""
-    back, inverse = sparse.csr_array(rows.T), np.linalg.inv(blocks)
+    back, inverse = sparse.csr_array(rows.T), inverses(blocks)
     return conjugate_gradients(
         lambda x: back @ (rows @ x) + prior * x,
-        lambda r: np.matmul(inverse, r.reshape(-1, 6, 1)).reshape(-1),
+        lambda r: products(inverse, r.reshape(-1, 6, 1)).reshape(-1),
         right,
         limits,
     )

@@ -16,6 +16,7 @@ from jaxtyping import Float64, Int32
 from ...errors import InputError
 from ...geometry.closest_points import Surface
 from ...geometry.decimate import BOUNDARY_WEIGHT, decimate
+from ...geometry.strict import rounded
 from ...geometry.subdivision import heights, levels_of, refine
 from ...types import Mesh
 
@@ -32,7 +33,7 @@ class TemplateOptions:
     """Options of the template of a group (decision 14)."""
 
     # Desired RMS distance of the key frame's vertices to the base mesh, in diagonals; `presets` at quality 50.
-    error: float = 0.00088 * (0.0018 / 0.0012) ** 0.55
+    error: float = rounded(0.00088 * (0.0018 / 0.0012) ** 0.55)
     levels: int = 2  # midpoint subdivisions of the base
     border: float = BOUNDARY_WEIGHT  # weight of open borders in the decimation
 

@@ -8,6 +8,7 @@ Differs from the paper: distances determine a pose only up to reflection, so a r
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,10 @@ from jaxtyping import Float32, Float64
 
 from ...errors import InputError
 from ...geometry.rigid import fit_rigid
+from ...geometry.strict import determinants, eigen, exp, norm, products
 from ...types import Centers
+
+LANCZOS = 30  # steps towards three eigenvectors, from which SMACOF starts: a guess
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +78,8 @@ def affinity(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOpti
 
     Sigma follows from the spacing of the centers, so that it depends neither on the unit nor on the number of bodies.
     """
-    sigma = np.sqrt(np.log(2)) / max(options.reach * center_spacing(distances), np.finfo(np.float32).tiny)
-    return np.exp(-np.square(np.float32(sigma) * distances))  # eq. 6
+    sigma = math.sqrt(math.log(2)) / max(options.reach * center_spacing(distances), float(np.finfo(np.float32).tiny))
+    return exp(-np.square(np.float32(sigma) * distances)).astype(np.float32)  # eq. 6
 
 
 def center_spacing(distances: Float32[np.ndarray, "K K"]) -> float:
@@ -87,18 +91,30 @@ def center_spacing(distances: Float32[np.ndarray, "K K"]) -> float:
 
 def _classical(distances: Float32[np.ndarray, "K K"], options: ReferenceCenterOptions) -> Float64[np.ndarray, "K 3"]:
     """Scale classically (Torgerson): project on the three strongest axes of the doubly centered squared distances."""
-    from scipy.sparse.linalg import eigsh
-
-    gram = -0.5 * np.square(distances)
+    gram = -0.5 * np.square(distances.astype(np.float64))
     gram -= gram.mean(axis=0, keepdims=True)
     gram -= gram.mean(axis=1, keepdims=True)
-    if len(gram) <= 8:  # `eigsh` needs more rows than vectors
-        values, vectors = np.linalg.eigh(gram.astype(np.float64))
-        values, vectors = values[-3:], vectors[:, -3:]
-    else:
-        start = np.random.default_rng(options.seed).standard_normal(len(gram)).astype(np.float32)
-        values, vectors = eigsh(gram, k=3, which="LA", v0=start, tol=1e-4)
-    return (vectors * np.sqrt(np.maximum(values, 0))).astype(np.float64)
+    start = np.random.default_rng(options.seed).standard_normal(len(gram))
+    values, vectors = _strongest(gram, start, min(LANCZOS, len(gram)))
+    return vectors * np.sqrt(np.maximum(values, 0))
+
+
+def _strongest(
+    matrix: Float64[np.ndarray, "K K"], start: Float64[np.ndarray, " K"], steps: int
+) -> tuple[Float64[np.ndarray, " 3"], Float64[np.ndarray, "K 3"]]:
+    """Return the three largest eigenvalues of a symmetric matrix and their vectors, by Lanczos steps."""
+    basis, inside = np.zeros((steps, len(start))), np.zeros((steps, steps))
+    vector = start
+    for step in range(steps):
+        basis[step] = vector / max(norm(vector), np.finfo(float).tiny)
+        image = products(matrix, basis[step][:, None])[:, 0]
+        inside[step, : step + 1] = inside[: step + 1, step] = products(basis[: step + 1], image[:, None])[:, 0]
+        vector = image
+        for _ in range(2):  # twice, so that rounding leaves nothing of the vectors so far
+            known = products(basis[: step + 1], vector[:, None])
+            vector = vector - products(basis[: step + 1].T, known)[:, 0]
+    values, vectors = eigen(inside)
+    return values[-3:], products(basis.T, vectors[:, -3:])
 
 
 def _smacof(
@@ -134,9 +150,8 @@ def _guttman(
     np.maximum(current, np.float32(1e-12), out=current)
     ratio = distances / current
     current -= distances
-    flat = current.ravel()
-    stress = float(flat @ flat)
-    moved = (ratio.sum(axis=1)[:, None] * x - ratio @ x) / np.float32(len(x))
+    stress = float(np.square(current).sum())
+    moved = (ratio.sum(axis=1)[:, None] * x - products(ratio, x).astype(np.float32)) / np.float32(len(x))
     return moved, stress
 
 
@@ -148,24 +163,24 @@ def _orient(
     A limb may be elsewhere than in the frame, so a global fit may prefer the mirror image; neighbourhoods do not.
     """
     count = min(12, len(pose))
-    near = np.argpartition(distances, count - 1, axis=1)[:, :count]
+    near = np.argsort(distances, axis=1, kind="stable")[:, :count]
     a, b = (
         positions[near] - positions[near].mean(axis=1, keepdims=True),
         pose[near] - pose[near].mean(axis=1, keepdims=True),
     )
-    votes = np.sign(np.linalg.det(np.swapaxes(b, 1, 2) @ a))
+    votes = np.sign(determinants(products(np.swapaxes(b, 1, 2), a)))
     if votes.sum() < 0:
         positions = positions * np.array([1.0, 1.0, -1.0])
     rotation, translation = fit_rigid(positions[None], pose[None], np.ones((1, len(pose))))
-    return positions @ rotation[0].T + translation[0]
+    return products(positions, rotation[0].T) + translation[0]
 
 
 def _stress(distances: Float32[np.ndarray, "K K"], positions: Float64[np.ndarray, "K 3"]) -> float:
     """Return Kruskal's stress (eq. 5); both of its sums count every pair twice, which cancels."""
     current = np.sqrt(_squared_distances(positions))
     np.fill_diagonal(current, 0)
-    norm = float(np.linalg.norm(distances))
-    return float(np.linalg.norm(distances - current)) / norm if norm > 0 else 0.0
+    size = norm(distances)
+    return norm(distances - current) / size if size > 0 else 0.0
 
 
 def _squared_distances(
@@ -173,7 +188,7 @@ def _squared_distances(
 ) -> Float32[np.ndarray, "K K"]:
     p = (pose - pose.mean(axis=0)).astype(np.float32)
     square = np.einsum("kd,kd->k", p, p)
-    result = p @ (-2 * p.T)
+    result = sum(p[:, k, None] * (-2 * p[:, k]) for k in range(3))
     result += square
     result += square[:, None]
     return np.maximum(result, 0, out=result)

@@ -16,6 +16,7 @@ from jaxtyping import Float32, Float64, Int64
 
 from ...errors import InputError
 from ...geometry.rigid import apply, blend, fit_rigid, from_rigid, rotate
+from ...geometry.strict import exp
 from ...geometry.topology import unique_edges, vertex_normals
 from ...types import Mesh
 
@@ -74,9 +75,7 @@ def neighbours(affinity: Float32[np.ndarray, "K K"], options: DeformOptions) -> 
     count = min(options.neighbours, len(affinity))
     distance = 1 - affinity
     np.fill_diagonal(distance, -1)  # a center comes first even if another one is at the same place
-    some = np.argpartition(distance, count - 1, axis=1)[:, :count]
-    order = np.argsort(np.take_along_axis(distance, some, axis=1), axis=1, kind="stable")
-    indices = np.take_along_axis(some, order, axis=1).astype(np.int64)
+    indices = np.argsort(distance, axis=1, kind="stable")[:, :count].astype(np.int64)
     return Neighbours(indices, np.take_along_axis(affinity, indices, axis=1).astype(np.float64), affinity)
 
 
@@ -176,7 +175,7 @@ def _weights(
     square = np.sum(np.square(points[:, None] - source[rows]), axis=2)
     square -= square.min(axis=1, keepdims=True)  # keeps weights from vanishing far from all centers
     width = options.falloff * _spacing(source, neighbours)
-    weights = neighbours.affinities[nearest] * np.exp(-square / max(width**2, np.finfo(float).tiny))
+    weights = neighbours.affinities[nearest] * exp(-square / max(width**2, np.finfo(float).tiny))
     return weights / weights.sum(axis=1, keepdims=True)
 
 

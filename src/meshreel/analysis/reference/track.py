@@ -8,6 +8,7 @@ Differs from its sources: one energy has both terms, so that convergence can be 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from jaxtyping import Float64, Int32, Int64
 from ... import _core
 from ...errors import InputError
 from ...geometry.inside import Samples, interior_samples
+from ...geometry.strict import exp
 from ...types import Centers, Mesh
 
 LEAST_AFFINITY = 1e-3  # weaker neighbours are dropped: a guess
@@ -173,7 +175,7 @@ class _Affinities:
         """Return neighbour lists (offsets, indices, affinities) with the strongest neighbours of each center."""
         o = self._options
         halvings = self._distance / o.reach**2 + self._difference / o.agreement**2
-        affinity = np.maximum(np.exp2(-halvings), 1e-6)
+        affinity = np.maximum(exp(-math.log(2) * halvings), 1e-6)
         order = np.lexsort((halvings, self._i))
         rank = np.empty(len(order), np.int64)
         rank[order] = np.arange(len(order)) - self._offsets[self._i[order]]

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from ...errors import InputError
+from ...geometry.strict import exp
 from .places import Places
 
 _UNIT = 20  # integer capacity of a link of weight 1: a guess
@@ -57,7 +58,7 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
     rests = always + around * _around(middles[near], middles[seeds], share[seeds])
     first, second = _links(places, near)
     turn = _hollow(middles[near], places.normals[near], first, second)
-    links = np.exp(-options.hollow * turn)
+    links = exp(-options.hollow * turn)
     moving[near] = _cut(moves, rests, np.stack([first, second]), links)
     return _large(places, moving, round(options.least / places.lattice.size**2))
 

@@ -15,6 +15,7 @@ from jaxtyping import Int32
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Seen
+from ...geometry.strict import inverse, products
 
 _APART = (0.06, 0.02)  # m, and share of the depth: a pixel whose depth varies by more sees a change; guesses
 
@@ -107,9 +108,9 @@ def tour(views: Sequence[PinholeCamera], start: int) -> list[int]:
     largest distance between two eyes.
     """
     eyes = np.array([view.eye for view in views])
-    axes = np.array([np.linalg.inv(view.extrinsic[:3, :3])[:, 2] for view in views])
+    axes = np.array([inverse(view.extrinsic[:3, :3])[:, 2] for view in views])
     away = np.linalg.norm(eyes[:, None] - eyes[None], axis=-1)
-    costs = away / (away.max() or 1.0) + (1 - axes @ axes.T) / 2
+    costs = away / (away.max() or 1.0) + (1 - products(axes, axes.T)) / 2
     order = [start]
     while len(order) < len(views):
         ahead = np.where(np.isin(np.arange(len(views)), order), np.inf, costs[order[-1]])

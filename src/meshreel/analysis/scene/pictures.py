@@ -14,6 +14,7 @@ from jaxtyping import Float64, UInt8
 
 from ...geometry.cameras import PinholeCamera, pack_cameras
 from ...geometry.raycast import Rays, Seen
+from ...geometry.strict import inverse
 from ...io.mask_pictures import write_picture
 from ...io.write import frame_names, make_folder, replacing
 from ...types import Frames
@@ -27,12 +28,14 @@ def normal_picture(seen: Seen, view: PinholeCamera) -> UInt8[np.ndarray, "H W 3"
     faces.
     """
     rows, columns = np.mgrid[: view.height, : view.width]
-    ahead = np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1) @ np.linalg.inv(view.intrinsic).T
+    ahead = np.einsum(
+        "hwd,ed->hwe", np.stack([columns + 0.5, rows + 0.5, np.ones(rows.shape)], axis=-1), inverse(view.intrinsic)
+    )
     hit = np.isfinite(seen.depth)
     points = np.where(hit, seen.depth, np.nan)[..., None] * ahead
     normals = np.nan_to_num(np.cross(_step(points, 1), _step(points, 0)))
     normals *= -np.sign((normals * ahead).sum(axis=-1, keepdims=True))
-    world = normals @ view.extrinsic[:3, :3]
+    world = np.einsum("hwd,de->hwe", normals, view.extrinsic[:3, :3])
     world /= np.maximum(np.linalg.norm(world, axis=-1, keepdims=True), 1e-30)
     colors = np.rint(255 * (world + 1) / 2).astype(np.uint8)
     return np.where(hit[..., None], colors, np.uint8(255))

@@ -21,6 +21,7 @@ from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.depth import DepthPicture
 from ...geometry.raycast import Rays
+from ...geometry.strict import products
 from ...geometry.topology import face_normals
 from ...geometry.voxels import Lattice, distinct, neighbours, spread
 from ...types import Frames, Mesh, evenly
@@ -329,7 +330,7 @@ def _projected(
     view: PinholeCamera, points: Float64[np.ndarray, "P 3"]
 ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"], Float64[np.ndarray, " N"]]:
     """Project points into a view; return the pixels of those inside the picture, their numbers, and their depths, m."""
-    local = points @ view.extrinsic[:3, :3].T + view.extrinsic[:3, 3]
+    local = products(points, view.extrinsic[:3, :3].T) + view.extrinsic[:3, 3]
     with np.errstate(invalid="ignore"):
         columns, rows = np.floor(view.project(local)).T
     inside = np.flatnonzero((columns >= 0) & (columns < view.width) & (rows >= 0) & (rows < view.height))

@@ -20,6 +20,7 @@ from jaxtyping import Float32, Float64, Int64
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays
+from ...geometry.strict import dot, norm, products, rounded
 from ...geometry.topology import face_normals
 from ...types import UP_AXES, Frames, Mesh, Up
 
@@ -142,7 +143,7 @@ def _pixels(
     options: ViewsOptions,
 ) -> Float32[np.ndarray, "W N"]:
     """Return the size in pixels, at most 1, of each sample's face in each viewing direction; all frames in one row."""
-    across = math.tan(math.radians(options.fov) / 2)
+    across = rounded(math.tan(math.radians(options.fov) / 2))
     high = across * options.height / options.width
     focal = options.width / 2 / across
     found = []
@@ -151,7 +152,7 @@ def _pixels(
         distance = np.maximum(np.linalg.norm(ahead, axis=1), 1e-12)
         facing = np.abs((part.normals * ahead).sum(axis=1)) / distance
         whole = np.where(free, focal**2 * facing * part.areas / distance**2, 0).astype(np.float32)  # on the axis
-        x, y, z = np.moveaxis((ahead / distance[:, None]).astype(np.float32) @ turns.swapaxes(1, 2), 2, 0)
+        x, y, z = np.moveaxis(np.einsum("nd,wed->wne", ahead / distance[:, None], turns), 2, 0)
         within = (np.abs(x) < across * z) & (np.abs(y) < high * z)
         found.append(np.where(within, np.minimum(whole / np.maximum(z, 1e-3) ** 3, 1), 0))
     return np.concatenate(found, axis=1).astype(np.float32)
@@ -164,7 +165,7 @@ def _greedy(
     unseen = np.ones(pixels.shape[1], np.float32)  # probability that no pixel of the chosen views meets the face
     chosen: list[PinholeCamera] = []
     for _ in range(min(count, len(candidates))):
-        best = int(np.argmax(pixels @ unseen))
+        best = int(np.argmax(np.einsum("cn,n->c", pixels, unseen)))
         chosen.append(candidates[best])
         unseen *= 1 - _SURE * pixels[best]
         pixels[best] = 0  # no view twice
@@ -173,10 +174,10 @@ def _greedy(
 
 def _looking(eye: Float64[np.ndarray, " 3"], turn: Float64[np.ndarray, "3 3"], options: ViewsOptions) -> PinholeCamera:
     """Return a camera at `eye` with the rotation `turn` from world to camera."""
-    focal = options.width / 2 / math.tan(math.radians(options.fov) / 2)
+    focal = options.width / 2 / rounded(math.tan(math.radians(options.fov) / 2))
     intrinsic = np.array([[focal, 0, options.width / 2], [0, focal, options.height / 2], [0, 0, 1.0]])
     extrinsic = np.eye(4)
-    extrinsic[:3, :3], extrinsic[:3, 3] = turn, -turn @ eye
+    extrinsic[:3, :3], extrinsic[:3, 3] = turn, -products(turn, eye[:, None])[:, 0]
     return PinholeCamera(options.width, options.height, intrinsic, extrinsic)
 
 
@@ -186,8 +187,8 @@ def _turns(axis: Up) -> Float64[np.ndarray, "W 3 3"]:
     up = np.array(UP_AXES[axis])
     turns = []
     for way in _WAYS:
-        forward = way / np.linalg.norm(way)
-        right = np.cross(forward, np.roll(up, 1) if abs(forward @ up) > 0.99 else up)
-        right /= np.linalg.norm(right)
+        forward = way / norm(way)
+        right = np.cross(forward, np.roll(up, 1) if abs(dot(forward, up)) > 0.99 else up)
+        right /= norm(right)
         turns.append(np.stack([right, np.cross(forward, right), forward]))
     return np.array(turns)

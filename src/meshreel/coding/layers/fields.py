@@ -15,6 +15,7 @@ from ... import _core
 from ...errors import InputError
 from ...format.layout import CodedField
 from ...format.records import pack
+from ...geometry import strict
 from .. import entropy, klt
 from ..steps import step_of
 from . import orthonormal
@@ -68,7 +69,7 @@ def encode_field(
     mean = trajectories.mean(axis=0) if surface is not None and len(trajectories) else np.zeros(width)
     bits = _mean_bits(rate.step)
     mean = np.rint(np.ldexp(mean, bits))
-    worth = rate.price * rate.step**2 * np.log2(2 * np.abs(mean) + 1).sum()
+    worth = rate.price * rate.step**2 * strict.log2(2 * np.abs(mean) + 1).sum()
     has_mean = bool(len(trajectories) * (np.ldexp(mean, -bits) ** 2).sum() > worth)
     side = np.append(bits, mean).astype(np.int32) if has_mean else np.zeros(0, np.int32)
     centered = trajectories - (np.ldexp(mean, -bits) if has_mean else 0.0)
@@ -106,7 +107,7 @@ class _Columns:
         scales = np.clip(scales, LEAST_SCALE, MOST_SCALE)
         self.basis = orthonormal.forward(np.ascontiguousarray(basis.vectors.T), scales)
         self.vectors = orthonormal.inverse(self.basis, count, width)
-        self.weights = np.ascontiguousarray(self.vectors @ trajectories.T)
+        self.weights = strict.products(self.vectors, trajectories.T)
         if np.abs(self.weights).max(initial=0) > MOST_WEIGHT * rate.step:
             raise InputError(f"a trajectory {np.abs(self.weights).max():g} long is too long for step {rate.step:g}")
         self.symbols, self.decoded = self._quantized(graph, surface)
@@ -124,7 +125,7 @@ class _Columns:
     def pays(self) -> Bool[np.ndarray, " M"]:
         """Return True for the columns whose absence would cost more than they do."""
         count, width = self.vectors.shape
-        basis_bits = np.log2(2.0 * np.abs(self.basis) + 1)
+        basis_bits = strict.log2(2.0 * np.abs(self.basis) + 1)
         rows = np.repeat(np.arange(count), width - np.arange(count))
         bits = 8.0 * self.sizes + np.bincount(rows, basis_bits, count)
         saved = (self.weights**2).sum(axis=1) - ((self.weights - self.decoded) ** 2).sum(axis=1)
@@ -137,4 +138,4 @@ def _only(basis: klt.Basis, kept: Int64[np.ndarray, " M"]) -> klt.Basis:
 
 def _mean_bits(step: float) -> int:
     """Return the fraction bits, at most 30, at which the mean's rounding error is at most a sixteenth of a step."""
-    return int(np.clip(np.ceil(np.log2(8.0 / step)), 0, MOST_BITS))
+    return min(max(strict.ceil_log2(8.0 / step), 0), MOST_BITS)

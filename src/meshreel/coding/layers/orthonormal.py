@@ -11,6 +11,7 @@ from jaxtyping import Float64, Int32
 
 from ... import _core
 from ...errors import FormatError
+from ...geometry.strict import dot, norm, products
 
 
 def forward(vectors: Float64[np.ndarray, "M C"], scales: Float64[np.ndarray, " M"]) -> Int32[np.ndarray, " N"]:
@@ -19,15 +20,15 @@ def forward(vectors: Float64[np.ndarray, "M C"], scales: Float64[np.ndarray, " M
     free = np.eye(width)  # columns: an orthonormal basis of the complement of the vectors so far
     rows = []
     for vector, scale in zip(vectors, scales.tolist(), strict=True):
-        inside = free.T @ vector
-        length = float(np.linalg.norm(inside))
+        inside = products(vector[None], free)[0]
+        length = norm(inside)
         symbols = np.rint(inside * (scale / length if length > 1e-6 else 0.0)).astype(np.int32)
         if not symbols.any():
             symbols[int(np.abs(inside).argmax())] = 1
         rows.append(symbols)
-        mirror = symbols / np.linalg.norm(symbols.astype(np.float64))
+        mirror = symbols / norm(symbols.astype(np.float64))
         mirror[0] += -1.0 if mirror[0] < 0 else 1.0
-        free = (free - np.outer(free @ mirror, 2.0 / (mirror @ mirror) * mirror))[:, 1:]
+        free = (free - np.outer(products(free, mirror[:, None])[:, 0], 2.0 / dot(mirror, mirror) * mirror))[:, 1:]
     return np.concatenate([np.zeros(0, np.int32), *rows])
 
 

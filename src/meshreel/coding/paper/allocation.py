@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float64, Int32, Int64
 
 from ...errors import InputError
 from ...format.layout import AnchorRule
+from ...geometry.strict import log2
 from ...geometry.topology import components
 from .. import entropy, klt
 from ..steps import RUNGS, rung_of, step_of
@@ -138,8 +139,8 @@ class _Components:
         """Distortion + price * rate of each component: the basis is orthonormal, so they add."""
         error = self.system.inverse(symbols * steps_of(rungs)) - self.weights
         bits = entropy.weights_cost(symbols[: self.vertices], neighbours)
-        bits += np.log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
-        bits += np.log2(2.0 * np.abs(self.basis.vectors) + 1).sum(axis=1)
+        bits += log2(2.0 * np.abs(symbols[self.vertices :]) + 1).sum(axis=0)
+        bits += log2(2.0 * np.abs(self.basis.vectors) + 1).sum(axis=1)
         return (error**2).sum(axis=0) + WORTH * self.options.step**2 * bits
 
     def dropped(self) -> Float64[np.ndarray, " M"]:
@@ -160,4 +161,4 @@ def _slopes(symbols: Float64[np.ndarray, "V M"] | Int32[np.ndarray, "V M"]) -> F
     """Return the bits per unit of magnitude under a two-sided geometric law with each column's mean magnitude."""
     mean = np.maximum(np.abs(symbols).mean(axis=0, dtype=np.float64) if len(symbols) else 1.0, 1e-3)
     ratio = mean / (1 + np.sqrt(1 + mean**2))  # of mean = 2 r / (1 - r^2)
-    return -np.log2(ratio) * np.ones(symbols.shape[1])
+    return -log2(np.atleast_1d(ratio)) * np.ones(symbols.shape[1])
