@@ -1,0 +1,41 @@
+// The player as Python serves it: compressed, and under addresses that browsers need not ask for again.
+
+import { spawn } from "node:child_process";
+import { once } from "node:events";
+import { join } from "node:path";
+
+import { expect, test } from "vitest";
+
+import { describeInBrowser, launchBrowser } from "../../test/browser.ts";
+import { hasPython, PYTHON, ROOT } from "../../test/python.ts";
+
+describeInBrowser("the player of meshreel play", () => {
+  test.skipIf(!hasPython)("plays, and comes from the browser's cache the second time", async () => {
+    const server = spawn(PYTHON, ["-m", "meshreel", "play", join(ROOT, "conformance/v1/layers.reel"), "--no-browser", "--json"]);
+    const browser = await launchBrowser();
+    try {
+      const [line] = (await once(server.stdout, "data")) as [Buffer];
+      const page = await browser.newPage();
+      const errors: string[] = [];
+      page.on("pageerror", (error) => errors.push(String(error)));
+      page.on("console", (message) => void (message.type() === "error" && errors.push(message.text())));
+      const load = async (): Promise<PerformanceResourceTiming[]> => {
+        await page.goto((JSON.parse(line.toString()) as { addresses: string[] }).addresses[0]);
+        await page.waitForFunction(() => (document.querySelector("meshreel-player")?.statistics?.triangles ?? 0) > 0);
+        const entries = await page.evaluate(() => performance.getEntriesByType("resource").map((entry) => entry.toJSON() as PerformanceResourceTiming));
+        return entries.filter((entry) => /\/player\/[0-9a-f]{24}\/[^/]*\.(js|css|wasm)$/.test(entry.name));
+      };
+      const [first, second] = [await load(), await load()];
+      const names = first.map((entry) => entry.name.replace(/.*\//, ""));
+      expect(names).toEqual(expect.arrayContaining(["page.js", "meshreel-player.js", "page.css"]));
+      for (const entry of first) expect(entry.encodedBodySize).toBeLessThan(entry.decodedBodySize);
+      expect(first.every((entry) => entry.transferSize > 0)).toBe(true);
+      expect(second.map((entry) => entry.transferSize)).toEqual(second.map(() => 0));
+      expect(second.length).toBe(first.length);
+      expect(errors).toEqual([]);
+    } finally {
+      await browser.close();
+      server.kill();
+    }
+  }, 120_000);
+});
