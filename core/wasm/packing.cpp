@@ -14,7 +14,8 @@ constexpr double kMostPlace = 65535.0, kHalfNormal = 127.5;
 uint16_t place_of(double x, double low, double high) {
     const double width = high - low;
     const double share = width > 0.0 ? (x - low) / width : 0.0;
-    return static_cast<uint16_t>(std::floor(std::min(std::max(share, 0.0), 1.0) * kMostPlace + 0.5));
+    const double within = share > 0.0 ? std::min(share, 1.0) : 0.0;  // not a number where the width overflows
+    return static_cast<uint16_t>(std::floor(within * kMostPlace + 0.5));
 }
 
 uint16_t byte_of(double x) { return static_cast<uint16_t>(std::floor((x + 1.0) * kHalfNormal + 0.5)); }
@@ -22,7 +23,7 @@ uint16_t byte_of(double x) { return static_cast<uint16_t>(std::floor((x + 1.0) *
 // The sphere onto the octahedron |x| + |y| + |z| = 1, its lower half folded outwards, onto a square.
 uint16_t octahedral(const double* n) {
     const double sum = std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2]);
-    if (!(sum > 0.0)) return static_cast<uint16_t>(byte_of(0.0) | byte_of(0.0) << 8);
+    if (!(sum > 0.0 && std::isfinite(sum))) return static_cast<uint16_t>(byte_of(0.0) | byte_of(0.0) << 8);
     double u = n[0] / sum, v = n[1] / sum;
     if (n[2] < 0.0) {
         const double folded = (1.0 - std::fabs(v)) * (u < 0.0 ? -1.0 : 1.0);

@@ -1,0 +1,21 @@
+// A CodedField record over a graph (form LAYERS), decoded twice.
+#include "input.h"
+
+using namespace meshreel;
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+    Input in(data, size);
+    const Links links = links_of(in);
+    const size_t width = in.u8() % 40;
+    const bool has_mean = in.u8() % 2 == 1;
+    Bytes record;
+    put_field(in, links.view(), width, has_mean, record);
+    if (in.u8() == 255) record = in.bytes();
+    const mr_bytes bytes{record.data(), record.size()};
+    const mr_graph graph = links.view();
+    std::vector<double> rows(graph.count * width), again(graph.count * width);
+    const int status = mr_decode_field(&bytes, &graph, width, has_mean, rows.data());
+    LAW(mr_decode_field(&bytes, &graph, width, has_mean, again.data()) == status);
+    if (status == MR_OK) LAW(are_same(rows, again));
+    return 0;
+}
