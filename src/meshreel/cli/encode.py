@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from ..encoder.digests import WriteLine, machine_line
 from ..encoder.options import EncoderOptions, SceneOptions
 from ..encoder.presets import preset_options
 from ..encoder.quality import Goal, encode_to
@@ -104,6 +107,7 @@ def command(
     masking: Masking = Masking(),
     jobs: int = 1,
     resume: bool | None = None,
+    debug_digests: Path | None = None,
     common: Common = Common(),
 ) -> None:
     """Encode a sequence of meshes into one .reel file.
@@ -123,6 +127,9 @@ def command(
     resume
         Continue an encode that was stopped, from the intervals that OUTPUT.part has: give the same inputs and options.
         --no-resume starts over. By default, what could be continued is an error.
+    debug_digests
+        A text file to write: digests of what each stage computed. Where two machines write different files, the first
+        line in which theirs differ says where the difference starts.
     """
     if output.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
@@ -138,8 +145,8 @@ def command(
     goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
     sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
-    with common.stages(len(sequence)) as progress, workers(jobs) as executor:
-        encoder = Encoder(sequence, executor, progress, masker)
+    with common.stages(len(sequence)) as progress, workers(jobs) as executor, _lines(debug_digests) as digests:
+        encoder = Encoder(sequence, executor, progress, masker, digests)
         if goal is None:
             summary = encoder.encode(output, options, resume)
         else:
@@ -150,6 +157,21 @@ def command(
     common.warn(warnings)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
     common.result({"output": str(output), "warnings": warnings} | row, f"{output}: {describe(row)}; {_reached(row)}")
+
+
+@contextmanager
+def _lines(path: Path | None) -> Iterator[WriteLine | None]:
+    """Open the file of digests and write its first line; None without a path."""
+    if path is None:
+        yield None
+        return
+    try:
+        file = path.open("w", encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --debug-digests") from None
+    with file:
+        file.write(machine_line())
+        yield file.write
 
 
 def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:

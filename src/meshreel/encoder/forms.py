@@ -6,7 +6,7 @@ In -> out: the frames of a group, and a reference that follows them or none -> a
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float64
@@ -37,6 +37,7 @@ class EncodedGroup:
     fidelity: Fidelity
     predicted: bool = False  # from the group before
     key: int | None = None  # the frame, counted in the group, whose surface the others follow
+    digests: tuple[str, ...] = field(default=(), kw_only=True)  # lines of `--debug-digests`
     stored: Stored | None = None  # where the payload is, in place of `payload`, of a group that a journal has
 
 

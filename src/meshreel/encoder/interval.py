@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..analysis.survey import Survey
 from ..types import Frames, Mesh, MeshSequence
+from .digests import Digests
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,6 +17,7 @@ class Interval:
     noise: float = 0.0  # RMS distance of the frames from the truth, normalised; 0: a clean capture
     first_frame: int = 0  # its number in the sequence
     track: int = 0
+    digests: Digests | None = field(default=None, kw_only=True)  # of what its stages compute; None: nobody asks
     surface: str = (
         ""  # digest of the frames; empty where they are whole frames of the sequence, which has their digests
     )
@@ -27,7 +29,7 @@ class Interval:
 
     def in_memory(self) -> Interval:
         """Return the interval with its frames in a list, which a worker process can receive."""
-        return Interval(list(self.frames), self.noise, self.first_frame, self.track)
+        return Interval(list(self.frames), self.noise, self.first_frame, self.track, digests=self.digests)
 
 
 class NormalisedFrames(Frames):

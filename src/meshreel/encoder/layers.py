@@ -24,6 +24,7 @@ from ..coding.reference_mesh import CodedReference, code_on_lattice
 from ..format.layout import Form
 from ..format.records import pack
 from ..types import Mesh
+from .digests import Digests, note
 from .forms import EncodedGroup, cheaper, empty_groups, intra_only, laplacian
 from .interval import Interval
 from .options import LayersOptions
@@ -44,6 +45,7 @@ class Ahead:
 
     surfaces: list[FrameSurface]
     noise: float  # RMS distance of the frames from the truth, normalised
+    digests: Digests | None = None
 
     @property
     def frames(self) -> list[Mesh]:
@@ -55,7 +57,7 @@ class Ahead:
 
     def first(self, count: int) -> Ahead:
         """Return the first `count` frames."""
-        return Ahead(self.surfaces[:count], self.noise)
+        return replace(self, surfaces=self.surfaces[:count])
 
     def target(self, options: LayersOptions) -> Fidelity:
         """Return the fidelity that these frames should reach, normalised."""
@@ -97,7 +99,9 @@ def encode_interval(interval: Interval, options: LayersOptions, stages: Stages |
     at, before = 0, None
     while at < len(frames):
         numbers = range(at, min(at + options.group_size, len(frames)))
-        group, before = _next_group(Ahead([FrameSurface(frames[k]) for k in numbers], interval.noise), before, options)
+        ahead = Ahead([FrameSurface(frames[k]) for k in numbers], interval.noise, interval.digests)
+        note(ahead.digests, "frames", *(array for mesh in ahead.frames for array in (mesh.vertices, mesh.faces)))
+        group, before = _next_group(ahead, before, options)
         stages.add("code", group.frame_count)
         at += group.frame_count
         yield group
@@ -119,6 +123,7 @@ def _continued(ahead: Ahead, before: Followed, options: LayersOptions) -> tuple[
     if still is not None:
         return _coded(ahead, before.reference, still, before, options)
     predictions = from_last(Mesh(before.positions, base.faces), ahead.surfaces, options.embedded, ahead.noise)
+    note(ahead.digests, "tracked from the group before", predictions)
     followed = ahead.first(len(predictions))
     if len(followed) < min(SHORTEST, len(ahead)):
         return None
@@ -149,6 +154,7 @@ def _alone(ahead: Ahead, options: LayersOptions) -> tuple[EncodedGroup, Followed
     while True:
         motion = _key_motion(ahead.first(count), options)
         group = ahead.first(motion.count)
+        note(group.digests, "key and motion", motion.key, motion.motion.positions, motion.motion.residuals)
         keyed = _keyed(group, motion, options)
         count = _fitted(group, keyed, options)
         if count == len(group) and keyed is not None:
@@ -189,6 +195,7 @@ def _laid(group: Ahead, motion: KeyMotion, fuse: bool, options: LayersOptions) -
     lattice = options.layers.step_above(noise) * (LATTICE if len(group) > 1 else LATTICE_ALONE)
     reference = code_on_lattice(base_mesh(surface, options.template, noise), lattice, options.template.levels)
     base, faces = reference.mesh, reference.base.faces
+    note(group.digests, "template, coded", reference.base.vertices, reference.base.faces)
     if base.is_empty:
         return None
     detail = shared_detail(base.faces, len(base.vertices), reference.levels)
@@ -218,9 +225,13 @@ def _coded(
 ) -> tuple[EncodedGroup, Followed | None]:
     """Encode a group in its cheapest form; the template that the next may begin with is the second value."""
     frames, previous = group.frames, before.state if before else None
+    note(group.digests, "fit", fit.positions)
     encoded = encode_layers(reference, fit.positions, options.layers, previous, group.noise)
+    note(group.digests, "fields and symbols", encoded.payload)
     shown = _with_tails(group, encoded, reference.base.faces, options)
+    note(group.digests, "patches", shown.payload[len(encoded.payload) :])
     fidelity = measure(frames, shown.frames)
+    note(group.digests, "fidelity", fidelity)
     chosen = EncodedGroup(Form.LAYERS, len(frames), shown.payload, shown.layers, fidelity, before is not None)
     target = group.target(options)
     if group.noise == 0 and fidelity.distance > TOO_COARSE * target.distance:

@@ -21,6 +21,7 @@ from ..analysis.reference.track import track_centers
 from ..coding.reference_mesh import CodedReference, code_reference
 from ..errors import NoReferenceError
 from ..types import Centers, Mesh
+from .digests import Digests, note
 from .forms import EncodedGroup, cheaper, empty_groups, intra_only, laplacian
 from .interval import Interval
 from .options import PaperOptions
@@ -75,8 +76,9 @@ def find_groups(interval: Interval, options: PaperOptions, stages: Stages | None
     if len(frames) == 1:
         return [FoundGroup(frames, None)]
     centers = track_centers(frames, options.track)
+    note(interval.digests, "centers", centers.positions)
     stages.add("track", len(frames))
-    return _Cutting(options, interval.noise).groups(frames, centers, options.groups.depth, stages)
+    return _Cutting(options, interval.noise, interval.digests).groups(frames, centers, options.groups.depth, stages)
 
 
 def analyze(
@@ -105,6 +107,7 @@ class _Cutting:
 
     options: PaperOptions
     noise: float
+    digests: Digests | None = None
 
     def groups(self, frames: Sequence[Mesh], centers: Centers, depth: int, stages: Stages) -> list[FoundGroup]:
         """Cut frames as `find_groups` does, from tracked centers; `depth` times at most."""
@@ -115,6 +118,8 @@ class _Cutting:
             reference, fit = analyze(frames, centers, options, stages)
         except NoReferenceError:
             return [FoundGroup(frames, None)]
+        note(self.digests, "reference, coded", reference.base.vertices, reference.base.faces)
+        note(self.digests, "fit", fit.positions)
         residuals = np.array([residual.rms for residual in fit.residuals])
         cut = cut_at(residuals / target_of(frames, options.target, self.noise).distance, options.groups)
         if cut is None:
@@ -124,7 +129,7 @@ class _Cutting:
         head, tail = frames[:cut], frames[cut:]
         known = replace(centers, positions=centers.positions[:cut])
         retracked = track_centers(tail, options.track)  # centers that were lost before the cut would spoil the tail
-        quick = _Cutting(replace(options, reference=options.reference.fewer_trials()), self.noise)
+        quick = replace(self, options=replace(options, reference=options.reference.fewer_trials()))
         again = Stages(None, len(frames))  # these frames have been through the stages once
         return [*quick.groups(head, known, depth - 1, again), *quick.groups(tail, retracked, depth - 1, again)]
 

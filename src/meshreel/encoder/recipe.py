@@ -8,8 +8,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+
+from threadpoolctl import threadpool_limits
 
 from . import layers, paper
+from .digests import Digests, note
 from .forms import EncodedGroup
 from .interval import Interval
 from .job import Job
@@ -28,14 +32,24 @@ def encode_intervals(job: Job, intervals: Iterable[Interval], stages: Stages) ->
     for interval in intervals:
         waiting.append(_begun(job, interval, stages))
         if len(waiting) > ahead:
-            yield waiting.popleft()()
+            yield _noted(job, waiting.popleft()())
     while waiting:
-        yield waiting.popleft()()
+        yield _noted(job, waiting.popleft()())
+
+
+def _noted(job: Job, groups: list[EncodedGroup]) -> list[EncodedGroup]:
+    """Write the lines of digests of some groups, if there are any."""
+    if job.digests is not None:
+        for line in (line for group in groups for line in group.digests):
+            job.digests(line)
+    return groups
 
 
 def _begun(job: Job, interval: Interval, stages: Stages) -> Callable[[], list[EncodedGroup]]:
     """Begin with an interval; return what waits for its groups."""
     method, journal, count = job.options.method, job.journal, len(interval.frames)
+    if job.digests is not None:
+        interval = replace(interval, digests=Digests(interval.track, interval.first_frame))
 
     def arrived(groups: list[EncodedGroup]) -> list[EncodedGroup]:
         stages.add("code", count)
@@ -54,20 +68,25 @@ def _begun(job: Job, interval: Interval, stages: Stages) -> Callable[[], list[En
 
 def encode_interval(
     interval: Interval, options: MethodOptions, stages: Stages | None = None, find: paper.FindGroups | None = None
-) -> Iterable[EncodedGroup]:
+) -> Iterator[EncodedGroup]:
     """Encode an interval as groups, in order, by the recipe whose options are given.
 
     `find` finds the groups of the paper's recipe; pass a store's `find` to reuse an earlier analysis.
     """
     if isinstance(options, LayersOptions):
-        return layers.encode_interval(interval, options, stages)
-    return paper.encode_interval(interval, options, stages, find)
+        groups = layers.encode_interval(interval, options, stages)
+    else:
+        groups = iter(paper.encode_interval(interval, options, stages, find))
+    for group in groups:
+        note(interval.digests, "payload", group.form.name, group.payload)
+        yield group if interval.digests is None else replace(group, digests=interval.digests.take())
 
 
 def encode_apart(interval: Interval, options: MethodOptions) -> list[EncodedGroup]:
     """Encode an interval in a worker process, which ends with its parent; the result can be pickled."""
     end_with_parent()
-    return list(encode_interval(interval, options))
+    with threadpool_limits(1):
+        return list(encode_interval(interval, options))
 
 
 def longest_interval(options: EncoderOptions, frame_rate: float) -> int:

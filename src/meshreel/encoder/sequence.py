@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.masks import Masker
@@ -35,6 +36,7 @@ from ..io.unfinished import unfinished
 from ..io.write import check_apart
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, Up, as_sequence, evenly
+from .digests import WriteLine
 from .interval import Interval, NormalisedFrames
 from .job import GroupStore, Job
 from .journal import Journal, made_of
@@ -100,13 +102,14 @@ class Encoder:
         executor: Executor | None = None,
         progress: Progress | None = None,
         masker: Masker | None = None,
+        digests: WriteLine | None = None,
     ) -> None:
         """Take executor and progress as `encode` does; with a `masker`, whose masks mark moving pixels, it is a scene.
 
-        The attribute `progress` may be replaced between encodes.
+        `digests` takes a line of JSON for each stage. The attribute `progress` may be replaced between encodes.
         """
         self.sequence, self._executor, self._masker = Unchanging(captured(sequence)), executor, masker
-        self.progress = progress
+        self.progress, self.digests = progress, digests
         self.store = GroupStore()  # groups that `prepare` found
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
@@ -116,6 +119,7 @@ class Encoder:
         """Frames per second of the sequence, 1/s."""
         return self.sequence.frame_rate
 
+    @threadpool_limits.wrap(limits=1)
     def prepare(self, options: EncoderOptions) -> None:
         """Find in advance what `encode` finds before a rate is chosen; raises what `encode` raises.
 
@@ -143,6 +147,7 @@ class Encoder:
         with Journal(path, resume) as journal, unfinished(path) as file:
             return self.encode_into(file, options, journal)
 
+    @threadpool_limits.wrap(limits=1)  # idle threads of BLAS would take a third of the processor's time
     def encode_into(self, file: BinaryIO, options: EncoderOptions, journal: Journal) -> Summary:
         """Encode the sequence into an open, empty file; its groups wait in the journal."""
         if options.scene is None and self._masker is not None:
@@ -154,7 +159,7 @@ class Encoder:
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence))
-        return Job(self.sequence, options, self._executor, stages, self.store)
+        return Job(self.sequence, options, self._executor, stages, self.store, digests=self.digests)
 
     def _is_scene(self, options: EncoderOptions) -> bool:
         if options.scene is None or not len(self.sequence):
@@ -176,6 +181,7 @@ def _encode_bodies(job: Job, file: BinaryIO, seen: Survey) -> Summary:
     """Encode a sequence in which everything may move."""
     sequence, options = job.sequence, job.options
     groups: list[GroupSummary] = []
+    job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped)
     with _writer(job, file, seen) as writer:
         for encoded in encode_intervals(job, _body_intervals(job, seen), job.stages):
             for group in encoded:
@@ -188,7 +194,10 @@ def _encode_bodies(job: Job, file: BinaryIO, seen: Survey) -> Summary:
 def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     """Encode a scene with a background."""
     sequence, options, seen = job.sequence, job.options, parts.seen
+    job.note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
+    job.note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
     states = encode_static(parts, len(sequence), sequence.frame_rate, job.scene.background)
+    job.note("background, coded", *(state.payload for state in states))
     with _writer(job, file, seen) as writer:
         coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)

@@ -1,0 +1,85 @@
+"""Digests of what each stage of an encode computed: where two machines write different files, the first line that
+differs names the stage where the difference starts.
+
+In: the arrays, numbers and bytes of a stage. Out: lines of JSON, in the order of the file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+WriteLine = Callable[[str], object]  # takes a line of JSON with its end
+LIBRARIES = ("meshreel", "numpy", "scipy", "open3d", "libigl", "fast-simplification", "DracoPy")
+
+
+class Digests:
+    """Collects the lines of an interval, which may be encoded in another process."""
+
+    def __init__(self, track: int, frame: int) -> None:
+        self._where, self._lines = {"track": track, "frame": frame}, list[str]()
+
+    def add(self, stage: str, *values: object) -> None:
+        """Add the line of a stage."""
+        self._lines.append(line_of(stage, *values, **self._where))
+
+    def take(self) -> tuple[str, ...]:
+        """Return the lines since the last call."""
+        lines, self._lines = tuple(self._lines), []
+        return lines
+
+
+def note(digests: Digests | None, stage: str, *values: object) -> None:
+    """Add the line of a stage where digests are wanted."""
+    if digests is not None:
+        digests.add(stage, *values)
+
+
+def line_of(stage: str, *values: object, **where: int) -> str:
+    """Return a line of JSON with the digest of some arrays, bytes, numbers or texts."""
+    digest = hashlib.sha256()
+    for value in values:
+        if isinstance(value, np.ndarray):
+            digest.update(repr((value.shape, value.dtype.str)).encode())
+            digest.update(np.ascontiguousarray(value).data)
+        else:
+            digest.update(value if isinstance(value, bytes) else repr(value).encode())
+    return json.dumps({"stage": stage, **where, "digest": digest.hexdigest()[:16]}) + "\n"
+
+
+def machine_line() -> str:
+    """Return the first line: the processor, its number of cores, and the libraries with what they chose for it."""
+    from threadpoolctl import threadpool_info
+
+    pools = [{k: pool.get(k) for k in ("internal_api", "version", "architecture")} for pool in threadpool_info()]
+    found: dict[str, Any] = {"stage": "machine", "python": platform.python_version(), "system": platform.platform()}
+    found |= {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "libraries": {name: _version(name) for name in LIBRARIES},
+    }
+    return json.dumps(found | {"pools": pools}) + "\n"
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _processor() -> str:
+    """Return the processor's name, which the standard library does not know on Linux."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
