@@ -12,6 +12,7 @@ import json
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, astuple
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -73,7 +74,8 @@ class Journal:
         elif self._done and self._lasting:
             if self._begun:
                 error.add_note(f"{self.path} has the {self._done} intervals that are done: continue with --resume")
-            self._file.close()
+            with suppress(OSError):  # bytes of a torn record, for which there is still no room
+                self._file.close()
             return
         discard(self._file, self.path)
 
