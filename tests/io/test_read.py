@@ -1,0 +1,78 @@
+"""Input files are regular and of bounded size: pipes, devices and sparse files end at once, with file and frame."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import tracemalloc
+
+import pytest
+
+from meshreel.capture.rig import read_rig
+from meshreel.errors import InputError
+from meshreel.io import read
+from meshreel.io.depth_pictures import read_depth
+from meshreel.io.mask_pictures import read_mask
+from meshreel.io.read import read_file
+from meshreel.io.sequence import open_sequence
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX files")
+
+
+def sparse(path):
+    with path.open("wb") as file:
+        file.truncate(5_000_000_000)
+
+
+def zeros(path):
+    path.symlink_to("/dev/zero")
+
+
+@posix
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [(os.mkfifo, "pipe or a device"), (zeros, "pipe or a device"), (sparse, "5000000000 bytes, more")],
+)
+@pytest.mark.parametrize("extension", ["ply", "obj", "glb", "stl", "off"])
+def test_what_is_no_mesh_file_ends_at_once_and_takes_no_memory(tmp_path, make, words, extension):
+    make(tmp_path / f"frame_0.{extension}")
+    tracemalloc.start()
+    begun = time.monotonic()
+    with pytest.raises(InputError, match=rf"frame 0 \(.*frame_0.{extension}\): cannot be read \(it (is|has).*{words}"):
+        open_sequence([tmp_path / f"frame_0.{extension}"])[0]
+    assert time.monotonic() - begun < 5 and tracemalloc.get_traced_memory()[1] < 10_000_000
+    tracemalloc.stop()
+
+
+@posix
+@pytest.mark.parametrize("make", [os.mkfifo, zeros, sparse])
+@pytest.mark.parametrize("of", [read_depth, read_mask])
+def test_what_is_no_picture_ends_at_once(tmp_path, make, of):
+    make(tmp_path / "depth_0.png")
+    with pytest.raises(InputError, match=r"depth_0.png: cannot be read \(it "):
+        of(tmp_path / "depth_0.png")
+
+
+@posix
+@pytest.mark.parametrize("make", [os.mkfifo, zeros, sparse])
+def test_what_is_no_description_of_a_rig_ends_at_once(tmp_path, make):
+    make(tmp_path / "rig.json")
+    with pytest.raises(InputError, match=r"rig.json: cannot be read \(it .*give JSON"):
+        read_rig(tmp_path)
+
+
+def test_an_archive_of_nothing_but_zeros_ends_at_once(tmp_path):
+    sparse(tmp_path / "a.npz")
+    with pytest.raises(InputError, match=r"a.npz: cannot be read as .npz"):
+        open_sequence(tmp_path / "a.npz")
+
+
+def test_a_file_that_grows_while_it_is_read_is_bounded(tmp_path, monkeypatch):
+    (tmp_path / "a").write_bytes(bytes(100))
+    monkeypatch.setattr(read, "MOST_BYTES", 99)
+    monkeypatch.setattr(
+        os, "fstat", lambda number, real=os.fstat: os.stat_result([*real(number)[:6], 9, *real(number)[7:10]])
+    )
+    with pytest.raises(OSError, match="more than the 99"):
+        read_file(tmp_path / "a")
