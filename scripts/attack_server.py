@@ -13,6 +13,7 @@ import os
 import random
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -75,8 +76,14 @@ Line = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
 
 @contextlib.asynccontextmanager
-async def connected(served: Served) -> AsyncIterator[Line]:
-    reader, writer = await asyncio.open_connection("127.0.0.1", served.port, limit=2**16)
+async def connected(served: Served, buffer: int | None = None) -> AsyncIterator[Line]:
+    """Connect; with a `buffer`, the system takes only so many bytes that are not read."""
+    line = socket.socket()
+    line.setblocking(False)
+    if buffer is not None:
+        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
+    await asyncio.get_running_loop().sock_connect(line, ("127.0.0.1", served.port))
+    reader, writer = await asyncio.open_connection(sock=line)
     try:
         yield reader, writer
     finally:
@@ -149,7 +156,7 @@ async def slow(served: Served, number: int) -> str:
 
 async def stalled(served: Served, _: int) -> str:
     """A client that takes no more of its answer is dropped."""
-    async with connected(served) as (reader, writer):
+    async with connected(served, 4096) as (reader, writer):
         writer.write(get("/files/big.reel"))
         await asyncio.sleep(Limits().stall + GRACE)
         received = await rest(reader, GRACE)

@@ -9,6 +9,9 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+import socket
+import struct
+import sys
 import threading
 import time
 from dataclasses import dataclass
@@ -20,8 +23,9 @@ import uvicorn
 from starlette.responses import PlainTextResponse
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-LAST_RESORT = 1.7  # s after a signal, when the process ends even if a thread hangs: within the 2 s that are promised
+LAST_RESORT = 1.5  # s after a signal, when the process ends even if a thread hangs: within the 2 s that are promised
 BACKLOG = 64  # connections that the system accepts before the server does (guess): a burst takes no more files at once
+NO_LINGER = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)  # the system forgets what it has not sent
 BUSY = PlainTextResponse("too many connections\n", 503, {"Retry-After": "5", "Connection": "close"})
 
 
@@ -79,6 +83,8 @@ class Connection(H11Protocol):
         if state != self._state:
             self._state, self._since = state, now
         elif unsent and now - self._since > self._limits.stall:
+            line: socket.socket = self.transport.get_extra_info("socket")
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_LINGER)
             self.transport.abort()
         elif is_asking and not unsent and now - self._since > self._limits.request:
             self.transport.close()

@@ -21,7 +21,7 @@ from .connections import Connection, Limits, Server, is_news, room_for_files
 
 LOCAL = ("localhost", "127.0.0.1", "::1")
 EVERYWHERE = ("0.0.0.0", "::")
-PATIENCE = 1  # s for responses in progress when the server stops (guess)
+PATIENCE = 0  # s for responses in progress when the server stops, beyond the 0.1 s that uvicorn gives them
 UNKNOWN = "meshreel, for one run of its server"  # organization that signs the certificate
 VALID = timedelta(days=365)  # validity of the certificate; Apple's systems refuse more than 825 days
 
