@@ -1,6 +1,6 @@
 """Checks that the lower bounds of pyproject.toml are the versions installed in this environment.
 
-`--row` stores what scripts/test-versions counted.
+`--build` prints the lowest build requirements instead; `--row` stores what scripts/test-versions counted.
 """
 
 from __future__ import annotations
@@ -56,8 +56,11 @@ def main() -> int:
     if sys.argv[1:2] == ["--row"]:
         store(sys.argv[2], sys.argv[3], float(sys.argv[4]))
         return 0
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    for sentence in (found := untrue(project)):
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    if sys.argv[1:] == ["--build"]:
+        print("\n".join("==".join(FORM.match(one).groups()) for one in settings["build-system"]["requires"]))
+        return 0
+    for sentence in (found := untrue(settings["project"])):
         print(f"pyproject.toml: {sentence}", file=sys.stderr)
     return bool(found)
 
