@@ -28,12 +28,17 @@ from .reference_mesh import CodedReference
 def encode_group(
     reference: CodedReference, field: Float64[np.ndarray, "V T 3"], options: DisplacementOptions
 ) -> tuple[bytes, tuple[int, ...]]:
-    """Encode a `laplacian` group; return its payload and its layer ends: k + 1 layers decode with k components."""
+    """Encode a `laplacian` group; return its payload and its layer ends: k + 1 layers decode with k components.
+
+    Raises CostlyError where readers would refuse so few bytes for it.
+    """
     displacements = encode_displacements(field, reference.base, options)
     record = LaplacianGroup(Form.LAPLACIAN, reference.levels, reference.step, reference.data, displacements)
     payload = pack(record)
     sizes = layer_sizes(displacements)
-    return payload, tuple(accumulate(sizes[1:], initial=len(payload) - sum(sizes[1:])))
+    layers = tuple(accumulate(sizes[1:], initial=len(payload) - sum(sizes[1:])))
+    _check_growth(record, reference.mesh, layers[0])
+    return payload, layers
 
 
 def decode_group(data: bytes, frame_count: int, layers: int | None = None) -> list[Mesh]:

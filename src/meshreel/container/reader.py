@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from ..errors import FormatError
+from ..format.budget import check_frames
 from ..format.checks import check_header, check_index, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
@@ -66,6 +67,7 @@ class ReelReader:
         check_header(self.header, self.frame_count)
         self.metadata = parse_metadata(self.header.metadata)
         self.size = self.chunks[-1].end  # bytes of the whole file, even if it is truncated
+        check_frames(sum(group.frame_count for group in self.groups), self.size)
         if source.size > self.size:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
         self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]

@@ -19,6 +19,7 @@ from types import TracebackType
 from typing import IO, Any, Protocol, runtime_checkable
 
 from ..errors import FormatError, InputError
+from ..format.budget import check_frames
 from ..format.checks import IndexChecks, check_header, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, IndexEntry, Layer, Preamble
 from ..format.records import least_size, pack
@@ -156,6 +157,8 @@ class ReelWriter:
         self._checks.finish()
         check_header(self.header, self.frame_count)
         head = pack_head(self.header, Index(tuple(self._entries)))
+        size = len(head) + sum(layer.size for entry in self._entries for layer in entry.layers)
+        check_frames(sum(self._checks.frames), size)
         if not isinstance(self._output, Path):
             self._copy(head, self._output)
             return

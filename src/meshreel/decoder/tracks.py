@@ -13,6 +13,7 @@ from ..coding.group import continue_group
 from ..coding.layers.coder import MOST_NUMBERS, LayersState
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
+from ..format.budget import Chain, together
 from ..format.layout import Form
 from ..types import Frames, Mesh, Placement
 from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
@@ -82,7 +83,11 @@ class Background:
     def __init__(self, reader: ReelReader) -> None:
         self.reader = reader
         self._place = placement(reader)
-        self._last: tuple[int, Mesh] = (-1, Mesh.empty())  # chunk and mesh; replaced as a whole, as other threads do
+        self._last = (
+            -1,
+            Mesh.empty(),
+            Chain(),
+        )  # chunk, mesh, what led to it; replaced as a whole, as other threads do
         self._refusals = Refusals()
 
     def of_frame(self, frame: int) -> Mesh | None:
@@ -100,7 +105,7 @@ class Background:
 
     def _state(self, chunk: Chunk) -> Mesh:
         """Decode a state, starting from the last one decoded if the state is that one or was changed from it."""
-        known, mesh = self._last
+        known, mesh, led = self._last
         chain = [chunk]
         self._refusals.check(chunk)
         while chain[-1].number != known and chain[-1].depends_on:
@@ -110,18 +115,19 @@ class Background:
         if chain[-1].number == known:
             chain.pop()
         for link in reversed(chain):
-            mesh = self._decode(link, mesh)
+            mesh, led = self._decode(link, mesh, led)
         if chain:
             mesh = read_only(mesh)
-            self._last = (chunk.number, mesh)
+            self._last = (chunk.number, mesh, led)
         return mesh
 
-    def _decode(self, chunk: Chunk, before: Mesh) -> Mesh:
+    def _decode(self, chunk: Chunk, before: Mesh, led: Chain) -> tuple[Mesh, Chain]:
         payload = self.reader.read_chunk(chunk.number)
         with self._refusals.of(chunk):
             if chunk.form == Form.PATCH:
-                return decode_change(payload, before, self._place)
-            return decode_background(payload, self._place)
+                after = decode_change(payload, before, self._place)
+                return after, led.then(before, after, len(payload))
+            return decode_background(payload, self._place), Chain(0, len(payload))
 
 
 def placement(reader: ReelReader) -> Placement:
@@ -130,15 +136,17 @@ def placement(reader: ReelReader) -> Placement:
 
 
 def moving_of_frame(tracks: Sequence[Track], frame: int) -> list[Mesh]:
-    """Return a frame of each track. Raises FormatError if their groups take over MOST_TOGETHER bytes of memory."""
+    """Return a frame of each track. Raises FormatError if their groups take more memory than their bytes may."""
     meshes: list[Mesh] = []
-    together = 0
+    taken = size = 0
     for track in tracks:
         mesh, nbytes = track.frame_and_memory(frame)
-        together += nbytes
-        if meshes and together > MOST_TOGETHER:
+        taken += nbytes
+        size += track.reader.chunk_of_frame(frame, track.number).size
+        most = min(together(size), MOST_TOGETHER)
+        if meshes and taken > most:
             raise FormatError(
-                f"frame {frame}: its groups of tracks 0 to {track.number} take {together} bytes, over {MOST_TOGETHER}"
+                f"frame {frame}: its groups of tracks 0 to {track.number} take {taken} bytes, over {most}"
             )
         meshes.append(mesh)
     return meshes

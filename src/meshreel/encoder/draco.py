@@ -12,6 +12,7 @@ import numpy as np
 
 from ..coding.intra import decode_intra, encode_intra
 from ..coding.mesh import MAX_BITS
+from ..format.budget import CostlyError
 from ..geometry.decimate import decimate
 from ..types import Mesh
 from .target import Fidelity, measure
@@ -40,14 +41,17 @@ def cheapest_intra(
         payload = encode_intra(meshes, step, levels)
         if len(payload) >= most_bytes:
             continue
-        fidelity = measure(frames, decode_intra(payload))
-        if fidelity.reaches(target):
+        fidelity = _fidelity(frames, payload)
+        if fidelity is not None and fidelity.reaches(target):
             return payload, fidelity
     return None
 
 
 def finest_intra(frames: Sequence[Mesh], step: float) -> tuple[bytes, Fidelity]:
-    """Encode every vertex in the `draco` form: the last resort where nothing cheaper reaches a target."""
+    """Encode every vertex in the `draco` form: the last resort where nothing cheaper reaches a target.
+
+    Raises CostlyError where readers would refuse so few bytes for the frames.
+    """
     payload = encode_intra(frames, coarse_enough(frames, step), 0)
     return payload, measure(frames, decode_intra(payload))
 
@@ -79,7 +83,16 @@ def _on_one_frame(
 
 
 def _reaches(frame: Mesh, reduced: Mesh, step: float, levels: int, target: Fidelity) -> bool:
-    return measure([frame], decode_intra(encode_intra([reduced], step, levels))).reaches(target)
+    fidelity = _fidelity([frame], encode_intra([reduced], step, levels))
+    return fidelity is not None and fidelity.reaches(target)
+
+
+def _fidelity(frames: Sequence[Mesh], payload: bytes) -> Fidelity | None:
+    """Return the fidelity of a payload, None where readers would refuse so few bytes for it."""
+    try:
+        return measure(frames, decode_intra(payload))
+    except CostlyError:
+        return None
 
 
 def _reduced(frame: Mesh, fraction: float) -> Mesh:

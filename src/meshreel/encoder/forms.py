@@ -16,6 +16,8 @@ from ..coding.intra import encode_empty
 from ..coding.paper.displacements import DisplacementOptions
 from ..coding.reference_mesh import CodedReference
 from ..container.writer import Stored
+from ..errors import InputError
+from ..format.budget import CostlyError
 from ..format.layout import Form
 from ..types import Mesh
 from .draco import IntraOptions, cheapest_intra, finest_intra
@@ -77,9 +79,20 @@ def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: IntraOptions) 
 
 
 def intra_only(frames: Sequence[Mesh], target: Fidelity, options: IntraOptions) -> EncodedGroup:
-    """Encode frames in the `draco` form at the target's fidelity, or as finely as that form can."""
+    """Encode frames in the `draco` form at the target's fidelity, or as finely as that form can.
+
+    Where its bytes may not hold so many frames, the group has only the first of them. Raises InputError where they may
+    not hold one.
+    """
     found = cheapest_intra(frames, target, np.inf, options)
-    payload, fidelity = found or finest_intra(frames, target.distance)
+    try:
+        payload, fidelity = found or finest_intra(frames, target.distance)
+    except CostlyError as error:
+        if len(frames) > 1:
+            return intra_only(frames[: len(frames) // 2], target, options)
+        raise InputError(
+            f"a mesh of {len(frames[0].faces)} faces: {error}, which no reader takes; simplify it"
+        ) from error
     return EncodedGroup(Form.DRACO, len(frames), payload, (), fidelity)
 
 

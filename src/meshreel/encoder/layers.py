@@ -8,6 +8,7 @@ follows are coded one by one.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +22,7 @@ from ..analysis.follow.template import base_mesh, shared_detail
 from ..analysis.groups import cut_at, leading
 from ..coding.layers.coder import EncodedLayers, LayersState, encode_layers
 from ..coding.reference_mesh import CodedReference, code_on_lattice
+from ..format.budget import CostlyError
 from ..format.layout import Form
 from ..format.records import pack
 from ..types import Mesh
@@ -159,7 +161,8 @@ def _alone(ahead: Ahead, options: LayersOptions) -> tuple[EncodedGroup, Followed
         count = _fitted(group, keyed, options)
         if count == len(group) and keyed is not None:
             encoded, followed = _coded(group, keyed.reference, keyed.fit, None, options)
-            return (replace(encoded, key=keyed.key) if encoded.form == Form.LAYERS else encoded), followed
+            is_keyed = encoded.form == Form.LAYERS and keyed.key < encoded.frame_count
+            return (replace(encoded, key=keyed.key) if is_keyed else encoded), followed
         if count == 0:
             return intra_only(group.frames, group.target(options), options.intra), None
 
@@ -223,10 +226,19 @@ def _fitted(group: Ahead, keyed: Keyed | None, options: LayersOptions) -> int:
 def _coded(
     group: Ahead, reference: CodedReference, fit: Fit, before: Followed | None, options: LayersOptions
 ) -> tuple[EncodedGroup, Followed | None]:
-    """Encode a group in its cheapest form; the template that the next may begin with is the second value."""
+    """Encode a group in its cheapest form; the template that the next may begin with is the second value.
+
+    Where its bytes may not hold so many frames, it has only the first of them.
+    """
     frames, previous = group.frames, before.state if before else None
     note(group.digests, "fit", fit.positions)
-    encoded = encode_layers(reference, fit.positions, options.layers, previous, group.noise)
+    try:
+        encoded = encode_layers(reference, fit.positions, options.layers, previous, group.noise)
+    except CostlyError:
+        if len(group) == 1:
+            return intra_only(frames, group.target(options), options.intra), None
+        half = len(group) // 2
+        return _coded(group.first(half), reference, fit.first(half), before, options)
     note(group.digests, "fields and symbols", encoded.payload)
     shown = _with_tails(group, encoded, reference.base.faces, options)
     note(group.digests, "patches", shown.payload[len(encoded.payload) :])
@@ -235,9 +247,10 @@ def _coded(
     chosen = EncodedGroup(Form.LAYERS, len(frames), shown.payload, shown.layers, fidelity, before is not None)
     target = group.target(options)
     if group.noise == 0 and fidelity.distance > TOO_COARSE * target.distance:
-        other = laplacian(frames, reference, fit.positions, options.displacements)
-        if other.fidelity.reaches(fidelity) and len(other.payload) < len(chosen.payload):
-            chosen = other
+        with suppress(CostlyError):
+            other = laplacian(frames, reference, fit.positions, options.displacements)
+            if other.fidelity.reaches(fidelity) and len(other.payload) < len(chosen.payload):
+                chosen = other
     if not np.isfinite(chosen.fidelity.distance):
         return intra_only(frames, target, options.intra), None  # the template has collapsed: nothing is comparable
     chosen = cheaper(frames, chosen, options.intra)

@@ -8,7 +8,8 @@ Differs from the paper: groups are not all of one length, and frames that no ref
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..analysis.reference.extraction import extract_reference, predict
 from ..analysis.reference.track import track_centers
 from ..coding.reference_mesh import CodedReference, code_reference
 from ..errors import NoReferenceError
+from ..format.budget import CostlyError
 from ..types import Centers, Mesh
 from .digests import Digests, note
 from .forms import EncodedGroup, cheaper, empty_groups, intra_only, laplacian
@@ -61,7 +63,7 @@ def encode_interval(
         groups = list(empty_groups(count))
     else:
         found = (find or find_groups)(interval, options, stages)
-        groups = [_encode_group(group, options, interval.noise) for group in found]
+        groups = [group for one in found for group in _encode_group(one, options, interval.noise)]
     stages.add("code", count)
     return groups
 
@@ -134,9 +136,16 @@ class _Cutting:
         return [*quick.groups(head, known, depth - 1, again), *quick.groups(tail, retracked, depth - 1, again)]
 
 
-def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> EncodedGroup:
-    """Encode a group in the cheaper of both forms, or in the only one it can have."""
-    if found.fitted is None:
-        return intra_only(found.frames, target_of(found.frames, options.target, noise), options.intra)
-    group = laplacian(found.frames, found.fitted.reference, found.fitted.positions, options.displacements)
-    return group if options.displacements.basis_size is not None else cheaper(found.frames, group, options.intra)
+def _encode_group(found: FoundGroup, options: PaperOptions, noise: float) -> Iterator[EncodedGroup]:
+    """Yield a group in the cheaper of both forms, or in the only one it can have; its halves where bytes are few."""
+    frames = found.frames
+    if found.fitted is not None:
+        with suppress(CostlyError):
+            group = laplacian(frames, found.fitted.reference, found.fitted.positions, options.displacements)
+            is_fixed = options.displacements.basis_size is not None
+            yield group if is_fixed else cheaper(frames, group, options.intra)
+            return
+    while frames:
+        group = intra_only(frames, target_of(frames, options.target, noise), options.intra)
+        yield group
+        frames = frames[group.frame_count :]

@@ -21,6 +21,7 @@ from ..analysis.scene.bodies import BodyOptions, at_most, find_bodies, same_bodi
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.survey import Survey
 from ..coding.background import decode_background, decode_change, encode_background, encode_change
+from ..format.budget import Chain, CostlyError
 from ..format.checks import MOST_TRACKS
 from ..geometry.closest_points import distances
 from ..geometry.decimate import decimate, decimate_faces
@@ -75,16 +76,25 @@ def encode_static(parts: Parts, count: int, frame_rate: float, options: Backgrou
     step, most = options.lattice * noise, options.coarse * noise
     payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
     found = [] if state.is_empty else [Static(0, payload, False)]
-    changes, again = {change.frame: change for change in parts.changes}, set(refreshes(count, frame_rate, options))
+    chain, changes, again = (
+        Chain(0, len(payload)),
+        {change.frame: change for change in parts.changes},
+        set(refreshes(count, frame_rate, options)),
+    )
     for frame in sorted({*changes, *again} - {0}):
         whole = state.is_empty or frame in again
         if change := changes.get(frame):
             came = _coded(_normalised(change.came, parts.seen), most, step)[1]
             payload = encode_change(state, _gone(parts, state, change), came, step)
-            state = decode_change(payload, state)
+            before, state = state, decode_change(payload, state)
+            try:
+                chain = chain.then(before, state, len(payload))
+            except CostlyError:
+                whole = True
         if whole and not state.is_empty:
             payload = encode_background(state, step)
             state = decode_background(payload)  # the next patch counts faces in the decoded order
+            chain = Chain(0, len(payload))
         if not (whole and state.is_empty):
             found.append(Static(frame, payload, not whole))
     return found

@@ -66,6 +66,11 @@ def allowance(size: int) -> int:
     return LIMITS.free + LIMITS.per_byte * size
 
 
+def together(size: int) -> int:
+    """Return the memory that the groups of one frame may take, which have `size` bytes together."""
+    return LIMITS.together + LIMITS.per_byte * size
+
+
 def draco_cost(meshes: Sequence[Size]) -> int:
     """Return the cost of a DRACO group, or of its first frames."""
     elements = [mesh.elements for mesh in meshes]
@@ -90,6 +95,28 @@ def laplacian_cost(reference: Size, frames: int, components: int, pairs: int) ->
 def change_cost(before: Size, added: Size) -> int:
     """Return the cost of a change of the background."""
     return LIMITS.element * (before.elements + added.elements)
+
+
+@dataclass(frozen=True, slots=True)
+class Chain:
+    """The chunks that lead to a state of the background: their cost and their bytes together."""
+
+    cost: int = 0
+    size: int = 0
+
+    def then(self, before: Mesh, after: Mesh, size: int) -> Chain:
+        """Return the chain with a chunk of `size` bytes more. Raises CostlyError where all of it costs too much."""
+        longer = Chain(self.cost + change_cost(Size.of(before), Size.of(after)), self.size + size)
+        if longer.cost > LIMITS.chain * allowance(longer.size):
+            raise CostlyError(f"background: {longer.size} bytes of states that cost {longer.cost} to decode")
+        return longer
+
+
+def check_frames(frames: int, size: int) -> None:
+    """Raise CostlyError if the groups of a file of `size` bytes have more frames, of all tracks, than they may."""
+    most = LIMITS.frames + LIMITS.frames_per_byte * size
+    if frames > most:
+        raise CostlyError(f"{frames} frames of all tracks in a file of {size} bytes, over {most}")
 
 
 def check_cost(cost: int, size: int, what: str) -> None:

@@ -107,7 +107,8 @@ def encode_layers(
     """Encode a group whose subdivided base should lie at `positions`; predicted from `previous` if given.
 
     With `previous`, the base mesh is that of its last frame, and only the number of levels of `reference` is used: give
-    the reference of the group whose base mesh was coded. Raises InputError for positions that cannot be coded.
+    the reference of the group whose base mesh was coded. Raises InputError for positions that cannot be coded, and
+    CostlyError where they take so few bytes that readers would refuse these.
     """
     frames, levels = len(positions), reference.levels
     base = reference.mesh if previous is None else Mesh(previous.base, previous.faces)
@@ -133,9 +134,12 @@ def encode_layers(
         layers.append(pack(coded.record))
         scalars.append(coded.scalars)
         known, faces = refine(known, level, coded.scalars, curvature), level.faces
+    ends = tuple(accumulate(map(len, layers)))
+    for count, end in enumerate(ends):
+        check_cost(layers_cost(Size.of(base, count), frames), end, "layers")
     last = known[-1, : len(base.vertices)].copy()
     state = LayersState(base.faces, last, tuple(level[-1].copy() for level in scalars))
-    return EncodedLayers(b"".join(layers), tuple(accumulate(map(len, layers))), known, state)
+    return EncodedLayers(b"".join(layers), ends, known, state)
 
 
 @dataclass(frozen=True, slots=True)
