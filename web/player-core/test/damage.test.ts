@@ -327,16 +327,18 @@ describe("a head", () => {
     player.dispose();
   });
 
-  test("of some kilobytes that tells of millions of frames is opened at once", async () => {
-    const file = makeReel(Array.from({ length: 1000 }, () => group(65535, [1], { form: Form.EMPTY })), { frameRate: 25 });
+  test("of some kilobytes that tells of a million frames is opened at once, and of many more refused", async () => {
+    const tell = (frames: number): Uint8Array => makeReel(Array.from({ length: 1000 }, () => group(frames, [1], { form: Form.EMPTY })), { frameRate: 25 });
+    const file = tell(960);
+    expect(() => Head.parse(tell(970))).toThrow("970000 frames of all tracks in a file of 14099 bytes, over 967871");
     rig.begin(file, FAST);
     const start = realNow();
     await play(1);
     rig.player.currentTime = rig.player.duration - 2;
     await pass(1);
     expect(realNow() - start).toBeLessThan(4000);
-    expect(rig.player.info?.frameCount).toBe(65_535_000);
-    expect(rig.player.currentFrame).toBeGreaterThan(65_534_000);
+    expect(rig.player.info?.frameCount).toBe(960_000);
+    expect(rig.player.currentFrame).toBeGreaterThan(959_000);
   });
 
   test("of very many chunks is read, their layers counted", async () => {

@@ -4,7 +4,9 @@ import type { Tools } from "./group.ts";
 import { continueGroup, decodeStatic } from "./group.ts";
 import type { LayersState } from "./layers.ts";
 import { checkPayload } from "./decoder.ts";
-import type { Mesh, Placement } from "../mesh.ts";
+import type { Placement } from "../mesh.ts";
+import { led } from "../format/budget.ts";
+import type { Led } from "../format/budget.ts";
 import { packGroup, packStatic } from "./pack.ts";
 import type { DecodeJob } from "../protocol.ts";
 import { describe } from "../format/reader.ts";
@@ -45,7 +47,7 @@ class Kept<T> {
 
 export class ChunkDecoder {
   private readonly states = new Kept<LayersState>(MOST_STATES);
-  private readonly statics = new Kept<Mesh>(MOST_STATICS);
+  private readonly statics = new Kept<Led>(MOST_STATICS);
 
   constructor(private readonly tools: Tools) {}
 
@@ -76,8 +78,8 @@ export class ChunkDecoder {
 
   private background(job: DecodeJob, place: Placement): Packed | null {
     const before = this.needed(this.statics, job);
-    const mesh = decodeStatic(this.tools, job.payload, before, place);
-    this.statics.set(job.file, job.chunk, mesh);
+    const mesh = decodeStatic(this.tools, job.payload, before && before.mesh, place);
+    this.statics.set(job.file, job.chunk, led(before, mesh, job.payload.length));
     if (job.stateOnly) return null;
     return { kind: "static", chunk: job.chunk, ...packStatic(this.tools.core, mesh), bytes: job.payload.length, decodeMs: 0 };
   }

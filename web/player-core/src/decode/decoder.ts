@@ -3,6 +3,8 @@
 import { continueGroup, decodeStatic } from "./group.ts";
 import type { Continued, Tools } from "./group.ts";
 import { frameOf } from "./decoded.ts";
+import { led } from "../format/budget.ts";
+import type { Led } from "../format/budget.ts";
 import { crc32 } from "../format/crc.ts";
 import { FormatError } from "../errors.ts";
 import { EMPTY, concatenate } from "../mesh.ts";
@@ -26,7 +28,7 @@ export class Video {
   readonly head: Head;
   private readonly place: Placement;
   private readonly groups = new Map<number, Continued | FormatError>();
-  private readonly states = new Map<number, Mesh | FormatError>();
+  private readonly states = new Map<number, Led | FormatError>();
 
   constructor(
     private readonly tools: Tools,
@@ -44,7 +46,7 @@ export class Video {
       const chunk = this.head.chunkOfFrame(index, track);
       return frameOf(this.decoded(chunk).group, index - chunk.firstFrame);
     });
-    return concatenate([state === null ? EMPTY : this.state(state), ...moving]);
+    return concatenate([state === null ? EMPTY : this.state(state).mesh, ...moving]);
   }
 
   private decoded(chunk: Chunk): Continued {
@@ -57,10 +59,12 @@ export class Video {
     });
   }
 
-  private state(chunk: Chunk): Mesh {
+  private state(chunk: Chunk): Led {
     return once(this.states, chunk, () => {
-      const before = this.head.changedFrom(chunk);
-      return decodeStatic(this.tools, this.payload(chunk, chunk.layers.length), before && this.state(before), this.place);
+      const changed = this.head.changedFrom(chunk);
+      const before = changed && this.state(changed);
+      const payload = this.payload(chunk, chunk.layers.length);
+      return led(before, decodeStatic(this.tools, payload, before && before.mesh, this.place), payload.length);
     });
   }
 

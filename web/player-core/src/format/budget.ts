@@ -42,6 +42,33 @@ export function changeCost(before: Mesh, added: Mesh): number {
   return LIMITS.element * (elementsOf(before) + elementsOf(added));
 }
 
+/** A state of the background, and the cost and the bytes of the chunks that led to it. */
+export interface Led {
+  readonly mesh: Mesh;
+  readonly cost: number;
+  readonly size: number;
+}
+
+/** The state that a chunk of `size` bytes made of the one before. FormatError where all that led to it costs too much. */
+export function led(before: Led | null, mesh: Mesh, size: number): Led {
+  if (before === null) return { mesh, cost: 0, size };
+  const after = { mesh, cost: before.cost + changeCost(before.mesh, mesh), size: before.size + size };
+  const most = LIMITS.chain * allowance(after.size);
+  if (after.cost > most) throw new FormatError(`background: ${after.size} bytes of states that cost ${after.cost} to decode`);
+  return after;
+}
+
+/** Memory that the groups of one frame may take, which have `size` bytes together. */
+export function together(size: number): number {
+  return LIMITS.together + LIMITS.perByte * size;
+}
+
+/** FormatError where the groups of a file have more frames, of all tracks, than its bytes may. */
+export function checkFrames(frames: number, size: number): void {
+  const most = LIMITS.frames + LIMITS.framesPerByte * size;
+  if (frames > most) throw new FormatError(`${frames} frames of all tracks in a file of ${size} bytes, over ${most}`);
+}
+
 /** FormatError where decoding costs more than `size` bytes may. */
 export function checkCost(cost: number, size: number, what: string): void {
   if (cost > allowance(size)) throw new FormatError(`${what}: ${size} bytes that cost ${cost} to decode, over ${allowance(size)}`);

@@ -3,6 +3,7 @@
 
 import { checkHeader, checkIndex } from "./checks.ts";
 import { crc32 } from "./crc.ts";
+import { checkFrames } from "./budget.ts";
 import { FormatError } from "../errors.ts";
 import { Checksum, ChunkKind, Form, Header, Index, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
 import type { Layer } from "./layout.gen.ts";
@@ -40,6 +41,8 @@ export class Head {
     const last = groups[groups.length - 1];
     const frameCount = last.firstFrame + last.frameCount;
     checkHeader(header, frameCount);
+    const end = chunks[chunks.length - 1];
+    checkFrames(frameCount * this.tracks.length, end.offset + end.size);
     this.times = timesOf(header.intervals);
     this.info = infoOf(header, chunks, this.tracks.length, frameCount, this.timestampOf(frameCount - 1));
   }

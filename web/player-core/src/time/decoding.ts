@@ -2,6 +2,7 @@
 
 import { FormatError } from "../errors.ts";
 import type { Fetcher } from "../net/fetcher.ts";
+import { together } from "../format/budget.ts";
 import { Form } from "../format/layout.gen.ts";
 import { mostLayers } from "../format/links.ts";
 import type { Links } from "../format/links.ts";
@@ -208,7 +209,10 @@ export class Decoding implements Holdings {
       this.#states.set(chunk.number, { layers, worker: outcome.worker });
       this.#tries.delete(chunk.number);
       this.#time(chunk, outcome.ms);
-      if (outcome.packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, outcome.packed, layers);
+      const { packed } = outcome;
+      const crowd = packed === null ? null : this.#crowdOf(chunk, bytesOf(packed));
+      if (crowd !== null) this.#fail(chunk, crowd);
+      else if (packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, packed, layers);
     } else {
       this.#share.clear(); // what follows in the chain would fail, too: it is planned again
       this.#submitted.clear();
@@ -217,6 +221,21 @@ export class Decoding implements Holdings {
       else this.#fail(chunk, outcome.message);
     }
     this.#events.changed();
+  }
+
+  /** Why a group of so many bytes cannot be shown with those of other tracks; null where it can. */
+  #crowdOf(chunk: Chunk, bytes: number): string | null {
+    if (chunk.kind === "static") return null;
+    let size = chunk.size;
+    for (let track = 0; track < this.#head.tracks.length; track++) {
+      const other = this.#head.chunkOfFrame(chunk.firstFrame, track);
+      const decoded = other === chunk ? undefined : this.#decoded.get(other.number);
+      if (decoded === undefined) continue;
+      bytes += decoded.bytes;
+      size += other.size;
+    }
+    if (bytes <= together(size) || size === chunk.size) return null;
+    return `with those of other tracks it takes ${bytes} bytes, over ${together(size)}`;
   }
 
   #add(chunk: Chunk, packed: Packed, layers: number): void {
