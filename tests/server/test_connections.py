@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import logging
+import re
 import socket
 import ssl
 import sys
 import time
 from http.client import HTTPResponse
+from pathlib import Path
 
 import pytest
 
+from meshreel.server import painter, posters
 from meshreel.server.app import make_app
 from meshreel.server.connections import Connection, Limits, room_for_files
 from meshreel.server.library import Library
 from meshreel.server.run import ServerOptions
 
+ROOT = Path(__file__).resolve().parents[2]
 SHORT = Limits(request=0.6, stall=0.6)
 HEAD = b"Host: localhost\r\n\r\n"
 BIG = b"GET /files/big.reel HTTP/1.1\r\n" + HEAD
@@ -182,3 +186,16 @@ def test_fewer_open_files_mean_fewer_connections(monkeypatch):
 
 def test_the_protocol_of_uvicorn_still_has_what_the_limits_go_by():
     assert {"send_400_response", "resume_writing", "connection_made"} <= set(dir(Connection.__base__))
+
+
+def test_the_limits_are_those_that_the_documentation_states():
+    page, limits = (ROOT / "docs/player.md").read_text(encoding="utf-8"), Limits()
+    rows = [line for line in page[page.index("### Limits") :].splitlines() if line.startswith("| ")]
+    assert [[int(number) for number in re.findall(r"\d+", row)] for row in rows[2:]] == [
+        [limits.request],
+        [limits.stall],
+        [limits.connections, limits.refused, 503],
+        [painter.PATIENCE, painter.MEMORY // 2**30],
+        [posters.MOST_WAITING, posters.LONGEST_WAIT],
+        [2],
+    ]
