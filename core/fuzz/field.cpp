@@ -6,7 +6,7 @@ using namespace meshreel;
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     Input in(data, size);
     const Links links = links_of(in);
-    const size_t width = in.u8() % 40;
+    const size_t width = in.u8() % 12;
     const bool has_mean = in.u8() % 2 == 1;
     Bytes record;
     put_field(in, links.view(), width, has_mean, record);

@@ -67,6 +67,7 @@ struct Mesh {
     mr_mesh view() const { return {positions.data(), vertices(), faces.data(), face_count()}; }
 };
 
+constexpr uint32_t kMostPlaces = 60;     // of a graph
 constexpr uint32_t kMostVertices = 128;  // and twice as many faces, so that a run takes under a millisecond
 
 // A mesh whose faces name its vertices, or, once in a while, others.
@@ -116,7 +117,7 @@ struct Links {
 
 inline Links links_of(Input& in) {
     Links links;
-    const uint32_t count = in.u16() % kMostVertices;
+    const uint32_t count = in.u16() % kMostPlaces;
     const bool is_bad = in.u8() == 255;
     for (uint32_t v = 0; v < count; ++v) {
         const uint32_t degree = v > 0 ? in.u8() % 12 : 0;

@@ -25,7 +25,7 @@ std::vector<int32_t> anchors_of(Input& in, const Mesh& mesh) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     Input in(data, size);
-    const Mesh base = mesh_of(in, 48);
+    const Mesh base = mesh_of(in, 40);
     const std::vector<int32_t> anchors = anchors_of(in, base);
     const int64_t columns = in.u8() % 4, count = static_cast<int64_t>(anchors.size());
     const double anchor_weight = 1 + in.u8() % 255, step = in.scale();

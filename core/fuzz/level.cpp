@@ -38,7 +38,7 @@ Bytes record_of(Input& in, const Finer& finer, size_t frames) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     Input in(data, size);
-    const Mesh mesh = mesh_of(in, 80);
+    const Mesh mesh = mesh_of(in, 32);
     const size_t frames = in.u8() % 9;
     Finer finer;
     if (!subdivided(mesh, finer)) return 0;

@@ -7,7 +7,7 @@ using namespace meshreel;
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     Input in(data, size);
-    Mesh mesh = mesh_of(in);
+    Mesh mesh = mesh_of(in, 64);
     const double stretch = in.scale();
     if (in.u8() % 2 == 1)
         for (double& x : mesh.positions) x = std::isfinite(x * stretch) ? x * stretch : x;

@@ -66,7 +66,7 @@ def watch_calls(write: Write) -> None:
         for v in range(1, len(starts) - 1):
             own = near[starts[v] : starts[v + 1]]
             links += bytes([len(own), *(v - 1 - own).tolist()])
-        count = min(len(columns), 5)
+        count = min(len(columns), 3)
         write(
             "weights",
             links + bytes([count]) + raw(data[: sum(sizes[:count])]) + b"\1" + sizes[:count].astype("<u2").tobytes(),

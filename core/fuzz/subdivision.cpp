@@ -32,7 +32,7 @@ void check_kept(Input& in, const Mesh& mesh) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     Input in(data, size);
-    const Mesh mesh = mesh_of(in);
+    const Mesh mesh = mesh_of(in, 64);
     const size_t count = mesh.face_count(), vertices = in.u8() == 255 ? in.u32() | 1u << 31 : mesh.vertices();
     check_kept(in, mesh);
     std::vector<int32_t> edges(6 * count), finer(12 * count), near(3 * count);

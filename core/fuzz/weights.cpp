@@ -6,7 +6,7 @@ using namespace meshreel;
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     Input in(data, size);
     const Links links = links_of(in);
-    const size_t columns = in.u8() % 6;
+    const size_t columns = in.u8() % 4;
     std::vector<size_t> sizes(columns);
     std::vector<int32_t> symbols(columns * links.count());
     const mr_weights weights = weights_of(symbols, columns, links.view());
