@@ -11,18 +11,30 @@ import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
 from importlib.metadata import version
+from typing import Any
 
 from reliability import ROOT, add_row
 
-EXTRAS = ("encode", "play", "usd")
+EXTRAS = ("encode", "play", "usd")  # which scripts/test-versions installs
 FORM = re.compile(r"([\w.-]+)>=([\d.]+)")  # of a requirement that is tested here
 
 
-def untrue(project: dict) -> list[str]:
+def requirements() -> list[str]:
+    """Return what meshreel, its extras and the bench require, without each other."""
+    product, bench = settings("pyproject.toml")["project"], settings("bench/pyproject.toml")["project"]
+    lists = [product["dependencies"], *(product["optional-dependencies"][extra] for extra in EXTRAS)]
+    return [one for found in (*lists, bench["dependencies"]) for one in found if not one.startswith("meshreel")]
+
+
+def settings(path: str) -> dict[str, Any]:
+    """Return a settings file of the repository."""
+    return tomllib.loads((ROOT / path).read_text(encoding="utf-8"))
+
+
+def untrue() -> list[str]:
     """Return the dependencies whose installed version is not their lower bound, as sentences."""
-    wanted = project["dependencies"] + [one for extra in EXTRAS for one in project["optional-dependencies"][extra]]
     found = []
-    for requirement in wanted:
+    for requirement in requirements():
         match = FORM.match(requirement)
         if match is None:
             found.append(f"{requirement}: give a lower bound")
@@ -56,12 +68,12 @@ def main() -> int:
     if sys.argv[1:2] == ["--row"]:
         store(sys.argv[2], sys.argv[3], float(sys.argv[4]))
         return 0
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     if sys.argv[1:] == ["--build"]:
-        print("\n".join("==".join(FORM.match(one).groups()) for one in settings["build-system"]["requires"]))
+        for requirement in settings("pyproject.toml")["build-system"]["requires"]:
+            print(requirement.replace(">=", "=="))
         return 0
-    for sentence in (found := untrue(settings["project"])):
-        print(f"pyproject.toml: {sentence}", file=sys.stderr)
+    for sentence in (found := untrue()):
+        print(f"check_bounds: {sentence}", file=sys.stderr)
     return bool(found)
 
 
