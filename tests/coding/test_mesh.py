@@ -15,8 +15,10 @@ import meshreel
 from meshreel.coding.intra import decode_intra, encode_intra
 from meshreel.coding.mesh import check_claims, decode_mesh, encode_mesh
 from meshreel.errors import FormatError, InputError
+from meshreel.io.meshes import read_mesh
 from tests.coding.draco_bombs import FAN, SLOW, bombs, flat, reel_of
 from tests.coding.draco_mutants import MOST_MEMORY, MOST_SECONDS, peak, run, valid_meshes  # noqa: F401
+from tests.shared_data import performer
 
 BOMBS = bombs()
 ROOT = Path(__file__).resolve().parents[2]
@@ -108,6 +110,14 @@ def test_the_frames_of_a_group_have_what_is_free_once() -> None:
     with pytest.raises(FormatError, match="so few bytes"):
         meshreel.open(reel_of(*[alone] * 4))[0]
     assert [len(mesh.faces) for mesh in decode_intra(encode_intra(frames, 1.0, 0))] == [len(frames[0].faces)] * 4
+
+
+@pytest.mark.parametrize("name", ["dancer", "collision", "mitch"])
+def test_a_captured_surface_claims_far_less_than_its_bytes_may(name: str) -> None:
+    mesh = read_mesh(sorted(performer(name).glob("*.obj"))[0]).mesh
+    width = float((mesh.vertices.max(axis=0) - mesh.vertices.min(axis=0)).max())
+    data = encode_mesh(mesh, width / 60)  # coarser than any encoder goes: 6 bits
+    assert len(mesh.faces) < (FREE + PER_BYTE * len(data)) / 3 and len(mesh.faces) < 6 * len(data)
 
 
 def test_the_bytes_of_ordinary_meshes_are_those_of_the_papers_level() -> None:
