@@ -12,11 +12,12 @@ namespace meshreel {
 namespace {
 
 // Faces, or points, that Draco meshes decoded together may claim: some, and more for each of their bytes. Each takes
-// some 60 bytes of memory. Real meshes have at most 6 faces a byte, and those of the standard traversal 8, whatever
-// they are.
+// some 60 bytes of memory. Captured surfaces have at most 6 faces a byte, and those of the standard traversal 8,
+// whatever they are.
 constexpr uint64_t kFree = 1 << 17, kPerByte = 16;
 constexpr uint64_t kMost = 64'000'000;  // MAX_FACES of coding/mesh.py
-// Corners that Draco may rename, at some 13 ns each. Real meshes have less than one a face.
+// Corners that Draco may rename, at some 13 ns each. Captured surfaces have less than one a face, grids full of holes
+// two.
 constexpr uint64_t kFreeSteps = 1 << 24, kStepsPerFace = 64;
 
 constexpr uint8_t kBegin[] = {'D', 'R', 'A', 'C', 'O'}, kVersion[] = {2, 2};
