@@ -13,7 +13,7 @@ import xml.etree.ElementTree as ElementTree
 from importlib.metadata import version
 from typing import Any
 
-from reliability import ROOT, add_row
+from scripts.reliability import ROOT, add_row
 
 EXTRAS = ("encode", "play", "usd")  # which scripts/test-versions installs
 FORM = re.compile(r"([\w.-]+)>=([\d.]+)")  # of a requirement that is tested here

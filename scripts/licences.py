@@ -100,7 +100,7 @@ def verdict(package: Distribution, free: bool) -> tuple[str, bool]:
 
 def main() -> int:
     """Print a table for each extra and the player's list; return 1 where there is a fault."""
-    faults = 0
+    count = faults = 0
     base = {package.name for package in brought("")}
     for extra in EXTRAS:
         print(f"\n## meshreel[{extra}], besides the base\n" if extra else "## meshreel\n")
@@ -108,12 +108,13 @@ def main() -> int:
             if extra and package.name in base:
                 continue
             text, fault = verdict(package, extra in MAY_BE_ANY)
-            faults += fault
+            count, faults = count + 1, faults + fault
             print(f"{'FAULT ' if fault else ''}{package.name} {package.version}: {text}")
     print("\n## the player, in src/meshreel/player/LICENSES.txt\n")
     for block in PLAYER.read_text(encoding="utf-8").split("-" * 78)[1:-1]:
         lines = [line for line in block.splitlines() if line.strip()]
         print(f"{lines[0].split(',')[0]}: {lines[1].rstrip('.')}")
+    print(f"\n{count} packages, {faults} faults")
     return bool(faults)
 
 

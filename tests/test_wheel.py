@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import subprocess
 import sys
+import tarfile
 import urllib.request
 import venv
 import zipfile
@@ -17,6 +19,7 @@ from tests.golden import GOLDEN
 
 ROOT = Path(__file__).resolve().parents[1]
 FILE = GOLDEN / "scene.reel"
+PAGES = ("CHANGELOG.md", "CONTRIBUTING.md", "FORMAT.md", "README.md")
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
 
 
@@ -35,6 +38,19 @@ def wheel(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def unpacked(tmp_path_factory):
+    """The folder of an sdist of this checkout, unpacked where nothing else is."""
+    folder = tmp_path_factory.mktemp("a folder of another name")
+    subprocess.run(
+        [sys.executable, "-m", "build", "--sdist", "--outdir", folder, ROOT], check=True, capture_output=True
+    )
+    [found] = folder.glob("meshreel-*.tar.gz")
+    with tarfile.open(found) as archive:
+        archive.extractall(folder, filter="data")
+    return folder / found.name.removesuffix(".tar.gz")
+
+
+@pytest.fixture(scope="module")
 def python(wheel):
     """The interpreter of a new environment that has the wheel and nothing of this checkout."""
     folder = wheel.parent / "venv"
@@ -50,6 +66,27 @@ def test_the_wheel_contains_the_product_and_nothing_else(wheel):
     assert {name.split("/")[0].split("-")[0] for name in names} == {"meshreel"}
     assert not [name for name in names if "bench" in name and name != "meshreel/cli/no_bench.py"]
     assert [name for name in names if name.startswith("meshreel/_core")]
+
+
+@pytest.mark.slow
+def test_the_sdist_contains_what_the_wheel_is_built_from_and_nothing_else(unpacked):
+    names = {path.name for path in unpacked.iterdir()}
+    assert names == {"CMakeLists.txt", "LICENSE", "NOTICE", "PKG-INFO", "core", "pyproject.toml", "src", *PAGES}
+    assert {path.name for path in (unpacked / "core").iterdir()} == {
+        "include",
+        "python",
+        "src",
+        "strict_arithmetic.cmake",
+    }
+    assert [path for path in unpacked.rglob("*") if path.suffix in (".so", ".pyd", ".pyc")] == []
+
+
+@pytest.mark.slow
+def test_the_wheel_of_the_sdist_alone_has_the_same_bytes(wheel, unpacked, tmp_path):
+    """Built again, in another folder, without git, from a fresh build folder."""
+    subprocess.run([sys.executable, *PIP, "wheel", str(unpacked), "--no-deps", "-w", str(tmp_path)], check=True)
+    again = tmp_path / wheel.name
+    assert hashlib.sha256(again.read_bytes()).digest() == hashlib.sha256(wheel.read_bytes()).digest()
 
 
 @pytest.mark.slow
