@@ -67,19 +67,19 @@ def test_damaged_meshes_that_draco_gets_to_see_cost_little() -> None:
     assert cost["longest"] < MOST_SECONDS and cost["peak"] < MOST_MEMORY
 
 
-def cost_of_most() -> dict[str, float]:
-    """Decode the mesh of the most faces that its bytes may claim."""
-    data, side = encode_mesh(flat(257), 1.0), 256
+def cost_of(data: bytes) -> dict[str, float]:
+    """Decode a mesh; return MB that the peak grew, and faces."""
     decode_mesh(FAN.pack(), 1.0)
     before = peak()
     faces = len(decode_mesh(data, 1.0).faces)
-    return {"peak": peak() - before, "faces": faces - 2 * side * side, "bytes": len(data)}
+    return {"peak": peak() - before, "faces": faces}
 
 
 def test_the_most_faces_that_few_bytes_may_claim_cost_little() -> None:
-    cost = in_a_process("cost_of_most()")
-    assert cost["faces"] == 0 and cost["bytes"] < 1000
-    assert cost["peak"] < 60
+    data = encode_mesh(flat(257), 1.0)
+    cost = in_a_process(f"cost_of(bytes.fromhex('{data.hex()}'))")
+    assert cost["faces"] == FREE and len(data) < 1000
+    assert 2 < cost["peak"] < 60 or sys.platform == "win32"
 
 
 @pytest.mark.parametrize("seed", range(3))
