@@ -41,7 +41,7 @@ def cost_of_bombs() -> dict[str, float]:
     """Decode each bomb, in a file whose sums are right; return MB that the peak grew, and seconds."""
     files = [reel_of(data) for data, _ in BOMBS.values()]
     meshreel.open(reel_of(FAN.pack()))[0]  # what a process takes once
-    before, begin = peak(), time.perf_counter()
+    before, begin = peak(is_new=True), time.perf_counter()
     for file in files:
         with pytest.raises(FormatError, match="damaged Draco data"):
             meshreel.open(file)[0]
@@ -70,7 +70,7 @@ def test_damaged_meshes_that_draco_gets_to_see_cost_little() -> None:
 def cost_of(data: bytes) -> dict[str, float]:
     """Decode a mesh; return MB that the peak grew, and faces."""
     decode_mesh(FAN.pack(), 1.0)
-    before = peak()
+    before = peak(is_new=True)
     faces = len(decode_mesh(data, 1.0).faces)
     return {"peak": peak() - before, "faces": faces}
 
@@ -79,7 +79,7 @@ def test_the_most_faces_that_few_bytes_may_claim_cost_little() -> None:
     data = encode_mesh(flat(257), 1.0)
     cost = in_a_process(f"cost_of(bytes.fromhex('{data.hex()}'))")
     assert cost["faces"] == FREE and len(data) < 1000
-    assert 2 < cost["peak"] < 60 or sys.platform == "win32"
+    assert (2 if sys.platform == "linux" else -1) < cost["peak"] < 60
 
 
 @pytest.mark.parametrize("seed", range(3))
