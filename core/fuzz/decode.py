@@ -6,6 +6,8 @@ A fault is a crash, an exception other than FormatError, a file that decodes in 
 
 from __future__ import annotations
 
+import ctypes
+import os
 import sys
 from pathlib import Path
 from random import Random
@@ -19,17 +21,29 @@ from mutate import mutate
 from verdict import check
 
 OF_HEAD = {"container": 0.8}  # probability that the head is changed
+MORE = 64  # bytes by which plain bytes may grow at once
+MUTATOR = ctypes.CFUNCTYPE(ctypes.c_size_t, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_size_t, ctypes.c_uint)
+
+
+def change(data: bytes) -> bytes:
+    """Change plain bytes as libFuzzer does, which has seen what they were compared with."""
+    room = ctypes.create_string_buffer(data, len(data) + MORE)
+    size = ctypes.CDLL(None).LLVMFuzzerMutate(room, ctypes.c_size_t(len(data)), ctypes.c_size_t(len(data) + MORE))
+    return room.raw[:size]
 
 
 def main() -> None:
     sys.argv.pop(0)
-    target = Path(sys.argv[0]).name
+    of_head = OF_HEAD.get(Path(sys.argv[0]).name, 0.1)
 
-    def changed(data: bytes, most: int, seed: int) -> bytes:
-        out = mutate(data, Random(seed), lambda part: atheris.Mutate(part, len(part) + 64), OF_HEAD.get(target, 0.1))
-        return out if len(out) <= most else data[:most]
+    @MUTATOR
+    def changed(data: int, size: int, most: int, seed: int) -> int:
+        out = mutate(ctypes.string_at(data, size), Random(seed), change, of_head)[:most]
+        ctypes.memmove(data, out, len(out))
+        return len(out)
 
-    atheris.Setup(sys.argv, check, custom_mutator=changed)
+    ctypes.CDLL(os.environ["MESHREEL_MUTATOR"]).set_mutator(changed)
+    atheris.Setup(sys.argv, check)
     atheris.Fuzz()
 
 

@@ -16,7 +16,8 @@ std::vector<int32_t> anchors_of(Input& in, const Mesh& mesh) {
         return anchors;
     }
     anchors.clear();  // as AnchorRule.SPREAD gives them
-    for (int32_t v = in.u8(); v < vertices; v += 1 + in.u8()) anchors.push_back(v);
+    const uint8_t stride = in.u8() % 8;
+    for (int32_t v = in.u8() % 4; v < vertices; v += 1 + stride) anchors.push_back(v);
     if (in.u8() == 255) anchors.push_back(in.number());
     return anchors;
 }

@@ -18,15 +18,17 @@ from pathlib import Path
 import verdict
 
 ROOT = Path(__file__).resolve().parents[2]
-# Files and functions that only an encoder runs.
+# Files and functions that only an encoder, or a compiler, runs.
 CORE_FILES = re.compile(r"tracking|prediction|surface_quantizer|rigid3|strict")
 CORE_FUNCTIONS = re.compile(
-    r"RangeEncoder|mr_encode|mr_weight_contexts|mr_edge_frames|mr_refine|mr_laplacian_(quantize|forward|weights)|shape|copy_out"
+    r"RangeEncoder|mr_encode|mr_weight_contexts|mr_edge_frames|mr_refine|mr_laplacian_(quantize|forward|weights)|shape|shaping|copy_out|learning_rates|sixteenths"
 )
 PYTHON_FILES = ("coding", "container/reader.py", "format/records.py", "format/kinds.py", "format/checks.py")
 PYTHON_LEFT_OUT = re.compile(
-    r"encode|pack(?!_all)(?<!unpack)|forward|quantize(?<!dequantize)|\bfit|label|cost|contexts|code_reference|code_on"
-    r"|LayerCodingOptions|_check_input|reach|run_lengths|_set_out|rung_of|_bits_for|purpose|IndexChecks\.finish_"
+    r"encode|forward|\bpack|_pack_items|\bquantize|allocation\.py|\bfit|[lL]abel|least|cost|contexts|code_reference|code_on"
+    r"|LayerCodingOptions|_check_input|\breach|run_lengths|_set_out|rung_of|_bits_for|_columns|_Columns|_dual|_only"
+    r"|_mean_bits|Rate\.|Graph\.core|Siblings\.graph|hierarchy|orthonormal|_check_steps|_head$(?<!_read_head)"
+    r"|decode_(field|group|layers)$"  # which the encoder, and tests, call in place of the decoder
 )
 
 
@@ -124,7 +126,7 @@ def of_python(cache: Path) -> Reached:
     reached = Reached("container, coding and format", f"of {', '.join(PYTHON_FILES)} without {PYTHON_LEFT_OUT.pattern}")
     for path, found in json.loads(out.read_text(encoding="utf-8"))["files"].items():
         for name, function in found["functions"].items():
-            if not name or PYTHON_LEFT_OUT.search(name) or "allocation" in path:
+            if not name or PYTHON_LEFT_OUT.search(f"{Path(path).name} {name}"):  # without a name: definitions
                 continue
             counts = function["summary"]
             reached.count("lines", counts["covered_lines"], counts["num_statements"])

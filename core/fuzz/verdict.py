@@ -11,8 +11,10 @@ import hashlib
 import json
 import sys
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
+from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.decoder.video import open as open_video
 from meshreel.errors import FormatError
 
@@ -45,13 +47,26 @@ def verdict(data: bytes, layers: int | None = None) -> str:
 
 
 def check(data: bytes) -> None:
-    """Decode a file; then decode it again, which must give the same, or with fewer layers."""
+    """Decode and describe a file; then decode it again, which must give the same, or with fewer layers."""
     first = verdict(data)
+    describe(data)
     layers = zlib.crc32(data) % 4
     if layers == 3:
         assert verdict(data) == first, "a file that decodes in two ways"
     elif first != "refused":
         verdict(data, layers)
+
+
+def describe(data: bytes) -> None:
+    """Ask what is asked of a file without its frames."""
+    with suppress(FormatError):
+        video = open_video(data)
+        reader = video.reader
+        assert repr(video) and video.up and video.duration > 0
+        assert reader.has_background in (False, True) and len(reader.missing) <= len(reader.chunks)
+        for chunk in reader.chunks:
+            with suppress(FormatError):
+                assert all(size >= 0 for size in payload_bytes_by_purpose(reader.read_chunk(chunk.number)).values())
 
 
 def corpus() -> list[Path]:
