@@ -33,17 +33,17 @@ def encode_meshes(meshes: Sequence[Mesh], step: float) -> tuple[bytes, ...]:
     """Encode meshes that are decoded together, as `encode_mesh`.
 
     Large, flat, regular meshes take so few bytes that no reader would believe these (`check_claims`); they are coded
-    plainly.
+    plainly. Raises InputError also for vertices of ten thousands of faces, some of them cut out in between.
     """
     for level in (COMPRESSION_LEVEL, PLAIN_LEVEL):
         coded = tuple(_encode_draco(mesh, step, level) for mesh in meshes)
         try:
             check_claims(coded)
+            return coded
         except FormatError as error:
-            refused = error
-            continue
-        return coded
-    raise InputError(f"a mesh of {max(len(mesh.faces) for mesh in meshes)} faces: {refused}; simplify it")
+            refused = error.__cause__
+    faces = sum(len(mesh.faces) for mesh in meshes)
+    raise InputError(f"{faces} faces that no reader would decode: {refused}; simplify the mesh")
 
 
 def _encode_draco(mesh: Mesh, step: float, level: int) -> bytes:
