@@ -136,5 +136,7 @@ def test_the_bytes_of_ordinary_meshes_are_those_of_the_papers_level() -> None:
 
 def test_a_mesh_that_no_reader_would_take_is_an_input_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(DracoPy, "encode", lambda *_, **__: SLOW.pack())
-    with pytest.raises(InputError, match="7200 faces that no reader would decode: vertices of many faces that are joined again"):
+    with pytest.raises(
+        InputError, match="7200 faces that no reader would decode: vertices of many faces that are joined"
+    ):
         encode_mesh(flat(61), 1.0)
