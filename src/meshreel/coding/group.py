@@ -63,7 +63,8 @@ def continue_group(
         meshes, state = _decode_layers(data, layers, previous, place)
     else:
         meshes, state = _decode_alone(data, form, frame_count, layers), None
-        meshes = meshes if place is None else [place.of(mesh) for mesh in meshes]
+        if place is not None and form != Form.EMPTY:  # whose frames are one mesh
+            meshes = [place.of(mesh) for mesh in meshes]
     if len(meshes) != frame_count:
         raise FormatError(f"a group of {len(meshes)} frames where the index says {frame_count}")
     return meshes, state

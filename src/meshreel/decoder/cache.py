@@ -19,7 +19,7 @@ from ..types import Mesh
 
 # Bytes of states that the tracks of a video keep together (guess): a few bytes of a file can describe groups that
 # each take as much memory as a group may.
-MOST_KEPT = 1 << 26
+MOST_KEPT = 1 << 25
 MOST_REFUSALS = 4096  # chunks of a track (guess); frames that follow one another are mostly of one group
 
 

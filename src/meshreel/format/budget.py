@@ -18,9 +18,9 @@ from ..types import Mesh
 class Limits:
     """Numbers of the law; costs are in bytes. An element is a face or a vertex of a mesh as it is shown."""
 
-    free: int = 192 << 20  # what any chunk may cost: real groups cost at most a third of it (docs/results)
-    per_byte: int = 8192  # and more for each of its bytes: real groups of that cost need at most a tenth of it
-    together: int = 128 << 20  # memory that the groups of one frame may take, and per_byte more (guess)
+    free: int = 192 << 20  # what any chunk may cost (guess): twice as much as any group of docs/results
+    per_byte: int = 8192  # and more for each of its bytes (guess)
+    together: int = 96 << 20  # memory that the groups of one frame may take, and per_byte more (guess)
     chain: int = 8  # times as much as a chunk's may the states cost that lead to one of the background (guess)
     frames: int = 65_535  # of all groups: what one group may have
     frames_per_byte: int = 64  # and more for each byte of the file: a still group has 2 (guess)
@@ -29,7 +29,7 @@ class Limits:
     element: int = 160  # of the largest mesh of a DRACO group; of a LAYERS group; of a change and what it changes
     shown: int = 30  # of an element in each frame of a DRACO group
     moving: int = 30  # of an element in each frame of a LAYERS group
-    solved: int = 2200  # of an element of a LAPLACIAN group, whose least squares fill in
+    solved: int = 1200  # of an element of a LAPLACIAN group, whose least squares fill in
     column: int = 20  # of an element in each frame and for each component of a LAPLACIAN group
     pair: int = 100  # of two corners at one vertex of a LAPLACIAN group: a row of the least squares squared
     number: int = 40  # of a number in the basis of a LAPLACIAN group

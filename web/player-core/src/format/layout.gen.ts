@@ -11,7 +11,7 @@ export const VERSION = 1;
 export const LIMITS = {
   free: 201326592,
   perByte: 8192,
-  together: 134217728,
+  together: 100663296,
   chain: 8,
   frames: 65535,
   framesPerByte: 64,
@@ -19,7 +19,7 @@ export const LIMITS = {
   element: 160,
   shown: 30,
   moving: 30,
-  solved: 2200,
+  solved: 1200,
   column: 20,
   pair: 100,
   number: 40,

@@ -1,0 +1,166 @@
+"""The worst legal file of each form costs no more than FORMAT.md promises ("What a file may cost")."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.coding.group import decode_group
+from meshreel.coding.intra import encode_empty
+from meshreel.coding.layers.coder import read_layers
+from meshreel.container.reader import ReelReader
+from meshreel.container.sources import BytesSource
+from meshreel.container.writer import ReelWriter
+from meshreel.encoder.forms import IntraOptions, intra_only
+from meshreel.encoder.interval import Interval
+from meshreel.encoder.layers import encode_interval
+from meshreel.encoder.presets import layers_options
+from meshreel.encoder.target import Fidelity
+from meshreel.errors import FormatError, InputError
+from meshreel.format import budget
+from meshreel.format.budget import LIMITS, Chain, CostlyError, Size
+from meshreel.format.layout import Form
+from meshreel.types import Mesh
+from tests.budget import worst_files as worst
+from tests.coding.bodies import ball, moving
+from tests.container.files import HEADER
+
+FORMAT = (Path(__file__).resolve().parents[2] / "FORMAT.md").read_text(encoding="utf-8")
+MEMORY, MEMORY_PER_BYTE = 384 << 20, 16 << 10  # bytes, of FORMAT.md
+SECONDS, SECONDS_PER_CHUNK, SECONDS_PER_BYTE = 1.0, 1.0, 100e-6  # of FORMAT.md
+SLOWER = 3  # times, at most, that a machine which runs tests beside others may take
+
+SMALL = {
+    "draco": partial(worst.draco, 3000),
+    "frames of draco": partial(worst.draco_frames, 3000),
+    "layers": partial(worst.layered, 3000),
+    "predicted layers": partial(worst.layered, 3000, predicted=5),
+    "laplacian": partial(worst.solved, 3000),
+    "laplacian of many frames": partial(worst.solved, 3000, 400),
+    "laplacian of a fan": partial(worst.fanned, 3000),
+    "patches of a background": partial(worst.changed, 3000),
+    "tracks": partial(worst.crowded, 3000),
+    "empty": partial(worst.empty, 1000),
+    "container": partial(worst.headed, 4000),
+}
+LARGE = {
+    "draco": partial(worst.draco, 40_000),
+    "layers": partial(worst.layered, 40_000),
+    "laplacian": partial(worst.solved, 40_000),
+    "patches of a background": partial(worst.changed, 60_000),
+    "tracks": partial(worst.crowded, 40_000),
+    "empty": partial(worst.empty, 30_000),
+    "container": partial(worst.headed, 60_000),
+}
+CASES = [
+    *(pytest.param(make, id=f"{name}, small") for name, make in SMALL.items()),
+    *(pytest.param(make, id=f"{name}, large", marks=pytest.mark.slow) for name, make in LARGE.items()),
+]
+
+
+@pytest.mark.parametrize("make", CASES)
+def test_the_worst_legal_file_costs_what_is_promised(make: Callable[[], bytes], tmp_path: Path):
+    pytest.importorskip("resource", reason="peak memory is measured on POSIX only")
+    from tests.budget.measure import measured
+
+    data = make()
+    cost = measured(tmp_path / "worst.reel", data)
+    chunks = len(ReelReader(BytesSource(data)).chunks)
+    assert cost.memory <= MEMORY + MEMORY_PER_BYTE * len(data)
+    assert cost.seconds <= SLOWER * (SECONDS + SECONDS_PER_CHUNK * chunks + SECONDS_PER_BYTE * len(data))
+    assert all("its groups of tracks" in message for message in cost.refused)  # all else is legal
+
+
+def test_the_promise_is_that_of_the_document():
+    promise = FORMAT[FORMAT.index("## What a file may cost") :]
+    assert f"{MEMORY >> 20} MiB + {MEMORY_PER_BYTE >> 10} KiB * n of memory" in promise
+    assert f"at most {SECONDS_PER_CHUNK:g} s + {SECONDS_PER_BYTE * 1e6:g} µs * m" in promise
+    numbers = dict(re.findall(r"^\| `(\w+)` \| ([\d,]+) \|", promise, re.MULTILINE))
+    assert numbers == {name: f"{value:,}" for name, value in asdict(LIMITS).items()}
+
+
+@pytest.mark.parametrize(
+    ("cost", "grown"),
+    [
+        (lambda k: budget.draco_cost([Size(1000, 500, 2)] * k), "draco"),
+        (lambda k: budget.layers_cost(Size(1000, 500, 2), k), "layers"),
+        (lambda k: budget.laplacian_cost(Size(100, 50, 2), k, 1, 3600), "laplacian"),
+        (lambda k: budget.change_cost(Size(1000 * k, 500 * k), Size(0, 0)), "background"),
+    ],
+)
+def test_more_than_its_bytes_may_cost_is_refused(cost: Callable[[int], int], grown: str):
+    most = worst.largest(cost, 100)
+    budget.check_cost(cost(most), 100, grown)
+    with pytest.raises(CostlyError, match=f"{grown}: 100 bytes that cost"):
+        budget.check_cost(cost(most + 1), 100, grown)
+    budget.check_cost(cost(most + 1), 100_000, grown)
+
+
+@pytest.mark.parametrize("name", ["draco", "solved"])
+def test_one_level_more_is_refused_before_memory_is_taken(name: str):
+    reader = ReelReader(BytesSource(getattr(worst, name)(3000)))
+    [chunk] = reader.chunks
+    payload = bytearray(reader.read_chunk(0))
+    payload[1] += 1  # the number of levels
+    with pytest.raises(CostlyError):
+        decode_group(bytes(payload), chunk.frame_count)
+
+
+def test_states_of_the_background_that_cost_too_much_together_are_refused():
+    mesh, chain = worst.grid(100), Chain()
+    fits = LIMITS.chain * budget.allowance(0) // budget.change_cost(Size.of(mesh), Size.of(mesh))
+    for _ in range(fits):
+        chain = chain.then(mesh, mesh, 0)
+    with pytest.raises(CostlyError, match="0 bytes of states that cost"):
+        chain.then(mesh, mesh, 0)
+    assert chain.then(mesh, mesh, 1000).size == 1000
+
+
+def test_a_file_has_no_more_frames_than_its_bytes_may(tmp_path: Path):
+    budget.check_frames(LIMITS.frames + 100 * LIMITS.frames_per_byte, 100)
+    with pytest.raises(CostlyError, match="frames of all tracks in a file of 100 bytes"):
+        budget.check_frames(LIMITS.frames + 100 * LIMITS.frames_per_byte + 1, 100)
+    with pytest.raises(InputError, match="frames of all tracks"), ReelWriter(tmp_path / "x.reel", HEADER) as writer:
+        for _ in range(4):
+            writer.add_group(writer.frame_count, LIMITS.frames, encode_empty())
+    data = worst.empty(1000)
+    assert len(meshreel.open(data)) > 0
+
+
+def test_a_group_that_readers_would_refuse_is_coded_as_shorter_ones(monkeypatch: pytest.MonkeyPatch):
+    frames = [Mesh(points, ball(1).base.faces) for points in moving(ball(1), 2)]
+    options = replace(layers_options(50), keys=1, tails=None)
+    [whole] = encode_interval(Interval(frames), options)
+    assert whole.form == Form.LAYERS
+    head = read_layers(whole.payload).head
+    one = budget.layers_cost(Size.of(worst.decode_mesh(head.base, head.step), head.levels), 1)
+    monkeypatch.setattr(budget, "LIMITS", budget.Limits(free=one, per_byte=1))
+    with pytest.raises(CostlyError):
+        decode_group(whole.payload, 2)
+    groups = list(encode_interval(Interval(frames), options))
+    assert [group.frame_count for group in groups] == [1, 1]
+
+
+def test_a_mesh_that_readers_would_refuse_is_an_error_of_the_input(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(budget, "LIMITS", budget.Limits(free=1000, per_byte=1))
+    with pytest.raises(InputError, match=r"a mesh of 200 faces: draco: .* simplify it"):
+        intra_only([worst.grid(10)] * 3, Fidelity(1e-4, 7.0, 1e-3), IntraOptions())
+    monkeypatch.setattr(budget, "LIMITS", budget.Limits(free=4000, per_byte=1))
+    assert intra_only([worst.grid(10)] * 3, Fidelity(1e-4, 7.0, 1e-3), IntraOptions()).frame_count < 3
+
+
+def test_a_frame_refused_for_its_tracks_decodes_none_again(monkeypatch: pytest.MonkeyPatch):
+    video = meshreel.open(worst.crowded(3000))
+    with pytest.raises(FormatError, match="its groups of tracks"):
+        video[0]
+    monkeypatch.setattr(ReelReader, "read_chunk", lambda *_: pytest.fail("a group is decoded again"))
+    with pytest.raises(FormatError, match="its groups of tracks"):
+        video[0]
+    assert np.isfinite(video.tracks[0][0].vertices).all()
