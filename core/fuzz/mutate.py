@@ -76,8 +76,8 @@ def mutate(data: bytes, random: Random, change: ChangeBytes, of_head: float = 0.
                 return _change_head(header, chunks, random, change)
             at = random.randrange(len(chunks))
             return assemble(header, [*chunks[:at], _Change(random, change).chunk(chunks[at]), *chunks[at + 1 :]])
-        except (FormatError, InputError, ValueError, OverflowError):
-            continue  # a value that cannot be packed
+        except (FormatError, InputError, ValueError, OverflowError, LookupError):
+            continue  # a value that cannot be packed, or a payload that no form has
     return change(data)
 
 

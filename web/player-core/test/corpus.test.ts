@@ -1,0 +1,61 @@
+// The corpus of the fuzzers: the player refuses what Python refuses, and decodes the rest to the same bits.
+
+import { createHash } from "node:crypto";
+import { readFileSync } from "node:fs";
+
+import { beforeAll, expect, test } from "vitest";
+
+import { Video } from "../src/decode/decoder.ts";
+import type { Tools } from "../src/decode/group.ts";
+import { FormatError } from "../src/errors.ts";
+import type { Mesh } from "../src/mesh.ts";
+import { open } from "../src/net/opening.ts";
+import { BytesSource } from "../src/net/source.ts";
+import { ROOT, nodeTools } from "./tools.ts";
+
+const FOLDER = `${ROOT}/core/fuzz/corpus`;
+const MOST_FRAMES = 24; // as in core/fuzz/verdict.py
+const VERDICTS = JSON.parse(readFileSync(`${FOLDER}/verdicts.json`, "utf8")) as Record<string, [string, string]>;
+
+let tools: Tools;
+beforeAll(async () => {
+  tools = await nodeTools();
+});
+
+/** Null where the bytes are refused. */
+function refused(error: unknown): null {
+  if (error instanceof FormatError) return null;
+  throw error;
+}
+
+/** As `verdict` of core/fuzz/verdict.py. */
+async function verdict(data: Uint8Array, layers: number | null): Promise<string> {
+  const opened = await open(new BytesSource(data), new AbortController().signal).catch(refused);
+  if (opened === null) return "refused";
+  const video = new Video(tools, data, layers);
+  const total = createHash("sha256");
+  let shown = 0;
+  for (let frame = 0; frame < Math.min(video.head.info.frameCount, MOST_FRAMES); frame++) {
+    const mesh = frameOf(video, frame);
+    if (mesh === null) {
+      total.update("refused");
+      continue;
+    }
+    shown += 1;
+    for (const { buffer, byteOffset, byteLength } of [mesh.vertices, mesh.faces]) total.update(new Uint8Array(buffer, byteOffset, byteLength));
+  }
+  return `${shown} ${total.digest("hex").slice(0, 16)}`;
+}
+
+function frameOf(video: Video, frame: number): Mesh | null {
+  try {
+    return video.frame(frame);
+  } catch (error) {
+    return refused(error);
+  }
+}
+
+test.each(Object.entries(VERDICTS))("%s", async (name, wanted) => {
+  const data = new Uint8Array(readFileSync(`${FOLDER}/${name}`));
+  expect([await verdict(data, null), await verdict(data, 1)]).toEqual(wanted);
+});
