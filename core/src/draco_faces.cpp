@@ -177,7 +177,7 @@ bool read_handles(DracoReader& in, uint64_t symbols, std::vector<Handle>& handle
 
 }  // namespace
 
-bool read_draco_faces(DracoReader& in, DracoTraversal traversal, const DracoClaims& claims, uint64_t& steps) {
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims) {
     std::vector<Handle> handles;
     if (!read_handles(in, claims.symbols, handles)) return false;
     Symbols symbols(in, traversal, claims);
@@ -193,7 +193,7 @@ bool read_draco_faces(DracoReader& in, DracoTraversal traversal, const DracoClai
             if (edge == Boundary::kNone || !waiting.emplace(handles.back().split, edge).second) return false;
         }
     }
-    steps = boundary.renamed();
+    claims.steps = boundary.renamed();
     return boundary.points() == claims.points && boundary.joined() == claims.splits &&
            claims.faces - claims.symbols <= boundary.open();
 }

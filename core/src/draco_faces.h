@@ -13,12 +13,12 @@ struct DracoClaims {
     uint64_t faces, points;
     uint64_t symbols;  // of the traversal; each has a face
     uint64_t splits;   // of these; Draco takes memory for a point more at each
+    uint64_t steps;  // corners that Draco renames, one by one: for damaged faces as many as the square of their number
 };
 
 enum class DracoTraversal : uint8_t { Standard = 0, ByValence = 2 };
 
-// True where the faces that follow are those that are claimed. `steps` is about how many corners Draco renames, one by
-// one, to join them: for damaged faces this grows with the square of their number.
-bool read_draco_faces(DracoReader& in, DracoTraversal traversal, const DracoClaims& claims, uint64_t& steps);
+// True where the faces that follow are those that are claimed. Sets the claims' steps.
+bool read_draco_faces(DracoReader& in, DracoTraversal traversal, DracoClaims& claims);
 
 }  // namespace meshreel

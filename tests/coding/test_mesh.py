@@ -16,7 +16,7 @@ from meshreel.coding.intra import decode_intra, encode_intra
 from meshreel.coding.mesh import check_claims, decode_mesh, encode_mesh
 from meshreel.errors import FormatError, InputError
 from meshreel.io.meshes import read_mesh
-from tests.coding.draco_bombs import FAN, SLOW, bombs, flat, reel_of
+from tests.coding.draco_bombs import FAN, SLOW, Draco, bombs, flat, reel_of
 from tests.coding.draco_mutants import MOST_MEMORY, MOST_SECONDS, peak, run, valid_meshes  # noqa: F401
 from tests.shared_data import performer
 
@@ -99,6 +99,13 @@ def test_a_large_flat_mesh_is_coded_plainly_so_that_it_keeps_the_law() -> None:
     data = encode_mesh(mesh, 1.0)
     assert len(mesh.faces) < FREE + PER_BYTE * len(data)
     assert len(decode_mesh(data, 1.0).faces) == len(mesh.faces)
+
+
+def test_the_frames_of_a_group_have_steps_that_are_free_once() -> None:
+    slow = Draco("E" * 1000 + "E" + "R" * 10_000 + "SCC" * 1000).pack()
+    check_claims([slow])
+    with pytest.raises(FormatError, match="joined again"):
+        check_claims([slow] * 2)
 
 
 def test_the_frames_of_a_group_have_what_is_free_once() -> None:
