@@ -29,7 +29,7 @@ class Limits:
     element: int = 160  # of the largest mesh of a DRACO group; of a LAYERS group; of a change and what it changes
     shown: int = 30  # of an element in each frame of a DRACO group
     moving: int = 30  # of an element in each frame of a LAYERS group
-    solved: int = 1200  # of an element of a LAPLACIAN group, whose least squares fill in
+    solved: int = 1600  # of an element of a LAPLACIAN group, whose least squares fill in
     column: int = 20  # of an element in each frame and for each component of a LAPLACIAN group
     pair: int = 100  # of two corners at one vertex of a LAPLACIAN group: a row of the least squares squared
     number: int = 40  # of a number in the basis of a LAPLACIAN group

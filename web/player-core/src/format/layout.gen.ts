@@ -19,7 +19,7 @@ export const LIMITS = {
   element: 160,
   shown: 30,
   moving: 30,
-  solved: 1200,
+  solved: 1600,
   column: 20,
   pair: 100,
   number: 40,
