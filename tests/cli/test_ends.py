@@ -1,4 +1,6 @@
-"""How an encode may end before its time: no space left, Ctrl-C, SIGTERM, SIGKILL. Nothing is left under the name."""
+"""How an encode may end before its time: no space left, Ctrl-C, SIGTERM, SIGKILL. Nothing is left under the name, no
+process lives, and the next run takes over what is left beside it.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +23,12 @@ from tests.small_options import quick
 
 real = command.Encoder
 
-def slow(sequence, executor, progress, masker):
+def slow(sequence, executor, progress, *rest):
     def wait(stage, done, total):
         if stage == "code" and done == 1:
             print("coding", flush=True)
             time.sleep(120)
-    return real(sequence, executor, wait, masker)
+    return real(sequence, executor, wait, *rest)
 
 command.preset_options = quick
 if sys.argv.pop(1) == "wait":
@@ -36,7 +38,7 @@ if __name__ == "__main__":
 """
 
 
-def start(folder, balls, mode, limit=None):
+def start(folder, balls, mode, limit=None, flags=()):
     """A process that encodes three single-frame groups into folder/a.reel."""
 
     def prepare():
@@ -48,10 +50,10 @@ def start(folder, balls, mode, limit=None):
 
     (folder / "script.py").write_text(SCRIPT)
     command = [sys.executable, folder / "script.py", mode, "encode", balls, "-o", folder / "out" / "a.reel"]
-    (folder / "out").mkdir()
+    (folder / "out").mkdir(exist_ok=True)
     return subprocess.Popen(
-        [*command, "--group-size", "1"],
-        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": os.pathsep.join(["src", "."])},
+        [*command, "--group-size", "1", *flags],
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": "."},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -60,20 +62,25 @@ def start(folder, balls, mode, limit=None):
 
 
 @pytest.mark.parametrize(
-    ("number", "code", "said"),
+    ("number", "code", "said", "left"),
     [
-        (signal.SIGINT, 130, "meshreel: interrupted\n"),
-        (signal.SIGTERM, 143, "meshreel: terminated\n"),
-        (signal.SIGKILL, -9, ""),
+        (signal.SIGINT, 130, "meshreel: interrupted\n", []),
+        (signal.SIGTERM, 143, "meshreel: terminated\n", []),
+        (signal.SIGKILL, -9, "", [".a.reel.part", "a.reel.part"]),
     ],
 )
-def test_a_process_that_is_stopped_leaves_nothing_and_says_so(balls, tmp_path, number, code, said):
+def test_a_process_that_is_stopped_says_so_and_only_a_killed_one_leaves_what_the_next_takes_over(
+    balls, tmp_path, number, code, said, left
+):
     process = start(tmp_path, balls, "wait")
     assert process.stdout.readline() == "coding\n"
     process.send_signal(number)
     _, errors = process.communicate(timeout=60)
     assert (process.returncode, errors) == (code, said)
-    assert list((tmp_path / "out").iterdir()) == []
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == left
+    if left:
+        assert start(tmp_path, balls, "run").wait() == 0
+        assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.reel"]
 
 
 def test_a_full_disk_leaves_nothing_and_says_so(balls, tmp_path):
@@ -81,7 +88,7 @@ def test_a_full_disk_leaves_nothing_and_says_so(balls, tmp_path):
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 2
     assert errors.startswith("meshreel: error: ") and errors.count("\n") == 1
-    assert "a.reel" in errors and "too large; free space, or choose another folder" in errors
+    assert "a.reel" in errors and "too large); free space, or choose another folder" in errors
     assert list((tmp_path / "out").iterdir()) == []
 
 
@@ -92,3 +99,81 @@ def test_a_whole_run_in_a_process_of_its_own_ends_with_zero(balls, tmp_path):
     assert (process.returncode, errors) == (0, ""), time.monotonic() - begun
     assert "3 frames" in out
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.reel"]
+
+
+WORKERS = """
+import sys, time
+from meshreel.cli.workers import workers
+
+def lives(seconds):
+    time.sleep(seconds)
+
+if __name__ == "__main__":
+    with workers(2) as executor:
+        for _ in range(2):
+            executor.submit(lives, 0.5)
+        executor.submit(lives, 0.0).result()  # both have started
+        print(*executor._processes, flush=True)
+        for _ in range(2):
+            executor.submit(lives, 60.0)
+        time.sleep(60)
+"""
+
+
+PLAIN = """
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from meshreel.encoder.worker import end_with_parent
+
+def workers(jobs):
+    return ProcessPoolExecutor(jobs, get_context("spawn"), end_with_parent)
+"""
+
+
+OWN = "from meshreel.cli.workers import workers"
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("of", [OWN, PLAIN], ids=["of the command line", "of a Python user"])
+def test_no_worker_lives_two_seconds_after_its_parent(tmp_path, number, of):
+    (tmp_path / "script.py").write_text(WORKERS.replace(OWN, of))
+    process = subprocess.Popen([sys.executable, tmp_path / "script.py"], stdout=subprocess.PIPE, text=True)
+    pids = [int(pid) for pid in process.stdout.readline().split()]
+    assert len(pids) == 2 and all(map(lives, pids))
+    process.send_signal(number)
+    process.wait()
+    until = time.monotonic() + 2
+    while any(map(lives, pids)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(map(lives, pids))
+
+
+def lives(pid):
+    """Whether a process lives: one that has ended, but for which nobody has waited, does not."""
+    state = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True).stdout
+    return state != "" and not state.startswith("Z")
+
+
+# The command line as the script of an installation runs it, with a signal when a module is about to be loaded.
+LOADING = """
+import os, signal, sys
+name, number, *sys.argv[1:] = sys.argv[1:]
+
+class Press:
+    def find_spec(self, loaded, path, target=None):
+        if loaded == name:
+            os.kill(os.getpid(), int(number))
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell has jobs in the background ignore it
+sys.meta_path.insert(0, Press())
+from meshreel.cli import main
+main()
+"""
+
+
+@pytest.mark.parametrize("module", ["cyclopts", "numpy", "rich", "scipy", "meshreel.encoder.sequence"])
+@pytest.mark.parametrize(("number", "code", "said"), [(2, 130, "interrupted"), (15, 143, "terminated")])
+def test_a_signal_while_the_program_is_loaded_ends_it_without_a_traceback(module, number, code, said):
+    command = [sys.executable, "-c", LOADING, module, str(number), "encode", "none", "-o", "a.reel"]
+    answer = subprocess.run(command, capture_output=True, text=True)
+    assert (answer.returncode, answer.stdout, answer.stderr) == (code, "", f"meshreel: {said}\n")
