@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from ..encoder.digests import WriteLine, machine_line
+from ..encoder.digests import WriteLines, machine_line
 from ..encoder.options import EncoderOptions, SceneOptions
 from ..encoder.presets import preset_options
 from ..encoder.quality import Goal, encode_to
@@ -160,7 +160,7 @@ def command(
 
 
 @contextmanager
-def _lines(path: Path | None) -> Iterator[WriteLine | None]:
+def _lines(path: Path | None) -> Iterator[WriteLines | None]:
     """Open the file of digests and write its first line; None without a path."""
     if path is None:
         yield None

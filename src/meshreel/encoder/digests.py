@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-WriteLine = Callable[[str], object]  # takes a line of JSON with its end
+WriteLines = Callable[[str], object]  # takes whole lines of JSON
 LIBRARIES = ("meshreel", "numpy", "scipy", "open3d", "libigl", "fast-simplification", "DracoPy")
 
 

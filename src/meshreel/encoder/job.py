@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..geometry.derived_sequences import CapturedSequence
-from .digests import WriteLine, line_of
+from .digests import WriteLines, line_of
 from .interval import Interval
 from .journal import Journal
 from .options import EncoderOptions, PaperOptions, SceneOptions
@@ -55,7 +55,7 @@ class Job:
     stages: Stages
     store: GroupStore = field(default_factory=GroupStore)
     journal: Journal | None = None  # of the output; None where groups are not kept
-    digests: WriteLine | None = None  # of what the stages compute; None where nobody asks
+    digests: WriteLines | None = None  # of what the stages compute; None where nobody asks
 
     def note(self, stage: str, *values: object) -> None:
         """Write the line of a stage where digests are wanted."""

@@ -32,17 +32,9 @@ def encode_intervals(job: Job, intervals: Iterable[Interval], stages: Stages) ->
     for interval in intervals:
         waiting.append(_begun(job, interval, stages))
         if len(waiting) > ahead:
-            yield _noted(job, waiting.popleft()())
+            yield waiting.popleft()()
     while waiting:
-        yield _noted(job, waiting.popleft()())
-
-
-def _noted(job: Job, groups: list[EncodedGroup]) -> list[EncodedGroup]:
-    """Write the lines of digests of some groups, if there are any."""
-    if job.digests is not None:
-        for line in (line for group in groups for line in group.digests):
-            job.digests(line)
-    return groups
+        yield waiting.popleft()()
 
 
 def _begun(job: Job, interval: Interval, stages: Stages) -> Callable[[], list[EncodedGroup]]:
@@ -56,6 +48,8 @@ def _begun(job: Job, interval: Interval, stages: Stages) -> Callable[[], list[En
         return groups
 
     def kept(groups: list[EncodedGroup]) -> list[EncodedGroup]:
+        if job.digests is not None:
+            job.digests("".join(line for group in groups for line in group.digests))
         return groups if journal is None else journal.keep(interval, groups)
 
     if journal is not None and (known := journal.take(interval)) is not None:

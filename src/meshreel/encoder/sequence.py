@@ -36,7 +36,7 @@ from ..io.unfinished import unfinished
 from ..io.write import check_apart
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, Up, as_sequence, evenly
-from .digests import WriteLine
+from .digests import WriteLines
 from .interval import Interval, NormalisedFrames
 from .job import GroupStore, Job
 from .journal import Journal, made_of
@@ -102,11 +102,11 @@ class Encoder:
         executor: Executor | None = None,
         progress: Progress | None = None,
         masker: Masker | None = None,
-        digests: WriteLine | None = None,
+        digests: WriteLines | None = None,
     ) -> None:
         """Take executor and progress as `encode` does; with a `masker`, whose masks mark moving pixels, it is a scene.
 
-        `digests` takes a line of JSON for each stage. The attribute `progress` may be replaced between encodes.
+        `digests` takes lines of JSON, one for each stage. The attribute `progress` may be replaced between encodes.
         """
         self.sequence, self._executor, self._masker = Unchanging(captured(sequence)), executor, masker
         self.progress, self.digests = progress, digests

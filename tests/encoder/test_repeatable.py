@@ -1,0 +1,130 @@
+"""Equal input and options give equal bytes: on any number of threads, with workers, elsewhere, on older processors."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_info
+
+from meshreel.encoder.digests import Digests, line_of
+from meshreel.encoder.sequence import Encoder
+from meshreel.types import MeshList
+from tests.small_bodies import body
+from tests.small_options import quick, with_method
+from tests.small_scene import scene
+
+ROOT = Path(__file__).resolve().parents[2]
+SEQUENCES = {"body": (body(1, 5), "best"), "noisy body": (body(2, 2), "best"), "paper": (body(3, 3), "paper")}
+PROGRAM = """
+import sys
+from tests.encoder.test_repeatable import encode_all
+sys.stdout.write(encode_all(int(sys.argv[1])))
+"""
+
+
+def encode_all(jobs: int) -> str:
+    """Digests of the files and of all stages, a line each."""
+    from meshreel.cli.encode import workers
+
+    found = list[str]()
+    with workers(jobs) as executor:
+        for name, (frames, preset) in SEQUENCES.items():
+            options = with_method(quick(preset, key_interval=0.4 if preset == "best" else None), group_size=2)
+            path = Path(f"repeatable {os.getpid()}.reel")
+            Encoder(MeshList(tuple(frames), 10.0), executor, digests=found.append).encode(path, options)
+            found.append(f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n")
+            path.unlink()
+    return "".join(found)
+
+
+def encoded(folder: Path, jobs: int = 1, **environment: str) -> str:
+    """What `encode_all` returns in a process of its own, in which such variables are set before anything is loaded."""
+    folder.mkdir(parents=True, exist_ok=True)
+    variables = os.environ | {"PYTHONPATH": str(ROOT)} | environment
+    program = folder / "program.py"
+    program.write_text(f"if __name__ == '__main__':\n{''.join('    ' + line for line in PROGRAM.splitlines(True))}")
+    command = [sys.executable, "program.py", str(jobs)]
+    done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What one thread of one process makes."""
+    return encoded(tmp_path_factory.mktemp("alone"), OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+
+
+def test_any_number_of_threads_gives_the_same_bytes(alone: str, tmp_path: Path):
+    assert alone.count("payload") >= 4  # stages are compared, too
+    assert encoded(tmp_path, OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2", IGL_NUM_THREADS="2") == alone
+
+
+def test_workers_locale_hash_seed_and_folder_do_not_matter(alone: str, tmp_path: Path):
+    assert encoded(tmp_path / "else where", jobs=2, LC_ALL="tr_TR.UTF-8", PYTHONHASHSEED="7") == alone
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names instructions of x86")
+@pytest.mark.slow
+def test_instructions_of_an_older_processor_give_the_same_bytes(alone: str, tmp_path: Path):
+    from numpy._core import _multiarray_umath as core
+
+    without = [name for name in core.__cpu_dispatch__ if core.__cpu_features__.get(name)]
+    plain = {"NPY_DISABLE_CPU_FEATURES": " ".join(without), "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-AVX,-FMA"}
+    assert encoded(tmp_path, OPENBLAS_CORETYPE="Prescott", **plain) == alone
+
+
+def test_the_encoder_and_its_callers_have_threads_of_their_own(tmp_path: Path):
+    def threads() -> list[int]:
+        return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+    before, during = threads(), list[int]()
+    encoder = Encoder(MeshList(tuple(body(0, 1)), 10.0), progress=lambda *_: during.extend(threads()))
+    encoder.encode(tmp_path / "a.reel", quick())
+    assert set(during) == {1}
+    assert threads() == before
+
+
+def test_lines_of_digests_name_each_stage_in_the_order_of_the_file(tmp_path: Path):
+    lines, options = list[str](), quick(key_interval=0.2)
+    encoder = Encoder(MeshList(tuple(body(0, 3)), 10.0), digests=lines.append)
+    encoder.encode(tmp_path / "a.reel", options)
+    rows = [json.loads(line) for line in "".join(lines).splitlines()]
+    assert [row.get("frame") for row in rows if row["stage"] == "payload"] == [0, 1]
+    stages = [row["stage"] for row in rows if row.get("frame") == 1]
+    wanted = {"frames", "key and motion", "template, coded", "fit", "fields and symbols"}
+    wanted |= {"patches", "fidelity", "payload"}
+    assert set(stages) == wanted
+    assert (stages[0], stages[-1]) == ("frames", "payload")
+    assert rows[0]["stage"] == "survey"
+    again = list[str]()
+    with ThreadPoolExecutor(2) as executor:
+        Encoder(MeshList(tuple(body(0, 3)), 10.0), executor, digests=again.append).encode(tmp_path / "b.reel", options)
+    assert again == lines
+
+
+def test_scenes_have_lines_of_their_background(tmp_path: Path):
+    lines = list[str]()
+    Encoder(scene(2), digests=lines.append).encode(tmp_path / "a.reel", quick())
+    stages = [json.loads(line)["stage"] for line in "".join(lines).splitlines()]
+    assert stages[:3] == ["survey", "background and noise", "background, coded"]
+    assert "payload" in stages
+
+
+def test_a_digest_tells_values_shapes_and_types_apart():
+    zeros = np.zeros((2, 3))
+    kinds = [zeros, zeros.T, zeros.astype(np.float32), zeros + 1, b"\0" * 48, 0.0, None, "0.0"]
+    assert len({line_of("stage", kind) for kind in kinds}) == len(kinds)
+    digests = Digests(1, 20)
+    digests.add("stage", zeros)
+    assert [json.loads(line)["frame"] for line in digests.take()] == [20]
+    assert digests.take() == ()
