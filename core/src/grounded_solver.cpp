@@ -25,6 +25,7 @@ GroundedSolver::Outcome GroundedSolver::compute(const SparseRows& rows, const st
         }
         most_anchors_ = std::max(most_anchors_, static_cast<int64_t>(component.anchors.size()));
     }
+    if (!factor_.order(rows)) return Outcome::kSingular;
     if (most_anchors_ > kMostAnchors) return Outcome::kTooManyAnchors;
     if (!factor_.compute(rows, grounds)) return Outcome::kSingular;
     responses_.assign(component_of_.size() * static_cast<size_t>(most_anchors_), 0.0);

@@ -18,6 +18,9 @@ namespace meshreel {
 // B = M U in an order of little fill, both by the pattern of a symmetric elimination.
 class GroundedFactor {
 public:
+    // Chooses the order of elimination, by the pattern alone. False where it fills in as no surface does.
+    bool order(const SparseRows& rows);
+
     // `grounds`: ascending vertices, one in each component that has edges. False where a pivot vanishes.
     bool compute(const SparseRows& rows, const std::vector<int32_t>& grounds);
 
@@ -29,7 +32,7 @@ private:
         double lower, upper;
     };
 
-    void count_fill(const SparseRows& rows);
+    bool count_fill(const SparseRows& rows);
     bool eliminate(const SparseRows& rows, const std::vector<int32_t>& grounds);
 
     std::vector<int32_t> order_;     // order_[k] is the vertex eliminated k-th

@@ -5,7 +5,7 @@ const char* mr_message(int status) {
         case MR_OK: return "no error";
         case MR_BAD_INPUT: return "an index is out of range, indices do not ascend, or a number is not finite";
         case MR_NOT_CAUSAL: return "neighbours must be smaller indices in order";
-        case MR_SINGULAR: return "a connected component has no anchor";
+        case MR_SINGULAR: return "a connected component has no anchor, or elimination fills in as on no surface";
         case MR_NO_MEMORY: return "not enough memory";
         case MR_OVERFLOW: return "a symbol beyond 32 bits";
         case MR_OUT_TOO_SMALL: return "the output has too little room";

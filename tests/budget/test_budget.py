@@ -15,6 +15,7 @@ import meshreel
 from meshreel.coding.group import decode_group
 from meshreel.coding.intra import encode_empty
 from meshreel.coding.layers.coder import read_layers
+from meshreel.coding.paper import laplacian
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import ReelWriter
@@ -26,7 +27,7 @@ from meshreel.encoder.target import Fidelity
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget
 from meshreel.format.budget import LIMITS, Chain, CostlyError, Size
-from meshreel.format.layout import Form
+from meshreel.format.layout import AnchorRule, Form
 from meshreel.types import Mesh
 from tests.budget import worst_files as worst
 from tests.coding.bodies import ball, moving
@@ -111,6 +112,19 @@ def test_one_level_more_is_refused_before_memory_is_taken(name: str):
     payload[1] += 1  # the number of levels
     with pytest.raises(CostlyError):
         decode_group(bytes(payload), chunk.frame_count)
+
+
+@pytest.mark.parametrize("anchors", [1, 100])
+def test_least_squares_that_fill_in_as_no_surface_does_are_refused_before_they_are_solved(anchors: int):
+    for count, is_legal in ((60, True), (600, False)):
+        mesh = worst.handles(70, count)
+        chosen = laplacian.anchors(AnchorRule.SPREAD, anchors, mesh.faces, len(mesh.vertices))
+        system, deltas = laplacian.System(mesh, chosen), np.zeros((len(mesh.vertices) + len(chosen), 1))
+        if is_legal:
+            assert not system.inverse(deltas).any()
+            continue
+        with pytest.raises(ValueError, match="elimination fills in"):
+            system.inverse(deltas)
 
 
 def test_states_of_the_background_that_cost_too_much_together_are_refused():

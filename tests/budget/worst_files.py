@@ -197,6 +197,24 @@ def fanned(size: int) -> bytes:
     return file_of((1, laplacian_group(encode_mesh(fan(count), STEP), 0, 1, 1, 100, AnchorRule.SPREAD)))
 
 
+def handles(side: int, count: int) -> Mesh:
+    """A grid with tubes between faces that are far from each other: no order of elimination fills in little."""
+    mesh, used, ends = grid(side), set[int](), list[int]()
+    for face in np.random.default_rng(0).permutation(len(mesh.faces)).tolist():
+        corners = set(mesh.faces[face].tolist())
+        if not corners & used and len(ends) < 2 * count:
+            used |= corners
+            ends.append(face)
+    tubes = [
+        row
+        for a, b in zip(ends[::2], ends[1::2], strict=True)
+        for p, q in [(mesh.faces[a], mesh.faces[b][::-1])]
+        for i, j in ((0, 1), (1, 2), (2, 0))
+        for row in ((p[i], p[j], q[i]), (p[j], q[j], q[i]))
+    ]
+    return Mesh.of(mesh.vertices, np.concatenate([np.delete(mesh.faces, ends, axis=0), np.array(tubes)]))
+
+
 def changed(size: int) -> bytes:
     """As many changes of a background as may lead to a state; each copies all of it."""
     floor, added = grid(70), encode_mesh(grid(1), STEP)

@@ -12,7 +12,7 @@ enum mr_status {
     MR_OK = 0,
     MR_BAD_INPUT,   // an index out of range or out of order, or a number that is not allowed
     MR_NOT_CAUSAL,  // a graph whose values are near others than those before them
-    MR_SINGULAR,    // a connected component has no anchor
+    MR_SINGULAR,    // a connected component has no anchor, or elimination fills in
     MR_NO_MEMORY,
     MR_OVERFLOW,       // a symbol beyond 32 bits
     MR_OUT_TOO_SMALL,  // sizes are set: call again with that much room

@@ -49,8 +49,11 @@ def laplacian(
     positions: Float64[np.ndarray, "T V 3"],
     options: DisplacementOptions,
 ) -> EncodedGroup:
-    """Encode a group in the `laplacian` form."""
-    payload, layers = encode_group(reference, displacement_field(reference, positions), options)
+    """Encode a group in the `laplacian` form. Raises CostlyError where readers would refuse it."""
+    try:
+        payload, layers = encode_group(reference, displacement_field(reference, positions), options)
+    except ValueError as error:  # least squares that are singular, or whose elimination fills in
+        raise CostlyError(f"laplacian: {error}") from error
     fidelity = measure(frames, decode_group(payload, len(frames)))
     return EncodedGroup(Form.LAPLACIAN, len(frames), payload, layers, fidelity)
 
