@@ -179,6 +179,7 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
     return {
         "bytes": summary.size,
         "frames": summary.frame_count,
+        "continued": summary.continued,
         "mbps": _mbps(summary.size, summary, frame_rate),
         "d2_psnr_paper": summary.psnr if math.isfinite(summary.psnr) else None,
         "scene": None if summary.scene is None else _scene_row(summary, summary.scene, frame_rate),
@@ -232,7 +233,8 @@ def describe(row: dict[str, Any]) -> str:
     forms = [group["form"] for group in row["groups"]]
     counted = ", ".join(_count_groups(forms.count(form), form) for form in sorted(set(forms)))
     scene = "" if row["scene"] is None else _describe_scene(row["scene"])
-    return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}{counted}"
+    before = f", {row['continued']} intervals from before" if row["continued"] else ""
+    return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}{counted}{before}"
 
 
 def _count_groups(count: int, form: str) -> str:
