@@ -55,7 +55,7 @@ def store(which: str, report: str, seconds: float) -> None:
     python = ".".join(platform.python_version_tuple()[:2])
     add_row(
         f"With the {which} versions of dependencies, on Python {python}, commands, readers, exports and server work",
-        f"./scripts/test-versions {which} {python}",
+        f"./scripts/test-versions {which} {python} --row",
         (count["tests"] - count["skipped"], "tests"),
         count["failures"] + count["errors"],
         seconds,

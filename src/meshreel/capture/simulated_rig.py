@@ -130,7 +130,7 @@ def simulate_rig(
         count = number + 1
         progress(count)
     with replacing(folder / TRUTH / LABELS) as file:
-        np.savez_compressed(file, allow_pickle=False, **labels)
+        np.savez_compressed(file, **labels)  # type: ignore[arg-type]  # NumPy 2.1 stores `allow_pickle=` as an array
     with replacing(folder / TRUTH / RIG) as file:
         record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}
         file.write((json.dumps(record, indent=1) + "\n").encode())
