@@ -1,7 +1,7 @@
 """Encodes of equal input under settings that must not matter: how many files differ, and where they begin to.
 
-`python scripts/repeat.py [FOLDER[@FRAMES]...] [--quality Q]... [--preset P]... [--no-rows]`. Each setting is a process
-of its own, which encodes all sequences.
+`python scripts/repeat.py [FOLDER[@FRAMES]...] [--bodies N] [--quality Q]... [--preset P]... [--no-rows]`. Each is
+a process of its own, which encodes all sequences.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from itertools import product
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-BODIES = 4  # small bodies, of about 100 or 250 vertices
+FRAME_RATE = 10.0  # 1/s; with groups of 2 frames and intervals of 4, some groups are predicted
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "IGL_NUM_THREADS", "TBB_NUM_THREADS")
 EXACT = "Equal input and options give equal bytes, whatever the threads, cores, workers, locale, hash seed and folder"
 KERNELS = "They do also with the instructions of other x86 processors in BLAS, NumPy and the C library"
@@ -66,13 +66,13 @@ def dispatched() -> list[str]:
     return [name for name in core.__cpu_dispatch__ if core.__cpu_features__.get(name)]
 
 
-def write_sequences(folder: Path, given: list[str]) -> list[Path]:
+def write_sequences(folder: Path, bodies: int, given: list[str]) -> list[Path]:
     """Write the frames of all sequences once, so that no setting can change them; return their files."""
     from meshreel.io.sequence import open_sequence
     from tests.small_bodies import body
     from tests.small_scene import scene
 
-    sequences = {f"body{seed}": body(seed, frames=5) for seed in range(BODIES)} | {"scene": scene(4)}
+    sequences = {f"small body {seed}": body(seed, frames=4) for seed in range(bodies)} | {"small scene": scene(3)}
     for name in given:
         path, _, count = name.partition("@")
         opened = open_sequence(path)
@@ -105,6 +105,7 @@ def encode_all(work: list[tuple[str, str, float]], out: Path, jobs: int) -> dict
     from meshreel.encoder.presets import preset_options
     from meshreel.encoder.sequence import Encoder
     from meshreel.types import Mesh, MeshList
+    from tests.small_options import quick
 
     out.mkdir()
     found = {}
@@ -113,9 +114,9 @@ def encode_all(work: list[tuple[str, str, float]], out: Path, jobs: int) -> dict
             frames = tuple(Mesh.of(*arrays) for arrays in pickle.loads(Path(path).read_bytes()))
             name = f"{Path(path).name} {preset} {quality:g}"
             with (out / f"{name}.jsonl").open("w", encoding="utf-8") as lines:
-                encoder = Encoder(MeshList(frames, 10.0), executor, digests=lines.write)
-                interval = 0.4 if preset == "best" else None  # s, of 10 frames: two groups, so that one is predicted
-                options = preset_options(preset, quality, group_size=2, key_interval=interval)
+                encoder = Encoder(MeshList(frames, FRAME_RATE), executor, digests=lines.write)
+                find = quick if name.startswith("small") else preset_options
+                options = find(preset, quality, group_size=2, key_interval=0.4 if preset == "best" else None)
                 encoder.encode(out / f"{name}.reel", options)
             found[name] = hashlib.sha256((out / f"{name}.reel").read_bytes()).hexdigest()
     return found
@@ -148,6 +149,7 @@ def main() -> int:
     """Return 1 if files differ."""
     parser = argparse.ArgumentParser()
     parser.add_argument("folders", nargs="*")
+    parser.add_argument("--bodies", type=int, default=4)
     parser.add_argument("--quality", type=float, action="append")
     parser.add_argument("--preset", action="append")
     parser.add_argument("--no-rows", action="store_true")
@@ -159,7 +161,7 @@ def main() -> int:
         return 0
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "in").mkdir()
-        paths = map(str, write_sequences(Path(folder) / "in", given.folders))
+        paths = map(str, write_sequences(Path(folder) / "in", given.bodies, given.folders))
         work = list(product(paths, given.preset or ["best", "paper"], given.quality or [50.0]))
         counts = compare(Path(folder), work)
     if not given.no_rows:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 import shutil
 from dataclasses import asdict, replace
 
@@ -110,6 +111,20 @@ def test_two_processes_write_the_same_file_as_one(run, balls, tmp_path):
         said = run("encode", balls, "-o", tmp_path / f"{jobs}.reel", "--group-size", "1", "--jobs", jobs, "--quiet")
         assert (said.code, said.err) == (0, "")
     assert (tmp_path / "1.reel").read_bytes() == (tmp_path / "2.reel").read_bytes()
+
+
+@pytest.mark.usefixtures("quick_presets")
+def test_digests_of_all_stages_are_written_on_request(run, balls, tmp_path):
+    said = run("encode", balls, "-o", tmp_path / "a.reel", "--debug-digests", tmp_path / "a.jsonl", "--quiet")
+    assert (said.code, said.err) == (0, "")
+    rows = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert {"numpy", "open3d"} <= set(rows[0]["libraries"])
+    assert (rows[0]["stage"], rows[1]["stage"], rows[-1]["stage"]) == ("machine", "survey", "payload")
+
+
+def test_digests_that_cannot_be_written_are_an_error(run, balls, tmp_path):
+    said = run("encode", balls, "-o", tmp_path / "b.reel", "--debug-digests", tmp_path / "no" / "b.jsonl")
+    assert failed(said, "b.jsonl: cannot be written", "--debug-digests")
 
 
 def test_flags_default_to_the_defaults_of_the_options():
