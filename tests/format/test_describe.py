@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -25,8 +26,9 @@ def test_format_md_is_not_stale():
 def test_generate_check_passes_and_fails_on_a_stale_document(tmp_path):
     copied = tmp_path / "scripts"
     copied.mkdir()
-    for name in ("generate", "generate_format.py"):
+    for name in ("generate", "generate_format.py", "reliability.py"):
         (copied / name).write_bytes((ROOT / "scripts" / name).read_bytes())
+    shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("pictures"))
     (tmp_path / "src").symlink_to(ROOT / "src")
     text = (ROOT / "FORMAT.md").read_text(encoding="utf-8")
     (tmp_path / "FORMAT.md").write_text(text, encoding="utf-8")
