@@ -79,7 +79,7 @@ class Encode:
     def judged(self) -> Counter[str]:
         """Return what is wrong after an encode that was stopped, and after the next run."""
         found = Counter[str]()
-        found["output changed"] += self.output.read_bytes() != b"old"
+        found["output torn"] += self.output.read_bytes() not in (b"old", self.whole)  # complete: killed as it ended
         found["left for resume"] += (self.folder / "out.reel.part").exists()
         found["next run failed"] += self.run("--resume").returncode != 0
         found["other bytes"] += self.output.read_bytes() != self.whole
@@ -109,6 +109,7 @@ def killed(encode: Encode, count: int, moments: random.Random) -> Counter[str]:
             continue
         time.sleep(GRACE)
         found += Counter({"kills": 1, "orphans": len(encode.orphans())}) + encode.judged()
+        print(f"{encode.folder.name}: {dict(found)}", file=sys.stderr, flush=True)
     return found
 
 
@@ -145,7 +146,7 @@ def told(promise: str, unit: str, found: Counter[str], seconds: float, command: 
     known = (unit, "left for resume", "in Python's own start")
     faults = sum(number for what, number in found.items() if what not in known)
     note = ", ".join(
-        f"{found[what]} {what}" for what in (*known[1:], "orphans", "output changed", "left over") if what in found
+        f"{found[what]} {what}" for what in (*known[1:], "orphans", "output torn", "left over") if what in found
     )
     print(f"{promise}: {found[unit]} {unit}, {faults} faults ({dict(found)}), {seconds:.0f} s", flush=True)
     reliability.add_row(promise, command, (found[unit], unit), faults, seconds, note)
