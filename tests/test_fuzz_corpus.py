@@ -10,6 +10,7 @@ import pytest
 import meshreel
 from core.fuzz import verdict
 from core.fuzz.mutate import assemble, change_bytes, mutate, parse
+from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.errors import FormatError
 from tests.golden import GOLDEN
 
@@ -49,3 +50,11 @@ def test_most_mutants_have_right_sums_and_all_are_decoded_or_refused(path):
         except FormatError as error:
             wrong_sums += "checksum" in str(error)
     assert wrong_sums <= 3
+
+
+def test_streams_that_claim_more_bytes_than_the_payload_has_are_refused_by_what_counts_them():
+    """`meshreel info` said that a group's head had fewer than no bytes."""
+    reader = meshreel.open(GOLDEN / "laplacian.reel").reader
+    payload = reader.read_chunk(0)
+    with pytest.raises(FormatError, match="claim 26 more"):
+        payload_bytes_by_purpose(payload[:-40])

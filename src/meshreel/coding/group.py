@@ -126,4 +126,7 @@ def payload_bytes_by_purpose(data: bytes) -> dict[str, int]:
         sizes = {"draco": sum(len(mesh) for mesh in unpack_all(DracoGroup, data).meshes)}
     else:
         sizes = {}
-    return sizes | {"group head": len(data) - sum(sizes.values())}
+    rest = len(data) - sum(sizes.values())
+    if rest < 0:
+        raise FormatError(f"a payload of {len(data)} bytes whose streams claim {-rest} more")
+    return sizes | {"group head": rest}
