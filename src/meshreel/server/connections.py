@@ -35,8 +35,8 @@ class Limits:
 
     request: float = 10.0
     """Seconds from the connection, or the end of the last response, until a request is complete (guess)."""
-    stall: float = 30.0
-    """Seconds in which a client must take what waits for it, about 100 kB (guess): slower than 4 kB/s plays nothing."""
+    stall: float = 60.0
+    """Seconds without progress of a response, as nginx has them: systems report progress in steps of up to 1 MB."""
     connections: int = 256
     """Connections that are served at once: those of 42 browsers, which open 6 each."""
     refused: int = 64

@@ -8,9 +8,11 @@ import { beforeAll, expect, test } from "vitest";
 import { Video } from "../src/decode/decoder.ts";
 import type { Tools } from "../src/decode/group.ts";
 import { FormatError } from "../src/errors.ts";
+import { Head } from "../src/format/reader.ts";
 import type { Mesh } from "../src/mesh.ts";
 import { open } from "../src/net/opening.ts";
 import { BytesSource } from "../src/net/source.ts";
+import { group, makeReel } from "./reel.ts";
 import { ROOT, nodeTools } from "./tools.ts";
 
 const FOLDER = `${ROOT}/core/fuzz/corpus`;
@@ -58,4 +60,12 @@ function frameOf(video: Video, frame: number): Mesh | null {
 test.each(Object.entries(VERDICTS))("%s", async (name, wanted) => {
   const data = new Uint8Array(readFileSync(`${FOLDER}/${name}`));
   expect([await verdict(data, null), await verdict(data, 1)]).toEqual(wanted);
+});
+
+test.each(["", "[]", "null", '{"a":NaN}', '{"a":1e999}', '{"a":"\\ud800"}', '{"\\udc00":1}'])("metadata %s is refused, as in Python", (text) => {
+  expect(() => Head.parse(makeReel([group(1, [10])], { frameRate: 25, metadata: text }))).toThrow(/^Header\.metadata: not/);
+});
+
+test("metadata may name anything", () => {
+  expect(Head.parse(makeReel([group(1, [10])], { frameRate: 25, metadata: '{"toString":1,"a":"\\ud83d\\ude00"}' })).info.metadata).toEqual({ toString: 1, a: "😀" });
 });

@@ -16,6 +16,7 @@ export interface FakeChunk {
 export interface FakeHeader {
   readonly frameRate: number;
   readonly intervals?: readonly number[]; // microseconds
+  readonly metadata?: string;
 }
 
 export function group(frames: number, layers: readonly number[], more: Partial<FakeChunk> = {}): FakeChunk {
@@ -34,7 +35,7 @@ export function stream(seconds: number, rates: readonly number[], chain = 1, fra
   return makeReel(chunks, { frameRate });
 }
 
-export function makeReel(chunks: readonly FakeChunk[], { frameRate, intervals = [] }: FakeHeader): Uint8Array<ArrayBuffer> {
+export function makeReel(chunks: readonly FakeChunk[], { frameRate, intervals = [], metadata = "{}" }: FakeHeader): Uint8Array<ArrayBuffer> {
   const bodies = chunks.map(({ form, layers }, k) => {
     const body = noise(layers.reduce((sum, size) => sum + size, 0), 7 + k);
     body[0] = form;
@@ -50,7 +51,10 @@ export function makeReel(chunks: readonly FakeChunk[], { frameRate, intervals = 
   });
   const header = new Writer().f64(frameRate).f64(0).f64(0).f64(0).f64(1);
   for (const corner of [-0.5, -0.5, -0.5, 0.5, 0.5, 0.5]) header.f32(corner);
-  header.u16(2).u8(0x7b).u8(0x7d).u32(0).u32(0).varint(intervals.length);
+  const text = new TextEncoder().encode(metadata);
+  header.u16(text.length);
+  for (const byte of text) header.u8(byte);
+  header.u32(0).u32(0).varint(intervals.length);
   for (const interval of intervals) header.varint(interval);
   const size = 14 + header.bytes.length + index.bytes.length + 4;
   const head = new Writer(82, 69, 69, 76, 13, 10, 26, 10).u8(1).u8(0).u32(size);

@@ -7,7 +7,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
-from tests.budget.test_budget import SMALL  # noqa: E402
+from tests.budget.test_budget import SMALL
 
 if __name__ == "__main__":
     sys.stdout.buffer.write(SMALL[sys.argv[1]]())

@@ -193,12 +193,18 @@ function boxOf(header: Header): Box {
   return { minimum: [x, y, z], size: [width, height, depth] };
 }
 
-/** Not needed to decode: what cannot be read is nothing. */
+/** The JSON object of a header. FormatError for other text, for numbers beyond doubles, and for half a surrogate, as in Python. */
 function metadataOf(text: string): Record<string, unknown> {
+  let value: unknown = null;
   try {
-    const value: unknown = JSON.parse(text);
-    return typeof value === "object" && value !== null && !Array.isArray(value) ? (value as Record<string, unknown>) : {};
+    value = JSON.parse(text, (key, part: unknown) => {
+      const words = typeof part === "string" ? key + part : key;
+      if (/\p{Surrogate}/u.test(words) || part === Infinity || part === -Infinity) throw new SyntaxError(key);
+      return part;
+    });
   } catch {
-    return {};
+    throw new FormatError(`Header.metadata: not JSON: ${text.slice(0, 40)}`);
   }
+  if (typeof value !== "object" || value === null || Array.isArray(value)) throw new FormatError("Header.metadata: not a JSON object");
+  return value as Record<string, unknown>;
 }
