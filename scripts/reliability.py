@@ -11,7 +11,7 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-ROWS = ROOT / "docs/results/reliability.jsonl"
+ROWS = ROOT / "docs/reliability.jsonl"
 PAGE = ROOT / "docs/reliability.md"
 KEYS = ("promise", "command", "count", "unit", "faults", "seconds", "version", "note")
 MARKED = re.compile(r"(<!-- rows -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -1,5 +1,5 @@
 """Builds the most expensive legal file of each form, decodes each in a fresh process, prints what it costs, and appends
-one row to docs/results/reliability.jsonl. Linux and macOS.
+one row to docs/reliability.jsonl. Linux and macOS.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ PYTHON = tuple(seeds.TARGETS)
 PACKAGE = CACHE / "python"  # a copy of the package, whose core has sanitizers
 MOST_BYTES = 4096  # of a file; arguments of a call take less
 MOST_ARGUMENTS = 2048
-OF_PYTHON = 0.25  # share of the time, for targets that are slower by a hundred
+OF_PYTHON = 0.4  # share of the time, for targets that are slower by a hundred
 MOST_KEPT = 40_000  # bytes of a target's committed corpus (a decision: all of them stay far below 1 MB)
 LIMITS = ("-timeout=30", "-rss_limit_mb=2560", "-malloc_limit_mb=1024")  # s, so long for machines that do other things
 SANITIZERS = "allocator_may_return_null=1:detect_leaks=0:quarantine_size_mb=8:malloc_context_size=2"

@@ -1,0 +1,260 @@
+"""Single attacks on `meshreel serve` over loopback: slow and crowding clients, nonsense, paths, hostile files.
+
+Each takes the server and the number of the trial, and returns what is wrong, "" if nothing is. Its docstring is the
+promise that it tests. scripts/attack_server.py runs them in numbers.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import random
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from meshreel.server.connections import Limits
+from meshreel.server.files import parse_ranges
+from meshreel.server.painter import PATIENCE
+from tests.coding.draco_bombs import bombs, reel_of
+
+GRACE = 5.0  # s beyond a limit, on a busy machine
+BIG = 32 * 2**20  # bytes, more than a connection buffers
+SECRET = b"nobody may read this"
+BOMBS = [reel_of(mesh) for mesh, _ in bombs().values()]
+HOST = b"Host: localhost\r\n"
+
+
+@dataclass
+class Served:
+    """A server with its folder, and what another client of it experiences."""
+
+    folder: Path
+    process: subprocess.Popen[bytes]
+    port: int
+    errors: Path
+    worst: float = 0.0  # s
+    faults: list[str] = field(default_factory=list)
+
+    def count(self, name: str) -> int:
+        """Return a number of the process: open files, threads, or the most memory that it had, kB (Linux alone)."""
+        try:
+            if name == "files":
+                return len(os.listdir(f"/proc/{self.process.pid}/fd"))  # noqa: PTH208
+            status = Path(f"/proc/{self.process.pid}/status").read_text()
+        except OSError:
+            return 0
+        return int(status.split({"threads": "Threads:", "memory": "VmHWM:"}[name])[1].split()[0])
+
+
+def begin(folder: Path) -> Served:
+    """Start a server for a folder next to a file that it may not give."""
+    errors = folder.parent / "errors.txt"
+    command = [sys.executable, "-P", "-m", "meshreel", "serve", str(folder), "--json"]
+    with errors.open("ab") as file:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=file)
+    assert process.stdout is not None
+    address = json.loads(process.stdout.readline())["addresses"][0]
+    return Served(folder, process, int(address.rstrip("/").rpartition(":")[2]), errors)
+
+
+Line = tuple[asyncio.StreamReader, asyncio.StreamWriter]
+
+
+@contextlib.asynccontextmanager
+async def connected(served: Served, buffer: int | None = None) -> AsyncIterator[Line]:
+    """Connect; with a `buffer`, the system takes only so many bytes that are not read."""
+    line = socket.socket()
+    line.setblocking(False)
+    if buffer is not None:
+        line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, buffer)
+    await asyncio.get_running_loop().sock_connect(line, ("127.0.0.1", served.port))
+    reader, writer = await asyncio.open_connection(sock=line)
+    try:
+        yield reader, writer
+    finally:
+        writer.transport.abort()
+
+
+def get(path: str, *headers: str) -> bytes:
+    lines = "".join(f"{header}\r\n" for header in headers)
+    return f"GET {path} HTTP/1.1\r\n".encode("latin-1") + HOST + lines.encode("latin-1") + b"\r\n"
+
+
+async def rest(reader: asyncio.StreamReader, seconds: float) -> bytes | None:
+    """Return what comes until the connection ends, None if it does not within some seconds."""
+    received = bytearray()
+    try:
+        async with asyncio.timeout(seconds):
+            while data := await reader.read(2**20):
+                received += data
+    except ConnectionError:
+        pass
+    except TimeoutError:
+        return None
+    return bytes(received)
+
+
+async def answer(reader: asyncio.StreamReader) -> tuple[int, dict[str, str], bytes]:
+    head = (await reader.readuntil(b"\r\n\r\n")).decode("latin-1").split("\r\n")
+    headers = {name.lower(): value.strip() for name, _, value in (line.partition(":") for line in head[1:])}
+    return int(head[0].split()[1]), headers, await reader.readexactly(int(headers.get("content-length", "0")))
+
+
+async def bystander(served: Served) -> None:
+    """Fetch a file again and again over one connection, and note what is wrong or late."""
+    wanted = (served.folder / "walk.reel").read_bytes()
+    async with connected(served) as (reader, writer):
+        while True:
+            began = time.monotonic()
+            writer.write(get("/files/walk.reel"))
+            try:
+                status, _, body = await answer(reader)
+            except (OSError, EOFError) as error:
+                served.faults.append(f"the connection of another client ended: {error}")
+                return
+            served.worst = max(served.worst, time.monotonic() - began)
+            if (status, body) != (200, wanted):
+                served.faults.append(f"another client got {status}")
+            await asyncio.sleep(0.05)
+
+
+async def silent(served: Served, _number: int) -> str:
+    """A client that connects and sends nothing is dropped."""
+    async with connected(served) as (reader, _):
+        return "" if await rest(reader, Limits().request + GRACE) == b"" else "not dropped"
+
+
+async def slow(served: Served, number: int) -> str:
+    """A client that sends its request a byte a second is dropped, also after a request that was answered."""
+    async with connected(served) as (reader, writer):
+        if number % 2:
+            writer.write(get("/style.css"))
+            await answer(reader)
+        ended = asyncio.create_task(rest(reader, Limits().request + GRACE))
+        for byte in get("/" + "a" * 100):
+            writer.write(bytes([byte]))
+            await asyncio.wait([ended], timeout=1)
+            if ended.done():
+                break
+        return "" if await ended == b"" else "not dropped"
+
+
+async def stalled(served: Served, _number: int) -> str:
+    """A client that takes no more of its answer is dropped."""
+    async with connected(served, 4096) as (reader, writer):
+        writer.write(get("/files/big.reel"))
+        await asyncio.sleep(Limits().stall + GRACE)
+        received = await rest(reader, GRACE)
+        return "" if received is not None and len(received) < BIG else "not dropped"
+
+
+async def nonsense(served: Served, number: int) -> str:
+    """Bytes that are no request are refused, or end the connection."""
+    chance = random.Random(number)
+    valid = bytearray(get("/files/walk.reel", "Range: bytes=0-9", "Content-Length: 5", "Transfer-Encoding: chunked"))
+    for _ in range(chance.randrange(1, 9)):
+        place = chance.randrange(len(valid))
+        valid[place : place + chance.choice([0, 1, 9])] = chance.randbytes(chance.choice([0, 1, 4, 999]))
+    data = chance.randbytes(chance.randrange(1, 2**15)) if number % 2 else bytes(valid)
+    async with connected(served) as (reader, writer):
+        writer.write(data + b"\r\n\r\n")
+        with contextlib.suppress(OSError):
+            writer.write_eof()
+        received = await rest(reader, Limits().request + GRACE)
+    if received is None:
+        return "no end"
+    return f"answered {received[:60]!r}" if b" 500 " in received[:40] else ""
+
+
+async def path(served: Served, number: int) -> str:
+    """A path does not lead out of the folder, nor to a file that is no .reel file."""
+    chance = random.Random(number)
+    up = ["..", "%2e%2e", ".%2e", "%252e%252e", "..%c0%af", "....", "..;", "..%00", "%2e%2e%5c", "sub/.."]
+    step = ["/", "%2f", "\\", "%5c", "//", "/./", "%252f", ":", "%00/"]
+    way = "".join(chance.choice(up) + chance.choice(step) for _ in range(chance.randrange(1, 6)))
+    targets = ["outside.reel", "outside.reel%00", "videos/secret.txt", str(served.folder.parent / "outside.reel")]
+    doors = ["/files/", "/watch/", "/posters/", "/player/", "/"]
+    asked = chance.choice(doors) + way + chance.choice(targets)
+    async with connected(served) as (reader, writer):
+        writer.write(get(asked, "Connection: close"))
+        received = await rest(reader, Limits().request + GRACE)
+    if received is None or SECRET in received:
+        return f"{asked} gives what it may not" if received else "no end"
+    return "" if received[9:12] in (b"404", b"400") else f"{asked}: {received[:12]!r}"
+
+
+async def ranges(served: Served, number: int) -> str:
+    """A header Range gives the bytes that RFC 9110 says, or the whole file."""
+    chance, data = random.Random(number), (served.folder / "walk.reel").read_bytes()
+    ends = ["", "0", "1", "7", str(len(data) - 1), str(len(data)), "9" * 40, "-1", "x"]
+    specs = [f"{chance.choice(ends)}-{chance.choice(ends)}" for _ in range(chance.choice([1, 1, 1, 2, 5, 200]))]
+    asked = chance.choice(["bytes=", "bytes=", "Bytes=", "items=", "bytes "]) + ",".join(specs)
+    found = parse_ranges(asked, len(data))
+    async with connected(served) as (reader, writer):
+        writer.write(get("/files/walk.reel", f"Range: {asked}"))
+        status, headers, body = await answer(reader)
+    wanted = 200 if found is None else 206 if found else 416
+    one = data if found is None else data[found[0].start : found[0].stop] if len(found) == 1 else b""
+    is_right = status == wanted and (body == one or (found is not None and len(found) > 1))
+    return "" if is_right else f"{asked!r}: {status}, {len(body)} bytes, {headers.get('content-range')}"
+
+
+async def changed(served: Served, number: int) -> str:
+    """A file that is cut, replaced or deleted while it is sent ends the connection; the next answer is the truth."""
+    file = served.folder / f"changed{number}.reel"
+    make_big(file)
+    async with connected(served) as (reader, writer):
+        writer.write(get(f"/files/{file.name}", "Connection: close"))
+        await reader.readuntil(b"\r\n\r\n")
+        change = number % 3
+        if change == 0:
+            os.truncate(file, 9)
+        else:
+            file.unlink()
+        if change == 1:
+            file.write_bytes(b"new")
+        received = await rest(reader, Limits().stall + GRACE)
+    if received is None or (change == 0 and len(received) == BIG):
+        return "not ended"
+    async with connected(served) as (reader, writer):
+        writer.write(get(f"/files/{file.name}"))
+        status, _, body = await answer(reader)
+    is_true = (status, body) == (404, body) if change == 2 else (status, body) == (200, file.read_bytes())
+    file.unlink(missing_ok=True)
+    return "" if is_true else f"then {status}"
+
+
+async def hostile(served: Served, number: int) -> str:
+    """A poster of a file that claims what it has not got is a plain tile, within its time."""
+    file = served.folder / f"hostile{number}.reel"
+    file.write_bytes(BOMBS[number % len(BOMBS)])
+    async with connected(served) as (reader, writer):
+        writer.write(get(f"/posters/{file.name}.png"))
+        async with asyncio.timeout(3 * PATIENCE):
+            status, headers, _ = await answer(reader)
+    return "" if status == 200 and "svg" in headers["content-type"] else f"{status} {headers}"
+
+
+async def crowd(served: Served, number: int) -> str:
+    """Clients beyond the limit are told 503 or dropped, and those before them are served."""
+    async with connected(served) as (reader, writer):
+        with contextlib.suppress(OSError):
+            writer.write(get("/style.css"))
+        try:
+            status, headers, _ = await answer(reader)
+        except (OSError, EOFError):
+            return ""
+        await asyncio.sleep(1)  # the place stays taken
+        return "" if status == 200 or (status == 503 and "retry-after" in headers) else f"{number}: {status}"
+
+
+def make_big(file: Path) -> None:
+    with file.open("wb") as empty:
+        empty.truncate(BIG)
