@@ -4,7 +4,8 @@ import { beforeAll, describe, expect, test, vi } from "vitest";
 
 import { hasPython, runModule } from "../../test/python.ts";
 import type { Tools } from "../src/decode/group.ts";
-import { checkClaims, decodeMesh } from "../src/decode/mesh.ts";
+import { decodeMesh } from "../src/decode/mesh.ts";
+import { checkClaims } from "../src/wasm/draco.ts";
 import { FormatError } from "../src/errors.ts";
 import { nodeTools } from "./tools.ts";
 

@@ -238,7 +238,7 @@ describe("a bad connection", () => {
   });
 
   test("that falls silent is cut and tried again", async () => {
-    source = new HttpSource(server.url, { retryMs: 2, silenceMs: 60 });
+    source = new HttpSource(server.url, { retryMs: 2, silenceMs: 400 });
     source.watch = { warn: (error) => warnings.push(error.message), progress: () => {} };
     server.respond = (response, asked, count) => {
       const body = server.begin(response, asked);

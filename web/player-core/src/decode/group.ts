@@ -8,6 +8,7 @@ import { DracoGroup, EmptyGroup, Form, LaplacianGroup, LayersPatches, StaticPatc
 import { EMPTY, concatenate, faceCount, placed, vertexCount, without } from "../mesh.ts";
 import type { Mesh, Placement } from "../mesh.ts";
 import { unpackAll } from "../format/records.ts";
+import { checkClaims } from "../wasm/draco.ts";
 import type { Core } from "../wasm/memory.ts";
 import { ofMeshes } from "./decoded.ts";
 import type { DecodedGroup } from "./decoded.ts";
@@ -15,7 +16,7 @@ import { claimsOf, decodeDisplacements } from "./displacements.ts";
 import { decodeIntegers } from "./entropy.ts";
 import { placeLayers, readLayers } from "./layers.ts";
 import type { LayersState } from "./layers.ts";
-import { checkClaims, checkGrowth, checkStep, decodeMesh, subdivideMidpoint } from "./mesh.ts";
+import { checkGrowth, checkStep, decodeMesh, subdivideMidpoint } from "./mesh.ts";
 import { decodePatches, fillRuns } from "./patches.ts";
 
 /** What decodes: the compiled core, and Draco. */

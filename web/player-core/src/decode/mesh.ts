@@ -2,10 +2,10 @@
 
 import type { Decoder, DecoderModule, Mesh as DracoMesh } from "draco3d";
 
-import { joined } from "../bytes.ts";
 import { FormatError } from "../errors.ts";
 import { EMPTY, checkFaces, faceCount, vertexCount } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
+import { checkClaims } from "../wasm/draco.ts";
 import { subdivide } from "../wasm/layers.ts";
 import { CoreStopped } from "../wasm/memory.ts";
 import type { Core } from "../wasm/memory.ts";
@@ -80,17 +80,6 @@ function allocated(draco: DecoderModule, size: number): number {
   const place = draco._malloc(size);
   if (place === 0) throw new CoreStopped(`Draco has no memory for ${size} bytes`);
   return place;
-}
-
-/** FormatError for Draco meshes of kinds that no encoder writes, or that together claim more than their bytes may. */
-export function checkClaims(core: Core, meshes: readonly Uint8Array[]): void {
-  const data = joined(meshes);
-  core.run((arena) => {
-    let place = arena.put(data);
-    const structs = meshes.flatMap(({ length }) => [(place += length) - length, length]); // mr_bytes
-    const status = core.call("mr_check_draco", arena.put(Int32Array.from(structs)), meshes.length);
-    core.check(status, `damaged Draco data (${data.length} bytes): `);
-  });
 }
 
 /** FormatError where subdivision makes an absurd mesh, or frames. */
