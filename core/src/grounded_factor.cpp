@@ -47,22 +47,22 @@ bool GroundedFactor::count_fill(const SparseRows& rows) {
     std::vector<int32_t> seen(n, -1);
     std::vector<int64_t> counts(n, 0);
     parent_.assign(n, -1);
+    int64_t products = 0;  // the sum of the squares of the counts
+    const int64_t most = kFreeProducts + kProductsPerVertex * n;
     for (int32_t k = 0; k < n; ++k) {
+        if (products > most) return false;  // before it is counted on: that costs as much as there are entries
         seen[k] = k;
         for (int64_t p = rows.starts[order_[k]]; p < rows.starts[order_[k] + 1]; ++p)
             for (int32_t j = position_[rows.columns[p]]; j < k && seen[j] != k; j = parent_[j]) {
                 if (parent_[j] < 0) parent_[j] = k;
+                products += 2 * counts[j] + 1;
                 ++counts[j];
                 seen[j] = k;
             }
     }
     starts_.assign(static_cast<size_t>(n) + 1, 0);
-    int64_t products = 0;
-    for (int32_t k = 0; k < n; ++k) {
-        starts_[k + 1] = starts_[k] + counts[k];
-        products += counts[k] * counts[k];
-    }
-    return products <= kFreeProducts + kProductsPerVertex * n;
+    for (int32_t k = 0; k < n; ++k) starts_[k + 1] = starts_[k] + counts[k];
+    return products <= most;
 }
 
 // Row k of M and column k of U from those before: both have the same pattern, so one pass finds both.
