@@ -13,6 +13,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 ROWS = ROOT / "docs/reliability.jsonl"
 PAGE = ROOT / "docs/reliability.md"
+WRITTEN = ("docs/reliability.*", "core/fuzz/corpus")  # by campaigns
 KEYS = ("promise", "command", "count", "unit", "faults", "seconds", "version", "note")
 MARKED = re.compile(r"(<!-- rows -->\n).*?(<!-- end -->)", re.DOTALL)
 
@@ -21,13 +22,20 @@ def add_row(
     promise: str, command: str, counted: tuple[float, str], faults: int, seconds: float, note: str = ""
 ) -> None:
     """Append what a campaign measured: `counted` is how many of which unit, `faults` how often the promise broke."""
-    described = subprocess.run(
-        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True, check=False
-    )
-    version = described.stdout.strip() or "unknown"
-    values = (promise, command, *counted, faults, round(seconds, 1), version, note)
+    values = (promise, command, *counted, faults, round(seconds, 1), _version(), note)
     with ROWS.open("a", encoding="utf-8", newline="\n") as file:
         file.write(json.dumps(dict(zip(KEYS, values, strict=True))) + "\n")
+
+
+def _version() -> str:
+    """Return the commit, marked as dirty where a tracked file differs from it that no campaign writes."""
+
+    def git(*arguments: str) -> str:
+        done = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+        return done.stdout.strip()
+
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", ".", *(f":!{name}" for name in WRITTEN))
+    return (git("rev-parse", "--short", "HEAD") or "unknown") + ("-dirty" if changed else "")
 
 
 def filled() -> str:

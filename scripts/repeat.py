@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FRAME_RATE = 10.0  # 1/s; with groups of 2 frames and intervals of 4, some groups are predicted
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "IGL_NUM_THREADS", "TBB_NUM_THREADS")
 EXACT = "Equal input and options give equal bytes, whatever the threads, cores, workers, locale, hash seed and folder"
-KERNELS = "They do also with the instructions of other x86 processors in BLAS, NumPy and the C library"
+KERNELS = "Equal input and options give equal bytes, whatever x86 instructions BLAS, NumPy and the C library choose"
 
 
 @dataclass(frozen=True, slots=True)

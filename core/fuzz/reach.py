@@ -83,9 +83,8 @@ def of_core(cache: Path, targets: tuple[str, ...]) -> Reached:
     )
     sources = [str(path) for name in ("src", "wasm") for path in sorted((ROOT / "core" / name).glob("*.*"))]
     export = [tool("llvm-cov"), "export", binaries[0][8:], *binaries[1:], f"-instr-profile={profile}", *sources]
-    functions = json.loads(subprocess.run([*export, "-format=text"], capture_output=True, check=True).stdout)["data"][
-        0
-    ]["functions"]
+    exported = json.loads(subprocess.run([*export, "-format=text"], capture_output=True, check=True).stdout)
+    functions = exported["data"][0]["functions"]
     kept: dict[str, set[int]] = {}
     left_out: dict[str, set[int]] = {}
     branches: dict[tuple[str, int, int, int], int] = {}  # place and outcome -> how often
@@ -137,9 +136,7 @@ def of_python(cache: Path) -> Reached:
 
 def tool(name: str) -> str:
     """The path of a tool of LLVM, of the version that compiles."""
-    version = subprocess.run(["clang++", "-dumpversion"], capture_output=True, text=True, check=True).stdout.split(".")[
-        0
-    ]
-    return (
-        shutil.which(f"{name}-{version}") or shutil.which(name) or sys.exit(f"fuzz: no {name}; install llvm-{version}")
-    )
+    dumped = subprocess.run(["clang++", "-dumpversion"], capture_output=True, text=True, check=True)
+    version = dumped.stdout.split(".")[0]
+    found = shutil.which(f"{name}-{version}") or shutil.which(name)
+    return found or sys.exit(f"fuzz: no {name}; install llvm-{version}")

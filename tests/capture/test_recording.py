@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 import sys
 import tempfile
 
@@ -51,6 +52,23 @@ def test_on_a_full_disk_frames_are_fused_again(recording, monkeypatch):
     monkeypatch.setattr("meshreel.capture.recording.tempfile.TemporaryFile", full)
     first, again = recording[0], recording[0]
     assert np.array_equal(first.vertices, again.vertices) and not recording._kept._places
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of a file's size")
+def test_a_disk_that_fills_while_a_frame_is_kept_costs_no_kept_frame():
+    import resource
+
+    kept, most = Kept(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    kept.put(1, TRIANGLE)
+    heeded = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, most[1]))
+    try:
+        kept.put(2, TRIANGLE)
+        again = kept.get(1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, most)
+        signal.signal(signal.SIGXFSZ, heeded)
+    assert np.array_equal(again.vertices, TRIANGLE.vertices) and kept.get(2) is None
 
 
 def test_without_keep_no_frame_is_stored(tmp_path, monkeypatch):

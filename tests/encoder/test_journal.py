@@ -14,8 +14,8 @@ from dataclasses import replace
 import pytest
 
 from meshreel.capture.procedural import sliding_sphere
+from meshreel.encoder import digests, recipe
 from meshreel.encoder import journal as module
-from meshreel.encoder import recipe
 from meshreel.encoder.forms import EncodedGroup
 from meshreel.encoder.journal import MAGIC, Journal
 from meshreel.encoder.quality import Goal, encode_to
@@ -132,7 +132,7 @@ def test_another_input_or_option_is_refused_and_named(stopped, sequence, options
 
 
 def test_another_version_of_meshreel_or_of_a_library_is_refused(stopped, monkeypatch):
-    monkeypatch.setattr(module, "version", lambda _: "0.0.7")
+    monkeypatch.setattr(digests, "version", lambda _: "0.0.7")
     with pytest.raises(InputError, match=r'libraries.numpy ".*", now "0.0.7"'):
         encode(stopped, resume=True)
     monkeypatch.setattr(module, "__version__", "0.0.9")

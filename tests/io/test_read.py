@@ -9,7 +9,9 @@ import tracemalloc
 
 import pytest
 
+from meshreel.analysis.scene.masks import read_views
 from meshreel.capture.rig import read_rig
+from meshreel.capture.truth import _labels
 from meshreel.errors import InputError
 from meshreel.io import read
 from meshreel.io.depth_pictures import read_depth
@@ -60,6 +62,17 @@ def test_what_is_no_description_of_a_rig_ends_at_once(tmp_path, make):
     make(tmp_path / "rig.json")
     with pytest.raises(InputError, match=r"rig.json: cannot be read \(it .*give JSON"):
         read_rig(tmp_path)
+
+
+@posix
+@pytest.mark.parametrize("make", [os.mkfifo, zeros, sparse])
+@pytest.mark.parametrize(
+    ("name", "of"), [("cameras.json", read_views), ("labels.npz", lambda folder: _labels(folder / "labels.npz"))]
+)
+def test_what_are_no_cameras_or_labels_ends_at_once(tmp_path, make, name, of):
+    make(tmp_path / name)
+    with pytest.raises(InputError, match=rf"{name}: .*cannot be read \(it "):
+        of(tmp_path)
 
 
 def test_an_archive_of_nothing_but_zeros_ends_at_once(tmp_path):

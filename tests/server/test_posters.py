@@ -76,6 +76,16 @@ def test_a_file_that_breaks_the_painter_has_a_plain_tile_and_others_have_theirs(
     assert asyncio.run(drawn.of(folder / "walk.reel", "tag")) is None
 
 
+def test_a_painter_that_died_between_two_posters_costs_the_next_file_nothing(painter, folder):
+    painter(CALLS)
+    drawn = posters.Posters()
+    assert asyncio.run(drawn.of(folder / "walk.reel", "tag")) == b"1"
+    drawn._painter._process.kill()
+    drawn._painter._process.wait()
+    assert asyncio.run(drawn.of(folder / "cut.reel", "tag")) == b"1"  # of a new process
+    drawn.close()
+
+
 def test_more_posters_than_said_wait_for_none(painter, monkeypatch, folder):
     painter(HANG)
     monkeypatch.setattr(posters, "MOST_WAITING", 2)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
@@ -93,7 +93,7 @@ class Kept:
     """Meshes by number in a temporary file without a name, which ends with this object or its process."""
 
     def __init__(self) -> None:
-        self._file: IO[bytes] | None = None
+        self._file: Any = None  # io.FileIO
         self._places: dict[int, tuple[int, int, int]] = {}  # offset in the file, numbers of vertices and of faces
         self._full = False
 
@@ -102,9 +102,14 @@ class Kept:
         if self._file is None or number not in self._places:
             return None
         offset, vertices, faces = self._places[number]
+        data = bytearray(24 * vertices + 12 * faces)
         self._file.seek(offset)
-        points = np.frombuffer(bytearray(self._file.read(24 * vertices)), np.float64)
-        corners = np.frombuffer(bytearray(self._file.read(12 * faces)), np.int32)
+        if self._file.readinto(data) != len(data):
+            return None
+        points, corners = (
+            np.frombuffer(data, np.float64, 3 * vertices),
+            np.frombuffer(data, np.int32, offset=24 * vertices),
+        )
         return Mesh(points.reshape(-1, 3), corners.reshape(-1, 3))
 
     def put(self, number: int, mesh: Mesh) -> None:
@@ -112,13 +117,14 @@ class Kept:
         if self._full:
             return
         try:
-            self._file = self._file or tempfile.TemporaryFile(prefix="meshreel-")  # noqa: SIM115
-            offset = self._file.seek(0, 2)
-            self._file.write(mesh.vertices.tobytes() + mesh.faces.tobytes())
-            self._file.flush()
-            self._places[number] = (offset, len(mesh.vertices), len(mesh.faces))
+            if self._file is None:  # without a buffer: one that could not be written would fail again when it is read
+                self._file = tempfile.TemporaryFile(prefix="meshreel-", buffering=0)  # noqa: SIM115
+            offset, data = self._file.seek(0, 2), mesh.vertices.tobytes() + mesh.faces.tobytes()
+            self._full = self._file.write(data) != len(data)
         except OSError:  # frames that are read again are then fused again
             self._full = True
+        if not self._full:
+            self._places[number] = (offset, len(mesh.vertices), len(mesh.faces))
 
 
 def open_recording(

@@ -9,12 +9,14 @@ import operator
 import zipfile
 import zlib
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
 from ..io.meshes import read_mesh
+from ..io.read import read_file
 from .rig import DepthCamera, read_cameras
 from .simulated_rig import LABELS, SceneFrame
 
@@ -59,7 +61,7 @@ def read_truth(folder: Path) -> Truth:
 def _labels(path: Path) -> dict[str, np.ndarray]:
     """Return packed labels by frame name."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with np.load(BytesIO(read_file(path)), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
     except _DAMAGED as error:
         raise InputError(f"{path}: labels cannot be read ({error}); simulate the rig again") from None

@@ -129,13 +129,15 @@ def command(
         --no-resume starts over. By default, what could be continued is an error.
     debug_digests
         A text file to write: digests of what each stage computed. Where two machines write different files, the first
-        line in which theirs differ says where the difference starts.
+        line in which theirs differ says where the difference starts. Not with --resume, nor with a target.
     """
     if output.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
     if jobs < 1:
         raise InputError(f"--jobs must be at least 1, got {jobs}")
     parting.check(masking)
+    if debug_digests is not None and (resume or coding.goal() is not None):
+        raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
     source = open_source(inputs, reading)
     scene = parting.scene(preset_options().scene or SceneOptions(), masking)
 

@@ -17,6 +17,7 @@ from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
 from ..geometry.cameras import unpack_cameras
 from ..geometry.derived_sequences import Upright
+from ..io.read import read_file
 from ..io.sequence import captured, open_sequence
 from ..types import MeshSequence, Up
 from .flags import Reading
@@ -104,9 +105,9 @@ class Masking:
         if self.views is None:
             return options
         try:
-            data = self.views.read_bytes()
+            data = read_file(self.views)
         except OSError as error:
-            text = f"{self.views}: cannot be read ({error.strerror})"
+            text = f"{self.views}: cannot be read ({error.strerror or error})"
             raise InputError(f"{text}; give Open3D pinhole camera JSON") from None
         return replace(options, cameras=one_size(unpack_cameras(data, str(self.views)), str(self.views)))
 

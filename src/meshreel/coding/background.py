@@ -59,13 +59,18 @@ def decode_change(data: bytes, before: Mesh, place: Placement | None = None) -> 
         raise FormatError(f"background: a patch of form {record.form.name}")
     check_step(record.step)
     dropped = _dropped(record, len(before.faces))
-    kept = part_of(before, ~dropped) if dropped.any() else before
     added = decode_mesh(record.mesh, record.step)
     check_growth(added, 0)
     check_cost(change_cost(Size.of(before), Size.of(added)), len(data), "background")
-    after = concatenate([kept, added if place is None else place.of(added)])
+    after = changed(before, dropped, added if place is None else place.of(added))
     check_growth(after, 0)
     return after
+
+
+def changed(before: Mesh, dropped: Bool[np.ndarray, " F"], added: Mesh) -> Mesh:
+    """Return a background without its dropped faces and the vertices that only they use, then the added mesh."""
+    kept = part_of(before, ~dropped) if dropped.any() else before
+    return concatenate([kept, added])
 
 
 def _dropped(record: StaticPatch, faces: int) -> Bool[np.ndarray, " F"]:

@@ -33,7 +33,7 @@ def encode_meshes(meshes: Sequence[Mesh], step: float) -> tuple[bytes, ...]:
     """Encode meshes that are decoded together, as `encode_mesh`.
 
     Large, flat, regular meshes take so few bytes that no reader would believe these (`check_claims`); they are coded
-    plainly. Raises InputError also for vertices of ten thousands of faces, some of them cut out in between.
+    plainly. Raises InputError also where tens of thousands of faces meet at one vertex, with holes between them.
     """
     for level in (COMPRESSION_LEVEL, PLAIN_LEVEL):
         coded = tuple(_encode_draco(mesh, step, level) for mesh in meshes)

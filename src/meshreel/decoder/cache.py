@@ -88,9 +88,10 @@ class Refusals:
         raise FormatError(message)
 
     def _keep(self, chunk: Chunk, message: str) -> None:
-        self._messages[chunk.number] = message
-        while len(self._messages) > MOST_REFUSALS:
-            self._messages.pop(next(iter(self._messages)), None)  # the oldest
+        kept = self._messages | {chunk.number: message}
+        if len(kept) > MOST_REFUSALS:
+            kept.pop(next(iter(kept)))  # the oldest
+        self._messages = kept
 
 
 def memory_of(meshes: Sequence[Mesh]) -> int:

@@ -83,11 +83,8 @@ class Background:
     def __init__(self, reader: ReelReader) -> None:
         self.reader = reader
         self._place = placement(reader)
-        self._last = (
-            -1,
-            Mesh.empty(),
-            Chain(),
-        )  # chunk, mesh, what led to it; replaced as a whole, as other threads do
+        # Number of a chunk, its mesh, and what led to it; replaced as a whole, as other threads do.
+        self._last = (-1, Mesh.empty(), Chain())
         self._refusals = Refusals()
 
     def of_frame(self, frame: int) -> Mesh | None:

@@ -17,8 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from .. import __version__
+
 WriteLines = Callable[[str], object]  # takes whole lines of JSON
-LIBRARIES = ("meshreel", "numpy", "scipy", "open3d", "libigl", "fast-simplification", "DracoPy")
+LIBRARIES = ("numpy", "scipy", "open3d", "libigl", "fast-simplification", "scikit-image", "DracoPy", "trimesh")
 
 
 class Digests:
@@ -64,16 +66,21 @@ def machine_line() -> str:
     found |= {
         "processor": _processor(),
         "cores": os.cpu_count(),
-        "libraries": {name: _version(name) for name in LIBRARIES},
+        "meshreel": __version__,
+        "libraries": versions(),
     }
     return json.dumps(found | {"pools": pools}) + "\n"
 
 
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
+def versions() -> dict[str, str | None]:
+    """Return the versions of the libraries on which bytes depend, None for one that is not installed."""
+    found = dict[str, str | None]()
+    for name in LIBRARIES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = None
+    return found
 
 
 def _processor() -> str:

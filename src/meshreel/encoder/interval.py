@@ -18,9 +18,8 @@ class Interval:
     first_frame: int = 0  # its number in the sequence
     track: int = 0
     digests: Digests | None = field(default=None, kw_only=True)  # of what its stages compute; None: nobody asks
-    surface: str = (
-        ""  # digest of the frames; empty where they are whole frames of the sequence, which has their digests
-    )
+    # Digest of the frames; empty where they are whole frames of the sequence, which has their digests.
+    surface: str = ""
 
     @property
     def stop(self) -> int:

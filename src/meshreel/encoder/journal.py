@@ -14,7 +14,6 @@ import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, astuple
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -26,13 +25,13 @@ from ..format.layout import Form
 from ..geometry.derived_sequences import Unchanging
 from ..io.differences import first_difference
 from ..io.unfinished import cannot_be_written, claim, discard, part_of, sync, sync_folder
+from .digests import versions
 from .forms import EncodedGroup
 from .interval import Interval
 from .options import EncoderOptions
 from .target import Fidelity
 
 MAGIC = b"meshreel journal 1\n"
-LIBRARIES = ("numpy", "scipy", "open3d", "libigl", "fast-simplification", "scikit-image", "DracoPy", "trimesh")
 _HEAD, _TEXT = struct.Struct("<QI"), struct.Struct("<I")
 _BLOCK = 1 << 20  # bytes that are read at once to check a record (guess)
 
@@ -196,7 +195,7 @@ def made_of(sequence: Unchanging, options: EncoderOptions, masker: object) -> di
     """Return all that the bytes of an encode depend on, for a sequence of which each frame has been read."""
     return {
         "meshreel": __version__,
-        "libraries": {name: _version(name) for name in LIBRARIES},
+        "libraries": versions(),
         "frames": len(sequence),
         "frame_rate": sequence.frame_rate,
         "up": sequence.up,
@@ -206,13 +205,6 @@ def made_of(sequence: Unchanging, options: EncoderOptions, masker: object) -> di
         "masks": type(masker).__name__,
         "surfaces": sequence.digests,
     }
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def _place(interval: Interval) -> dict[str, Any]:

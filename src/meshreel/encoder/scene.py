@@ -20,7 +20,7 @@ from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.bodies import BodyOptions, at_most, find_bodies, same_bodies, with_ring
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.survey import Survey
-from ..coding.background import decode_background, decode_change, encode_background, encode_change
+from ..coding.background import changed, decode_background, decode_change, encode_background, encode_change
 from ..format.budget import Chain, CostlyError
 from ..format.checks import MOST_TRACKS
 from ..geometry.closest_points import distances
@@ -76,18 +76,17 @@ def encode_static(parts: Parts, count: int, frame_rate: float, options: Backgrou
     step, most = options.lattice * noise, options.coarse * noise
     payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
     found = [] if state.is_empty else [Static(0, payload, False)]
-    chain, changes, again = (
-        Chain(0, len(payload)),
-        {change.frame: change for change in parts.changes},
-        set(refreshes(count, frame_rate, options)),
-    )
+    chain, changes = Chain(0, len(payload)), {change.frame: change for change in parts.changes}
+    again = set(refreshes(count, frame_rate, options))
     for frame in sorted({*changes, *again} - {0}):
         whole = state.is_empty or frame in again
         if change := changes.get(frame):
             came = _coded(_normalised(change.came, parts.seen), most, step)[1]
-            payload = encode_change(state, _gone(parts, state, change), came, step)
-            before, state = state, decode_change(payload, state)
+            before, gone = state, _gone(parts, state, change)
+            payload = encode_change(before, gone, came, step)
+            state = changed(before, gone, came)
             try:
+                state = decode_change(payload, before)  # in the order of faces that a reader has
                 chain = chain.then(before, state, len(payload))
             except CostlyError:
                 whole = True

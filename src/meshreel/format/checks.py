@@ -123,9 +123,8 @@ def parse_metadata(text: str) -> dict[str, Any]:
     """Parse Header.metadata, which must be a JSON object."""
     try:
         metadata = json.loads(text, parse_constant=_refuse)
-        json.dumps(
-            metadata, allow_nan=False, ensure_ascii=False
-        ).encode()  # 1e999 and half a surrogate can be read only
+        # 1e999 and half a surrogate can be read, but not written.
+        json.dumps(metadata, allow_nan=False, ensure_ascii=False).encode()
     except (ValueError, RecursionError) as error:
         raise FormatError(f"Header.metadata: not JSON: {text!r:.40}") from error
     if not isinstance(metadata, dict):

@@ -76,12 +76,8 @@ class Library:
             root = self.folder.resolve()
             path = (root / name).resolve(strict=True)
             return path if path.is_relative_to(root) and path.is_file() else None
-        except (
-            OSError,
-            ValueError,
-            RuntimeError,
-        ):  # too long, a NUL; RuntimeError: links in a circle, before Python 3.13
-            return None
+        except (OSError, ValueError, RuntimeError):
+            return None  # a name too long, a NUL, or links in a circle, which are a RuntimeError before Python 3.13
 
     def entry(self, name: str) -> Entry:
         """Return the facts of a file; damage and absence are part of them and not raised."""
@@ -94,9 +90,8 @@ class Library:
             with FileSource(path) as source:
                 reader = ReelReader(source)
         except (MeshreelError, OSError) as error:
-            return Entry(
-                name, error=str(error).removeprefix(f"{path}: ")
-            )  # viewers need not know the folders of the server
+            # Viewers need not know the folders of the server.
+            return Entry(name, error=str(error).removeprefix(f"{path}: "))
         lost, whole = len(reader.missing), len(reader.chunks)
         cut = f"{lost} of {whole} chunks are missing: the file is truncated" if lost else ""
         return Entry(name, reader.size, reader.frame_count, reader.duration, cut)

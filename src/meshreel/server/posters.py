@@ -77,7 +77,9 @@ class _Painter:
 
     def draw(self, path: Path) -> bytes | None:
         """Return a PNG, None if there is none, the process dies of it, or it takes too long."""
-        process = self._process or self._start()
+        process = self._process
+        if process is None or process.poll() is not None:  # it may have died of what it drew before
+            process = self._start()
         picture = process and self._ask(process, json.dumps(str(path)).encode() + b"\n", PATIENCE)
         return picture or None
 
@@ -93,9 +95,13 @@ class _Painter:
         with self._lock:
             if self._is_closed:
                 return None
-            self._process = process = subprocess.Popen(
-                PAINTER, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=os.environ | ONE_THREAD
-            )
+            environment, silent = os.environ | ONE_THREAD, subprocess.DEVNULL
+            try:
+                self._process = process = subprocess.Popen(
+                    PAINTER, stdin=pipe, stdout=pipe, stderr=silent, env=environment
+                )
+            except OSError:  # too many processes or open files
+                return None
         return None if self._ask(process, b"", START) is None else process
 
     def _ask(self, process: subprocess.Popen[bytes], line: bytes, limit: float) -> bytes | None:

@@ -19,6 +19,7 @@ from meshreel.encoder.parts import take_apart
 from meshreel.encoder.progress import Stages
 from meshreel.encoder.scene import encode_static
 from meshreel.errors import InputError
+from meshreel.format.budget import CostlyError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import concatenate, subdivide_midpoint, weld
@@ -110,6 +111,22 @@ def test_the_background_has_a_patch_for_each_change(scene: MeshList) -> None:
     assert min(distance_to(between, here), distance_to(between, there)) > 0.15
     assert distance_to(last, there) < 0.03 < 0.15 < distance_to(last, here)
     assert max(distance_to(room, np.array([1.2, 0.0, 1.5])) for room in (first, between, last)) < 0.01
+
+
+def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(scene: MeshList, monkeypatch) -> None:
+    def costly(payload: bytes, before: Mesh) -> Mesh:
+        raise CostlyError(f"{len(payload)} bytes for {len(before.faces)} faces")
+
+    monkeypatch.setattr("meshreel.encoder.scene.decode_change", costly)
+    options = SceneOptions(OPTIONS)
+    parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
+    states = encode_static(parts, FRAMES, 4.0, options.background)
+    assert [state.is_patch for state in states] == [False, False, False]
+    place = Placement(parts.seen.unit, tuple(parts.seen.center))
+    here, there = (np.array([x, 0.4, 1.0]) for x in (0.5, 1.8))
+    _, between, last = (place.of(decode_background(state.payload)) for state in states)
+    assert min(distance_to(between, here), distance_to(between, there)) > 0.15
+    assert distance_to(last, there) < 0.03 < 0.15 < distance_to(last, here)
 
 
 def test_a_background_repeated_at_a_change_is_complete(scene: MeshList, found: ByPlace) -> None:

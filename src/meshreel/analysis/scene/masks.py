@@ -16,6 +16,7 @@ from ...errors import InputError
 from ...geometry.cameras import PinholeCamera, unpack_cameras
 from ...geometry.raycast import Seen
 from ...io.mask_pictures import find_masks, read_mask
+from ...io.read import read_file
 
 CAMERAS = "cameras.json"  # file name: Open3D's pinhole camera JSON, beside the folders of the views
 
@@ -74,9 +75,9 @@ def read_views(folder: Path) -> tuple[PinholeCamera, ...]:
     """Read the views, all of one size, from a folder's `cameras.json`. Raises InputError if it is invalid."""
     path = folder / CAMERAS
     try:
-        data = path.read_bytes()
+        data = read_file(path)
     except OSError as error:
-        text = f"{path}: cannot be read ({error.strerror}); give the cameras of the masks"
+        text = f"{path}: cannot be read ({error.strerror or error}); give the cameras of the masks"
         raise InputError(f"{text}, as Open3D pinhole camera JSON") from None
     return one_size(unpack_cameras(data, str(path)), str(path))
 
