@@ -165,7 +165,7 @@ def launcher(target: str) -> Path:
 
 
 def minimise() -> None:
-    """Write the committed corpus: of each target a few small inputs that reach what all of them do."""
+    """Write the committed corpus: of each target a few small inputs that reach most of what all of them do."""
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         list(pool.map(minimise_target, (*NATIVE, *PYTHON)))
     verdict.main([])
@@ -184,8 +184,12 @@ def minimise_target(target: str) -> None:
         sys.exit(f"fuzz: the corpus of {target} cannot be merged:\n{done.stderr[-4000:]}")
     shutil.rmtree(kept, ignore_errors=True)
     kept.mkdir(parents=True)
-    left = MOST_KEPT
-    for path in sorted(merged.iterdir(), key=lambda path: path.stat().st_size):
+    paths, left = sorted(merged.iterdir(), key=lambda path: path.stat().st_size), MOST_KEPT
+    if target in PYTHON:  # those first without which lines would be missing
+        program = [sys.executable, str(Path(__file__).parent / "reach.py"), *map(str, paths)]
+        first = subprocess.run(program, check=True, capture_output=True, text=True).stdout.splitlines()
+        paths.sort(key=lambda path: str(path) not in first)
+    for path in paths:
         left -= path.stat().st_size
         if left < 0:
             break

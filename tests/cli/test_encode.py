@@ -122,9 +122,25 @@ def test_digests_of_all_stages_are_written_on_request(run, balls, tmp_path):
     assert (rows[0]["stage"], rows[1]["stage"], rows[-1]["stage"]) == ("machine", "survey", "payload")
 
 
+@pytest.mark.usefixtures("quick_presets")
+def test_digests_replace_neither_an_input_nor_the_output_and_appear_when_they_are_whole(run, balls, tmp_path):
+    frame = balls / "ball_0.ply"
+    before = frame.read_bytes()
+    assert failed(run("encode", frame, "-o", tmp_path / "b.reel", "--debug-digests", frame), "is the input", "name")
+    assert frame.read_bytes() == before
+    out = tmp_path / "b.reel"
+    assert failed(run("encode", frame, "-o", out, "--debug-digests", out), "is the output, too", "--debug-digests")
+    (tmp_path / "d.txt").write_text("old")
+    said = run("encode", tmp_path / "none", "-o", out, "--debug-digests", tmp_path / "d.txt")
+    assert said.code == 2 and (tmp_path / "d.txt").read_text() == "old"
+    for flags in (("--resume",), ("--target-mbps", "1")):
+        said = run("encode", frame, "-o", out, "--debug-digests", tmp_path / "d.txt", *flags)
+        assert failed(said, "--debug-digests describes one whole encode", "leave out")
+
+
 def test_digests_that_cannot_be_written_are_an_error(run, balls, tmp_path):
     said = run("encode", balls, "-o", tmp_path / "b.reel", "--debug-digests", tmp_path / "no" / "b.jsonl")
-    assert failed(said, "b.jsonl: cannot be written", "--debug-digests")
+    assert failed(said, "b.jsonl: cannot be written", "choose another folder")
 
 
 def test_flags_default_to_the_defaults_of_the_options():

@@ -172,3 +172,15 @@ def test_any_head_with_a_matching_checksum_is_read_or_refused(body):
 
 def changed(place: int, flip: int) -> bytes:
     return DATA[:place] + bytes([DATA[place] ^ flip]) + DATA[place + 1 :]
+
+
+def test_a_head_of_a_sparse_file_is_refused_before_it_is_read():
+    class Sparse(BytesSource):
+        size = 1 << 32
+
+        def get_bytes(self, offset: int, length: int) -> bytes:
+            assert offset == 0 and length < 1 << 20
+            return super().get_bytes(offset, length)
+
+    with pytest.raises(FormatError, match="a head of 4294967295 bytes, over 67108864"):
+        ReelReader(Sparse(pack(Preamble(MAGIC, VERSION, 0, (1 << 32) - 1)) + bytes(1000)))

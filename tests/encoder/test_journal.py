@@ -172,13 +172,26 @@ def test_a_torn_last_record_is_left_out_at_every_byte(stopped, fake):
 def test_no_flipped_byte_is_trusted(stopped):
     data, whole = (stopped.parent / "a.reel.part").read_bytes(), encode(stopped.parent / "whole.reel")
     ends = ends_of(data)
-    for at in range(len(MAGIC), len(data), 11):
+    for at in range(ends[1], len(data), 11):
         flipped = data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]
-        assert intervals_in(flipped, stopped) == max(sum(end <= at for end in ends) - 1, 0)
+        assert intervals_in(flipped, stopped) == sum(end <= at for end in ends) - 1
         if at % 499 < 11:
             assert encode(stopped, resume=True) == whole
     with pytest.raises(InputError, match="is no journal"):
         intervals_in(b"?" + data[1:], stopped)
+
+
+def test_a_journal_whose_first_interval_is_damaged_is_not_overwritten_unasked(stopped):
+    data, part = (stopped.parent / "a.reel.part").read_bytes(), stopped.parent / "a.reel.part"
+    first, second, *_ = ends_of(data)
+    for at in (len(MAGIC) + 9, first - 1, first + 9, second - 1):
+        flipped = data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]
+        part.write_bytes(flipped)
+        for resume in (None, True):
+            with pytest.raises(InputError, match="is damaged at its beginning; start over with --no-resume"):
+                encode(stopped, resume)
+        assert part.read_bytes() == flipped
+    encode(stopped, resume=False)
 
 
 @pytest.mark.parametrize("size", [0, 7, len(MAGIC), len(MAGIC) + 5])

@@ -9,9 +9,11 @@ import tracemalloc
 
 import pytest
 
+import meshreel
 from meshreel.analysis.scene.masks import read_views
 from meshreel.capture.rig import read_rig
 from meshreel.capture.truth import _labels
+from meshreel.encoder.journal import Journal
 from meshreel.errors import InputError
 from meshreel.io import read
 from meshreel.io.depth_pictures import read_depth
@@ -73,6 +75,31 @@ def test_what_are_no_cameras_or_labels_ends_at_once(tmp_path, make, name, of):
     make(tmp_path / name)
     with pytest.raises(InputError, match=rf"{name}: .*cannot be read \(it "):
         of(tmp_path)
+
+
+@posix
+def test_a_pipe_among_frames_is_refused_and_not_left_out(tmp_path):
+    for number in (0, 2):
+        (tmp_path / f"f_{number}.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    os.mkfifo(tmp_path / "f_1.obj")
+    sequence = open_sequence(tmp_path)
+    with pytest.raises(InputError, match=r"f_1.obj\): cannot be read \(it is a pipe"):
+        sequence[1]
+
+
+@posix
+def test_a_pipe_in_place_of_a_video_ends_at_once(tmp_path):
+    os.mkfifo(tmp_path / "a.reel")
+    with pytest.raises(InputError, match=r"a.reel is no binary file that can seek"):
+        meshreel.open(tmp_path / "a.reel")
+
+
+@posix
+def test_a_pipe_in_place_of_the_output_is_not_replaced(tmp_path):
+    os.mkfifo(tmp_path / "a.reel")
+    with pytest.raises(InputError, match=r"a.reel: is a pipe or a device"), Journal(tmp_path / "a.reel"):
+        pass
+    assert (tmp_path / "a.reel").is_fifo()
 
 
 def test_an_archive_of_nothing_but_zeros_ends_at_once(tmp_path):

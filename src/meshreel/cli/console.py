@@ -56,7 +56,8 @@ class Common:
             console = Console(highlight=False, soft_wrap=True)
             for text in texts:
                 console.print(text, markup=False)
-        sys.stdout.flush()  # a server prints its addresses and keeps running
+        if sys.stdout is not None:  # it is closed where the caller has none
+            sys.stdout.flush()  # a server prints its addresses and keeps running
 
     @contextmanager
     def stages(self, total: int) -> Iterator[StageBars]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +18,7 @@ from ..encoder.quality import Goal, encode_to
 from ..encoder.sequence import Encoder
 from ..encoder.summary import SceneSummary, Summary
 from ..errors import InputError
+from ..io.write import check_apart, replacing
 from .console import Common
 from .flags import Reading
 from .sources import Masking, open_source
@@ -147,7 +148,11 @@ def command(
     goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
     sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
-    with common.stages(len(sequence)) as progress, workers(jobs) as executor, _lines(debug_digests) as digests:
+    with (
+        common.stages(len(sequence)) as progress,
+        workers(jobs) as executor,
+        _lines(debug_digests, output, sequence.files) as digests,
+    ):
         encoder = Encoder(sequence, executor, progress, masker, digests)
         if goal is None:
             summary = encoder.encode(output, options, resume)
@@ -162,18 +167,17 @@ def command(
 
 
 @contextmanager
-def _lines(path: Path | None) -> Iterator[WriteLines | None]:
-    """Open the file of digests and write its first line; None without a path."""
+def _lines(path: Path | None, output: Path, inputs: Iterable[Path]) -> Iterator[WriteLines | None]:
+    """Yield what writes lines to the file of digests, which appears when the encode is done; None without a path."""
     if path is None:
         yield None
         return
-    try:
-        file = path.open("w", encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --debug-digests") from None
-    with file:
-        file.write(machine_line())
-        yield file.write
+    check_apart(path, inputs)
+    if path.absolute() == output.absolute():
+        raise InputError(f"{path}: is the output, too; give another --debug-digests")
+    with replacing(path) as file:
+        file.write(machine_line().encode())
+        yield lambda lines: file.write(lines.encode())
 
 
 def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:

@@ -59,7 +59,9 @@ def _begin() -> None:
     """Let the parent heed Ctrl-C, and let SIGTERM and the parent's end end a worker without a message."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    if sys.platform == "linux":  # at once, too, where a library holds Python's lock for seconds
+    # At once, too, where a library holds Python's lock. The signal follows the thread that started the worker:
+    # here the command's main thread, so it is not for an executor of a caller's own.
+    if sys.platform == "linux":
         import ctypes
 
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)

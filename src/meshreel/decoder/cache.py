@@ -1,7 +1,7 @@
 """Cache of one track: the last group decoded, and the states from which the next groups of its chain continue.
 
 In: decoded meshes and states, and what was refused. Out: the same, within a bound on memory. Values are replaced as a
-whole and never changed, so that threads can share a track without a lock.
+whole and never changed, but for the refusals, which only grow; so threads can share a track without a lock.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from ..types import Mesh
 # Bytes of states that the tracks of a video keep together (guess): a few bytes of a file can describe groups that
 # each take as much memory as a group may.
 MOST_KEPT = 1 << 25
-MOST_REFUSALS = 4096  # chunks of a track (guess); frames that follow one another are mostly of one group
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +62,8 @@ class CachedStates:
 class Refusals:
     """Chunks whose bytes are damaged though their checksums match, so that no frame more decodes them again.
 
-    What could not be read is not among them: a file may grow, and a network may come back.
+    What could not be read is not among them: a file may grow, and a network may come back. A refusal takes some hundred
+    bytes, and each chunk has 14 bytes of its file at least.
     """
 
     def __init__(self) -> None:
@@ -75,23 +75,17 @@ class Refusals:
         try:
             yield
         except FormatError as error:
-            self._keep(chunk, f"{chunk}: {error}")
-            raise FormatError(f"{chunk}: {error}") from error
+            message = self._messages[chunk.number] = f"{chunk}: {error}"
+            raise FormatError(message) from error
 
-    def check(self, chunk: Chunk, *dependents: Chunk) -> None:
+    def check(self, chunk: Chunk, dependents: Sequence[Chunk] = ()) -> None:
         """Raise the FormatError of a refused chunk again, and remember it for those that need this chunk."""
         message = self._messages.get(chunk.number)
         if message is None:
             return
         for dependent in dependents:
-            self._keep(dependent, message)
+            self._messages[dependent.number] = message
         raise FormatError(message)
-
-    def _keep(self, chunk: Chunk, message: str) -> None:
-        kept = self._messages | {chunk.number: message}
-        if len(kept) > MOST_REFUSALS:
-            kept.pop(next(iter(kept)))  # the oldest
-        self._messages = kept
 
 
 def memory_of(meshes: Sequence[Mesh]) -> int:

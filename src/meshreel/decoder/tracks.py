@@ -56,7 +56,7 @@ class Track(Frames):
         states = self._states
         self._refusals.check(chunk)
         while (before := self.reader.group_before(chain[-1])) is not None and before.number not in states.known:
-            self._refusals.check(before, *chain)
+            self._refusals.check(before, chain)
             chain.append(before)
         state = None if before is None else states.known[before.number]
         states = CachedStates({}) if before is None else states.copy()
@@ -107,7 +107,7 @@ class Background:
         self._refusals.check(chunk)
         while chain[-1].number != known and chain[-1].depends_on:
             before = self.reader.chunks[chain[-1].depends_on[0]]
-            self._refusals.check(before, *chain)
+            self._refusals.check(before, chain)
             chain.append(before)
         if chain[-1].number == known:
             chain.pop()

@@ -62,6 +62,7 @@ def machine_line() -> str:
     from threadpoolctl import threadpool_info
 
     pools = [{k: pool.get(k) for k in ("internal_api", "version", "architecture")} for pool in threadpool_info()]
+    pools.sort(key=str)  # they are found in any order
     found: dict[str, Any] = {"stage": "machine", "python": platform.python_version(), "system": platform.platform()}
     found |= {
         "processor": _processor(),

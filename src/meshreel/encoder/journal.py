@@ -51,12 +51,14 @@ class Journal:
         self._made: dict[str, Any] | None = None  # what the bytes of the records depend on
         self._records: list[tuple[int, int]] = []  # of intervals done before: begin and length
         self._done = self._taken = self._end = 0
-        self._begun = False
+        self._begun = self._is_damaged = False
 
     def __enter__(self) -> Journal:
         with cannot_be_written(self.output):
             if self.output.is_dir():
                 raise InputError(f"{self.output}: cannot be written: is a folder, name a file")
+            if self.output.exists() and not self.output.is_file():
+                raise InputError(f"{self.output}: is a pipe or a device, which the file would replace; name a file")
             self._file = claim(self.path, self.output)
             try:
                 self._open()
@@ -131,6 +133,8 @@ class Journal:
             raise InputError(
                 f"{text}; continue with --resume (resume=True), or start over with --no-resume (resume=False)"
             )
+        if self._is_damaged and not count and self._resume is not False:
+            raise InputError(f"{self.path}: is damaged at its beginning; start over with --no-resume (resume=False)")
         if not count or not self._resume:
             self.restart()
             return
@@ -151,6 +155,7 @@ class Journal:
             for start in range(0, length, _BLOCK):
                 found = zlib.crc32(self._file.read(min(_BLOCK, length - start)), found)
             if found != wanted:
+                self._is_damaged = True
                 return
             yield at, length
             at += length

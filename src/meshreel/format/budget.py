@@ -22,6 +22,7 @@ class Limits:
     per_byte: int = 8192  # and more for each of its bytes (guess)
     together: int = 96 << 20  # memory that the groups of one frame may take, and per_byte more (guess)
     chain: int = 8  # times as much as a chunk's may the states cost that lead to one of the background (guess)
+    head: int = 64 << 20  # bytes of the head, which is read whole (guess): of a file of weeks
     frames: int = 65_535  # of all groups: what one group may have
     frames_per_byte: int = 64  # and more for each byte of the file: a still group has 2 (guess)
     frame: int = 1024  # of a frame, whatever is in it

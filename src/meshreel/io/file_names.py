@@ -70,7 +70,7 @@ def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
 
 
 def _is_mesh(path: Path) -> bool:
-    return path.suffix.lower() in EXTENSIONS and not path.name.startswith(".") and path.is_file()
+    return path.suffix.lower() in EXTENSIONS and not path.name.startswith(".") and not path.is_dir()
 
 
 def _of_one_kind(folder: Path) -> list[Path]:

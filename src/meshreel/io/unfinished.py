@@ -6,6 +6,7 @@ taken over by the next run to the same output, and what a living run writes is l
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import sys
@@ -20,6 +21,7 @@ from ..errors import InputError
 
 _LONGEST = 255  # bytes of a file's name, on the usual file systems
 _KEPT = 40  # characters of a name that is too long with its suffix: at most 160 bytes (guess)
+_FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))
 _PAUSE = 0.02  # s, between two looks at a lock (guess)
 _FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
 
@@ -64,8 +66,8 @@ def cannot_be_written(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"{path}: cannot be written ({reason}); free space, or choose another folder") from error
+        remedy = "free space, or choose another folder" if error.errno in _FULL else "choose another folder"
+        raise InputError(f"{path}: cannot be written ({error.strerror or error}); {remedy}") from error
 
 
 def claim(name: Path, output: Path, wait: float = 0.0) -> BinaryIO:

@@ -13,6 +13,7 @@ export const LIMITS = {
   perByte: 8192,
   together: 100663296,
   chain: 8,
+  head: 67108864,
   frames: 65535,
   framesPerByte: 64,
   frame: 1024,

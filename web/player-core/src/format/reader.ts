@@ -5,7 +5,7 @@ import { checkHeader, checkIndex } from "./checks.ts";
 import { crc32 } from "./crc.ts";
 import { checkFrames } from "./budget.ts";
 import { FormatError } from "../errors.ts";
-import { Checksum, ChunkKind, Form, Header, Index, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
+import { Checksum, ChunkKind, Form, Header, Index, LIMITS, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
 import type { Layer } from "./layout.gen.ts";
 import { unpack, unpackAll } from "./records.ts";
 import type { Box, Info } from "../types.ts";
@@ -58,6 +58,7 @@ export class Head {
     }
     if (preamble.flags !== 0) throw new FormatError(`flags ${preamble.flags}: version ${VERSION} has none`);
     if (preamble.headSize < PREAMBLE_SIZE + Checksum.least) throw new FormatError(`a head of ${preamble.headSize} bytes: damaged`);
+    if (preamble.headSize > LIMITS.head) throw new FormatError(`a head of ${preamble.headSize} bytes, over ${LIMITS.head}`);
     return preamble.headSize;
   }
 
