@@ -302,6 +302,8 @@ describe("a head", () => {
   future[8] = 2;
   const huge = whole.slice(0, 3000);
   new DataView(huge.buffer).setUint32(10, 0xffffffff, true);
+  const long = whole.slice(0, 3000);
+  new DataView(long.buffer).setUint32(10, 4000, true);
   const cases: [string, Uint8Array, RegExp][] = [
     ["of another kind of file", new TextEncoder().encode("<!doctype html><html></html>"), /^not a .reel file/],
     ["of no file at all", new Uint8Array(0), /^not a .reel file/],
@@ -309,7 +311,8 @@ describe("a head", () => {
     ["cut in its midst", whole.slice(0, 60), /truncated or damaged/],
     ["of a future version", future, /^format version 2: this player knows version 1/],
     ["with a bit turned", turned, /checksum/],
-    ["of four gigabytes", huge, /a head of 4294967295 bytes in a file of 3000: truncated or damaged/],
+    ["of four gigabytes", huge, /a head of 4294967295 bytes, over 67108864/],
+    ["longer than its file", long, /a head of 4000 bytes in a file of 3000: truncated or damaged/],
     ["of a shorter file", Uint8Array.from([...whole, 0]), /1 bytes behind the last chunk/],
   ];
   test.each(cases)("%s is refused, by the event and by the promises", async (_, bytes, message) => {
