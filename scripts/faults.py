@@ -154,20 +154,11 @@ def told(promise: str, unit: str, found: Counter[str], seconds: float, command: 
 
 
 PLAIN = ("--dynamic-only", "--fps", "20")
+KILLED = "A killed encode{} leaves no process, and continues to the same bytes"
 STOPS = {  # each promise: its unit, how it is tried, the input, flags
-    "A killed encode leaves no process, and continues to the same bytes": ("kills", killed, "meshes", PLAIN),
-    "A killed encode with --jobs 2 leaves no process, and continues to the same bytes": (
-        "kills",
-        killed,
-        "meshes",
-        (*PLAIN, "--jobs", "2"),
-    ),
-    "A killed encode that fuses the frames of a rig leaves no process, and continues to the same bytes": (
-        "kills",
-        killed,
-        "rig",
-        (),
-    ),
+    KILLED.format(""): ("kills", killed, "meshes", PLAIN),
+    KILLED.format(" with --jobs 2"): ("kills", killed, "meshes", (*PLAIN, "--jobs", "2")),
+    KILLED.format(" that fuses the frames of a rig"): ("kills", killed, "rig", ()),
     "An encode whose disk is full says so, and continues to the same bytes": ("full disks", filled, "meshes", PLAIN),
     "Ctrl-C in the first half second gives no traceback": ("interrupts", interrupted, "meshes", PLAIN),
 }

@@ -110,12 +110,15 @@ def of_core(cache: Path, targets: tuple[str, ...]) -> Reached:
     return reached
 
 
+def counted_files() -> list[str]:
+    """Return the patterns of the Python files whose lines count."""
+    return [str(ROOT / "src/meshreel" / name) + ("" if name.endswith(".py") else "/*") for name in PYTHON_FILES]
+
+
 def of_python(cache: Path) -> Reached:
     """Replay the corpus of the Python targets and count lines and branches of the package."""
     data, out = cache / "corpus.coverage", cache / "corpus.json"
-    include = ",".join(
-        str(ROOT / "src/meshreel" / name) + ("" if name.endswith(".py") else "/*") for name in PYTHON_FILES
-    )
+    include = ",".join(counted_files())
     coverage = [sys.executable, "-m", "coverage"]
     replay = [str(Path(verdict.__file__)), *map(str, verdict.corpus())]
     subprocess.run(
@@ -138,10 +141,9 @@ def reaching_new_lines(names: list[str]) -> Iterable[str]:
     """Yield the files that reach lines of the package which no earlier one reaches."""
     from coverage import Coverage
 
-    include = [str(ROOT / "src/meshreel" / name) + ("" if name.endswith(".py") else "/*") for name in PYTHON_FILES]
     known: set[tuple[str, int]] = set()
     for name in names:
-        counting = Coverage(data_file=None, include=include)
+        counting = Coverage(data_file=None, include=counted_files())
         with counting.collect():
             verdict.check(Path(name).read_bytes())
         data = counting.get_data()

@@ -86,6 +86,13 @@ def test_decode_and_info_need_nothing_of_the_encoder(tmp_path):
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "[0, 0] []\n"
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="a shell of POSIX")
+def test_a_closed_standard_output_is_no_fault():
+    command = ["sh", "-c", '"$@" >&-', "sh", sys.executable, "-m", "meshreel", "info", str(FILE)]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (answer.returncode, answer.stderr) == (0, "")
+
+
 def test_a_module_run_exits_with_the_code(tmp_path):
     command = [sys.executable, "-m", "meshreel", "info", str(tmp_path / "none.reel")]
     answer = subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ)

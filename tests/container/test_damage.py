@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from meshreel.container.reader import Chunk, ReelReader
 from meshreel.container.sources import BytesSource
 from meshreel.container.writer import pack_head
-from meshreel.errors import FormatError
+from meshreel.errors import FormatError, InputError
+from meshreel.format.budget import LIMITS
 from meshreel.format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Index, IndexEntry, Layer, Preamble
 from meshreel.format.records import least_size, pack
 from tests.container.files import HEADER, PAYLOADS, small_file
@@ -184,3 +185,11 @@ def test_a_head_of_a_sparse_file_is_refused_before_it_is_read():
 
     with pytest.raises(FormatError, match="a head of 4294967295 bytes, over 67108864"):
         ReelReader(Sparse(pack(Preamble(MAGIC, VERSION, 0, (1 << 32) - 1)) + bytes(1000)))
+
+
+def test_no_head_is_written_that_would_not_be_read(monkeypatch):
+    monkeypatch.setattr("meshreel.format.budget.LIMITS", replace(LIMITS, head=HEAD_SIZE - 1))
+    with pytest.raises(FormatError, match=f"a head of {HEAD_SIZE} bytes, over {HEAD_SIZE - 1}"):
+        ReelReader(BytesSource(DATA))
+    with pytest.raises(InputError, match=f"cannot be stored: a head of {HEAD_SIZE} bytes"):
+        small_file()

@@ -172,9 +172,13 @@ def test_a_torn_last_record_is_left_out_at_every_byte(stopped, fake):
 def test_no_flipped_byte_is_trusted(stopped):
     data, whole = (stopped.parent / "a.reel.part").read_bytes(), encode(stopped.parent / "whole.reel")
     ends = ends_of(data)
-    for at in range(ends[1], len(data), 11):
+    for at in range(len(MAGIC), len(data), 11):
         flipped = data[:at] + bytes([data[at] ^ 0x40]) + data[at + 1 :]
-        assert intervals_in(flipped, stopped) == sum(end <= at for end in ends) - 1
+        try:
+            assert intervals_in(flipped, stopped) == max(sum(end <= at for end in ends) - 1, 0)
+        except InputError as error:
+            assert at < ends[1] and "is damaged at its beginning" in str(error)
+            continue
         if at % 499 < 11:
             assert encode(stopped, resume=True) == whole
     with pytest.raises(InputError, match="is no journal"):

@@ -20,6 +20,7 @@ from meshreel.io.depth_pictures import read_depth
 from meshreel.io.mask_pictures import read_mask
 from meshreel.io.read import read_file
 from meshreel.io.sequence import open_sequence
+from meshreel.io.write import replacing
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="POSIX files")
 
@@ -90,16 +91,17 @@ def test_a_pipe_among_frames_is_refused_and_not_left_out(tmp_path):
 @posix
 def test_a_pipe_in_place_of_a_video_ends_at_once(tmp_path):
     os.mkfifo(tmp_path / "a.reel")
-    with pytest.raises(InputError, match=r"a.reel is no binary file that can seek"):
+    with pytest.raises(InputError, match=r"a.reel: cannot be opened: it is a pipe or a device"):
         meshreel.open(tmp_path / "a.reel")
 
 
 @posix
-def test_a_pipe_in_place_of_the_output_is_not_replaced(tmp_path):
+@pytest.mark.parametrize("opened", [Journal, replacing])
+def test_a_pipe_in_place_of_the_output_is_not_replaced(tmp_path, opened):
     os.mkfifo(tmp_path / "a.reel")
-    with pytest.raises(InputError, match=r"a.reel: is a pipe or a device"), Journal(tmp_path / "a.reel"):
+    with pytest.raises(InputError, match=r"a.reel: is a pipe or a device"), opened(tmp_path / "a.reel"):
         pass
-    assert (tmp_path / "a.reel").is_fifo()
+    assert (tmp_path / "a.reel").is_fifo() and len(list(tmp_path.iterdir())) == 1
 
 
 def test_an_archive_of_nothing_but_zeros_ends_at_once(tmp_path):

@@ -86,6 +86,19 @@ def test_a_painter_that_died_between_two_posters_costs_the_next_file_nothing(pai
     drawn.close()
 
 
+def test_a_poster_for_which_no_process_can_be_had_now_is_drawn_later(painter, monkeypatch, folder):
+    def full(*_, **__):
+        raise OSError(24, "Too many open files")
+
+    painter(CALLS)
+    drawn = posters.Posters()
+    with monkeypatch.context() as patched:
+        patched.setattr(posters.subprocess, "Popen", full)
+        assert asyncio.run(drawn.of(folder / "walk.reel", "tag")) is None
+    assert asyncio.run(drawn.of(folder / "walk.reel", "tag")) == b"1"
+    drawn.close()
+
+
 def test_more_posters_than_said_wait_for_none(painter, monkeypatch, folder):
     painter(HANG)
     monkeypatch.setattr(posters, "MOST_WAITING", 2)

@@ -106,10 +106,8 @@ class Kept:
         self._file.seek(offset)
         if self._file.readinto(data) != len(data):
             return None
-        points, corners = (
-            np.frombuffer(data, np.float64, 3 * vertices),
-            np.frombuffer(data, np.int32, offset=24 * vertices),
-        )
+        points = np.frombuffer(data, np.float64, 3 * vertices)
+        corners = np.frombuffer(data, np.int32, offset=24 * vertices)
         return Mesh(points.reshape(-1, 3), corners.reshape(-1, 3))
 
     def put(self, number: int, mesh: Mesh) -> None:

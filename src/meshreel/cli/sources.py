@@ -9,15 +9,13 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..analysis.scene.masks import ImageMasks, Masker, one_size
+from ..analysis.scene.masks import ImageMasks, Masker, read_view_file
 from ..analysis.scene.sam3 import Sam3Masks, Sam3Options
 from ..analysis.scene.segmentation import SegmentOptions
 from ..capture.recording import open_recording
 from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
-from ..geometry.cameras import unpack_cameras
 from ..geometry.derived_sequences import Upright
-from ..io.read import read_file
 from ..io.sequence import captured, open_sequence
 from ..types import MeshSequence, Up
 from .flags import Reading
@@ -104,12 +102,7 @@ class Masking:
         """Return the options with the views that were asked for. Raises InputError where their file is wrong."""
         if self.views is None:
             return options
-        try:
-            data = read_file(self.views)
-        except OSError as error:
-            text = f"{self.views}: cannot be read ({error.strerror or error})"
-            raise InputError(f"{text}; give Open3D pinhole camera JSON") from None
-        return replace(options, cameras=one_size(unpack_cameras(data, str(self.views)), str(self.views)))
+        return replace(options, cameras=read_view_file(self.views))
 
     def masker(self, frames: int) -> Masker | None:
         """Return the source of masks of `frames` frames, None for geometric change. Raises InputError."""

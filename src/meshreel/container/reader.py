@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from ..errors import FormatError
-from ..format.budget import LIMITS, check_frames
+from ..format.budget import check_frames, check_head
 from ..format.checks import check_header, check_index, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
@@ -160,8 +160,7 @@ def _read_head(source: Source) -> tuple[Header, Index, int]:
     end = size - least_size(Checksum)
     if not start <= end or size > source.size:
         raise FormatError(f"head of {size} bytes in a file of {source.size}: truncated or damaged")
-    if size > LIMITS.head:
-        raise FormatError(f"a head of {size} bytes, over {LIMITS.head}")
+    check_head(size)
     data = data[:size] + (source.get_bytes(len(data), size - len(data)) if size > len(data) else b"")
     if len(data) != size or unpack_all(Checksum, data[end:]).crc != zlib.crc32(data[:end]):
         raise FormatError("the head is damaged: its checksum does not match")

@@ -6,7 +6,6 @@ ends with the process. Memory stays flat, and a process that is killed leaves no
 
 from __future__ import annotations
 
-import errno
 import os
 import tempfile
 import zlib
@@ -19,11 +18,11 @@ from types import TracebackType
 from typing import IO, Any, Protocol, runtime_checkable
 
 from ..errors import FormatError, InputError
-from ..format.budget import check_frames
+from ..format.budget import check_frames, check_head
 from ..format.checks import IndexChecks, check_header, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, IndexEntry, Layer, Preamble
 from ..format.records import least_size, pack
-from ..io.unfinished import sync_folder, unfinished
+from ..io.unfinished import FULL, sync_folder, unfinished
 from .sources import Stream
 
 
@@ -181,9 +180,10 @@ class ReelWriter:
 
 
 def pack_head(header: Header, index: Index) -> bytes:
-    """Pack the head, which is everything before the chunks."""
+    """Pack the head, which is everything before the chunks. Raises FormatError for one that no reader would read."""
     body = pack(header) + pack(index)
     size = least_size(Preamble) + len(body) + least_size(Checksum)
+    check_head(size)
     data = pack(Preamble(MAGIC, VERSION, 0, size)) + body
     return data + pack(Checksum(zlib.crc32(data)))
 
@@ -218,7 +218,7 @@ def _as_input_error(name: str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        remedy = "; free space, or choose another folder" if error.errno in (errno.ENOSPC, errno.EFBIG) else ""
+        remedy = "; free space, or choose another folder" if error.errno in FULL else ""
         raise InputError(f"{name}: cannot be written: {error.strerror or error}{remedy}") from error
     except FormatError as error:
         raise InputError(f"{name}: cannot be stored: {error}") from error

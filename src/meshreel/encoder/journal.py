@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, astuple
 from pathlib import Path
@@ -51,14 +51,12 @@ class Journal:
         self._made: dict[str, Any] | None = None  # what the bytes of the records depend on
         self._records: list[tuple[int, int]] = []  # of intervals done before: begin and length
         self._done = self._taken = self._end = 0
-        self._begun = self._is_damaged = False
+        self._begun = False
 
     def __enter__(self) -> Journal:
         with cannot_be_written(self.output):
             if self.output.is_dir():
                 raise InputError(f"{self.output}: cannot be written: is a folder, name a file")
-            if self.output.exists() and not self.output.is_file():
-                raise InputError(f"{self.output}: is a pipe or a device, which the file would replace; name a file")
             self._file = claim(self.path, self.output)
             try:
                 self._open()
@@ -125,7 +123,7 @@ class Journal:
         start = self._file.read(len(MAGIC))
         if not MAGIC.startswith(start):
             raise InputError(f"{self.path}: is no journal of an encode, and in the way of one; move it away")
-        whole = list(self._whole_records()) if start == MAGIC else []
+        whole, is_damaged = self._whole_records() if start == MAGIC else ([], False)
         made = self._read(*whole[0])[0].get("made") if whole else None
         count = len(whole) - 1 if isinstance(made, dict) else 0
         if count and self._resume is None:
@@ -133,7 +131,7 @@ class Journal:
             raise InputError(
                 f"{text}; continue with --resume (resume=True), or start over with --no-resume (resume=False)"
             )
-        if self._is_damaged and not count and self._resume is not False:
+        if is_damaged and not count and self._resume is not False:
             raise InputError(f"{self.path}: is damaged at its beginning; start over with --no-resume (resume=False)")
         if not count or not self._resume:
             self.restart()
@@ -142,23 +140,27 @@ class Journal:
         self._done = self.continued = count
         self._file.truncate(self._end)
 
-    def _whole_records(self) -> Iterator[tuple[int, int]]:
-        """Yield begin and length of each record up to the first that is torn or damaged, reading block by block."""
+    def _whole_records(self) -> tuple[list[tuple[int, int]], bool]:
+        """Return begin and length of each record up to the first that is torn or damaged, and whether one is damaged.
+
+        They are read block by block. A torn one ends beyond the file.
+        """
+        records: list[tuple[int, int]] = []
         size, at = self._file.seek(0, 2), len(MAGIC)
         while at + _HEAD.size <= size:
             self._file.seek(at)
             length, wanted = _HEAD.unpack(self._file.read(_HEAD.size))
             at += _HEAD.size
             if not _TEXT.size <= length <= size - at:
-                return
+                break
             found = 0
             for start in range(0, length, _BLOCK):
                 found = zlib.crc32(self._file.read(min(_BLOCK, length - start)), found)
             if found != wanted:
-                self._is_damaged = True
-                return
-            yield at, length
+                return records, True
+            records.append((at, length))
             at += length
+        return records, False
 
     def _read(self, begin: int, length: int) -> tuple[dict[str, Any], int]:
         """Return the JSON of a record, and where its payloads begin."""

@@ -84,12 +84,11 @@ def encode_static(parts: Parts, count: int, frame_rate: float, options: Backgrou
             came = _coded(_normalised(change.came, parts.seen), most, step)[1]
             before, gone = state, _gone(parts, state, change)
             payload = encode_change(before, gone, came, step)
-            state = changed(before, gone, came)
             try:
-                state = decode_change(payload, before)  # in the order of faces that a reader has
+                state = decode_change(payload, before)
                 chain = chain.then(before, state, len(payload))
-            except CostlyError:
-                whole = True
+            except CostlyError:  # no reader would decode it
+                state, whole = changed(before, gone, came), True
         if whole and not state.is_empty:
             payload = encode_background(state, step)
             state = decode_background(payload)  # the next patch counts faces in the decoded order

@@ -113,6 +113,12 @@ class Chain:
         return longer
 
 
+def check_head(size: int) -> None:
+    """Raise CostlyError if a head has more bytes than it may."""
+    if size > LIMITS.head:
+        raise CostlyError(f"a head of {size} bytes, over {LIMITS.head}")
+
+
 def check_frames(frames: int, size: int) -> None:
     """Raise CostlyError if the groups of a file of `size` bytes have more frames, of all tracks, than they may."""
     most = LIMITS.frames + LIMITS.frames_per_byte * size

@@ -21,7 +21,7 @@ from ..errors import InputError
 
 _LONGEST = 255  # bytes of a file's name, on the usual file systems
 _KEPT = 40  # characters of a name that is too long with its suffix: at most 160 bytes (guess)
-_FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))
+FULL = (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC))  # of a disk or a quota
 _PAUSE = 0.02  # s, between two looks at a lock (guess)
 _FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
 
@@ -66,15 +66,18 @@ def cannot_be_written(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        remedy = "free space, or choose another folder" if error.errno in _FULL else "choose another folder"
+        remedy = "free space, or choose another folder" if error.errno in FULL else "choose another folder"
         raise InputError(f"{path}: cannot be written ({error.strerror or error}); {remedy}") from error
 
 
 def claim(name: Path, output: Path, wait: float = 0.0) -> BinaryIO:
     """Open an unfinished file of an output, new or left by a dead process, and lock it.
 
-    Raises InputError where a living process has it for longer than `wait` seconds, OSError where it cannot be made.
+    Raises InputError where a living process has it for longer than `wait` seconds, or where the output is a pipe or a
+    device, which it would replace; OSError where it cannot be made.
     """
+    if output.exists() and not (output.is_file() or output.is_dir()):
+        raise InputError(f"{output}: is a pipe or a device, which the file would replace; name a file")
     until = time.monotonic() + wait
     while True:
         number = os.open(name, _FLAGS, 0o666)

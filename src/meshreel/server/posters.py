@@ -28,6 +28,10 @@ LARGEST = 2**20  # bytes of a PNG: more than its pixels have
 Poster = tuple[Path, str]  # path and ETag
 
 
+class NotStarted(Exception):
+    """The system gave the server no process now: a poster may be drawn later."""
+
+
 class Posters:
     """Cache of posters, one for each version of a file. A file that has none is not tried again."""
 
@@ -51,7 +55,7 @@ class Posters:
                 drawing.add_done_callback(partial(self._keep, wanted))
         if drawing is None:
             return None
-        with suppress(TimeoutError):  # the poster is drawn all the same, for later requests
+        with suppress(TimeoutError, NotStarted):  # after a time-out it is drawn all the same, for later requests
             return await asyncio.wait_for(asyncio.shield(asyncio.wrap_future(drawing)), LONGEST_WAIT)
         return None
 
@@ -63,6 +67,8 @@ class Posters:
     def _keep(self, drawn: Poster, drawing: Future[bytes | None]) -> None:
         with self._lock:
             self._drawn.pop(drawn, None)
+            if isinstance(drawing.exception(), NotStarted):
+                return
             self._known[drawn] = drawing.result()
             while len(self._known) > MOST_POSTERS:
                 self._known.popitem(last=False)
@@ -76,7 +82,7 @@ class _Painter:
         self._is_closed, self._lock = False, threading.Lock()
 
     def draw(self, path: Path) -> bytes | None:
-        """Return a PNG, None if there is none, the process dies of it, or it takes too long."""
+        """Return a PNG, None if there is none, the process dies of it, or it takes too long. Raises NotStarted."""
         process = self._process
         if process is None or process.poll() is not None:  # it may have died of what it drew before
             process = self._start()
@@ -100,8 +106,8 @@ class _Painter:
                 self._process = process = subprocess.Popen(
                     PAINTER, stdin=pipe, stdout=pipe, stderr=silent, env=environment
                 )
-            except OSError:  # too many processes or open files
-                return None
+            except OSError as error:  # too many processes or open files
+                raise NotStarted from error
         return None if self._ask(process, b"", START) is None else process
 
     def _ask(self, process: subprocess.Popen[bytes], line: bytes, limit: float) -> bytes | None:

@@ -73,12 +73,15 @@ class ImageMasks(Masker):
 
 def read_views(folder: Path) -> tuple[PinholeCamera, ...]:
     """Read the views, all of one size, from a folder's `cameras.json`. Raises InputError if it is invalid."""
-    path = folder / CAMERAS
+    return read_view_file(folder / CAMERAS, "the cameras of the masks, as Open3D pinhole camera JSON")
+
+
+def read_view_file(path: Path, wanted: str = "Open3D pinhole camera JSON") -> tuple[PinholeCamera, ...]:
+    """Read views, all of one size, from a file. Raises InputError, which says what is `wanted`, if it is invalid."""
     try:
         data = read_file(path)
     except OSError as error:
-        text = f"{path}: cannot be read ({error.strerror or error}); give the cameras of the masks"
-        raise InputError(f"{text}, as Open3D pinhole camera JSON") from None
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); give {wanted}") from None
     return one_size(unpack_cameras(data, str(path)), str(path))
 
 
