@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, runtime_checkable
 
 from ..errors import InputError
-from ..io.read import open_regular
 
 
 @runtime_checkable
@@ -80,15 +80,21 @@ class StreamSource:
         self._file.close()
 
 
+def _open_at_once(path: str, flags: int) -> int:
+    """Open a file; a pipe without waiting for its writer, so that it is refused as one that cannot seek."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
 class FileSource(StreamSource):
     """A file on disk, held open until `close`; threads may share it. Raises InputError if it cannot be read."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
         try:
-            super().__init__(open_regular(self.path), str(self.path))
+            file = open(self.path, "rb", opener=_open_at_once)  # noqa: SIM115 (open until `close`)
         except OSError as error:
-            raise InputError(f"{self.path}: cannot be opened: {error.strerror or error}") from error
+            raise InputError(f"{self.path}: cannot be opened: {error.strerror}") from error
+        super().__init__(file, str(self.path))
 
     def __enter__(self) -> FileSource:
         return self
