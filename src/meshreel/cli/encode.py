@@ -189,6 +189,7 @@ def summary_row(summary: Summary, frame_rate: float) -> dict[str, Any]:
         "mbps": _mbps(summary.size, summary, frame_rate),
         "d2_psnr_paper": summary.psnr if math.isfinite(summary.psnr) else None,
         "scene": None if summary.scene is None else _scene_row(summary, summary.scene, frame_rate),
+        "work": summary.work,
         "groups": [
             {
                 "track": group.track,

@@ -19,6 +19,7 @@ from ..container.writer import Stored
 from ..errors import InputError
 from ..format.budget import CostlyError
 from ..format.layout import Form
+from ..geometry.work import Work
 from ..types import Mesh
 from .draco import IntraOptions, cheapest_intra, finest_intra
 from .target import NO_ERROR, Fidelity, measure
@@ -41,6 +42,7 @@ class EncodedGroup:
     key: int | None = None  # the frame, counted in the group, whose surface the others follow
     digests: tuple[str, ...] = field(default=(), kw_only=True)  # lines of `--debug-digests`
     stored: Stored | None = None  # where the payload is, in place of `payload`, of a group that a journal has
+    work: Work = field(default_factory=dict, kw_only=True)  # that another process did until this group was done
 
 
 def laplacian(

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
+from ..geometry.work import add, since, so_far
 from . import layers, paper
 from .digests import Digests, note
 from .forms import EncodedGroup
@@ -45,6 +46,8 @@ def _begun(job: Job, interval: Interval, stages: Stages) -> Callable[[], list[En
 
     def arrived(groups: list[EncodedGroup]) -> list[EncodedGroup]:
         stages.add("code", count)
+        for group in groups:
+            add(group.work)
         return groups
 
     def kept(groups: list[EncodedGroup]) -> list[EncodedGroup]:
@@ -80,7 +83,9 @@ def encode_apart(interval: Interval, options: MethodOptions) -> list[EncodedGrou
     """Encode an interval in a worker process, which ends with its parent; the result can be pickled."""
     end_with_parent()
     with threadpool_limits(1):
-        return list(encode_interval(interval, options))
+        before = so_far()
+        *others, last = encode_interval(interval, options)
+        return [*others, replace(last, work=since(before))]
 
 
 def longest_interval(options: EncoderOptions, frame_rate: float) -> int:

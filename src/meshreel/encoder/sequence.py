@@ -32,6 +32,7 @@ from ..format.layout import Form, Header
 from ..geometry.closest_points import distances
 from ..geometry.derived_sequences import Unchanging, Welded, captured
 from ..geometry.topology import drop_unreferenced
+from ..geometry.work import since, so_far
 from ..io.unfinished import unfinished
 from ..io.write import check_apart
 from ..metrics.distance import PSNR_CEILING, psnr
@@ -152,10 +153,12 @@ class Encoder:
         """Encode the sequence into an open, empty file; its groups wait in the journal."""
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
+        before = so_far()
         job, parts = replace(self._job(options), journal=journal), self.parts(options)
         seen = survey(job.sequence, job.stages) if parts is None else parts.seen
         journal.begin(made_of(self.sequence, options, self._masker))
-        return _encode_bodies(job, file, seen) if parts is None else _encode_scene(job, file, parts)
+        summary = _encode_bodies(job, file, seen) if parts is None else _encode_scene(job, file, parts)
+        return replace(summary, work=since(before))
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..format.layout import Form
+from ..geometry.work import Work
 from .target import Fidelity
 
 
@@ -42,6 +43,7 @@ class Summary:
     warnings: tuple[str, ...] = ()  # about surface that was not kept, a line each
     scene: SceneSummary | None = None  # of a scene with a background
     continued: int = 0  # intervals that an earlier run, which was stopped, had done
+    work: Work = field(default_factory=dict)  # that this run did
 
     @property
     def frame_count(self) -> int:

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int64
 
 from ..types import Mesh
+from . import work
 from .topology import blend, border_mask, face_normals, unique_edges
 
 _AT_BORDER = 1e-4  # barycentric weight below which a point is on an edge (guess)
@@ -59,6 +60,7 @@ class Surface:
         """Find the closest point of the surface to each query, with its face and barycentric weights."""
         import open3d as o3d
 
+        work.count("closest points", len(queries))
         points = queries.astype(np.float32)
         order = _along_curve(points)  # neighbours visit the same boxes: a fifth of the time
         sorted_points = o3d.core.Tensor.from_numpy(points[order])

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..types import Mesh
+from . import work
 from .topology import border_edges, clean
 
 # Size of the bounding box's diagonal for each library, in its own unit; found by trial, without recorded rows.
@@ -34,6 +35,7 @@ def decimate(mesh: Mesh, vertices: int, border: float = BOUNDARY_WEIGHT) -> Mesh
     mesh = clean(mesh)
     if len(mesh.vertices) <= vertices or mesh.diagonal == 0:
         return mesh
+    work.count("decimations")
     is_open = has_boundary(mesh)
     faces = max(len(mesh.faces) - 2 * (len(mesh.vertices) - vertices), 4)
     for _ in range(ROUNDS):
@@ -56,6 +58,7 @@ def decimate_faces(mesh: Mesh, faces: int) -> Mesh:
     mesh = clean(mesh)
     if len(mesh.faces) <= faces or mesh.diagonal == 0:
         return mesh
+    work.count("decimations")
     if has_boundary(mesh):
         return clean(_collapse_open(mesh, faces, BOUNDARY_WEIGHT))
     return clean(_collapse_closed(mesh, faces))

@@ -17,6 +17,7 @@ from jaxtyping import Bool
 
 from ..errors import InputError
 from ..types import Mesh, MeshSequence, Up, check_up
+from . import work
 from .depth import DepthFrames, DepthPicture
 from .topology import part_of, weld
 
@@ -92,6 +93,7 @@ class Unchanging(DerivedSequence):
         self._digests: dict[int, str] = {}
 
     def __getitem__(self, index: int) -> Mesh:
+        work.count("frames read")
         mesh = super().__getitem__(index)
         now = digest([mesh])
         if self._digests.setdefault(index, now) != now:

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float64, Int32
 
 from ...errors import InputError
+from ...geometry import work
 from ...types import Mesh
 from .conjugate_gradients import Limits
 from .match import FrameSurface, MatchOptions, match
@@ -165,6 +166,7 @@ def fit_surfaces(
     guides: Guides = Guides(),
 ) -> Float64[np.ndarray, "T V 3"]:
     """Fit a template to prepared frames (None: an empty one); return its positions without residuals."""
+    work.count("frames fitted", len(surfaces))
     key, template = _key(surfaces, guides.key), Template(faces, predictions.shape[1])
     registration = _Registration(template, surfaces, options, key, guides.noise)
     positions = registration.first(predictions, guides.rest)

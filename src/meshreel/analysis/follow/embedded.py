@@ -17,6 +17,7 @@ from jaxtyping import Float64
 from scipy.spatial import cKDTree
 
 from ...errors import InputError
+from ...geometry import work
 from ...geometry.closest_points import Surface
 from ...geometry.rigid import quaternions
 from ...geometry.strict import products, rotations_of
@@ -136,6 +137,7 @@ class Tracker:
         surface = mesh if isinstance(mesh, FrameSurface) else None if mesh.is_empty else FrameSurface(mesh)
         if surface is not None and not np.isfinite(surface.mesh.vertices).all():
             raise InputError(f"frame {frame} has coordinates that are not finite; repair it first")
+        work.count("frames tracked")
         pose, residual = self._poses[self._known(frame)], np.inf
         if surface is not None:
             pose, residual = self._follow(frame, surface)

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Int64
 
 from ...errors import InputError
+from ...geometry import work
 from ...geometry.poisson import PoissonOptions, drop_small, reconstruct
 from ...geometry.topology import clean, edge_lengths, vertex_normals
 from ...types import Mesh
@@ -51,6 +52,7 @@ def fused_mesh(
 
     `noise` is the RMS distance of the frames from the truth. The mesh is empty if too little agrees.
     """
+    work.count("surfaces fused")
     carried = [FrameSurface(motion.back(at, frame.mesh)) for at, frame in enumerate(frames)]
     points = np.concatenate([one.mesh.vertices for one in carried])
     cell = max(options.noise * noise, options.spacing * _spacing(frames))

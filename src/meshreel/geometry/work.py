@@ -1,0 +1,43 @@
+"""Counts of the work that an encode does: what costs time on every machine, and depends on none.
+
+In: `count` where work is done. Out: what was counted since a moment, by kind.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from typing import Literal
+
+Kind = Literal["frames read", "frames tracked", "frames fitted", "surfaces fused", "decimations", "closest points"]
+Work = dict[str, int]  # number of times by kind
+
+_here = threading.local()
+
+
+def count(kind: Kind, number: int = 1) -> None:
+    """Count work that this thread does."""
+    _counts()[kind] += number
+
+
+def so_far() -> Work:
+    """Return what this thread has done so far."""
+    return dict(_counts())
+
+
+def since(before: Work) -> Work:
+    """Return what this thread has done since `so_far` returned `before`."""
+    return {
+        kind: number - before.get(kind, 0) for kind, number in sorted(so_far().items()) if number > before.get(kind, 0)
+    }
+
+
+def add(work: Work) -> None:
+    """Count work that another thread or process did for this one."""
+    _counts().update(work)
+
+
+def _counts() -> Counter[str]:
+    if not hasattr(_here, "counts"):
+        _here.counts = Counter[str]()
+    return _here.counts
