@@ -8,6 +8,7 @@ void bind_dense(nanobind::module_&);
 void bind_entropy(nanobind::module_&);
 void bind_laplacian(nanobind::module_&);
 void bind_layers(nanobind::module_&);
+void bind_fit(nanobind::module_&);
 void bind_tracking(nanobind::module_&);
 
 }  // namespace meshreel
@@ -19,5 +20,6 @@ NB_MODULE(_core, m) {
     meshreel::bind_entropy(m);
     meshreel::bind_laplacian(m);
     meshreel::bind_layers(m);
+    meshreel::bind_fit(m);
     meshreel::bind_tracking(m);
 }

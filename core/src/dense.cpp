@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "guarded.h"
+#include "strict_exp.h"
 
 namespace meshreel {
 namespace {
@@ -97,16 +98,6 @@ void diagonalise(double* a, double* vectors, size_t n) {
     }
 }
 
-double exp_of(double x) {
-    if (!(x < 709.782712893384)) return x != x ? x : std::numeric_limits<double>::infinity();
-    if (x < -745.2) return 0.0;
-    const double k = std::nearbyint(x * 1.4426950408889634);
-    const double r = (x - k * 0.693147180369123816490) - k * 1.90821492927058770002e-10;  // ln 2 in two parts
-    double sum = 1.0;
-    for (double n = 14.0; n >= 1.0; n -= 1.0) sum = 1.0 + r / n * sum;
-    return std::ldexp(sum, static_cast<int>(k));
-}
-
 double log2_of(double x) {
     if (!(x > 0.0)) {
         return x == 0.0 ? -std::numeric_limits<double>::infinity() : std::numeric_limits<double>::quiet_NaN();
@@ -175,7 +166,7 @@ int mr_eigen(const double* matrices, size_t count, size_t size, double* values, 
     });
 }
 
-void mr_exp(const double* x, size_t count, double* out) { std::transform(x, x + count, out, exp_of); }
+void mr_exp(const double* x, size_t count, double* out) { std::transform(x, x + count, out, strict_exp); }
 
 void mr_log2(const double* x, size_t count, double* out) { std::transform(x, x + count, out, log2_of); }
 

@@ -51,8 +51,9 @@ inline Matrix product(const Matrix& a, const Matrix& b) {
 }
 
 // Turns `r` towards the rotation nearest to `s` (maximal trace of r^T s). Directions that s does not determine keep r:
-// so a degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice.
-inline void follow(Matrix& r, const Matrix& s, int steps) {
+// so a degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice. It ends after a
+// step of `still`, rad^2.
+inline void follow(Matrix& r, const Matrix& s, int steps, double still = 1e-16) {
     for (int step = 0; step < steps; ++step) {
         Vec torque{0, 0, 0};
         double alignment = 0, size = 0;
@@ -64,7 +65,7 @@ inline void follow(Matrix& r, const Matrix& s, int steps) {
         }
         const Vec w = (1 / (std::fabs(alignment) + 1e-9 * std::sqrt(size) + 1e-300)) * torque;
         r = product(turn(w), r);
-        if (dot(w, w) < 1e-16) break;
+        if (dot(w, w) < still) break;
     }
 }
 

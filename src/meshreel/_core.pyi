@@ -180,3 +180,45 @@ def frames_of_rows(rows: Float64[np.ndarray, "V 3 T"], place: _Place | None) -> 
 def keep_faces(
     faces: Int32[np.ndarray, "F 3"], dropped: UInt8[np.ndarray, " F"], room: Int32[np.ndarray, "N 3"]
 ) -> int: ...
+
+# bind_fit.cpp
+
+class SurfaceTree:
+    def __init__(self, positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> None: ...
+    def move(self, positions: Float64[np.ndarray, "V 3"]) -> None: ...
+    def closest(
+        self, queries: Float64[np.ndarray, "N 3"], reach: float, guesses: Int32[np.ndarray, " N"] | None = None
+    ) -> tuple[Int32[np.ndarray, " N"], Float64[np.ndarray, "N 3"]]: ...
+
+class FitTarget:
+    def __init__(
+        self,
+        tree: SurfaceTree,
+        positions: Float64[np.ndarray, "V 3"],
+        faces: Int32[np.ndarray, "F 3"],
+        normals: Float64[np.ndarray, "V 3"],
+        inside: UInt8[np.ndarray, " V"],
+        points: Float64[np.ndarray, "N 3"],
+        point_normals: Float64[np.ndarray, "N 3"],
+        outward: Float64[np.ndarray, "N 3"],
+    ) -> None: ...
+
+class FitTemplate:
+    def __init__(self, faces: Int32[np.ndarray, "F 3"], vertices: int) -> None: ...
+    def fit(
+        self,
+        target: FitTarget,
+        rest: Float64[np.ndarray, "V 3"],
+        place: Float64[np.ndarray, "V 3"],
+        start: Float64[np.ndarray, "V 3"],
+        gates: Float64[np.ndarray, " R"],
+        smoothing: Float64[np.ndarray, " R"],
+        agreement: float,
+        anchor: float,
+        tolerance: float,
+        iterations: int,
+        turn: bool,
+    ) -> Float64[np.ndarray, "V 3"]: ...
+    def turned_laplacian(
+        self, rest: Float64[np.ndarray, "V 3"], now: Float64[np.ndarray, "V 3"]
+    ) -> Float64[np.ndarray, "V 3"]: ...

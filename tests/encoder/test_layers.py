@@ -9,7 +9,7 @@ from typing import overload
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.match import FrameSurface
+from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.group import continue_group
 from meshreel.encoder import layers as layered

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from meshreel.geometry.cameras import PinholeCamera
-from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.raycast import Rays
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere
@@ -92,13 +91,3 @@ def test_a_view_sees_what_its_rays_meet():
     assert same.mean() > 0.99 and (seen.faces >= 0).mean() > 0.1
     depth = (hit.distances * local[:, 2]).reshape(60, 80)
     assert np.allclose(depth[same & (seen.faces >= 0)], seen.depth[same & (seen.faces >= 0)], atol=1e-5)
-
-
-def test_rays_reuse_a_surface_built_for_closest_points():
-    ball = moved(sphere(0.5), (0, 0, 3))
-    surface = Surface(ball)
-    rays, alone = Rays.of(surface), Rays(ball, origin=np.zeros(3))
-    seen, wanted = rays.look(camera()), alone.look(camera())
-    assert np.array_equal(seen.faces, wanted.faces) and np.array_equal(seen.depth, wanted.depth)
-    assert np.array_equal(rays.backs(camera(), seen), alone.backs(camera(), wanted))
-    assert np.array_equal(surface.closest(np.zeros((1, 3))).points, Surface(ball).closest(np.zeros((1, 3))).points)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float64, Int32
 
-from ..analysis.fit.match import FrameSurface
+from ..analysis.fit.frame import FrameSurface
 from ..analysis.fit.surface_fit import Fit, Guides, fit_surfaces
 from ..analysis.follow.correspond import KeyMotion, choose_key, from_last
 from ..analysis.follow.fused_template import fused_mesh

@@ -15,7 +15,6 @@ from jaxtyping import Bool, Float32, Float64, Int32
 
 from ..types import Mesh
 from .cameras import PinholeCamera
-from .closest_points import Surface
 from .strict import inverse, products
 from .topology import face_normals
 
@@ -51,13 +50,6 @@ class Rays:
         if not mesh.is_empty:
             vertices = (mesh.vertices - self._origin).astype(np.float32)
             self._scene.add_triangles(self._tensor(vertices), self._tensor(mesh.faces.astype(np.uint32)))
-
-    @staticmethod
-    def of(surface: Surface) -> Rays:
-        """Reuse the scene of a mesh that is prepared for closest points; coordinates are float32 about 0."""
-        rays = Rays(Mesh.empty(), np.zeros(3))
-        rays._mesh, rays._scene = surface.mesh, surface.scene
-        return rays
 
     def cast(self, origins: Float64[np.ndarray, "N 3"], directions: Float64[np.ndarray, "N 3"]) -> Hit:
         """Find the first intersection of each of N rays."""

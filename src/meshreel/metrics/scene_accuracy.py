@@ -129,7 +129,7 @@ class Scene:
     @cached_property
     def rays(self) -> Rays:
         """Scene for ray casting, about `origin`."""
-        return Rays(self.mesh, np.zeros(3)) if self.mesh.is_empty else Rays.of(self.surface)
+        return Rays(self.mesh, np.zeros(3))
 
 
 def visible(scene: Scene, points: Scatter) -> Bool[np.ndarray, " N"]:

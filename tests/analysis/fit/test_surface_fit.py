@@ -153,7 +153,6 @@ def test_vertices_that_no_face_uses_keep_their_prediction() -> None:
         {"smoothing": (1.0, 1.0, 1.0, 0.0)},
         {"agreement": 1.0},
         {"anchor": 0.0},
-        {"guard": 0.5},
         {"second_smoothing": -1.0},
         {"second_smoothing": 0.0},
         {"components": -1},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.match import FrameSurface
+from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow import correspond
 from meshreel.analysis.follow.correspond import choose_key, from_last
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.match import FrameSurface
+from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.follow.embedded import EmbeddedOptions, Stage, Tracker, register
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.errors import InputError

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from meshreel.analysis.fit.match import FrameSurface
+from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.fit.residual import residual_of
 from meshreel.analysis.follow.embedded import Motion
 from meshreel.analysis.follow.embedded_graph import area_samples, build_graph, farthest_first

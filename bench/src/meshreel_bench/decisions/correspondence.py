@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.analysis.fit.match import FrameSurface
+from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.fit.residual import Residual, residual_of
 from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames
 from meshreel.analysis.follow.embedded import register

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from meshreel.analysis.fit.match import FrameSurface
+from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.fit.surface_fit import Guides, fit_surfaces
 from meshreel.analysis.follow.correspond import choose_key
 from meshreel.analysis.follow.template import shared_detail

@@ -14,7 +14,7 @@ from ...geometry.closest_points import Surface
 from ...geometry.strict import angle
 from ...geometry.topology import vertex_areas, vertex_normals
 from ...types import Mesh
-from .match import ON_BORDER, FrameSurface, interpolated, interpolated_scalar
+from .frame import ON_BORDER, FrameSurface, interpolated
 
 BITS = 0.01  # share of a noisy frame's area that may be stray surface: a guess
 
@@ -51,7 +51,7 @@ def residual_of(fitted: Mesh, frame: FrameSurface) -> Residual:
     ) / 2
     quantile = max(float(np.quantile(to_fit, 0.95)), float(np.quantile(to_frame, 0.95)))
     own, areas = vertex_areas(frame.mesh), vertex_areas(fitted)
-    beside = interpolated_scalar(frame.inside, frame.mesh.faces, back) > ON_BORDER
+    beside = frame.inside_at(back) > ON_BORDER
     by_area = max(_rms(to_fit, own), _rms(to_frame, areas))
     common = max(_rms(to_fit, _without_farthest(to_fit, own)), _rms(to_frame * beside, areas))
     return Residual(_rms(to_fit), _rms(to_frame), quantile, angles, by_area, common)

@@ -15,14 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32
 
+from ... import _core
 from ...errors import InputError
 from ...geometry import work
 from ...types import Mesh
-from .conjugate_gradients import Limits
-from .match import FrameSurface, MatchOptions, match
+from .frame import FrameSurface
 from .residual import NOTHING, Residual, residual_of
-from .shape import doubtful, strongest_components, turned_laplacian
-from .system import Problem, Template, solve
+from .shape import strongest_components
 
 FOLLOWED = 6e-4  # RMS noise from which the second fit trusts the coherent positions more than the frames (decision 16)
 NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit it (decision 16)
@@ -45,7 +44,6 @@ class FitOptions:
     pull: float = 0.1  # row weight of the offset from the coherent positions in the second fit
     restart: bool = True  # the second fit starts from the coherent positions, and the key keeps its first fit
     second_smoothing: float | None = None  # row weight of the coherent shape; None: the last of `smoothing`
-    guard: float = 1.0  # factor on the smoothing where faces fold over or collapse
     iterations: int = 40  # largest number of conjugate-gradient iterations per round
     tolerance: float = 1e-3  # relative residual at which they stop
 
@@ -56,10 +54,9 @@ class FitOptions:
             )
         if not -1 <= self.agreement < 1:
             raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
-        if min(self.anchor, self.pull) <= 0 or self.guard < 1 or self.components < 0:
+        if min(self.anchor, self.pull) <= 0 or self.components < 0:
             raise InputError(
-                f"anchor {self.anchor}, pull {self.pull}, guard {self.guard}, "
-                f"components {self.components}: give > 0, > 0, >= 1, >= 0"
+                f"anchor {self.anchor}, pull {self.pull}, components {self.components}: give > 0, > 0, >= 0"
             )
         if self.second_smoothing is not None and not self.second_smoothing > 0:
             raise InputError(
@@ -167,7 +164,7 @@ def fit_surfaces(
 ) -> Float64[np.ndarray, "T V 3"]:
     """Fit a template to prepared frames (None: an empty one); return its positions without residuals."""
     work.count("frames fitted", len(surfaces))
-    key, template = _key(surfaces, guides.key), Template(faces, predictions.shape[1])
+    key, template = _key(surfaces, guides.key), _core.FitTemplate(faces, predictions.shape[1])
     registration = _Registration(template, surfaces, options, key, guides.noise)
     positions = registration.first(predictions, guides.rest)
     if options.components and len(surfaces) > 1:
@@ -190,7 +187,7 @@ def _key(surfaces: Sequence[FrameSurface | None], key: int | None) -> int:
 class _Registration:
     """First and second fit of one template to prepared frames."""
 
-    template: Template
+    template: _core.FitTemplate
     surfaces: Sequence[FrameSurface | None]
     options: FitOptions
     key: int
@@ -200,49 +197,61 @@ class _Registration:
         self, predictions: Float64[np.ndarray, "T V 3"], given: Float64[np.ndarray, "V 3"] | None
     ) -> Float64[np.ndarray, "T V 3"]:
         """Fit every frame from its prediction, the key frame first: its fit is the rest shape if none is given."""
-        options, template, rounds = self.options, self.template, self.options.rounds(self.noise)
+        rounds = self.options.rounds(self.noise)
+        schedule = _Schedule(rounds.gates, rounds.smoothing, self.options.anchor, turn=True)
         positions = predictions.copy()
-        rest = predictions[self.key] if given is None else given
         for at in [self.key] + [t for t in range(len(self.surfaces)) if t != self.key]:
-            surface = self.surfaces[at]
-            if surface is None:
-                continue
-            x = predictions[at]
-            for gate, smoothing in zip(rounds.gates, rounds.smoothing, strict=True):
-                shape, turns = turned_laplacian(template, rest, x)
-                stiffness = np.full(template.count, smoothing)
-                if (
-                    options.guard > 1 and smoothing == rounds.smoothing[-1]
-                ):  # not in earlier rounds, which must follow the data
-                    stiffness[doubtful(template, rest, turns, x)] *= options.guard
-                x = self._round(x, surface, gate, Problem(shape, stiffness, predictions[at], options.anchor))
-            positions[at] = x
-            rest = positions[self.key] if given is None else given
+            own = predictions if at == self.key else positions  # until the key is fitted, its prediction
+            rest = own[self.key] if given is None else given
+            positions[at] = self._fitted(at, rest, predictions[at], predictions[at], schedule)
         return positions
 
     def second(
         self, first: Float64[np.ndarray, "T V 3"], coherent: Float64[np.ndarray, "T V 3"]
     ) -> Float64[np.ndarray, "T V 3"]:
         """Fit the frames again, near coherent positions made from the first fit."""
-        options, template, rounds = self.options, self.template, self.options.rounds(self.noise)
+        rounds, restart = self.options.rounds(self.noise), self.options.restart
+        gates = rounds.gates[-2:]
+        schedule = _Schedule(gates, (rounds.second_smoothing,) * len(gates), rounds.pull, turn=False)
         positions = first.copy()
-        for at, surface in enumerate(self.surfaces):
-            if surface is None or (at == self.key and options.restart):
-                continue
-            x = coherent[at] if options.restart else first[at]
-            stiffness = np.full(template.count, rounds.second_smoothing)
-            if options.guard > 1:
-                _, turns = turned_laplacian(template, first[self.key], x)
-                stiffness[doubtful(template, first[self.key], turns, x)] *= options.guard
-            shape = template.laplacian @ coherent[at]
-            for gate in rounds.gates[-2:]:
-                x = self._round(x, surface, gate, Problem(shape, stiffness, coherent[at], rounds.pull))
-            positions[at] = x
+        for at in range(len(self.surfaces)):
+            if not (at == self.key and restart):
+                start = coherent[at] if restart else first[at]
+                positions[at] = self._fitted(at, coherent[at], coherent[at], start, schedule)
         return positions
 
-    def _round(
-        self, x: Float64[np.ndarray, "V 3"], surface: FrameSurface, gate: float, problem: Problem
+    def _fitted(
+        self,
+        at: int,
+        rest: Float64[np.ndarray, "V 3"],
+        place: Float64[np.ndarray, "V 3"],
+        start: Float64[np.ndarray, "V 3"],
+        schedule: _Schedule,
     ) -> Float64[np.ndarray, "V 3"]:
-        options = self.options
-        rows = match(self.template, x, surface, MatchOptions(gate, options.agreement))
-        return x + solve(self.template, rows, x, problem, Limits(options.iterations, options.tolerance))
+        """Fit one frame in the core; an empty one keeps where it starts."""
+        surface, o = self.surfaces[at], self.options
+        if surface is None:
+            return start
+        return self.template.fit(
+            surface.target,
+            rest,
+            place,
+            start,
+            np.array(schedule.gates),
+            np.array(schedule.smoothing),
+            o.agreement,
+            schedule.anchor,
+            o.tolerance,
+            o.iterations,
+            schedule.turn,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Schedule:
+    """Rounds of the fit of one frame."""
+
+    gates: tuple[float, ...]
+    smoothing: tuple[float, ...]
+    anchor: float  # row weight
+    turn: bool  # whether the shape turns with each vertex's neighbourhood

@@ -14,7 +14,7 @@ from jaxtyping import Float64
 
 from ...geometry.topology import vertex_normals
 from ...types import Mesh
-from ..fit.match import FrameSurface
+from ..fit.frame import FrameSurface
 from .embedded import EmbeddedOptions, Motion, Tracker
 
 NOISY_KEYS = 2  # keys tried at most under noise: the fused template completes them (decision 16)

@@ -24,7 +24,7 @@ from ...geometry.strict import products, rotations_of
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
 from ..fit.conjugate_gradients import Limits
-from ..fit.match import FrameSurface
+from ..fit.frame import FrameSurface
 from .embedded_graph import DeformationGraph, area_samples, build_graph, farthest_first
 from .embedded_match import NORMAL_REACH, SampledSurface
 from .embedded_solve import GraphSolver, Planes, Pose, RestGraph, moved, rotation, turned, unmoved

@@ -11,7 +11,7 @@ from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
 from ...geometry.strict import exp
-from ..fit.match import FrameSurface
+from ..fit.frame import FrameSurface
 from .embedded_graph import area_samples
 from .embedded_solve import Planes
 
@@ -24,7 +24,7 @@ class SampledSurface:
     def __init__(self, frame: FrameSurface, samples: int, agreement: float) -> None:
         self._frame, self._agreement = frame, agreement
         chosen = area_samples(frame.mesh, samples)
-        chosen = chosen[frame.inside[chosen] > 0]
+        chosen = chosen[frame.inside[chosen]]
         self._points, self._normals = frame.mesh.vertices[chosen], frame.normals[chosen]
         self._spacing = float(np.sqrt(frame.surface.areas.sum() / samples))
 
@@ -36,8 +36,9 @@ class SampledSurface:
         frame = self._frame
         hits = frame.surface.closest(points)
         planes = frame.normals_at(hits)
-        inside = np.einsum("nk,nk->n", hits.barycentric, frame.inside[frame.mesh.faces[hits.faces]])
-        weights = inside * self._weights(np.linalg.norm(points - hits.points, axis=1) / gate, planes, normals)
+        weights = frame.inside_at(hits) * self._weights(
+            np.linalg.norm(points - hits.points, axis=1) / gate, planes, normals
+        )
         return _kept(np.arange(len(points)), planes, hits.points, weights)
 
     def _back(self, points: Float64[np.ndarray, "S 3"], normals: Float64[np.ndarray, "S 3"], gate: float) -> Planes:

@@ -18,7 +18,7 @@ from ...geometry import work
 from ...geometry.poisson import PoissonOptions, drop_small, reconstruct
 from ...geometry.topology import clean, edge_lengths, vertex_normals
 from ...types import Mesh
-from ..fit.match import ON_BORDER, FrameSurface, interpolated_scalar
+from ..fit.frame import ON_BORDER, FrameSurface
 from .embedded import Motion
 
 SHALLOWEST, DEEPEST = 4, 10  # limits of the octree's depth (guess)
@@ -81,7 +81,7 @@ def _agreeing(surface: Mesh, frames: Sequence[FrameSurface], reach: float) -> In
     for frame in frames:
         hits = frame.surface.closest(surface.vertices)
         near = np.linalg.norm(hits.points - surface.vertices, axis=1) <= reach
-        within = interpolated_scalar(frame.inside, frame.mesh.faces, hits) > ON_BORDER
+        within = frame.inside_at(hits) > ON_BORDER
         count += near & within & (np.einsum("nd,nd->n", frame.surface.normals[hits.faces], normals) > 0)
     return count
 

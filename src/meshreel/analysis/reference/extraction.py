@@ -17,7 +17,7 @@ from jaxtyping import Float64
 from ...errors import InputError
 from ...geometry.closest_points import Surface
 from ...types import Centers, Mesh
-from ..fit.match import FrameSurface
+from ..fit.frame import FrameSurface
 from ..fit.surface_fit import FitOptions, Guides, fit_surfaces
 from .centers import ReferenceCenterOptions, affinity, largest_distances, reference_centers
 from .deform import DeformOptions, Neighbours, bind, center_motions, move, neighbours

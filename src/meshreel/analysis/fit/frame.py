@@ -1,0 +1,60 @@
+"""Frames prepared for fits: search structure, vertex normals, and samples on open borders.
+
+In: a mesh. Out: FrameSurface, and values of its vertices at points of its surface.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float64
+
+from ... import _core
+from ...geometry.closest_points import Hits, Surface
+from ...geometry.topology import border_edges, vertex_normals
+from ...types import Mesh
+from .border import border_sides, sample_border
+
+ON_BORDER = 1e-6  # points of a surface with an interpolated `inside` up to this lie on an open border: rounding
+
+
+class FrameSurface:
+    """A frame prepared for matching: search structure, vertex normals, and which vertices are on no open border."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self.surface = Surface(mesh)
+        self.normals = vertex_normals(mesh)
+        self.inside = _inside(mesh)
+
+    def normals_at(self, hits: Hits) -> Float64[np.ndarray, "N 3"]:
+        """Interpolate the vertex normals at points of the surface; unit vectors."""
+        return interpolated(self.normals, self.mesh.faces, hits)
+
+    def inside_at(self, hits: Hits) -> Float64[np.ndarray, " N"]:
+        """Interpolate 1 for vertices inside and 0 for those on open borders at points of the surface."""
+        return np.einsum("nk,nk->n", hits.barycentric, self.inside[self.mesh.faces[hits.faces]])
+
+    @cached_property
+    def target(self) -> _core.FitTarget:
+        """The frame as the core's fit takes it."""
+        rim = sample_border(self.mesh, border_sides(self.mesh.faces))
+        inside = self.inside.astype(np.uint8)
+        vertices, faces = self.mesh.vertices, self.mesh.faces
+        return _core.FitTarget(
+            self.surface.tree, vertices, faces, self.normals, inside, rim.points, rim.normals, rim.outward
+        )
+
+
+def interpolated(values: Float64[np.ndarray, "V 3"], faces: np.ndarray, hits: Hits) -> Float64[np.ndarray, "N 3"]:
+    """Interpolate unit vectors of a mesh's vertices at points of its surface; zero where they cancel."""
+    n = np.einsum("nk,nkd->nd", hits.barycentric, values[faces[hits.faces]])
+    length = np.linalg.norm(n, axis=1)
+    return n / np.where(length > 0, length, 1.0)[:, None]
+
+
+def _inside(mesh: Mesh) -> Bool[np.ndarray, " V"]:
+    inside = np.ones(len(mesh.vertices), bool)
+    inside[border_edges(mesh).reshape(-1)] = False
+    return inside
