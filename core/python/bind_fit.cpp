@@ -1,57 +1,13 @@
 #include "meshreel/fit.h"
 
-#include <algorithm>
 #include <vector>
 
-#include "arrays.h"
+#include "trees.h"
 
 namespace meshreel {
 namespace {
 
 using namespace nb::literals;
-
-template <class T, void (*destroy)(T*)>
-struct Destroy {
-    void operator()(T* handle) const { destroy(handle); }
-};
-
-bool are_vectors(const In<double, 2>& rows, size_t count) { return rows.shape(0) == count && rows.shape(1) == 3; }
-
-class SurfaceTree {
-public:
-    SurfaceTree(In<double, 2> positions, In<int32_t, 2> faces) : vertices_(positions.shape(0)) {
-        const mr_mesh mesh = mesh_of(positions, faces);
-        mr_tree* tree = nullptr;
-        check(mr_tree_create(&mesh, &tree));
-        tree_.reset(tree);
-    }
-
-    void move(In<double, 2> positions) {
-        expect(are_vectors(positions, vertices_));
-        check(mr_tree_move(tree_.get(), positions.data()));
-    }
-
-    nb::tuple closest(In<double, 2> queries, double reach, nb::object guesses) const {
-        const size_t count = queries.shape(0);
-        expect(are_vectors(queries, count));
-        Buffer<int32_t> faces(count);
-        std::fill(faces.data(), faces.data() + count, -1);
-        if (!guesses.is_none()) {
-            const auto given = nb::cast<In<int32_t, 1>>(guesses);
-            expect(given.shape(0) == count);
-            std::copy(given.data(), given.data() + count, faces.data());
-        }
-        Buffer<double> weights(3 * count);
-        check(mr_tree_closest(tree_.get(), queries.data(), count, reach, faces.data(), weights.data()));
-        return nb::make_tuple(faces.shaped(count), weights.shaped(count, 3));
-    }
-
-    const mr_tree* handle() const { return tree_.get(); }
-
-private:
-    size_t vertices_;
-    std::unique_ptr<mr_tree, Destroy<mr_tree, mr_tree_destroy>> tree_;
-};
 
 // A frame that templates are fitted to; it holds the arrays that it refers to.
 class FitTarget {
@@ -63,7 +19,7 @@ public:
         const size_t count = points.shape(0);
         expect(are_vectors(normals, positions.shape(0)) && inside.shape(0) == positions.shape(0));
         expect(are_vectors(points, count) && are_vectors(point_normals, count) && are_vectors(outward, count));
-        target_ = {mesh_of(positions, faces), nb::cast<const SurfaceTree&>(tree).handle(), normals.data(),
+        target_ = {mesh_of(positions, faces), nb::cast<const PySurfaceTree&>(tree).handle(), normals.data(),
                    inside.data(), {points.data(), point_normals.data(), outward.data(), count}};
     }
 
@@ -110,10 +66,10 @@ private:
 }  // namespace
 
 void bind_fit(nb::module_& m) {
-    nb::class_<SurfaceTree>(m, "SurfaceTree", "A mesh with at least one face, prepared for closest-point queries.")
+    nb::class_<PySurfaceTree>(m, "SurfaceTree", "A mesh with at least one face, prepared for closest-point queries.")
         .def(nb::init<In<double, 2>, In<int32_t, 2>>(), "positions"_a, "faces"_a)
-        .def("move", &SurfaceTree::move, "positions"_a, "Gives the vertices other positions.")
-        .def("closest", &SurfaceTree::closest, "queries"_a, "reach"_a, "guesses"_a = nb::none(),
+        .def("move", &PySurfaceTree::move, "positions"_a, "Gives the vertices other positions.")
+        .def("closest", &PySurfaceTree::closest, "queries"_a, "reach"_a, "guesses"_a = nb::none(),
              "The closest face to each query, -1 where none is within reach, and the weights of its corners.");
     nb::class_<FitTarget>(m, "FitTarget", "A frame prepared for fits, with samples on its open borders.")
         .def(nb::init<nb::object, In<double, 2>, In<int32_t, 2>, In<double, 2>, In<uint8_t, 1>, In<double, 2>,

@@ -4,6 +4,7 @@
 namespace meshreel {
 
 void bind_draco(nanobind::module_&);
+void bind_deform(nanobind::module_&);
 void bind_dense(nanobind::module_&);
 void bind_entropy(nanobind::module_&);
 void bind_laplacian(nanobind::module_&);
@@ -16,6 +17,7 @@ void bind_tracking(nanobind::module_&);
 NB_MODULE(_core, m) {
     m.doc() = "The arithmetic that must be fast, and equal to the bit in every build.";
     meshreel::bind_draco(m);
+    meshreel::bind_deform(m);
     meshreel::bind_dense(m);
     meshreel::bind_entropy(m);
     meshreel::bind_laplacian(m);

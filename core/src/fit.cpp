@@ -7,22 +7,11 @@
 #include "arrays.h"
 #include "fit_equations.h"
 #include "guarded.h"
-#include "strict_exp.h"
+#include "pair_weight.h"
 #include "tree_handle.h"
 
 namespace meshreel {
 namespace {
-
-Vec unit(Vec a) {
-    const double size = std::sqrt(dot(a, a));
-    return (1.0 / (size > 0.0 ? size : 1.0)) * a;
-}
-
-// Gaussian of a distance in gates, sigma half a gate; 0 past the gate and where normals disagree.
-double pair_weight(Vec gap, double gate, double agree, double least) {
-    const double distance = std::sqrt(dot(gap, gap)) / gate;
-    return agree > least && distance < 1.0 ? strict_exp(-2.0 * distance * distance) : 0.0;
-}
 
 struct Samples {  // on open borders
     std::vector<double> points;
@@ -99,7 +88,7 @@ private:
                 inside += hit.weights[k] * fitted_.inside[static_cast<size_t>(corner)];
             }
             const double agree = dot(normal, face_normals_[static_cast<size_t>(hit.face)]);
-            const double weight = pair_weight(point - closest, gate, agree, rounds_.agreement) * inside * evenly;
+            const double weight = pair_weight(length(point - closest) / gate, agree, rounds_.agreement) * inside * evenly;
             add(hit.face, hit.weights, normal, point, weight);
         }
     }
@@ -135,7 +124,7 @@ private:
             inside += hit.weights[k] * target_.inside[corner];
         }
         normal = unit(normal);
-        const double weight = pair_weight(point - closest, gate, dot(normal, own), rounds_.agreement) * inside * share;
+        const double weight = pair_weight(length(point - closest) / gate, dot(normal, own), rounds_.agreement) * inside * share;
         add(face, corners, normal, closest, weight);
     }
 
@@ -186,7 +175,8 @@ private:
         const Vec outward = load(target_.rim.outward + 3 * other);
         if (!(dot(own.outward[mine], outward) > rounds_.agreement)) return;
         const double agree = dot(own.normals[mine], normal);
-        const double weight = pair_weight(load(&own.points[3 * mine]) - point, gate, agree, rounds_.agreement);
+        const double away = length(load(&own.points[3 * mine]) - point) / gate;
+        const double weight = pair_weight(away, agree, rounds_.agreement);
         for (Vec direction : {outward, normal})
             add(own.faces[mine], own.corners[mine], direction, point, weight * share / MR_RIM_SAMPLES);
     }

@@ -222,3 +222,54 @@ class FitTemplate:
     def turned_laplacian(
         self, rest: Float64[np.ndarray, "V 3"], now: Float64[np.ndarray, "V 3"]
     ) -> Float64[np.ndarray, "V 3"]: ...
+
+# bind_deform.cpp
+
+class DeformTarget:
+    def __init__(
+        self,
+        tree: SurfaceTree,
+        positions: Float64[np.ndarray, "V 3"],
+        faces: Int32[np.ndarray, "F 3"],
+        normals: Float64[np.ndarray, "V 3"],
+        inside: UInt8[np.ndarray, " V"],
+        points: Float64[np.ndarray, "N 3"],
+        point_normals: Float64[np.ndarray, "N 3"],
+        spacing: float,
+    ) -> None: ...
+
+class Deformation:
+    def __init__(
+        self,
+        nodes: Float64[np.ndarray, "N 3"],
+        edges: Int32[np.ndarray, "E 2"],
+        held: Float64[np.ndarray, " E"],
+        points: Float64[np.ndarray, "S 3"],
+        normals: Float64[np.ndarray, "S 3"],
+        bound: Int32[np.ndarray, "S k"],
+        weights: Float64[np.ndarray, "S k"],
+    ) -> None: ...
+    def deform(
+        self,
+        frame: DeformTarget,
+        rotations: Float64[np.ndarray, "N 3 3"],
+        positions: Float64[np.ndarray, "N 3"],
+        gates: Float64[np.ndarray, " R"],
+        rigidity: Float64[np.ndarray, " R"],
+        torn: float,
+        place: float,
+        agreement: float,
+        tolerance: float,
+        iterations: int,
+    ) -> tuple[Float64[np.ndarray, "N 3 3"], Float64[np.ndarray, "N 3"]]: ...
+    def matched(
+        self,
+        frame: DeformTarget,
+        rotations: Float64[np.ndarray, "N 3 3"],
+        positions: Float64[np.ndarray, "N 3"],
+        gate: float,
+        agreement: float,
+    ) -> float: ...
+    def holds(
+        self, rotations: Float64[np.ndarray, "N 3 3"], positions: Float64[np.ndarray, "N 3"], torn: float
+    ) -> Float64[np.ndarray, " E"]: ...

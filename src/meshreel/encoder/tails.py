@@ -305,7 +305,7 @@ def _samples(mesh: Mesh) -> tuple[Float64[np.ndarray, "N 3"], Float64[np.ndarray
 
 def _squared(
     surface: Surface, points: Float64[np.ndarray, "N 3"]
-) -> tuple[Float64[np.ndarray, " N"], Int64[np.ndarray, " N"]]:
+) -> tuple[Float64[np.ndarray, " N"], Int32[np.ndarray, " N"]]:
     hits = surface.closest(points)
     return ((hits.points - points) ** 2).sum(axis=1), hits.faces
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32
+from jaxtyping import Bool, Float64, Int32, Int64
 
 from .. import _core
 from ..types import Mesh
@@ -60,6 +60,11 @@ class Surface:
         faces, barycentric = self.tree.closest(np.ascontiguousarray(queries), np.inf, guesses)
         return Hits(blend(self.mesh.vertices, self.mesh.faces[faces], barycentric), faces, barycentric)
 
+    def move(self, vertices: Float64[np.ndarray, "V 3"]) -> None:
+        """Give the vertices other positions; the search structure is kept, which takes a tenth of a new one's time."""
+        self.mesh = Mesh(vertices, self.mesh.faces)
+        self.tree.move(vertices)
+
     def past_border(self, hits: Hits) -> Bool[np.ndarray, " N"]:
         """Return which closest points are on the mesh's border: their queries lie beside the surface, not above it."""
         edges, corners = self._border
@@ -75,6 +80,17 @@ class Surface:
         ends = np.zeros(len(self.mesh.vertices), bool)
         ends[edges[border].reshape(-1)] = True
         return border[face_edges], ends[self.mesh.faces]
+
+
+def area_samples(mesh: Mesh, count: int) -> Int64[np.ndarray, " S"]:
+    """Choose about `count` vertices, spread evenly over the area; ascending, the same for the same mesh."""
+    if len(mesh.vertices) <= count:
+        return np.arange(len(mesh.vertices))
+    _, areas = face_normals(mesh)
+    share = np.bincount(mesh.faces.reshape(-1), np.repeat(areas, 3), len(mesh.vertices))
+    reached = np.cumsum(share)
+    at = (np.arange(count) + 0.5) * (reached[-1] / count)
+    return np.unique(np.minimum(np.searchsorted(reached, at), len(share) - 1))
 
 
 class Outline:

@@ -10,10 +10,10 @@ import pytest
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.fit.residual import residual_of
 from meshreel.analysis.follow.embedded import Motion
-from meshreel.analysis.follow.embedded_graph import area_samples, build_graph, farthest_first
+from meshreel.analysis.follow.embedded_graph import build_graph, farthest_first
 from meshreel.analysis.follow.fused_template import FusedOptions, fused_mesh
 from meshreel.errors import InputError
-from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.closest_points import Surface, area_samples
 from meshreel.geometry.topology import clean, concatenate
 from meshreel.types import Mesh
 

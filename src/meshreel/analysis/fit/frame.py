@@ -8,10 +8,10 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Float64, Int64
 
 from ... import _core
-from ...geometry.closest_points import Hits, Surface
+from ...geometry.closest_points import Hits, Surface, area_samples
 from ...geometry.topology import border_edges, vertex_normals
 from ...types import Mesh
 from .border import border_sides, sample_border
@@ -27,6 +27,7 @@ class FrameSurface:
         self.surface = Surface(mesh)
         self.normals = vertex_normals(mesh)
         self.inside = _inside(mesh)
+        self._samples, self._sampled = dict[int, Int64[np.ndarray, " S"]](), dict[int, _core.DeformTarget]()
 
     def normals_at(self, hits: Hits) -> Float64[np.ndarray, "N 3"]:
         """Interpolate the vertex normals at points of the surface; unit vectors."""
@@ -36,15 +37,28 @@ class FrameSurface:
         """Interpolate 1 for vertices inside and 0 for those on open borders at points of the surface."""
         return np.einsum("nk,nk->n", hits.barycentric, self.inside[self.mesh.faces[hits.faces]])
 
+    def samples(self, count: int) -> Int64[np.ndarray, " S"]:
+        """Return about `count` vertices, spread evenly over the area."""
+        if count not in self._samples:
+            self._samples[count] = area_samples(self.mesh, count)
+        return self._samples[count]
+
+    def sampled(self, count: int) -> _core.DeformTarget:
+        """Return the frame with about `count` samples, as the core's embedded deformation takes it."""
+        if count not in self._sampled:
+            some, spacing = self.samples(count), float(np.sqrt(self.surface.areas.sum() / count))
+            some = some[self.inside[some]]
+            points, normals = self.mesh.vertices[some], self.normals[some]
+            whole = (self.surface.tree, self.mesh.vertices, self.mesh.faces, self.normals, self.inside.view(np.uint8))
+            self._sampled[count] = _core.DeformTarget(*whole, points, normals, spacing)
+        return self._sampled[count]
+
     @cached_property
     def target(self) -> _core.FitTarget:
         """The frame as the core's fit takes it."""
         rim = sample_border(self.mesh, border_sides(self.mesh.faces))
-        inside = self.inside.astype(np.uint8)
-        vertices, faces = self.mesh.vertices, self.mesh.faces
-        return _core.FitTarget(
-            self.surface.tree, vertices, faces, self.normals, inside, rim.points, rim.normals, rim.outward
-        )
+        whole = (self.surface.tree, self.mesh.vertices, self.mesh.faces, self.normals, self.inside.view(np.uint8))
+        return _core.FitTarget(*whole, rim.points, rim.normals, rim.outward)
 
 
 def interpolated(values: Float64[np.ndarray, "V 3"], faces: np.ndarray, hits: Hits) -> Float64[np.ndarray, "N 3"]:

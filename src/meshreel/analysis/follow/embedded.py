@@ -13,22 +13,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 from scipy.spatial import cKDTree
 
+from ... import _core
 from ...errors import InputError
 from ...geometry import work
-from ...geometry.closest_points import Surface
+from ...geometry.closest_points import Surface, area_samples
 from ...geometry.rigid import quaternions
 from ...geometry.strict import products, rotations_of
 from ...geometry.topology import clean, vertex_normals
 from ...types import Mesh
-from ..fit.conjugate_gradients import Limits
 from ..fit.frame import FrameSurface
-from .embedded_graph import DeformationGraph, area_samples, build_graph, farthest_first
-from .embedded_match import NORMAL_REACH, SampledSurface
-from .embedded_solve import GraphSolver, Planes, Pose, RestGraph, moved, rotation, turned, unmoved
+from .embedded_graph import Binding, DeformationGraph, build_graph, farthest_first
+from .embedded_pose import Pose, moved, rotation, turned, unmoved
 
+NORMAL_REACH = 0.01  # diagonals, weight of a difference of unit normals in a search: a guess
 LOST = 3.0  # RMS distances of the noise that a residual may have in addition: legs come and go (decision 16)
 BACK_ROUNDS = 2  # rounds of the inverse, the first of which only estimates the nodes that move a point: a guess
 UNUSUAL = 1.25  # a frame is retried if its residual exceeds this many times the median so far (decision 15)
@@ -119,9 +119,10 @@ class Tracker:
             raise InputError(f"the key frame {key} has coordinates that are not finite; repair it first")
         o = self.options
         self._samples = area_samples(self.mesh, o.samples)
+        self._moved = Surface(self.mesh)
         nodes = farthest_first(self.mesh, self._samples, o.fine.nodes)
         self._graph, coarse = build_graph(self.mesh, nodes), build_graph(self.mesh, nodes[: o.coarse.nodes])
-        self._fine, self._few = GraphSolver(self._rest(self._graph)), self._rest(coarse)
+        self._fine, self._few = self._rest(self._graph), self._rest(coarse)
         self._nodes_by_few = coarse.bind(self._graph.nodes, coarse.cells[nodes], o.neighbours)
         self._all = self._graph.bind(self.mesh.vertices, self._graph.cells, o.neighbours)
         self._poses = {key: Pose.at(self._graph.nodes)}
@@ -155,10 +156,10 @@ class Tracker:
         residuals = np.array([self._residuals[frame] for frame in frames])
         return Motion(self.mesh, self._graph, rotations, positions, residuals, self.options.neighbours)
 
-    def _rest(self, graph: DeformationGraph) -> RestGraph:
+    def _rest(self, graph: DeformationGraph) -> _Rest:
         points, normals = self.mesh.vertices[self._samples], vertex_normals(self.mesh)[self._samples]
         binding = graph.bind(points, graph.cells[self._samples], self.options.neighbours)
-        return RestGraph(graph.nodes, graph.edges, points, normals, binding)
+        return _Rest(graph.nodes, graph.edges, points, normals, binding, np.ones(len(graph.edges)))
 
     def _known(self, frame: int) -> int:
         """Return the registered frame, between a frame and the key, that is nearest to it and not empty."""
@@ -172,7 +173,7 @@ class Tracker:
     def _follow(self, frame: int, surface: FrameSurface) -> tuple[Pose, float]:
         """Register a frame from several starts until one is good enough; return the best pose and its residual."""
         o, last = self.options, self._known(frame)
-        there = SampledSurface(surface, o.samples, o.agreement)
+        there = surface.sampled(o.samples)
         usual = np.median([r for r in self._residuals.values() if 0 < r < np.inf] or [0.0])  # noise is not failure
         starts = self._starts(frame, there)
         best = self._poses[last], np.inf
@@ -187,7 +188,7 @@ class Tracker:
         stay = self._poses[last], self._measure(self._poses[last], surface)
         return best if best[1] < stay[1] else stay
 
-    def _starts(self, frame: int, surface: SampledSurface) -> list[Pose]:
+    def _starts(self, frame: int, surface: _core.DeformTarget) -> list[Pose]:
         """Return the neighbour's pose and its extrapolation, the one that matches the frame better first."""
         last = self._known(frame)
         side = 1 if frame > last else -1
@@ -198,36 +199,59 @@ class Tracker:
         ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
         gate = self.options.coarse.gates[-1]
         poses = [ahead, self._poses[last]]
-        return sorted(poses, key=lambda pose: -_planes(self._fine.rest, pose, surface, gate).weights.sum())
+        return sorted(poses, key=lambda pose: -self._fine.matched(surface, pose, gate, self.options.agreement))
 
-    def _carried(self, pose: Pose, surface: SampledSurface, torn: float) -> Pose:
+    def _carried(self, pose: Pose, surface: _core.DeformTarget, torn: float) -> Pose:
         """Move a pose by a coarse graph whose rest is that pose, so that its detail stays."""
-        few, fine = self._few, self._fine.rest
+        few, fine = self._few, self._fine
         here = Pose(pose.rotations[: len(few.nodes)], pose.positions[: len(few.nodes)])
         points, normals = moved(fine.points, fine.nodes, fine.binding, pose), turned(fine.normals, fine.binding, pose)
-        rest = RestGraph(here.positions, few.edges, points, normals, few.binding)
-        solver = GraphSolver(rest, GraphSolver(few).holds(here, torn))
-        carried = self._rounds(solver, Pose.at(here.positions), surface, self.options.coarse, torn)
+        rest = _Rest(here.positions, few.edges, points, normals, few.binding, few.holds(here, torn))
+        carried = self._rounds(rest, Pose.at(here.positions), surface, self.options.coarse, torn)
         positions = moved(pose.positions, here.positions, self._nodes_by_few, carried)
         return Pose(products(rotation(self._nodes_by_few, carried), pose.rotations), positions)
 
-    def _rounds(self, solver: GraphSolver, pose: Pose, surface: SampledSurface, stage: Stage, torn: float) -> Pose:
+    def _rounds(self, rest: _Rest, pose: Pose, surface: _core.DeformTarget, stage: Stage, torn: float) -> Pose:
         o = self.options
-        for gate, rigidity in zip(stage.gates, stage.rigidity, strict=True):
-            planes = _planes(solver.rest, pose, surface, gate)
-            stiffness = rigidity * solver.holds(pose, torn)
-            following = solver.step(pose, planes, stiffness, o.damping, Limits(o.iterations, o.tolerance))
-            if not following.is_finite:
-                break
-            pose = following
-        return pose
+        gates, rigidity = np.array(stage.gates), np.array(stage.rigidity)
+        rounds = (gates, rigidity, torn, o.damping, o.agreement, o.tolerance, o.iterations)
+        return Pose(*rest.core.deform(surface, pose.rotations, pose.positions, *rounds))
 
     def _measure(self, pose: Pose, surface: FrameSurface) -> float:
         """Return the RMS distance over samples of both surfaces; the larger of both directions."""
-        mesh = Mesh(moved(self.mesh.vertices, self._graph.nodes, self._all, pose), self.mesh.faces)
-        theirs = surface.mesh.vertices[area_samples(surface.mesh, self.options.samples)]
-        gaps = (_gaps(surface.surface, mesh.vertices[self._samples]), _gaps(Surface(mesh), theirs))
-        return float(np.sqrt(max(np.mean(gap) for gap in gaps)))
+        vertices = moved(self.mesh.vertices, self._graph.nodes, self._all, pose)
+        self._moved.move(vertices)
+        theirs = surface.mesh.vertices[surface.samples(self.options.samples)]
+        ahead, back = surface.surface.closest(vertices[self._samples]).points, self._moved.closest(theirs).points
+        pairs = ((ahead, vertices[self._samples]), (back, theirs))
+        return float(np.sqrt(max(((one - other) ** 2).sum(axis=1).mean() for one, other in pairs)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Rest:
+    """Deformation graph at rest, with the samples bound to it."""
+
+    nodes: Float64[np.ndarray, "N 3"]
+    edges: Int64[np.ndarray, "E 2"]
+    points: Float64[np.ndarray, "S 3"]
+    normals: Float64[np.ndarray, "S 3"]
+    binding: Binding
+    held: Float64[np.ndarray, " E"]  # factor of each edge's squared row weight
+
+    @property
+    def core(self) -> _core.Deformation:
+        """The graph as the core takes it."""
+        edges, bound = self.edges.astype(np.int32), self.binding.indices.astype(np.int32)
+        weights = self.binding.weights
+        return _core.Deformation(self.nodes, edges, self.held, self.points, self.normals, bound, weights)
+
+    def holds(self, pose: Pose, torn: float) -> Float64[np.ndarray, " E"]:
+        """Return the factor of each edge: 1 for one as at rest, a quarter for one off by `torn` of its length."""
+        return self.core.holds(pose.rotations, pose.positions, torn)
+
+    def matched(self, surface: _core.DeformTarget, pose: Pose, gate: float, agreement: float) -> float:
+        """Return the sum of the weights of all pairs of samples at a pose."""
+        return self.core.matched(surface, pose.rotations, pose.positions, gate, agreement)
 
 
 @dataclass(frozen=True, slots=True)
@@ -281,19 +305,8 @@ def register(key_mesh: Mesh, frames: Sequence[Mesh], key: int, options: Embedded
     return tracker.motion(range(len(frames)))
 
 
-def _planes(rest: RestGraph, pose: Pose, surface: SampledSurface, gate: float) -> Planes:
-    points, normals = moved(rest.points, rest.nodes, rest.binding, pose), turned(rest.normals, rest.binding, pose)
-    return surface.planes(points, normals, gate)
-
-
 def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:
     """Continue from pose `last` by `ratio` times the step from `first` to it."""
     turn = quaternions(products(last.rotations, first.rotations.transpose(0, 2, 1)))
     turns = rotations_of(turn * [1, ratio, ratio, ratio])  # the tangent of half the angle grows; exact for a ratio of 1
     return Pose(products(turns, last.rotations), last.positions + ratio * (last.positions - first.positions))
-
-
-def _gaps(surface: Surface, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
-    """Return squared distances of points to a surface."""
-    offsets = surface.closest(points).points - points
-    return np.einsum("nd,nd->n", offsets, offsets)

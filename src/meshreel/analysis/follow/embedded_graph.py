@@ -14,7 +14,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from ...geometry.topology import components, face_normals, unique_edges, vertex_normals
+from ...geometry.topology import components, unique_edges, vertex_normals
 from ...types import Mesh
 
 TURN = 0.01  # diagonals, weight of a difference of unit normals, so that both sides of a thin part get nodes: a guess
@@ -52,17 +52,6 @@ class DeformationGraph:
         weights = np.square(np.maximum(1 - away[:, :count] / reach[:, None], 0))
         weights[:, 0] = np.maximum(weights[:, 0], 1e-12)
         return Binding(np.maximum(indices[:, :count], 0), weights / weights.sum(axis=1, keepdims=True))
-
-
-def area_samples(mesh: Mesh, count: int) -> Int64[np.ndarray, " S"]:
-    """Choose about `count` vertices, spread evenly over the area; ascending, the same for the same mesh."""
-    if len(mesh.vertices) <= count:
-        return np.arange(len(mesh.vertices))
-    _, areas = face_normals(mesh)
-    share = np.bincount(mesh.faces.reshape(-1), np.repeat(areas, 3), len(mesh.vertices))
-    reached = np.cumsum(share)
-    at = (np.arange(count) + 0.5) * (reached[-1] / count)
-    return np.unique(np.minimum(np.searchsorted(reached, at), len(share) - 1))
 
 
 def farthest_first(mesh: Mesh, candidates: Int64[np.ndarray, " S"], count: int) -> Int64[np.ndarray, " N"]:

@@ -1,0 +1,55 @@
+// The tree of a surface as a class, which frames hold.
+#pragma once
+
+#include <algorithm>
+#include <memory>
+
+#include "arrays.h"
+#include "meshreel/tree.h"
+
+namespace meshreel {
+
+template <class T, void (*destroy)(T*)>
+struct Destroy {
+    void operator()(T* handle) const { destroy(handle); }
+};
+
+inline bool are_vectors(const In<double, 2>& rows, size_t count) { return rows.shape(0) == count && rows.shape(1) == 3; }
+
+class PySurfaceTree {
+public:
+    PySurfaceTree(In<double, 2> positions, In<int32_t, 2> faces) : vertices_(positions.shape(0)) {
+        const mr_mesh mesh = mesh_of(positions, faces);
+        mr_tree* tree = nullptr;
+        check(mr_tree_create(&mesh, &tree));
+        tree_.reset(tree);
+    }
+
+    void move(In<double, 2> positions) {
+        expect(are_vectors(positions, vertices_));
+        check(mr_tree_move(tree_.get(), positions.data()));
+    }
+
+    nb::tuple closest(In<double, 2> queries, double reach, nb::object guesses) const {
+        const size_t count = queries.shape(0);
+        expect(are_vectors(queries, count));
+        Buffer<int32_t> faces(count);
+        std::fill(faces.data(), faces.data() + count, -1);
+        if (!guesses.is_none()) {
+            const auto given = nb::cast<In<int32_t, 1>>(guesses);
+            expect(given.shape(0) == count);
+            std::copy(given.data(), given.data() + count, faces.data());
+        }
+        Buffer<double> weights(3 * count);
+        check(mr_tree_closest(tree_.get(), queries.data(), count, reach, faces.data(), weights.data()));
+        return nb::make_tuple(faces.shaped(count), weights.shaped(count, 3));
+    }
+
+    const mr_tree* handle() const { return tree_.get(); }
+
+private:
+    size_t vertices_;
+    std::unique_ptr<mr_tree, Destroy<mr_tree, mr_tree_destroy>> tree_;
+};
+
+}  // namespace meshreel
