@@ -20,6 +20,7 @@ CLOSED_DIAGONAL = 10.0  # here AGGRESSION 4 reaches the target and loses nothing
 OPEN_DIAGONAL = 100.0  # below it Open3D takes whole regions for flat (guess)
 AGGRESSION = 4.0  # of fast-simplification; see CLOSED_DIAGONAL (guess)
 BOUNDARY_WEIGHT = 10.0  # of planes on open borders against planes of faces (guess)
+ROUGHLY = 5  # times the wanted vertices that a first, quick pass leaves: errors are those of one pass (decision 14)
 ROUNDS = 3  # corrections of the number of faces: a collapse takes one face at a border and two elsewhere (guess)
 _ONE_AT_A_TIME = threading.Lock()  # fast-simplification keeps its mesh in static variables
 
@@ -36,7 +37,8 @@ def decimate(mesh: Mesh, vertices: int, border: float = BOUNDARY_WEIGHT) -> Mesh
     if len(mesh.vertices) <= vertices or mesh.diagonal == 0:
         return mesh
     work.count("decimations")
-    is_open = has_boundary(mesh)
+    if is_open := has_boundary(mesh):
+        mesh = _roughly(mesh, ROUGHLY * vertices)
     faces = max(len(mesh.faces) - 2 * (len(mesh.vertices) - vertices), 4)
     for _ in range(ROUNDS):
         small = clean(_collapse_open(mesh, faces, border) if is_open else _collapse_closed(mesh, faces))
@@ -60,8 +62,16 @@ def decimate_faces(mesh: Mesh, faces: int) -> Mesh:
         return mesh
     work.count("decimations")
     if has_boundary(mesh):
-        return clean(_collapse_open(mesh, faces, BOUNDARY_WEIGHT))
+        return clean(_collapse_open(_roughly(mesh, ROUGHLY * faces // 2), faces, BOUNDARY_WEIGHT))
     return clean(_collapse_closed(mesh, faces))
+
+
+def _roughly(mesh: Mesh, vertices: int) -> Mesh:
+    """Decimate a much finer mesh to about `vertices` vertices, without regard for its borders, in a tenth of the time."""
+    if len(mesh.vertices) < 2 * vertices:
+        return mesh
+    rough = clean(_collapse_closed(mesh, 2 * vertices))
+    return rough if len(rough.vertices) >= vertices // 2 else mesh  # many bits may be lost in one pass
 
 
 def has_boundary(mesh: Mesh) -> bool:
