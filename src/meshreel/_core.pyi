@@ -69,6 +69,25 @@ def klt_inverse(
     weights: Float64[np.ndarray, "V M"], vectors: Float64[np.ndarray, "M 3T"], mean: Float64[np.ndarray, " 3T"]
 ) -> Float64[np.ndarray, "V 3T"]: ...
 
+# bind_topology.cpp
+
+def weld(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"]]: ...
+def clean(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"]]: ...
+def drop_unreferenced(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "F 3"]]: ...
+def components(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Int32[np.ndarray, " V"]: ...
+def face_normals(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]: ...
+def vertex_normals(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> Float64[np.ndarray, "V 3"]: ...
+
 # bind_tracking.cpp
 
 def spread_centers(
