@@ -19,7 +19,8 @@ template <class T>
 using Row = std::array<T, 3>;
 
 bool sound(const mr_mesh& mesh) {
-    return mesh.vertices <= INT32_MAX && in_range(mesh.faces, 3 * mesh.face_count, mesh.vertices);
+    return mesh.vertices <= INT32_MAX && mesh.face_count <= INT32_MAX &&
+           in_range(mesh.faces, 3 * mesh.face_count, mesh.vertices);
 }
 
 template <class T>
@@ -38,12 +39,14 @@ std::vector<int32_t> first_of_same(size_t count, Key key, Same same) {
     size_t mask = 1;
     while (mask < count) mask *= 2;
     mask -= 1;
-    std::vector<int32_t> bounds(mask + 2, 0), rows(count), first(count);
-    const auto bucket = [&](size_t row) { return static_cast<size_t>(hash_of(key(row))) & mask; };
-    for (size_t row = 0; row < count; ++row) ++bounds[bucket(row) + 1];
+    std::vector<int32_t> bounds(mask + 2, 0), rows(count), first(count), buckets(count);
+    for (size_t row = 0; row < count; ++row) {
+        buckets[row] = static_cast<int32_t>(hash_of(key(row)) & mask);
+        ++bounds[static_cast<size_t>(buckets[row]) + 1];
+    }
     std::partial_sum(bounds.begin(), bounds.end(), bounds.begin());
     for (size_t row = count; row-- > 0;)  // backwards: bounds sink from the ends of the buckets to their beginnings
-        rows[static_cast<size_t>(--bounds[bucket(row) + 1])] = static_cast<int32_t>(row);
+        rows[static_cast<size_t>(--bounds[static_cast<size_t>(buckets[row]) + 1])] = static_cast<int32_t>(row);
     for (size_t at = 0; at <= mask; ++at) {
         const auto begin = rows.begin() + bounds[at + 1], end = at < mask ? rows.begin() + bounds[at + 2] : rows.end();
         if (end - begin > 1)
@@ -75,15 +78,14 @@ std::vector<int32_t> first_at_position(const mr_mesh& mesh) {
     });
 }
 
-std::vector<int32_t> first_with_vertices(const std::vector<Row<int32_t>>& faces) {
-    const auto key = [&](size_t f) {
-        Row<int32_t> corners = faces[f];
+std::vector<int32_t> first_with_vertices(std::vector<Row<int32_t>> faces) {
+    for (Row<int32_t>& corners : faces) {
         if (corners[0] > corners[1]) std::swap(corners[0], corners[1]);
         if (corners[1] > corners[2]) std::swap(corners[1], corners[2]);
         if (corners[0] > corners[1]) std::swap(corners[0], corners[1]);
-        return corners;
-    };
-    return first_of_same(faces.size(), key, [&](size_t a, size_t b) { return key(a) == key(b); });
+    }
+    return first_of_same(
+        faces.size(), [&](size_t f) { return faces[f]; }, [&](size_t a, size_t b) { return faces[a] == faces[b]; });
 }
 
 bool collapsed(const Row<int32_t>& face) { return face[0] == face[1] || face[1] == face[2] || face[2] == face[0]; }
@@ -92,10 +94,12 @@ Row<int32_t> face_of(const mr_mesh& mesh, size_t f) {
     return {mesh.faces[3 * f], mesh.faces[3 * f + 1], mesh.faces[3 * f + 2]};
 }
 
-// The cross product of two sides of a face, and its length.
+// The cross product of two sides of a face, and the square of its length.
 struct Span {
     Row<double> normal;
-    double length;
+    double square;
+
+    double length() const { return std::sqrt(square); }
 };
 
 Span span_of(const mr_mesh& mesh, const Row<int32_t>& face) {
@@ -104,11 +108,11 @@ Span span_of(const mr_mesh& mesh, const Row<int32_t>& face) {
     const double ux = b[0] - a[0], uy = b[1] - a[1], uz = b[2] - a[2];
     const double vx = c[0] - a[0], vy = c[1] - a[1], vz = c[2] - a[2];
     const double x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
-    return {{x, y, z}, std::sqrt(x * x + y * y + z * z)};
+    return {{x, y, z}, x * x + y * y + z * z};
 }
 
 Row<double> unit(const Span& span) {
-    const double divisor = span.length > 0 ? span.length : 1.0;
+    const double divisor = span.square > 0 ? span.length() : 1.0;
     return {span.normal[0] / divisor, span.normal[1] / divisor, span.normal[2] / divisor};
 }
 
@@ -151,7 +155,7 @@ void clean(const mr_mesh& mesh, mr_rest& rest) {
     faces.reserve(mesh.face_count);
     for (size_t f = 0; f < mesh.face_count; ++f) {
         const Row<int32_t> face = face_of(mesh, f);
-        if (!collapsed(face) && span_of(mesh, face).length > 0) faces.push_back(face);
+        if (!collapsed(face) && span_of(mesh, face).square > 0) faces.push_back(face);
     }
     const std::vector<int32_t> first = first_with_vertices(faces);
     rest.face_count = 0;
@@ -184,7 +188,7 @@ void normals_of_vertices(const mr_mesh& mesh, double* normals) {
     for (size_t f = 0; f < mesh.face_count; ++f) {
         const Span span = span_of(mesh, face_of(mesh, f));
         weighted[f] = unit(span);
-        for (double& part : weighted[f]) part *= span.length / 2;
+        for (double& part : weighted[f]) part *= span.length() / 2;
     }
     std::fill_n(normals, 3 * mesh.vertices, 0.0);
     std::vector<double> sums(3 * mesh.vertices);
@@ -242,7 +246,7 @@ int mr_face_normals(const mr_mesh* mesh, double* normals, double* areas) {
             const Span span = span_of(*mesh, face_of(*mesh, f));
             const Row<double> normal = unit(span);
             std::copy_n(normal.data(), 3, normals + 3 * f);
-            areas[f] = span.length / 2;
+            areas[f] = span.length() / 2;
         }
     });
 }
