@@ -69,6 +69,37 @@ def klt_inverse(
     weights: Float64[np.ndarray, "V M"], vectors: Float64[np.ndarray, "M 3T"], mean: Float64[np.ndarray, " 3T"]
 ) -> Float64[np.ndarray, "V 3T"]: ...
 
+# bind_reading.cpp
+
+def split_lines(
+    text: UInt8[np.ndarray, " B"], comment: str
+) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"]]: ...
+def read_numbers(
+    text: UInt8[np.ndarray, " B"], starts: Int64[np.ndarray, " N"], ends: Int64[np.ndarray, " N"], stop: str
+) -> tuple[Float64[np.ndarray, " M"], Int32[np.ndarray, " N"], int]: ...
+def read_lists(
+    data: UInt8[np.ndarray, " B"], fields: Int64[np.ndarray, "P 2"], count: int, wanted: int, big_endian: bool
+) -> tuple[UInt8[np.ndarray, " M"], Int64[np.ndarray, " N"], int, int]: ...
+
+# bind_topology.cpp
+
+def weld(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"]]: ...
+def clean(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"]]: ...
+def drop_unreferenced(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "F 3"]]: ...
+def components(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Int32[np.ndarray, " V"]: ...
+def face_normals(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]: ...
+def vertex_normals(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
+) -> Float64[np.ndarray, "V 3"]: ...
+
 # bind_tracking.cpp
 
 def spread_centers(

@@ -23,6 +23,7 @@ from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.target import Fidelity
 from meshreel.errors import InputError
 from meshreel.format.layout import Form
+from meshreel.geometry import derived_sequences
 from meshreel.types import Mesh, MeshList
 from tests.small_options import quick
 from tests.small_scene import scene
@@ -256,7 +257,7 @@ def test_a_search_begins_again_and_keeps_nothing(fake, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_frame_that_changes_after_the_survey_is_refused(fake, tmp_path):
+def test_a_frame_that_changes_after_the_survey_is_refused(fake, tmp_path, monkeypatch):
     class Moving(MeshList):
         reads = 0
 
@@ -266,6 +267,7 @@ def test_a_frame_that_changes_after_the_survey_is_refused(fake, tmp_path):
             return Mesh(mesh.vertices + (self.reads > 9), mesh.faces)
 
     Moving.__slots__ = ()
+    monkeypatch.setattr(derived_sequences, "MOST_KEPT", 0)  # so that frames are read again
     fake()
     with pytest.raises(InputError, match=r"frame \d: has changed while it was encoded; encode again"):
         encode(tmp_path / "a.reel", sequence=Moving(BALLS.meshes, 10.0))

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
-from meshreel.geometry.derived_sequences import Chosen, Upright, captured, forth_and_back
+from meshreel.geometry import derived_sequences
+from meshreel.geometry.derived_sequences import Chosen, Recent, Unchanging, Upright, captured, forth_and_back
+from meshreel.types import Mesh, MeshList
 
 
 def test_chosen_frames_are_those_of_the_source():
@@ -30,3 +37,54 @@ def test_a_sequence_that_names_no_up_axis_is_refused():
 
     with pytest.raises(InputError, match="up axis 'x'"):
         captured(Sideways(sliding_sphere(2, levels=1), None))
+
+
+def triangles(count: int) -> Mesh:
+    return Mesh.of(np.zeros((0, 3)), np.zeros((count, 3)))  # 12 bytes each
+
+
+@given(st.integers(0, 100), st.lists(st.integers(0, 9), max_size=40))
+def test_the_frames_used_last_are_kept_as_far_as_they_fit(most: int, numbers: list[int]):
+    recent, used = Recent(most), list[int]()
+    for number in numbers:
+        fitting = [k for at, k in enumerate(used) if sum(12 * other for other in used[: at + 1]) <= most]
+        found = recent.get(number)
+        assert (found is not None) == (number in fitting)
+        if found is None:
+            recent.keep(number, found := triangles(number))
+        assert len(found.faces) == number
+        used = [number, *(k for k in fitting if k != number)]
+
+
+class Counted(MeshList):
+    """Frames that count how often each is read, and that move from their third reading on."""
+
+    __slots__ = ()
+    reads: ClassVar[dict[int, int]] = {}
+
+    def __getitem__(self, index: int) -> Mesh:
+        self.reads[index] = self.reads.get(index, 0) + 1
+        mesh = super().__getitem__(index)
+        return Mesh(mesh.vertices + (self.reads[index] > 2), mesh.faces)
+
+
+def test_each_frame_is_read_once_while_all_fit(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(Counted, "reads", {})
+    source = sliding_sphere(3, levels=1)
+    frames = Unchanging(Counted(tuple(source)))
+    for _ in range(4):
+        for index, mesh in enumerate(frames):
+            np.testing.assert_array_equal(mesh.vertices, source[index].vertices)
+    assert Counted.reads == {0: 1, 1: 1, 2: 1} and len(frames.digests) == 3
+
+
+def test_a_frame_that_changed_before_it_is_read_again_is_refused(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(Counted, "reads", {})
+    source = sliding_sphere(3, levels=1)
+    monkeypatch.setattr(derived_sequences, "MOST_KEPT", source[0].vertices.nbytes + source[0].faces.nbytes)
+    frames = Unchanging(Counted(tuple(source)))  # it keeps one
+    for _ in range(2):
+        assert len(list(frames)) == 3
+    assert frames[2] is frames[2] and Counted.reads == {0: 2, 1: 2, 2: 2}
+    with pytest.raises(InputError, match="frame 0: has changed while it was encoded"):
+        frames[0]

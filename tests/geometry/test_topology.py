@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,6 +24,7 @@ from meshreel.geometry.topology import (
     with_neighbours,
 )
 from meshreel.types import Mesh
+from tests.geometry import topology_formulas as formulas
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
 SOLID = Mesh.of(CORNERS, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -68,16 +72,65 @@ def test_normals_have_unit_length_and_are_zero_without_area() -> None:
     np.testing.assert_array_equal(vertex_normals(flat)[[3, 4]], np.zeros((2, 3)))
 
 
-def test_normals_are_bit_by_bit_those_of_the_vector_formula() -> None:
+NUMBERS = st.sampled_from([0.0, -0.0, 1.0, -1.0, 0.1, 3e-160, 1e-170, 1e12, 1 + 2**-52])
+MESHES = st.integers(1, 9).flatmap(
+    lambda count: st.builds(
+        Mesh.of,
+        st.lists(st.tuples(*[NUMBERS] * 3), min_size=count, max_size=count),
+        st.lists(st.tuples(*[st.integers(0, count - 1)] * 3), max_size=30),
+    )
+)
+
+
+def assert_same_bits(found: Mesh | tuple, expected: Mesh | tuple) -> None:
+    for one, other in zip(
+        *(astuple(each) if isinstance(each, Mesh) else each for each in (found, expected)), strict=True
+    ):
+        assert one.shape == other.shape and one.dtype == other.dtype and one.tobytes() == other.tobytes()
+
+
+def assert_as_formulas(mesh: Mesh) -> None:
+    assert_same_bits(weld(mesh), formulas.weld(mesh))
+    assert_same_bits(clean(mesh), formulas.clean(mesh))
+    assert_same_bits(drop_unreferenced(mesh), formulas.drop_unreferenced(mesh))
+    assert_same_bits(face_normals(mesh), formulas.face_normals(mesh))
+    assert_same_bits((vertex_normals(mesh),), (formulas.vertex_normals(mesh),))
+    for one, other in zip(unique_edges(mesh.faces), formulas.unique_edges(mesh.faces), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@settings(max_examples=300, deadline=None)
+@given(MESHES)
+def test_small_meshes_with_everything_twice_are_treated_as_numpys_formulas_say(mesh: Mesh) -> None:
+    assert_as_formulas(mesh)
+
+
+def test_large_meshes_are_treated_as_numpys_formulas_say() -> None:
     rng = np.random.default_rng(0)
-    mesh = Mesh.of(rng.normal(size=(200, 3)) * 10.0 ** rng.integers(-6, 6, (200, 1)), rng.integers(0, 200, (2000, 3)))
-    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
-    cross = np.cross(b - a, c - a)
-    length = np.linalg.norm(cross, axis=1)
-    normals, areas = face_normals(mesh)
-    assert normals.tobytes() == (cross / np.where(length > 0, length, 1.0)[:, None]).tobytes()
-    assert areas.tobytes() == (length / 2).tobytes()
-    assert [part.shape for part in face_normals(Mesh.empty())] == [(0, 3), (0,)]
+    points = rng.normal(size=(200, 3)) * 10.0 ** rng.integers(-6, 6, (200, 1))
+    assert_as_formulas(Mesh.of(points, rng.integers(0, 200, (2000, 3))))
+    assert_as_formulas(Mesh.of(points.round(0), rng.integers(0, 200, (20000, 3))))
+    assert_as_formulas(Mesh.of(np.zeros((2000, 3)), np.tile(np.arange(3), (3000, 1))))  # one bucket has all
+    assert_as_formulas(Mesh.of(points, np.zeros((0, 3))))
+
+
+def test_a_position_that_is_no_number_is_equal_to_none() -> None:
+    points = np.array([[0, 0, np.nan], [0, 0, np.nan], [-0.0, 0, np.inf], [0.0, 0, np.inf]])
+    mesh = Mesh.of(points, [[0, 1, 2], [0, 1, 3]])
+    assert_same_bits(weld(mesh), Mesh.of(points[:3], [[0, 1, 2], [0, 1, 2]]))
+    assert np.signbit(weld(mesh).vertices[2, 0])
+    assert clean(mesh).is_empty
+    assert_same_bits(weld(mesh), formulas.weld(mesh))
+
+
+@pytest.mark.parametrize("call", [weld, clean, drop_unreferenced, face_normals, vertex_normals, subdivide_midpoint])
+@pytest.mark.parametrize("wrong", [-1, 4, 2**31 - 1, -(2**31)])
+def test_a_face_that_refers_to_a_missing_vertex_is_refused(call: Callable[[Mesh], object], wrong: int) -> None:
+    for points in (CORNERS, CORNERS[:0]):
+        with pytest.raises(ValueError, match="an index is out of range"):
+            call(Mesh.of(points, [[0, 1, 2], [2, wrong, 1]]))
+    with pytest.raises(ValueError, match="an index is out of range"):
+        components(np.array([[0, 1, wrong]], np.int32), 4)
 
 
 def test_a_blend_of_corners_is_the_corner_the_middle_or_any_affine_field_between() -> None:
@@ -104,7 +157,7 @@ def test_welding_merges_equal_positions_and_drops_what_collapses() -> None:
     np.testing.assert_array_equal(whole.vertices[whole.faces], soup.vertices[soup.faces])
     twice = Mesh.of([[0, 0, 0], [0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3], [1, 2, 3]])
     assert weld(twice).faces.tolist() == [[0, 1, 2], [0, 1, 2]]
-    assert weld(Mesh.empty()).is_empty
+    assert weld(Mesh.empty()).is_empty and clean(Mesh.empty()).is_empty
 
 
 def test_cleaning_leaves_each_face_with_an_area_once_and_no_loose_vertex() -> None:

@@ -34,6 +34,8 @@ OBJ_FORMS = {
     "negative_indices": "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 5 5 5\n",
     "windows_newlines": TRIANGLE.replace("\n", "\r\n"),
     "old_mac_newlines": TRIANGLE.replace("\n", "\r"),
+    "slash_and_nothing": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/ 2/// 3/x /9\n",
+    "vertical_tabs": "\v\fv 0\v0\f0\nv 1 0 0\nv 0 1 0\nf 1\v2\f3\n",
     "comments": "# a\nv 0 0 0 # b\n\n  v 1 0 0\nv 0 1 0\n  # c\nf 1 2 3 # d",
     "exponents_and_tabs": "v\t0e0 -0 +0.\nv\t1E0  0\t0\nv .0 1.0e+00 0  \ng a b\ns off\nf  1 2 3 \n",
     "continued_lines": "v 0 0 \\\n0\nv 1 0 0\nv 0 1 0\nf 1 \\\r\n2 3\n",
@@ -210,6 +212,23 @@ def test_a_ply_cut_anywhere_is_refused(tmp_path: Path, data: bytes) -> None:
 def test_a_bad_ply_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read(tmp_path, "m.ply", PLY_TEXT.replace(old, new, 1))
+
+
+def test_lists_before_and_behind_the_faces_of_a_binary_ply_are_skipped(tmp_path: Path) -> None:
+    head = "ply\nformat binary_big_endian 1.0\nelement strip 2\nproperty list ushort double weights\nelement vertex 4\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz")
+    head += "element face 2\nproperty list uchar float uv\nproperty list uint ushort vertex_index\nend_header\n"
+    strips = b"".join(len(row).to_bytes(2, "big") + np.array(row, ">f8").tobytes() for row in ([], [0.5, 0.25]))
+    corners = [[0, 1, 2], [0, 1, 2, 3]]
+    faces = b"".join(
+        bytes([k]) + np.zeros(k, ">f4").tobytes() + len(row).to_bytes(4, "big") + np.array(row, ">u2").tobytes()
+        for k, row in enumerate(corners)
+    )
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], ">f4").tobytes()
+    mesh = read(tmp_path, "m.ply", head.encode() + strips + square + faces).mesh
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
+    with pytest.raises(InputError, match="face 1 is too short"):
+        read(tmp_path, "m.ply", (head.encode() + strips + square + faces)[:-1])
 
 
 def test_absurd_sizes_are_refused_before_memory_is_taken(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Connectivity of triangle meshes: edges, components, welding, normals and midpoint subdivision.
 
-Pure array functions on vertices (V x 3) and faces (F x 3), without heavy imports: the decoder uses this file.
+Pure functions of vertices (V x 3) and faces (F x 3), without heavy imports: the decoder uses this file. Those whose
+loops are in core/ raise ValueError for a face that refers to a missing vertex.
 """
 
 from __future__ import annotations
@@ -10,16 +11,16 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
 
+from .. import _core
 from ..types import Mesh
 
 
 def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]:
     """Return the undirected edges (i < j, sorted) and, for each face, the numbers of its edges 01, 12 and 20."""
-    f = faces.astype(np.int64)
-    pairs = np.sort(np.stack([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]], axis=1).reshape(-1, 2), axis=1)
-    count = int(pairs.max()) + 1 if len(pairs) else 1
-    keys, inverse = np.unique(pairs[:, 0] * count + pairs[:, 1], return_inverse=True)
-    return np.stack([keys // count, keys % count], axis=1), inverse.reshape(-1, 3)
+    count = int(faces.max(initial=-1)) + 1
+    edges, finer = _core.subdivide(faces, count)
+    middles = finer[3::4]  # of the four faces that each is cut into, the one between the midpoints of its edges
+    return edges.astype(np.int64), middles.astype(np.int64) - count
 
 
 def border_mask(edges: Int64[np.ndarray, "E 2"], face_edges: Int64[np.ndarray, "F 3"]) -> Bool[np.ndarray, " E"]:
@@ -44,33 +45,16 @@ def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
 
     Old vertices come first, in order; new ones follow in the order of the sorted edges.
     """
-    for _ in range(levels if len(mesh.faces) else 0):
-        edges, face_edges = unique_edges(mesh.faces)
-        e = (face_edges + len(mesh.vertices)).astype(np.int32)
-        a, b, c = mesh.faces.T
-        faces = np.stack(
-            [
-                np.stack([a, e[:, 0], e[:, 2]], axis=1),
-                np.stack([e[:, 0], b, e[:, 1]], axis=1),
-                np.stack([e[:, 2], e[:, 1], c], axis=1),
-                np.stack([e[:, 0], e[:, 1], e[:, 2]], axis=1),
-            ],
-            axis=1,
-        ).reshape(-1, 3)
+    for _ in range(levels):
+        edges, faces = _core.subdivide(mesh.faces, len(mesh.vertices))
         midpoints = (mesh.vertices[edges[:, 0]] + mesh.vertices[edges[:, 1]]) / 2
-        mesh = Mesh.of(np.concatenate([mesh.vertices, midpoints]), faces)
+        mesh = Mesh(np.concatenate([mesh.vertices, midpoints]), faces)
     return mesh
 
 
 def face_normals(mesh: Mesh) -> tuple[Float64[np.ndarray, "F 3"], Float64[np.ndarray, " F"]]:
     """Return unit normals and areas (squared units of the vertices) of the faces; a zero area has a zero normal."""
-    axes = [np.ascontiguousarray(axis) for axis in mesh.vertices.T]  # axis by axis: half the time, the same sums
-    a, b, c = (np.ascontiguousarray(corner) for corner in mesh.faces.T)
-    (ux, uy, uz), (vx, vy, vz) = ([axis[to] - axis[a] for axis in axes] for to in (b, c))
-    cross = (uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx)
-    length = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
-    divisor = np.where(length > 0, length, 1.0)
-    return np.stack([along / divisor for along in cross], axis=1), length / 2
+    return _core.face_normals(mesh.vertices, mesh.faces)
 
 
 def blend(
@@ -85,14 +69,7 @@ def blend(
 
 def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
     """Return area-weighted unit normals of the vertices; zero where a vertex has no face with an area."""
-    normals, areas = face_normals(mesh)
-    weighted = normals * areas[:, None]
-    total = np.zeros((len(mesh.vertices), 3))
-    for corner in range(3):
-        for axis in range(3):
-            total[:, axis] += np.bincount(mesh.faces[:, corner], weighted[:, axis], len(mesh.vertices))
-    length = np.linalg.norm(total, axis=1)
-    return total / np.where(length > 0, length, 1.0)[:, None]
+    return _core.vertex_normals(mesh.vertices, mesh.faces)
 
 
 def vertex_areas(mesh: Mesh) -> Float64[np.ndarray, " V"]:
@@ -106,29 +83,17 @@ def weld(mesh: Mesh) -> Mesh:
 
     UV seams duplicate positions; codecs and normals need them to be one vertex.
     """
-    if len(mesh.vertices) == 0:
-        return mesh
-    _, first, inverse = np.unique(mesh.vertices, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)  # keep the order of first appearance
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    faces = rank[inverse.reshape(-1)][mesh.faces]
-    return Mesh.of(mesh.vertices[first[order]], faces[~_collapsed(faces)])
+    return Mesh(*_core.weld(mesh.vertices, mesh.faces))
 
 
 def clean(mesh: Mesh) -> Mesh:
     """Remove collapsed, zero-area and repeated faces, then vertices that no face uses."""
-    faces = mesh.faces[~_collapsed(mesh.faces)]
-    faces = faces[face_normals(Mesh.of(mesh.vertices, faces))[1] > 0]
-    _, first = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-    return drop_unreferenced(Mesh.of(mesh.vertices, faces[np.sort(first)]))
+    return Mesh(*_core.clean(mesh.vertices, mesh.faces))
 
 
 def drop_unreferenced(mesh: Mesh) -> Mesh:
     """Remove vertices that no face uses; the others keep their order."""
-    used = np.zeros(len(mesh.vertices), dtype=bool)
-    used[mesh.faces.reshape(-1)] = True
-    return Mesh.of(mesh.vertices[used], (np.cumsum(used) - 1)[mesh.faces])
+    return Mesh(*_core.drop_unreferenced(mesh.vertices, mesh.faces))
 
 
 def part_of(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
@@ -160,20 +125,4 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
 
 def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:
     """Label each of `count` vertices with its connected component; components are numbered by their first vertex."""
-    labels = np.arange(count)
-    f = faces.astype(np.int64)
-    while True:  # label propagation with pointer jumping: O(log V) rounds
-        low = labels[f].min(axis=1) if len(f) else np.zeros(0, np.int64)
-        new = labels.copy()
-        for corner in range(3):
-            np.minimum.at(new, f[:, corner], low)
-            np.minimum.at(new, labels[f[:, corner]], low)
-        new = new[new]
-        if np.array_equal(new, labels):
-            return np.unique(labels, return_inverse=True)[1].reshape(-1)
-        labels = new
-
-
-def _collapsed(faces: Int32[np.ndarray, "F 3"] | Int64[np.ndarray, "F 3"]) -> Bool[np.ndarray, " F"]:
-    a, b, c = faces.T
-    return (a == b) | (b == c) | (c == a)
+    return _core.components(faces, count).astype(np.int64)

@@ -28,7 +28,7 @@ def parse_obj(data: bytes) -> Polygons:
     lines = Lines.of(data)
     first = lines.text[lines.starts]
     second = lines.text[np.minimum(lines.starts + 1, lines.ends)]
-    bare = (second == ord(" ")) | (second == ord("\t")) | (second == ord("\n"))
+    bare = (second == ord(" ")) | (second == ord("\t")) | (lines.ends == lines.starts + 1)
     is_vertex, is_face = bare & (first == ord("v")), bare & (first == ord("f"))
     vertices, dropped = _vertices(lines, np.flatnonzero(is_vertex))
     corners, sizes = _faces(lines, np.flatnonzero(is_face), np.cumsum(is_vertex)[is_face], len(vertices))
@@ -37,7 +37,7 @@ def parse_obj(data: bytes) -> Polygons:
 
 
 def _vertices(lines: Lines, chosen: Int64[np.ndarray, " V"]) -> tuple[Float64[np.ndarray, "V 3"], Dropped]:
-    values, counts = lines.values(chosen, lines.block(chosen, skip=1))
+    values, counts = lines.values(chosen, skip=1)
     short = np.flatnonzero(counts < 3)
     if len(short):
         where = chosen[short[0]]
@@ -50,10 +50,7 @@ def _faces(
     lines: Lines, chosen: Int64[np.ndarray, " P"], defined: Int64[np.ndarray, " P"], count: int
 ) -> tuple[Int64[np.ndarray, " C"], Int64[np.ndarray, " P"]]:
     """Return corners (from 0) and polygon sizes; `defined` vertices precede each face line, `count` are in the file."""
-    block = lines.block(chosen, skip=1)
-    if (block == ord("/")).any():
-        block = np.frombuffer(re.sub(rb"/[^ \t\n]*", b"", block.tobytes()), dtype=np.uint8)
-    values, sizes = lines.values(chosen, block)
+    values, sizes = lines.values(chosen, skip=1, stop="/")
     short = np.flatnonzero(sizes < 3)
     if len(short):
         where = chosen[short[0]]

@@ -22,7 +22,7 @@ def parse_off(data: bytes) -> Polygons:
     filled = np.flatnonzero(lines.ends > lines.starts)
     if len(filled) == 0:
         raise Unreadable("OFF file ends before its counts (truncated?)")
-    head, _ = lines.values(filled[:1], lines.block(filled[:1]))
+    head, _ = lines.values(filled[:1])
     if len(head) < 2 or (head < 0).any():
         raise Unreadable(f"OFF counts expected, found {lines.line(int(filled[0]))!r}")
     vertex_count, face_count = whole(head[:2], "OFF count").tolist()
@@ -31,7 +31,7 @@ def parse_off(data: bytes) -> Polygons:
             f"OFF announces {vertex_count} vertices and {face_count} faces but has {len(filled) - 1} lines"
         )
     chosen = filled[1 : 1 + vertex_count]
-    values, counts = lines.values(chosen, lines.block(chosen))
+    values, counts = lines.values(chosen)
     if (counts < 3).any():
         raise Unreadable(f"OFF vertex {int(np.argmax(counts < 3))} has fewer than 3 coordinates")
     vertices = values[(np.cumsum(counts) - counts)[:, None] + np.arange(3)]
@@ -40,7 +40,7 @@ def parse_off(data: bytes) -> Polygons:
 
 
 def _faces(lines: Lines, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
-    values, counts = lines.values(chosen, lines.block(chosen))
+    values, counts = lines.values(chosen)
     begins = np.cumsum(counts) - counts
     sizes = whole(values[begins], "OFF corner count")
     if (sizes + 1 > counts).any():

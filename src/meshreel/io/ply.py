@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import _core
 from .polygons import Dropped, Polygons, Unreadable
 from .text_lines import Lines, whole
 
@@ -113,7 +114,7 @@ class _Text:
     """Body of an ASCII file; elements must be read in their order."""
 
     def __init__(self, data: bytes) -> None:
-        self._lines = Lines.of(data, comment=b"\0")  # PLY has comments in its header only
+        self._lines = Lines.of(data, comment="\0")  # PLY has comments in its header only
         self._filled = np.flatnonzero(self._lines.ends > self._lines.starts)
 
     def read(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
@@ -121,7 +122,7 @@ class _Text:
         chosen, self._filled = self._filled[: element.rows], self._filled[element.rows :]
         if len(chosen) < element.rows:
             raise Unreadable(f"PLY announces {element.rows} {element.name} rows but has {len(chosen)} (truncated?)")
-        values, counts = self._lines.values(chosen, self._lines.block(chosen))
+        values, counts = self._lines.values(chosen)
         ends = np.cumsum(counts)
         place, padded = ends - counts, np.append(values, 0.0)  # place: the next unread value of each row
         columns, items, sizes = Columns(), np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -185,24 +186,23 @@ class _Binary:
         return int.from_bytes(self._data[at:end], order), end  # type: ignore[arg-type]
 
     def _uneven_rows(self, element: _Element, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:
-        """Read rows of different lengths one by one: where a row begins depends on the row before."""
-        begins, sizes, dtype = list[int](), list[int](), np.dtype("<i4")
+        """Read rows of different lengths: where a row begins depends on the row before."""
         if wanted is None and element.name == "vertex":
             raise Unreadable("PLY vertices with lists of different lengths are not read")
-        for row in range(element.rows):
-            for field in element.properties:
-                length, self._at = self._length(field, self._at)
-                if field.name == wanted:
-                    begins.append(self._at)
-                    sizes.append(length)
-                    dtype = field.dtype
-                self._at += length * field.dtype.itemsize
-            if self._at > len(self._data):
-                raise _short(element, row)
-        lengths = np.array(sizes, dtype=np.int64)
-        picked = _ranges(np.array(begins, dtype=np.int64), lengths * dtype.itemsize)
-        items = np.frombuffer(self._data, dtype=np.uint8)[picked].view(dtype)
-        return {}, whole(items, "PLY index"), lengths
+        lists = [(p.name, p.count is not None) for p in element.properties]
+        number = 0 if wanted is None else lists.index((wanted, True))
+        sizes = [(p.count.itemsize if p.count else 0, p.dtype.itemsize) for p in element.properties]
+        fields = np.array(sizes, dtype=np.int64)
+        is_big = any(p.count is not None and p.count.byteorder == ">" for p in element.properties)
+        rest = np.frombuffer(self._data, dtype=np.uint8)[self._at :]
+        items, lengths, size, bad = _core.read_lists(rest, fields, element.rows, number, is_big)
+        if bad >= 0:
+            raise _short(element, bad)
+        self._at += size
+        if wanted is None:
+            return {}, np.zeros(0, np.int64), np.zeros(0, np.int64)
+        values = items.view(element.properties[number].dtype)
+        return {}, whole(values, "PLY index"), lengths.view(np.int64)  # of the same size, by its usual name
 
 
 def _even_rows(element: _Element, rows: np.ndarray, wanted: str | None) -> tuple[Columns, np.ndarray, np.ndarray]:

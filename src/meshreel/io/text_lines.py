@@ -1,4 +1,4 @@
-"""Lines of numbers in text files, parsed without a Python loop over the lines.
+"""Lines of numbers in text files, parsed by the core.
 
 In: the bytes of a file. Out: flat values and their count in each line. Raises Unreadable with the line number of a word
 that is no number.
@@ -6,37 +6,29 @@ that is no number.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64, Int64, UInt8
 
+from .. import _core
 from .polygons import Unreadable
-
-_IS_BLANK = np.isin(np.arange(256), list(b" \t\n\v\f"))
 
 
 @dataclass(frozen=True, slots=True)
 class Lines:
     """Text and the positions of its lines."""
 
-    text: np.ndarray  # uint8, every line ended by a newline
-    starts: Int64[np.ndarray, " L"]
-    ends: Int64[np.ndarray, " L"]  # position of the newline
+    text: UInt8[np.ndarray, " B"]
+    starts: Int64[np.ndarray, " L"]  # behind leading blanks
+    ends: Int64[np.ndarray, " L"]  # before comments and newlines: text goes on behind each of them
 
     @staticmethod
-    def of(data: bytes, comment: bytes = b"#") -> Lines:
-        """Return the lines of a text with any newlines, without comments and leading blanks; line numbers stay."""
-        if b"\r" in data:
-            data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-        if comment in data:
-            data = re.sub(re.escape(comment) + rb"[^\n]*", b"", data)
-        if data[:1].isspace() or b"\n " in data or b"\n\t" in data:
-            data = re.sub(rb"(?m)^[ \t\v\f]+", b"", data)
+    def of(data: bytes, comment: str = "#") -> Lines:
+        """Return the lines of a text with any newlines, without comments and leading blanks."""
         text = np.frombuffer(data + b"\n", dtype=np.uint8)
-        ends = np.flatnonzero(text == ord("\n"))
-        return Lines(text, np.concatenate([[0], ends[:-1] + 1]), ends)
+        starts, ends = _core.split_lines(text[:-1], comment)
+        return Lines(text, starts.view(np.int64), ends.view(np.int64))  # of the same size, by its usual name
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -46,55 +38,20 @@ class Lines:
         shown = self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
         return shown if len(shown) <= 60 else shown[:57] + "..."
 
-    def block(self, chosen: Int64[np.ndarray, " N"], skip: int = 0) -> np.ndarray:
-        """Return the bytes (uint8) of the chosen lines with newlines, the first `skip` bytes of each blanked."""
-        if len(chosen) == 0:
-            return np.zeros(0, dtype=np.uint8)
-        starts, sizes = self.starts[chosen], self.ends[chosen] + 1 - self.starts[chosen]
-        if chosen[-1] - chosen[0] == len(chosen) - 1:  # consecutive lines, as nearly always, need no mask over the text
-            block = self.text[starts[0] : starts[-1] + sizes[-1]].copy()
-        else:
-            wanted = np.zeros(len(self), dtype=bool)
-            wanted[chosen] = True
-            block = self.text[np.repeat(wanted, self.ends + 1 - self.starts)]
-        begins = np.cumsum(sizes) - sizes
-        for k in range(skip):
-            block[begins + k] = ord(" ")
-        return block
-
     def values(
-        self, chosen: Int64[np.ndarray, " N"], block: np.ndarray
+        self, chosen: Int64[np.ndarray, " N"], skip: int = 0, stop: str = ""
     ) -> tuple[Float64[np.ndarray, " M"], Int64[np.ndarray, " N"]]:
-        """Return all numbers in a block of the chosen lines, and the count in each line."""
-        counts = count_words(block)
-        try:
-            values = np.fromstring(block.tobytes(), dtype=np.float64, sep=" ")
-        except ValueError:
-            values = np.zeros(0)
-        if len(values) != counts.sum():
-            raise self._junk(chosen, block)
-        return values, counts
+        """Return all numbers of the chosen lines, without their first `skip` bytes, and the count in each line.
 
-    def _junk(self, chosen: Int64[np.ndarray, " N"], block: np.ndarray) -> Unreadable:
-        for number, line in zip(chosen, block.tobytes().split(b"\n"), strict=False):
-            for word in line.split():
-                try:
-                    float(word)
-                except ValueError:
-                    shown = word[:20].decode("utf-8", "replace")
-                    return Unreadable(f"line {number + 1} ({self.line(number)!r}) has {shown!r} where a number must be")
-        return Unreadable("a number is written in a way that cannot be read")
-
-
-def count_words(block: np.ndarray) -> Int64[np.ndarray, " N"]:
-    """Return the number of words in each line of a block (uint8, each line with its newline)."""
-    if len(block) == 0:
-        return np.zeros(0, dtype=np.int64)
-    blank = _IS_BLANK[block]
-    begins = ~blank
-    begins[1:] &= blank[:-1]
-    ends = np.flatnonzero(block == ord("\n"))
-    return np.diff(np.searchsorted(np.flatnonzero(begins), ends), prepend=0)
+        What follows the letter `stop` in a word is no part of the number.
+        """
+        values, counts, bad = _core.read_numbers(self.text, self.starts[chosen] + skip, self.ends[chosen], stop or "\0")
+        if bad >= 0:
+            number = int(np.searchsorted(self.starts, bad, side="right")) - 1
+            word = self.text[bad : self.ends[number]].tobytes().split()[0]
+            shown = (word.split(stop.encode())[0] if stop else word)[:20].decode("utf-8", "replace")
+            raise Unreadable(f"line {number + 1} ({self.line(number)!r}) has {shown!r} where a number must be")
+        return values, counts.astype(np.int64)
 
 
 def whole(values: np.ndarray, what: str) -> Int64[np.ndarray, "..."]:
