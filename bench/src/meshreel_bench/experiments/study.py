@@ -123,7 +123,18 @@ class Flat:
     within: float = 0.1
 
 
-Promise = Reaches | Always | Gains | LeastRate | Rises | Flat
+@dataclass(frozen=True, slots=True)
+class NoMore:
+    """Promise that a value is at most so many times the sum of what others have, one row each."""
+
+    text: str
+    which: Which
+    key: str
+    factor: float
+    than: tuple[Which, ...]
+
+
+Promise = Reaches | Always | Gains | LeastRate | Rises | Flat | NoMore
 
 
 @dataclass(frozen=True, slots=True)
