@@ -15,7 +15,6 @@ from pathlib import Path
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.capture.recording import open_recording
-from meshreel.capture.truth import Truth
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.derived_sequences import Chosen, forth_and_back
@@ -65,11 +64,6 @@ class Dataset:
     sequence: MeshSequence
     cameras: tuple[PinholeCamera, ...] = ()  # where it was seen from; none: look from around it
     scene: SceneData | None = None  # of a simulated scene
-
-    @property
-    def truth(self) -> Truth | None:
-        """The clean frames of a simulated scene."""
-        return None if self.scene is None else self.scene.truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,11 +116,6 @@ class Store:
         files = [path] if path.exists() else find_frames(path)[0]
         read = (*map(checksum, files), self.own.frame_rate, self.own.frames, self.own.scale)
         return hashlib.sha256(repr(read).encode()).hexdigest()
-
-
-def open_dataset(name: str, data: Path, frames: int | None = None, cache: Path | None = None) -> MeshSequence:
-    """Return the sequence called `name` (`Store.open`)."""
-    return Store(data, cache).open(name, frames).sequence
 
 
 def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:

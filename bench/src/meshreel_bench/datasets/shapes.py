@@ -71,15 +71,12 @@ def _outline(teeth: int) -> Float64[np.ndarray, "P 2"]:
     pitch = MODULE * teeth / 2
     radii = np.linspace(pitch - DEDENDUM * MODULE, pitch + ADDENDUM * MODULE, FLANK)
     steep = np.arccos(np.minimum(pitch * np.cos(PRESSURE) / radii, 1))  # 0 below the base circle: flanks are radial
-    half = np.pi / (2 * teeth) + _involute(PRESSURE) - _involute(steep)  # angle from the middle of a tooth to its flank
+    at_pitch = np.pi / (2 * teeth) + np.tan(PRESSURE) - PRESSURE
+    half = at_pitch - np.tan(steep) + steep  # angle from the middle of a tooth to its flank
     flanks = np.concatenate([np.stack([radii, -half], axis=1), np.stack([radii, half], axis=1)[::-1]])
     middles = 2 * np.pi * np.arange(teeth) / teeth
     radius, angle = np.tile(flanks[:, 0], teeth), (middles[:, None] + flanks[:, 1]).ravel()
     return radius[:, None] * _on_circle(angle)
-
-
-def _involute(angle: Float64[np.ndarray, " _"] | float) -> Float64[np.ndarray, " _"]:
-    return np.tan(angle) - angle
 
 
 def _on_circle(angles: Float64[np.ndarray, " P"]) -> Float64[np.ndarray, "P 2"]:

@@ -57,6 +57,11 @@ class Bound:
     over_floor: bool = False
 
 
+def at_most(key: str, limit: float, unit: str = "") -> Bound:
+    """Return the bound of a value that must not be larger."""
+    return Bound(key, limit, unit, least=False)
+
+
 @dataclass(frozen=True, slots=True)
 class Which:
     """Rows that a promise is about: a sequence, a curve, and options."""

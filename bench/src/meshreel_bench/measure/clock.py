@@ -42,33 +42,31 @@ class StageTimer:
     def __enter__(self) -> StageTimer:
         self.stages: dict[str, float] = {}
         self.references = [reference_s() for _ in range(SAMPLES)]
-        if ON_TIME:
-            signal.signal(signal.SIGALRM, self._sample)  # on this thread, so that nothing runs beside the loop
-            signal.setitimer(signal.ITIMER_REAL, PAUSE, PAUSE)
         self._work, self._apart = so_far(), 0.0
         self._start = self._last = time.process_time()
+        if ON_TIME:
+            signal.signal(signal.SIGALRM, self._sample)  # on this thread, so that nothing runs beside the loop
+            signal.setitimer(signal.ITIMER_REAL, PAUSE)
         return self
 
     def __call__(self, stage: str, _done: int, _total: int) -> None:
         """Charge the time since the last report to `stage`."""
-        now = self._now()
+        now = time.process_time() - self._apart
         self.stages[stage] = self.stages.get(stage, 0.0) + now - self._last
         self._last = now
 
     def __exit__(self, *_error: object) -> None:
         if ON_TIME:
+            signal.signal(signal.SIGALRM, signal.SIG_IGN)  # first: a sample that is due would start the timer again
             signal.setitimer(signal.ITIMER_REAL, 0)
-            signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        self.seconds, self.work = self._now() - self._start, since(self._work)
+        self.seconds, self.work = time.process_time() - self._apart - self._start, since(self._work)
         self.references += [reference_s() for _ in range(SAMPLES)]
-
-    def _now(self) -> float:
-        return time.process_time() - self._apart
 
     def _sample(self, *_signal: object) -> None:
         start = time.process_time()
         self.references.append(reference_s())
         self._apart += time.process_time() - start
+        signal.setitimer(signal.ITIMER_REAL, PAUSE)
 
 
 def cost_of(timers: Sequence[StageTimer], frames: int) -> Encoding:

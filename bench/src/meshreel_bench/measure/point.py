@@ -57,9 +57,9 @@ def measure_point(point: Point, store: Store) -> Row:
     if point.codec == SEGMENTATION:
         return msgspec.structs.replace(row, metrics=_segmentation(known))
     if point.codec == TRUTH:
-        if known.truth is None:
+        if known.scene is None:
             raise InputError("the truth itself is known of simulated scenes only")
-        clean = [known.truth[number].mesh for number in numbers]
+        clean = [known.scene.truth[number].mesh for number in numbers]
         metrics, per_frame = measure_frames(Measured(known, numbers, clean), point.metrics)
         return msgspec.structs.replace(row, name=TRUTH_NAME, metrics=metrics, per_frame=per_frame)
     codec = make_codec(point.codec, point.options)
@@ -158,5 +158,4 @@ def _segmentation(known: Dataset) -> dict[str, float | None]:
     if known.scene is None:
         raise InputError("a segmentation is judged on simulated scenes only, whose labels are known")
     scene, numbers = known.scene, range(len(known.sequence))
-    score = score_labels((scene.labels(i, FOUND) for i in numbers), (scene.labels(i) for i in numbers))
-    return {"iou_mean": score.mean, "iou_worst": score.worst, "static_called_dynamic": score.static_called_dynamic}
+    return score_labels((scene.labels(i, FOUND) for i in numbers), (scene.labels(i) for i in numbers))
