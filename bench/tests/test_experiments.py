@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.variants import VARIANTS
-from meshreel_bench.experiments import EXPERIMENTS, ablations, find_experiment
+from meshreel_bench.experiments import EXPERIMENTS, ablations, find_experiment, speed
 from meshreel_bench.rows import read_rows
 
 from meshreel.errors import InputError
@@ -36,6 +36,14 @@ def test_tables_share_the_points_of_figure_6():
     all_points = {point.key for point in find_experiment("figure6").points()}
     for name in ("table1", "table2"):
         assert {point.key for point in find_experiment(name).points()} < all_points
+
+
+def test_promises_of_speed_are_about_points_that_are_declared():
+    declared = list(speed.STUDY.points())
+    for promise in speed.PROMISES:
+        for which in (promise.which, *getattr(promise, "than", ())):
+            fits = [p for p in declared if p.sequence == which.sequence and p.options.items() >= which.options.items()]
+            assert any(make_codec(p.codec, dict(p.options)).name == which.curve for p in fits), which
 
 
 def test_every_part_that_is_switched_off_is_a_variant():

@@ -25,6 +25,7 @@ from .experiments.study import Sweep as Points
 from .measure.runner import Sweep, run_points
 from .report import write_report
 from .report.pages import parts_of
+from .report.tables import change_table
 from .report.values import value
 from .report.verdicts import Verdict, verdicts
 from .rows import Options, Point, Row, failed_rows, join_rows, measured_rows, read_rows
@@ -178,6 +179,13 @@ def report(
     common.result({"files": written} | _promised(found), verdict_table(found), *written)
 
 
+@command.command
+def compare(before: Path, after: Path, /, *, common: Common = Common()) -> None:
+    """Print what points cost before and after a change, from two files of rows that `run` wrote."""
+    lines = change_table(*(measured_rows(_some_rows(path)) for path in (before, after)))
+    common.result({"table": lines}, *(lines or [f"{before} and {after} have no point in common"]))
+
+
 @command.command(name="list")
 def list_experiments(*, common: Common = Common()) -> None:
     """List the experiments, their sequences, and how many points each has."""
@@ -255,6 +263,7 @@ def make_app() -> App:
     app = App(name="meshreel-bench", help=HELP, suppress_keyboard_interrupt=False)
     app.command(run)
     app.command(report)
+    app.command(compare)
     app.command(list_experiments, name="list")
     app.command(codecs)
     return app

@@ -70,6 +70,8 @@ class Encoding(msgspec.Struct, frozen=True, omit_defaults=True):
     s: float | None = None  # a frame
     stages_s: dict[str, float] = {}  # a frame
     peak_rss_mb: float | None = None  # of the process, points of a shared analysis included
+    reference_s: float | None = None  # `measure.clock.reference_s` meanwhile
+    work: dict[str, float] = {}  # a frame, by kind (`meshreel.geometry.work`)
 
 
 class Decoding(msgspec.Struct, frozen=True):
@@ -79,6 +81,7 @@ class Decoding(msgspec.Struct, frozen=True):
     frame_ms: float
     vertices: float  # of a frame, mean
     peak_rss_mb: float | None = None
+    reference_s: float | None = None  # `measure.clock.reference_s` after the passes
 
 
 class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):

@@ -12,7 +12,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
-from meshreel_bench.codecs.necgs import FULL, QUICK, NecgsCodec
+from meshreel_bench.codecs.necgs import QUICK, NecgsCodec
 from meshreel_bench.codecs.necgs.cubes import extract
 from meshreel_bench.codecs.necgs.grid import box_of, place_grids, truncated_distances
 from meshreel_bench.codecs.necgs.stream import decode_stream, encode_stream
@@ -231,7 +231,6 @@ def test_naming_the_codec_does_not_load_torch():
 def test_every_configuration_is_a_codec():
     assert make_codec("necgs", {}) == NecgsCodec()
     assert make_codec("necgs", QUICK).shape.layers == ((16, 64), (8, 48), (6, 32), (4, 4))
-    assert make_codec("necgs", FULL).shape.layers[0] == (16, 512)
 
 
 @pytest.mark.parametrize(

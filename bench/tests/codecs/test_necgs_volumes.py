@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from meshreel_bench.codecs.necgs.cubes import cut, extract
@@ -45,11 +42,6 @@ def coded(frames: int = 3, seed: int = 0) -> Coded:
     features = random.integers(-128, 129, (int(full.sum()), SHAPE.feature_size)).astype(np.int32)
     parameters = [random.integers(-9, 10, int(np.prod(size))).astype(np.int32) for size in SHAPE.tensors]
     return Coded(SHAPE, False, full, placement, features, parameters)
-
-
-def with_checksum(inner: bytes, head: bytes) -> bytes:
-    """A stream whose checksum holds."""
-    return head[:9] + zlib.crc32(inner).to_bytes(4, "little") + inner
 
 
 def test_the_surface_of_any_signs_is_closed_and_each_edge_is_walked_both_ways_alike():
@@ -206,45 +198,3 @@ def test_every_truncation_and_every_byte_that_is_wrong_is_refused():
         decode_stream(data + b"\0")
     with pytest.raises(FormatError, match="NeCGS"):
         decode_stream(data[:8] + b"\x02" + data[9:])
-
-
-def test_damage_with_a_right_checksum_is_refused_or_is_another_set():
-    data = encode_stream(coded())
-    inner, random, refused = data[13:], np.random.default_rng(2), 0
-    places = [*range(80), *random.integers(80, len(inner), 150).tolist()]
-    for at in places:
-        wrong = inner[:at] + bytes([inner[at] ^ int(random.integers(1, 256))]) + inner[at + 1 :]
-        try:
-            decode_stream(with_checksum(wrong, data))
-        except FormatError:
-            refused += 1
-    assert refused > len(places) // 2
-    with pytest.raises(FormatError, match="trimmed 2"):
-        decode_stream(with_checksum(inner[:4] + b"\x02" + inner[5:], data))
-    for end in (*range(100), *range(100, len(inner), 211)):
-        with pytest.raises(FormatError):
-            decode_stream(with_checksum(inner[:end], data))
-
-
-@pytest.mark.parametrize(
-    ("changed", "words"),
-    [
-        ({"shape": replace(SHAPE, resolution=48)}, "resolution 48"),
-        ({"shape": replace(SHAPE, bits=3)}, "3 bits"),
-        ({"shape": replace(SHAPE, features=65)}, "65 features"),
-        ({"shape": replace(SHAPE, channels=200)}, "200 channels"),
-        ({"shape": replace(SHAPE, channels=8)}, "integers"),
-        ({"shape": replace(SHAPE, resolution=32)}, "tensors"),
-        ({"shape": replace(SHAPE, bits=7)}, "symbol beyond 64"),
-        ({"placement": Placement(-1.0, (0.0, 0.0, 0.0), np.zeros((3, 3), np.int32))}, "cells of -1"),
-        ({"placement": Placement(1.0, (1e13, 0.0, 0.0), np.zeros((3, 3), np.int32))}, "cells of 1"),
-        ({"placement": Placement(1.0, (0.0, 0.0, 0.0), np.full((3, 3), 2**30 + 9, np.int32))}, "cells away"),
-        ({"parameters": []}, "0 tensors"),
-        ({"full": np.ones(3, bool)}, "integers"),
-        ({"full": np.ones(400_000, bool), "placement": coded(400_000).placement}, "cannot come from"),
-    ],
-)
-def test_heads_that_cannot_be_are_refused(changed, words):
-    whole = replace(coded(), **changed)
-    with pytest.raises(FormatError, match=words):
-        decode_stream(encode_stream(whole))

@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.tvmc import TvmcCodec
-from meshreel_bench.codecs.tvmc.layout import LONGEST, Group, Kind, State, Stream, pack_stream, unpack_stream
+from meshreel_bench.codecs.tvmc.layout import Kind, unpack_stream
 from meshreel_bench.codecs.tvmc.tracked import decode_tracked, encode_tracked
 from meshreel_bench.codecs.tvmc.tracking import Tracked, track_sequence
 from meshreel_bench.codecs.tvmc.video import TvmcVideo
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
-from meshreel.coding.intra import encode_intra
 from meshreel.encoder.presets import quality_of_vertices, reference_vertices
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import FormatError, InputError, NoReferenceError
-from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.topology import concatenate
 from meshreel.metrics.distance import surface_errors
@@ -75,7 +73,7 @@ def with_checksum(data):
 @pytest.mark.parametrize("step", [1e-2, 1e-4])
 def test_a_group_decodes_to_the_fitted_vertices_within_half_a_step(tracking, step):
     group = tracking.groups[0]
-    frames = decode_tracked(encode_tracked(group.reference, group.field, step), group.field.shape[1], step)
+    frames = decode_tracked(encode_tracked(group.reference, group.field, step), step)
     for number, frame in enumerate(frames):
         wanted = group.reference.base.vertices + group.field[:, number]
         assert np.abs(frame.vertices - wanted).max() <= step / 2 * (1 + 1e-9)
@@ -209,7 +207,7 @@ def test_a_scene_has_its_background_once_and_its_body_tracked(rolling):
         assert of_body(frame).sum() > 0 and found.diagonal == pytest.approx(clean.diagonal, abs=CELL)
 
 
-# ---- hostile bytes
+# ---- damaged bytes
 
 
 def test_every_truncation_and_every_flipped_byte_is_told(stream):
@@ -225,74 +223,9 @@ def test_every_truncation_and_every_flipped_byte_is_told(stream):
         TvmcVideo(stream + b"\0")
 
 
-def test_bytes_that_are_changed_with_their_checksum_give_frames_or_an_error(stream):
-    random, errors = np.random.default_rng(2), 0
-    for place in [*range(60), *random.integers(0, len(stream) - 4, 140).tolist()]:
-        damaged = bytearray(stream)
-        damaged[place] ^= 1 << random.integers(0, 8)
-        try:
-            video = TvmcVideo(with_checksum(bytes(damaged)))
-            frames = [video[number] for number in range(min(len(video), 4))]
-        except FormatError:
-            errors += 1
-            continue
-        assert all(np.isfinite(mesh.vertices).all() for mesh in frames)
-        assert all(mesh.faces.max(initial=-1) < len(mesh.vertices) for mesh in frames)
-    assert errors > 20
-
-
 def test_another_version_is_told_as_one(stream):
     with pytest.raises(FormatError, match="version"):
         TvmcVideo(with_checksum(stream[:4] + bytes([9]) + stream[5:]))
-
-
-GROUP = Group(0, 2, Kind.DRACO, encode_intra([BALL, BALL], 1e-2, 0))
-WHOLE, PATCH = State(0, encode_intra([BALL], 1e-2, 0)), State(1, b"\x05")
-PLAIN = Stream(b"TVMC", 1, 2, (0.0, 0.0, 0.0), 1.0, 1e-3, (), (), (GROUP,))
-
-
-def test_a_stream_that_keeps_the_laws_is_read():
-    assert unpack_stream(pack_stream(PLAIN)) == PLAIN
-    assert len(TvmcVideo(pack_stream(PLAIN))[1].faces) == len(BALL.faces)
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"frame_count": 0, "groups": ()}, "0 frames"),
-        ({"frame_count": LONGEST + 1}, "frames"),
-        ({"scale": 0.0}, "scale 0"),
-        ({"scale": 1e16}, "scale 1e"),
-        ({"step": 0.0}, "step 0"),
-        ({"step": -1.0}, "step -1"),
-        ({"origin": (0.0, -1e16, 0.0)}, "origin"),
-        ({"bare": (1, 2)}, "3 frames"),
-        ({"states": (PATCH,)}, "patch of none"),
-        ({"states": (WHOLE, WHOLE)}, "states"),
-        ({"states": (replace(WHOLE, first_frame=2),)}, "states"),
-        ({"groups": (replace(GROUP, first_frame=1),)}, "beyond the end"),
-        ({"groups": (replace(GROUP, frame_count=0),)}, "0 frames"),
-        ({"groups": (replace(GROUP, first_frame=1, frame_count=1), GROUP)}, "out of order"),
-        ({"groups": (GROUP,) * (MOST_TRACKS + 1)}, "257 groups"),
-        (
-            {"frame_count": 1000, "states": (WHOLE, *(replace(PATCH, first_frame=k) for k in range(1, 300)))},
-            f"frame {MOST_CHANGES + 1}",
-        ),
-        ({"frame_count": 100, "groups": (replace(GROUP, frame_count=100),)}, "100 frames"),
-    ],
-)
-def test_streams_that_break_a_law_are_told(change, words):
-    with pytest.raises(FormatError, match=words):
-        unpack_stream(pack_stream(replace(PLAIN, **change)))
-
-
-def test_groups_of_other_frames_than_they_claim_are_told(tracking):
-    group = tracking.groups[0]
-    payload = encode_tracked(group.reference, group.field, 1e-3)
-    for wrong in (Group(0, 1, Kind.TRACKED, payload), replace(GROUP, frame_count=1), Group(0, 1, Kind.TRACKED, b"")):
-        video = TvmcVideo(pack_stream(replace(PLAIN, groups=(wrong,))))
-        with pytest.raises(FormatError, match="group 0"):
-            video[0]
 
 
 def test_frames_beyond_the_end_are_no_frames(stream):

@@ -50,23 +50,11 @@ def test_a_scene_is_captured_once_and_kept(scene, cache):
     assert first.stat().st_mtime_ns == made and np.array_equal(again.meshes[0].faces, scene.meshes[0].faces)
 
 
-def test_labels_are_those_of_the_nearest_clean_faces_or_those_of_a_file(scene):
+def test_labels_are_those_of_the_nearest_clean_faces(scene):
     labels = [scene.labels(number) for number in range(4)]
     middles = scene.meshes[3].vertices[scene.meshes[3].faces].mean(axis=1)
     assert np.array_equal(labels[3], middles[:, 2] < 0.5) and labels[3].any()
     assert np.array_equal(scene.labels(3), labels[3])  # as kept
-    path = scene.folder / "labels" / "planted.npz"
-    np.savez(
-        path, **{f"frame_{i:05}": np.packbits(~found) for i, found in enumerate(labels[:3])}, frame_00003=np.zeros(1)
-    )
-    assert np.array_equal(scene.labels(2, "planted"), ~labels[2])
-    with pytest.raises(InputError, match="frame_00003 for"):
-        scene.labels(3, "planted")
-    with pytest.raises(InputError, match=r"none\.npz: no labels of frame_00000"):
-        scene.labels(0, "none")
-    np.savez(path, frame_00000=np.zeros(1))
-    with pytest.raises(InputError, match="no labels of frame_00001"):
-        scene.labels(1, "planted")
 
 
 def test_labels_that_another_encoder_has_found_are_not_taken_for_this_ones(scene, monkeypatch):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums, open_dataset
+from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums
 from meshreel_bench.datasets.scenes import PROCEDURAL
 from meshreel_bench.datasets.side_by_side import SideBySide
 
@@ -18,6 +18,10 @@ from meshreel.types import MeshList
 from tests.shared_data import ROOT
 
 BALLS = sliding_sphere(3, levels=1)
+
+
+def open_dataset(name, data, frames=None):
+    return Store(data).open(name, frames).sequence
 
 
 @pytest.fixture
@@ -96,8 +100,8 @@ def test_a_folder_of_anybodys_has_no_checksum(planted):
 def test_the_procedural_sequences_need_no_data(tmp_path):
     assert len(open_dataset(DEMO, tmp_path / "none", 2)) == 2
     room = Store(tmp_path / "none", tmp_path / "cache").open(PROCEDURAL, 2)
-    assert len(room.sequence) == 2 and len(room.cameras) == 4 and room.truth is not None
-    assert room.sequence[1].diagonal == pytest.approx(room.truth[1].mesh.diagonal, rel=0.2)
+    assert len(room.sequence) == 2 and len(room.cameras) == 4 and room.scene is not None
+    assert room.sequence[1].diagonal == pytest.approx(room.scene.truth[1].mesh.diagonal, rel=0.2)
     again = Store(tmp_path / "none", tmp_path / "cache").open(PROCEDURAL, 2)
     assert np.array_equal(again.sequence[0].vertices, room.sequence[0].vertices)
 
@@ -122,7 +126,7 @@ def test_living_room_is_captured_once(tmp_path):
     if not ROOT.exists():
         pytest.skip(f"benchmark data not present: {ROOT}")
     known = Store(ROOT, tmp_path).open("living_room", 2)
-    assert len(known.sequence) == 2 and known.sequence.frame_rate == 8.0 and known.truth is None
+    assert len(known.sequence) == 2 and known.sequence.frame_rate == 8.0 and known.scene is None
     assert (known.cameras[0].width, known.cameras[0].height) == (320, 240)
     file = tmp_path / "living_room" / "meshes" / "frame_00001.ply"
     made = file.stat().st_mtime_ns

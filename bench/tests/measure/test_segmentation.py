@@ -16,16 +16,15 @@ def labels(*numbers):
 def test_overlap_over_union_mean_and_worst():
     true = [labels(1, 1, 0, 0), labels(1, 1, 1, 0)]
     score = score_labels([labels(1, 0, 1, 0), labels(1, 1, 1, 0)], true)
-    assert score.iou == (1 / 3, 1.0) and score.mean == pytest.approx(2 / 3) and score.worst == pytest.approx(1 / 3)
-    assert score.static_called_dynamic == 1 / 3  # one of the three static faces of both frames
+    assert score["iou_mean"] == pytest.approx(2 / 3) and score["iou_worst"] == pytest.approx(1 / 3)
+    assert score["static_called_dynamic"] == 1 / 3  # one of the three static faces of both frames
 
 
 def test_the_truth_scores_full_and_frames_without_motion_count_as_right():
     true = [labels(1, 0), labels(0, 0)]
-    score = score_labels(true, true)
-    assert score.iou == (1.0, 1.0) and score.static_called_dynamic == 0
-    assert score_labels([labels(1, 0)], [labels(0, 0)]).worst == 0
-    assert score_labels([labels(0, 1)], [labels(1, 1)]).static_called_dynamic == 0  # nothing stands there
+    assert score_labels(true, true) == {"iou_mean": 1, "iou_worst": 1, "static_called_dynamic": 0}
+    assert score_labels([labels(1, 0)], [labels(0, 0)])["iou_worst"] == 0
+    assert score_labels([labels(0, 1)], [labels(1, 1)])["static_called_dynamic"] == 0  # nothing stands there
 
 
 def test_labels_that_do_not_fit_are_told():

@@ -6,8 +6,8 @@ import msgspec
 import pytest
 from meshreel_bench.experiments.study import D2, NORMALS
 from meshreel_bench.names import TSMC, TVMC, title
-from meshreel_bench.report.values import curve, curve_of, floors, hull_of, rated, value
-from meshreel_bench.rows import Group, Stream
+from meshreel_bench.report.values import REST_S, curve, curve_of, floors, hull_of, rated, value
+from meshreel_bench.rows import Decoding, Encoding, Group, Stream
 
 from bench.tests.made_up import failed, floor, row
 
@@ -22,6 +22,14 @@ def test_values_are_metrics_rates_and_times():
     assert value(ROW, "d2_psnr_paper") == 60.0 and value(ROW, "encode_s") == 7.0 and value(ROW, "decode_ms") == 2.0
     assert value(ROW, "encode_s.code") == 7.0 and value(ROW, "encode_s.track") is None and value(ROW, "none") is None
     assert value(failed("ball", "best", "slow"), "mbps") is None
+
+
+def test_times_at_rest_are_scaled_by_the_loop_beside_them_and_work_has_its_kind():
+    assert value(ROW, "encode_s_at_rest") is None and value(ROW, "decode_ms_at_rest") is None
+    encoding, decoding = Encoding(7.0, reference_s=2 * REST_S, work={"frames fitted": 1.5}), Decoding(5.0, 2.0, 9.0)
+    made = msgspec.structs.replace(ROW, encoding=encoding, decoding=decoding)
+    assert value(made, "encode_s_at_rest") == pytest.approx(3.5) and value(made, "decode_ms_at_rest") is None
+    assert value(made, "work.frames fitted") == 1.5 and value(made, "work.frames read") is None
 
 
 def test_a_background_counts_as_sent_every_ten_seconds():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import msgspec
 import pytest
 from meshreel_bench.experiments.study import (
@@ -12,6 +14,7 @@ from meshreel_bench.experiments.study import (
     Flat,
     Gains,
     LeastRate,
+    NoMore,
     Reaches,
     Rises,
     Study,
@@ -83,6 +86,15 @@ def test_memory_is_flat_where_more_frames_need_no_more(peak, met):
     few, many = (msgspec.structs.replace(BEST[0], point=Point("ball", "best", frames=n), frames=n) for n in (20, 60))
     many = msgspec.structs.replace(many, encoding=msgspec.structs.replace(many.encoding, peak_rss_mb=peak))
     assert judged(Flat(Which("ball", "best")), [few, many])[0].met is met
+
+
+def test_a_value_is_compared_with_the_sum_of_others():
+    parts = (Which("ball", "best", {"quality": 0.5}), Which("ball", "best", {"quality": 1.0}))
+    promise = NoMore("two in one", Which("ball", "best", {"quality": 2.0}), "mbps", 1.2, parts)
+    [found] = judged(promise)
+    assert found.met is False and found.value == "2 against 1.5: 1.33 times" and found.bound == "<= 1.2 times"
+    assert judged(replace(promise, factor=1.4))[0].met is True
+    assert judged(promise, BEST[1:])[0].word == "not measured"
 
 
 def test_what_no_row_decides_is_not_measured():

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from meshreel.analysis.scene.probe import is_scene
 from meshreel.analysis.survey import survey
-from meshreel.decoder.video import open as open_video
 from meshreel.encoder.options import SceneOptions
 from meshreel.encoder.parts import take_apart
 from meshreel.encoder.progress import Stages
@@ -37,6 +37,7 @@ class Still:
 class BackgroundOnceDracoCodec(TwoSteps):
     """A background once, and in every frame `fraction` of the vertices that move."""
 
+    analysis_key: ClassVar[str] = "background once"  # equal for all operating points
     fraction: float = 0.25
     qp: int = 10  # bits along the longest side of what moves
     levels: int = 0  # midpoint subdivisions in the decoder, of what moves
@@ -48,11 +49,6 @@ class BackgroundOnceDracoCodec(TwoSteps):
     def name(self) -> str:
         """The name in rows and plots."""
         return "background_once_draco" + ("_subdivided" if self.levels else "")
-
-    @property
-    def analysis_key(self) -> str:
-        """Equal for all operating points."""
-        return "background once"
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Still:
         """Return the background and what moves. Raises InputError for frames that cannot be used."""
@@ -74,7 +70,3 @@ class BackgroundOnceDracoCodec(TwoSteps):
         small = Frames(frame_rate, seen, (decimated(mesh, self.fraction) for mesh in meshes))
         points = [Point(self.qp, self.levels)] * len(seen.diagonals)
         return write_frames(small, points, progress, analysis.background)
-
-    def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
-        return open_video(data)

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, cast
 
+from meshreel.decoder.video import open as open_video
 from meshreel.types import Mesh, MeshSequence
 
-from ..codec import Progress
+from ..codec import Progress, TwoStepCodec
 
 
 class Options:
-    """A codec whose fields are its options."""
+    """A codec whose fields are its options, and whose streams are .reel files unless it has a decoder of its own."""
 
     __slots__ = ()
 
@@ -21,21 +22,17 @@ class Options:
         """The operating point, ready for JSON."""
         return asdict(cast(Any, self))
 
+    def decode(self, data: bytes) -> Sequence[Mesh]:
+        """Return the frames, from the bytes alone."""
+        return open_video(data)
+
 
 class TwoSteps(Options):
     """A codec that first finds what does not depend on the rate; see `TwoStepCodec`."""
 
     __slots__ = ()
 
-    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Any:
-        """Return what operating points share. Raises InputError for frames that cannot be used."""
-        raise NotImplementedError
-
-    def code(self, analysis: Any, progress: Progress | None = None) -> bytes:
-        """Return the stream; the analysis stays as it was."""
-        raise NotImplementedError
-
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+    def encode(self: TwoStepCodec, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """Return the stream. Raises InputError for frames that cannot be used."""
         return self.code(self.analyse(sequence, progress), progress)
 

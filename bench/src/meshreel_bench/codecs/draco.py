@@ -10,12 +10,14 @@ import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
+
+import DracoPy
+import msgspec
 
 from meshreel.analysis.survey import Survey, survey
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.container.writer import ReelWriter
-from meshreel.decoder.video import open as open_video
 from meshreel.encoder.scene import Static
 from meshreel.encoder.sequence import make_header
 from meshreel.errors import InputError
@@ -26,6 +28,7 @@ from ..codec import Progress
 from .base import Options, TwoSteps
 
 LARGE = 100_000  # faces; a larger mesh is decimated in two steps, as QEM to a number of vertices takes some rounds
+ALONE = "DracoPy"  # in place of this project's own decoder
 ON_THE_WAY = 3  # vertices after the first step, in those that are wanted
 
 
@@ -40,25 +43,17 @@ class Point(NamedTuple):
 class DracoCodec(Options):
     """Draco per frame, compression level 7."""
 
+    name: ClassVar[str] = "draco"
     qp: int = 10  # bits along each frame's longest side
 
     def __post_init__(self) -> None:
         check_qp(self.qp)
-
-    @property
-    def name(self) -> str:
-        """The name in rows and plots."""
-        return "draco"
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """Return a .reel file of single frames."""
         seen = survey(sequence)
         frames = Frames(sequence.frame_rate, seen, (seen.normalise(frame) for frame in sequence))
         return write_frames(frames, [Point(self.qp)] * len(sequence), progress)
-
-    def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
-        return open_video(data)
 
 
 class Frames(NamedTuple):
@@ -76,14 +71,17 @@ class DecimatedDracoCodec(TwoSteps):
     fraction: float = 0.25
     qp: int = 10  # bits along each frame's longest side
     levels: int = 0  # midpoint subdivisions in the decoder
+    decoder: str | None = None  # "DracoPy": meshes without a file around them, for what that package alone costs
 
     def __post_init__(self) -> None:
         check_point(self.fraction, self.qp, self.levels)
+        if self.decoder not in (None, ALONE) or (self.decoder and self.levels):
+            raise InputError(f"decoder {self.decoder}, levels {self.levels}: give {ALONE} and no levels, or no decoder")
 
     @property
     def name(self) -> str:
         """The name in rows and plots."""
-        return "decimated_draco" if self.levels == 0 else "decimated_draco_subdivided"
+        return "decimated_draco" + ("_subdivided" if self.levels else f", {ALONE}" if self.decoder else "")
 
     @property
     def analysis_key(self) -> str:
@@ -101,12 +99,19 @@ class DecimatedDracoCodec(TwoSteps):
 
     def code(self, analysis: Frames, progress: Progress | None = None) -> bytes:
         """Return a .reel file of single frames."""
+        if self.decoder:
+            unit, center, how = analysis.seen.unit, analysis.seen.center, {"quantization_bits": self.qp}
+            meshes = [(unit * mesh.vertices + center, mesh.faces) for mesh in analysis.meshes]
+            return msgspec.msgpack.encode([bytes(DracoPy.encode(*m, compression_level=7, **how)) for m in meshes])
         points = [Point(self.qp, self.levels)] * len(analysis.seen.diagonals)
         return write_frames(analysis, points, progress)
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """Return the frames, from the bytes alone."""
-        return open_video(data)
+        if not self.decoder:
+            return Options.decode(self, data)
+        meshes = map(DracoPy.decode, msgspec.msgpack.decode(data, type=list[bytes]))
+        return [Mesh.of(mesh.points, mesh.faces) for mesh in meshes]
 
 
 def check_point(fraction: float, qp: int, levels: int) -> None:

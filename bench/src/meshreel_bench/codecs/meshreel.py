@@ -3,24 +3,44 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from meshreel.decoder.video import open as open_video
 from meshreel.encoder.job import shared_options
 from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import Encoder
-from meshreel.types import Mesh, MeshSequence
+from meshreel.types import MeshSequence
 
 from ..codec import Progress
 from .base import TwoSteps
 from .variants import find_variant
 
 
+class Prepared(TwoSteps):
+    """A codec that first prepares an encoder of meshreel."""
+
+    __slots__ = ()
+
+    @property
+    def encoder_options(self) -> EncoderOptions:
+        """Options of the encoder."""
+        raise NotImplementedError
+
+    @property
+    def analysis_key(self) -> str:
+        """Equal for options with which `Encoder.prepare` finds the same."""
+        return repr(shared_options(self.encoder_options))
+
+    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
+        """Return an encoder that has found what operating points share. Raises InputError for unusable frames."""
+        encoder = Encoder(sequence, progress=progress)
+        encoder.prepare(self.encoder_options)
+        return encoder
+
+
 @dataclass(frozen=True, slots=True)
-class MeshreelCodec(TwoSteps):
+class MeshreelCodec(Prepared):
     """A preset at a quality; options that are None keep the preset's values.
 
     `basis_size` fixes the number of components m; a `variant` (`.variants`) changes one thing of the preset.
@@ -48,15 +68,6 @@ class MeshreelCodec(TwoSteps):
         chosen = {name: value for name, value in asdict(self).items() if value is not None and name != "variant"}
         return find_variant(self.variant)(preset_options(**chosen))
 
-    @property
-    def analysis_key(self) -> str:
-        """Equal for options with which `Encoder.prepare` finds the same."""
-        return analysis_key(self.encoder_options)
-
-    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
-        """Return an encoder that has found what does not depend on the rate."""
-        return prepared(sequence, self.encoder_options, progress)
-
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
         """Return the .reel file."""
         analysis.progress = progress
@@ -64,19 +75,3 @@ class MeshreelCodec(TwoSteps):
             path = Path(folder) / "video.reel"
             analysis.encode(path, self.encoder_options)
             return path.read_bytes()
-
-    def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
-        return open_video(data)
-
-
-def prepared(sequence: MeshSequence, options: EncoderOptions, progress: Progress | None = None) -> Encoder:
-    """Return an encoder that has found what operating points share."""
-    encoder = Encoder(sequence, progress=progress)
-    encoder.prepare(options)
-    return encoder
-
-
-def analysis_key(options: EncoderOptions) -> str:
-    """Return a key that is equal for options with which `Encoder.prepare` finds the same."""
-    return repr(shared_options(options))

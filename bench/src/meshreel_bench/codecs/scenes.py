@@ -18,7 +18,7 @@ from meshreel.geometry.topology import concatenate, drop_unreferenced
 from meshreel.types import Mesh, MeshSequence
 
 from ..codec import Progress
-from ..datasets.scenes import TRUE, SceneFrames
+from ..datasets.scenes import FOUND, TRUE, SceneFrames
 from .base import Options
 from .draco import Frames, Point, check_qp, write_frames
 
@@ -46,10 +46,6 @@ class SceneDracoCodec(Options):
         meshes = [frames.scene.decimated(number, self.share) for number in frames.numbers]
         return _written(frames.frame_rate, meshes, [Point(self.qp, self.levels)] * len(meshes), progress)
 
-    def decode(self, data: bytes) -> Sequence[Mesh]:
-        """Return the frames, from the bytes alone."""
-        return open_video(data)
-
 
 @dataclass(frozen=True, slots=True)
 class BackgroundDracoCodec(Options):
@@ -67,6 +63,8 @@ class BackgroundDracoCodec(Options):
             check_qp(qp)
         for share in (self.share, self.background_share):
             _check_share(share)
+        if self.labels not in (TRUE, FOUND):
+            raise InputError(f"labels {self.labels!r}: give {TRUE} or {FOUND}")
 
     @property
     def name(self) -> str:

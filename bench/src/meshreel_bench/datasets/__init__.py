@@ -15,7 +15,6 @@ from pathlib import Path
 
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.capture.recording import open_recording
-from meshreel.capture.truth import Truth
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.derived_sequences import Chosen, forth_and_back
@@ -26,12 +25,14 @@ from meshreel.types import MeshSequence
 
 from .captured import Captured
 from .checksums import check_source, checksum, known_checksums
-from .remesh import RemeshedSequence
+from .remesh import RemeshedSequence, RemeshOptions
 from .rooms import PEOPLE, ROOM
 from .scenes import PROCEDURAL, SCENES, SceneData, open_scene
+from .shapes import gears, prism
 from .side_by_side import Place, SideBySide
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
+SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism}  # neither do these
 SYNTHETIC = "synthetic4"
 BODIES: dict[str, Place] = {  # of SYNTHETIC, m: on one floor, 30 cm apart
     "dancer": (-1.39, 0.48, 0.0),
@@ -43,9 +44,12 @@ SYNTHETIC_FRAMES = 10
 RECORDINGS = ("living_room",)
 PERFORMERS, RECORDED = "performers", "captures"  # folders of the benchmark data
 SCALES = {"basketball_player": 0.1}  # to metres; the others are in metres
-REMESHED = {"crane60": "crane", "samba60": "samba"}  # new connectivity in every frame, from a body that has one
-REMESHED_FRAMES = 60
-NAMES = (DEMO, SYNTHETIC, *SCENES, PROCEDURAL, *RECORDINGS, *REMESHED)
+REMESHED = {  # new connectivity in every frame: of a body, its first frames
+    "crane60": ("crane", 60, RemeshOptions()),
+    "samba60": ("samba", 60, RemeshOptions()),
+    "dancer160k": ("dancer", 4, RemeshOptions(vertices=160_000, levels=2)),
+}
+NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, PROCEDURAL, *RECORDINGS, *REMESHED)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
     "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
@@ -60,11 +64,6 @@ class Dataset:
     sequence: MeshSequence
     cameras: tuple[PinholeCamera, ...] = ()  # where it was seen from; none: look from around it
     scene: SceneData | None = None  # of a simulated scene
-
-    @property
-    def truth(self) -> Truth | None:
-        """The clean frames of a simulated scene."""
-        return None if self.scene is None else self.scene.truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +85,8 @@ class Store:
                 return Dataset(played(known.sequence, frames or len(known.sequence)), known.cameras)
         if name == DEMO:
             return Dataset(soft_bodies(SoftBodiesOptions(frames=frames or SoftBodiesOptions().frames)))
+        if name in SHAPES:
+            return Dataset(SHAPES[name](*([frames] if frames else [])))
         if name in (*SCENES, PROCEDURAL):
             return _scene(name, self.data, frames, self.cache)
         if name in RECORDINGS:
@@ -95,8 +96,9 @@ class Store:
             bodies = [(_open_files(body, self.data, count), place) for body, place in BODIES.items()]
             return Dataset(SideBySide(bodies))
         if name in REMESHED:
-            source = _open_files(REMESHED[name], self.data, min(frames or REMESHED_FRAMES, REMESHED_FRAMES))
-            return Dataset(RemeshedSequence(source, None if self.cache is None else self.cache / name))
+            body, most, options = REMESHED[name]
+            source = _open_files(body, self.data, min(frames or most, most))
+            return Dataset(RemeshedSequence(source, None if self.cache is None else self.cache / name, options))
         return Dataset(_open_files(name, self.data, frames, self.own))
 
     def digest(self, name: str) -> str | None:
@@ -114,11 +116,6 @@ class Store:
         files = [path] if path.exists() else find_frames(path)[0]
         read = (*map(checksum, files), self.own.frame_rate, self.own.frames, self.own.scale)
         return hashlib.sha256(repr(read).encode()).hexdigest()
-
-
-def open_dataset(name: str, data: Path, frames: int | None = None, cache: Path | None = None) -> MeshSequence:
-    """Return the sequence called `name` (`Store.open`)."""
-    return Store(data, cache).open(name, frames).sequence
 
 
 def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:

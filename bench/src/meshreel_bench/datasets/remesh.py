@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
-from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.derived_sequences import DerivedSequence
@@ -30,11 +29,6 @@ class RemeshOptions:
     vertices: int = 10_000  # about this number is kept
     levels: int = 1  # midpoint subdivisions before the jitter
     jitter: float = 0.35  # largest move of a vertex along the surface, of its shortest edge
-
-    def __post_init__(self) -> None:
-        if self.vertices < 4 or not 0 <= self.levels <= 4 or not 0 <= self.jitter <= 0.5:
-            text = f"vertices {self.vertices}, levels {self.levels}, jitter {self.jitter:g}"
-            raise InputError(f"remeshing with {text}: give at least 4 vertices, levels 0 to 4, jitter 0 to 0.5")
 
 
 class RemeshedSequence(DerivedSequence):

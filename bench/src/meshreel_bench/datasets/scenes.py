@@ -27,7 +27,6 @@ from meshreel.capture.recording import open_recording
 from meshreel.capture.rig import RIG
 from meshreel.capture.simulated_rig import TRUTH
 from meshreel.capture.truth import Truth, read_truth
-from meshreel.errors import InputError
 from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.derived_sequences import Chosen
 from meshreel.io.meshes import read_mesh
@@ -54,25 +53,16 @@ class SceneData:
     truth: Truth
 
     def labels(self, number: int, source: str = TRUE) -> Bool[np.ndarray, " F"]:
-        """Which faces of a frame move: `truth`, `found`, or what `labels/SOURCE.npz` says (a bit a face, by frame).
-
-        Raises InputError where that file is missing or does not fit.
-        """
+        """Which faces of a frame move: those nearest to clean ones that do (`TRUE`), or what the encoder finds."""
         if source == TRUE:
             path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
             return _kept_array(path, lambda: self.truth[number].labels_for(self.meshes[number]))
-        path, frame = self.folder / "labels" / f"{_kept_as(source)}.npz", f"frame_{number:05}"
-        if source == FOUND and not path.exists():
+        path = self.folder / "labels" / f"{_kept_as(source)}.npz"
+        if not path.exists():
             _find_labels(self.meshes, path)
-        faces = len(self.meshes[number].faces)
-        try:
-            with np.load(path, allow_pickle=False) as archive:
-                bits = archive[frame]
-        except (OSError, ValueError, KeyError) as error:
-            raise InputError(f"{path}: no labels of {frame} ({error}); write packed labels of every frame") from None
-        if bits.dtype != np.uint8 or bits.shape != ((faces + 7) // 8,):
-            raise InputError(f"{path}: {bits.dtype} {bits.shape} in {frame} for {faces} faces; give a bit a face")
-        return np.unpackbits(bits, count=faces).astype(bool)
+        with np.load(path, allow_pickle=False) as archive:
+            bits = archive[f"frame_{number:05}"]
+        return np.unpackbits(bits, count=len(self.meshes[number].faces)).astype(bool)
 
     def background(self, source: str = TRUE) -> Mesh:
         """Background fused over time from the rig's depth, as the encoder fuses it."""

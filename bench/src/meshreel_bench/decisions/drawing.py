@@ -76,6 +76,20 @@ def camera_for(meshes: list[Mesh], size: int, view: int = 0) -> OrthographicCame
     return parallel_views_around(Box.of(meshes), size)[view]
 
 
+def oblique(meshes: list[Mesh], towards_eye: np.ndarray, shape: tuple[int, int], margin: float) -> OrthographicCamera:
+    """A parallel view that holds all meshes, `shape` pixels wide and high, `margin` times as large as they need."""
+    ahead = -towards_eye / np.linalg.norm(towards_eye)
+    right = np.cross(ahead, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(ahead, right), ahead])
+    turned = np.concatenate([mesh.vertices for mesh in meshes]) @ rotation.T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    extrinsic = np.eye(4)
+    extrinsic[:3, :3], extrinsic[:3, 3] = rotation, -(low + high) / 2
+    pixel = margin * max((high - low)[:2] / shape)  # m
+    return OrthographicCamera(*shape, pixel, extrinsic, back=2 * float(np.linalg.norm(Box.of(meshes).size)))
+
+
 def shaded(mesh: Mesh, camera: OrthographicCamera, colors: Float64[np.ndarray, "V 3"] | None = None) -> np.ndarray:
     """A mesh under a lamp beside the camera: grey, or colors of its vertices."""
     camera = _finer(camera)
@@ -102,10 +116,14 @@ def heat(mesh: Mesh, camera: OrthographicCamera, other: Mesh) -> np.ma.MaskedArr
     return distances
 
 
+def placed(points: Float64[np.ndarray, "K 3"], camera: OrthographicCamera) -> Float64[np.ndarray, "K 3"]:
+    """Points in the coordinates of a camera."""
+    return points @ camera.extrinsic[:3, :3].T + camera.extrinsic[:3, 3]
+
+
 def draw_edges(axes: Any, mesh: Mesh, camera: OrthographicCamera, line: float = 0.3) -> None:
     """The mesh's faces with their edges, nearest last."""
-    rotation, shift = camera.extrinsic[:3, :3], camera.extrinsic[:3, 3]
-    points = mesh.vertices @ rotation.T + shift
+    points = placed(mesh.vertices, camera)
     flat = camera.project(points)[mesh.faces]
     a, b, c = (points[mesh.faces[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
@@ -130,9 +148,9 @@ def draw_points(
     rim: float = 0.2,
 ) -> None:
     """Points as dots, nearest last."""
-    placed = points @ camera.extrinsic[:3, :3].T + camera.extrinsic[:3, 3]
-    order = np.argsort(-placed[:, 2], kind="stable")
-    flat = camera.project(placed)
+    local = placed(points, camera)
+    order = np.argsort(-local[:, 2], kind="stable")
+    flat = camera.project(local)
     axes.scatter(*flat[order].T, s=size, c=colors[order], linewidths=rim, edgecolors="black")
     axes.set(xlim=(0, camera.width), ylim=(camera.height, 0))
 

@@ -17,10 +17,9 @@ from PIL import Image, ImageDraw, ImageFont
 
 import meshreel
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
-from meshreel.metrics.viewpoints import Box, OrthographicCamera
 from meshreel.types import Mesh
 
-from .drawing import shaded
+from .drawing import oblique, shaded
 
 FRAMES = 90  # of the recording: three seconds
 EVERY = 2  # of the frames are drawn: 15 pictures per second
@@ -65,7 +64,7 @@ def main(folder: Path = Path("docs/pictures")) -> None:
 
 def write_gif(pairs: list[tuple[Mesh, Mesh]], facts: Facts, path: Path) -> None:
     """Write pairs of meshes side by side, at about the speed of the recording."""
-    camera = oblique([original for original, _ in pairs])
+    camera = oblique([original for original, _ in pairs], FROM, PANEL, MARGIN)
     pictures = [side_by_side([shaded(mesh, camera) for mesh in pair], facts.captions) for pair in pairs]
     duration = 10 * round(100 * EVERY / facts.frame_rate)  # ms; a GIF counts in hundredths of a second
     pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=duration, loop=0, optimize=True)
@@ -82,20 +81,6 @@ def side_by_side(panels: list[np.ndarray], titles: tuple[str, ...]) -> Image.Ima
         )
         pen.text((number * wide + wide / 2, TITLE / 2), title, fill=60, font=font, anchor="mm")
     return picture.quantize(GREYS)
-
-
-def oblique(meshes: list[Mesh]) -> OrthographicCamera:
-    """Return a parallel view from slightly above that holds all meshes."""
-    ahead = -FROM / np.linalg.norm(FROM)
-    right = np.cross(ahead, [0.0, 1.0, 0.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(ahead, right), ahead])
-    placed = np.concatenate([mesh.vertices for mesh in meshes]) @ rotation.T
-    low, high = placed.min(axis=0), placed.max(axis=0)
-    extrinsic = np.eye(4)
-    extrinsic[:3, :3], extrinsic[:3, 3] = rotation, -(low + high) / 2
-    pixel = MARGIN * max((high - low)[:2] / PANEL)  # m
-    return OrthographicCamera(*PANEL, pixel, extrinsic, back=2 * float(np.linalg.norm(Box.of(meshes).size)))
 
 
 if __name__ == "__main__":

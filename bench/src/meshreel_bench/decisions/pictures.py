@@ -23,19 +23,8 @@ from meshreel.metrics.error_sheet import SheetOptions, write_sheet
 from meshreel.metrics.viewpoints import Box
 from meshreel.types import Mesh, MeshList
 
-from . import room_picture
-from .drawing import (
-    BODIES,
-    DPI,
-    Sheet,
-    camera_for,
-    draw_edges,
-    draw_points,
-    heat,
-    normal_colored,
-    shaded,
-    write_figure,
-)
+from . import drawing, room_picture
+from .drawing import BODIES, Sheet, camera_for, draw_edges, draw_points, normal_colored, shaded
 from .stages import CONTACT, FIRST, Stages, compute, story
 
 Picture = Callable[[Stages, Path], None]
@@ -78,7 +67,7 @@ def centers(stages: Stages, path: Path) -> None:
     for panel, t in ((1, 0), (2, len(positions) - 1)):
         draw_points(sheet.axes[panel], positions[t], camera, colors)
         sheet.axes[panel].set_title(f"frame {FIRST + t}: one color, one trajectory", fontsize=9)
-    tracks = np.stack([camera.project(_placed(p, camera)) for p in positions])
+    tracks = np.stack([camera.project(drawing.placed(p, camera)) for p in positions])
     for k in range(0, tracks.shape[1], 3):
         sheet.axes[2].plot(*tracks[:, k].T, color=colors[k], linewidth=0.7, zorder=0)
     sheet.write(path)
@@ -138,7 +127,7 @@ def fit(stages: Stages, path: Path) -> None:
     image = None
     for panel, (name, mesh) in enumerate(shapes.items()):
         sheet.image(2 * panel, f"reference {name}", shaded(mesh, camera))
-        errors = 100 * heat(frame, camera, mesh)
+        errors = 100 * drawing.heat(frame, camera, mesh)
         image = sheet.axes[2 * panel + 1].imshow(errors, cmap="viridis", vmin=0, vmax=0.3, interpolation="nearest")
         rms = float(np.sqrt(np.mean(np.square(errors.compressed()))))
         sheet.axes[2 * panel + 1].set_title(f"RMS {rms:.3f} %", fontsize=9)
@@ -148,7 +137,7 @@ def fit(stages: Stages, path: Path) -> None:
 
 def components(stages: Stages, path: Path) -> None:
     """The energy of each KLT component, as many in color as are sent, and the quantiser's base step."""
-    figure = Figure(figsize=(8, 3), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(8, 3), dpi=drawing.DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     deviations = 100 * np.sqrt(stages.basis.energies)
@@ -162,7 +151,7 @@ def components(stages: Stages, path: Path) -> None:
         yscale="log", xlabel="component", ylabel="RMS of its weights,\n% of the diagonal", xlim=(0, len(numbers) + 1)
     )
     axes.legend(frameon=False, fontsize=8)
-    write_figure(figure, path)
+    drawing.write_figure(figure, path)
 
 
 def decoded(stages: Stages, path: Path) -> None:
@@ -176,7 +165,7 @@ def decoded(stages: Stages, path: Path) -> None:
 
 def parts(stages: Stages, path: Path) -> None:
     """The payload's bytes by what they are for."""
-    figure = Figure(figsize=(8, 1.5), dpi=DPI, layout="constrained")
+    figure = Figure(figsize=(8, 1.5), dpi=drawing.DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     start = 0
@@ -185,7 +174,7 @@ def parts(stages: Stages, path: Path) -> None:
         start += size
     axes.set(yticks=[], xlim=(0, start), xlabel=f"bytes of the group: {start}, for {len(stages.frames)} frames")
     axes.legend(frameon=False, fontsize=8, ncols=4, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    write_figure(figure, path)
+    drawing.write_figure(figure, path)
 
 
 PICTURES: dict[str, Picture] = {
@@ -221,11 +210,6 @@ def _colors_by_place(stages: Stages) -> np.ndarray:
     low, high = first.min(axis=0), first.max(axis=0)
     share = (first - low) / (high - low)
     return matplotlib.colormaps["turbo"]((3.2 * share[:, 1] + 0.5 * share[:, 0]) % 1.0)[:, :3]
-
-
-def _placed(points: np.ndarray, camera: object) -> np.ndarray:
-    extrinsic = camera.extrinsic  # type: ignore[attr-defined]
-    return points @ extrinsic[:3, :3].T + extrinsic[:3, 3]
 
 
 def _inside(mesh: Mesh, low: np.ndarray, high: np.ndarray) -> np.ndarray:

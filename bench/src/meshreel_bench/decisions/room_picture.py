@@ -19,10 +19,9 @@ from meshreel.capture.simulated_rig import SensorOptions, simulate_rig
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.sequence import encode
 from meshreel.geometry.topology import components, concatenate, part_of
-from meshreel.metrics.viewpoints import Box, OrthographicCamera
 from meshreel.types import Mesh
 
-from .drawing import BODIES, Sheet, shaded
+from .drawing import BODIES, Sheet, oblique, shaded
 
 FRAMES, SHOWN = 20, 9
 WIDTH, NOISE, VOXEL = 256, 0.3, 0.03  # as `meshreel demo` has them
@@ -39,7 +38,7 @@ def draw(path: Path) -> None:
         encode(capture, Path(folder) / "room.reel")
         with open_video(Path(folder) / "room.reel") as video:
             background, decoded = video.background(SHOWN), video[SHOWN]
-    sheet, camera = Sheet(4, PANEL), _oblique(background)
+    sheet, camera = Sheet(4, PANEL), oblique([background], FROM, (PANEL, PANEL), 1.03)
     colored, colors = _colored(frame, moves)
     sheet.image(0, f"fused: {len(frame.faces)} faces", shaded(frame, camera))
     sheet.image(1, f"moving: {100 * moves.mean():.0f} % of the faces", shaded(colored, camera, colors))
@@ -62,17 +61,3 @@ def _colored(mesh: Mesh, moves: np.ndarray) -> tuple[Mesh, Float64[np.ndarray, "
     rank = np.argsort(np.argsort(-np.bincount(label), kind="stable"), kind="stable")[label]
     colors = np.concatenate([np.tile(GREY, (len(still.vertices), 1)), BODIES[rank % len(BODIES)]])
     return concatenate([still, moving]), colors
-
-
-def _oblique(mesh: Mesh) -> OrthographicCamera:
-    """A parallel view from above the open sides."""
-    box = Box.of([mesh])
-    ahead = -FROM / np.linalg.norm(FROM)
-    right = np.cross(ahead, [0.0, 1.0, 0.0])
-    right /= np.linalg.norm(right)
-    extrinsic = np.eye(4)
-    extrinsic[:3, :3] = np.stack([right, np.cross(ahead, right), ahead])
-    extrinsic[:3, 3] = -extrinsic[:3, :3] @ box.center
-    placed = mesh.vertices @ extrinsic[:3, :3].T + extrinsic[:3, 3]
-    reach = float(np.abs(placed[:, :2]).max())
-    return OrthographicCamera(PANEL, PANEL, 2.06 * reach / PANEL, extrinsic, back=2 * mesh.diagonal)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, figure6, layers, scenes, tables, targets
+from . import ablations, figure6, layers, scenes, speed, tables, targets
 from .study import Study
 
 # In the order of the report.
@@ -19,6 +19,7 @@ EXPERIMENTS: dict[str, Study] = {
     "scenes": scenes.STUDY,
     "layers": layers.STUDY,
     "targets": targets.STUDY,
+    "speed": speed.STUDY,
 }
 
 

@@ -22,6 +22,7 @@ from .study import (
     Sweep,
     Values,
     Which,
+    at_most,
 )
 
 REMESHED = ("crane60", "samba60")
@@ -60,52 +61,46 @@ JUDGED = (SYMMETRIC, NORMALS, KEYLESS)
 ANCHORS = (DRACO, DECIMATED, SUBDIVIDED)
 
 
-def _rate(limit: float) -> Bound:
-    return Bound("mbps", limit, "Mbps", least=False)
-
-
-def _distance(limit: float) -> Bound:
-    return Bound("d2_psnr_paper", limit, "dB")
-
-
-def _normals(limit: float) -> Bound:
-    return Bound("normal_error_deg", limit, "degrees", least=False)
+def _bounds(mbps: float, db: float, degrees: float, *more: Bound) -> tuple[Bound, ...]:
+    """Return bounds of rate, D2 and normals, and some more."""
+    rate, normals = at_most("mbps", mbps, "Mbps"), at_most(NORMALS.key, degrees, "degrees")
+    return (rate, Bound(D2.key, db, "dB"), normals, *more)
 
 
 PROMISES: tuple[Promise, ...] = (
     Reaches(
         "dancer: rate, D2, normals, SSIM without key frames (released code 5.8 Mbps at 56.4 dB)",
         Which("dancer", BEST),
-        (_rate(0.34), _distance(64.0), _normals(5.3), Bound(KEYLESS.key, 0.86, "SSIM")),
+        _bounds(0.34, 64.0, 5.3, Bound(KEYLESS.key, 0.86, "SSIM")),
     ),
-    Reaches("dancer, high: rate, D2, normals", Which("dancer", BEST), (_rate(1.0), _distance(67.9), _normals(4.1))),
+    Reaches("dancer, high: rate, D2, normals", Which("dancer", BEST), _bounds(1.0, 67.9, 4.1)),
     Reaches(
         "basketball_player: rate, D2, normals, worst frame's D2",
         Which("basketball_player", BEST),
-        (_rate(0.39), _distance(65.0), _normals(4.3), Bound("d2_psnr_paper_worst", 62.0, "dB")),
+        _bounds(0.39, 65.0, 4.3, Bound("d2_psnr_paper_worst", 62.0, "dB")),
     ),
-    Reaches("mitch: rate, D2, normals", Which("mitch", BEST), (_rate(0.27), _distance(70.0), _normals(3.4))),
+    Reaches("mitch: rate, D2, normals", Which("mitch", BEST), _bounds(0.27, 70.0, 3.4)),
     *(Gains(body, BEST, ANCHORS, JUDGED, -70.0) for body in REMESHED),
     *(
         Always(
             f"{body}: bytes of frames 31 to 60 over those of 1 to 30",
             Which(body, BEST),
-            Bound("second_half_over_first", 1.0, least=False),
+            at_most("second_half_over_first", 1.0),
         )
         for body in (*REMESHED, *BACKWARDS)
     ),
     Always(
         "collision: decoded triangles that bridge the bodies once they are apart",
         Which("collision", BEST),
-        Bound("bridges", 0, least=False),
+        at_most("bridges", 0),
     ),
     *(
         Gains(body, BEST, ANCHORS, JUDGED, -60.0, ends_past=Bound(SYMMETRIC.key, 70.0, "dB"))
         for body in ("dancer", "basketball_player")
     ),
-    Always("encode, dancer", Which("dancer", BEST), Bound("encode_s", 4.0, "CPU s/frame", least=False)),
+    Always("encode, dancer", Which("dancer", BEST), at_most("encode_s", 4.0, "CPU s/frame")),
     Flat(Which("collision", BEST)),
-    Always("decode, dancer", Which("dancer", BEST), Bound("decode_ms", 1.5, "ms", least=False)),
+    Always("decode, dancer", Which("dancer", BEST), at_most("decode_ms", 1.5, "ms")),
 )
 STUDY = Study(
     title="Targets of the preset `best`",

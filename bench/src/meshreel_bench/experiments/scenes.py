@@ -7,7 +7,7 @@ Everything is measured against the truth and against the noisy input, people and
 from __future__ import annotations
 
 from ..names import BEST
-from .study import Always, Bound, Flat, Gains, Measure, Promise, Reaches, Study, Sweep, Which
+from .study import Always, Bound, Flat, Gains, Measure, Promise, Reaches, Study, Sweep, Which, at_most
 
 ROOM, STANDING = "room2", "room2-standing"
 LOOPED = f"{ROOM}-forth-and-back"
@@ -31,35 +31,30 @@ DEFAULT = Which(ROOM, BEST, {"quality": 50.0, "variant": None}, metrics="regions
 SYSTEM = Which(ROOM, BEST, metrics="regions")
 
 
-def _most(key: str, limit: float, unit: str = "") -> Bound:
-    return Bound(key, limit, unit, least=False)
-
-
 def _over_input(key: str, limit: float, unit: str = "", least: bool = False) -> Bound:
     return Bound(key, limit, unit, least, over_floor=True)
-
-
-def _labels(scene: str) -> Which:
-    return Which(scene, "segmentation")
 
 
 PROMISES: tuple[Promise, ...] = (
     Reaches(
         f"{ROOM}: segmentation, IoU of the dynamic faces, share of static ones called dynamic",
-        _labels(ROOM),
-        (Bound("iou_mean", 0.95), Bound("iou_worst", 0.9), _most("static_called_dynamic", 0.002)),
+        Which(ROOM, "segmentation"),
+        (Bound("iou_mean", 0.95), Bound("iou_worst", 0.9), at_most("static_called_dynamic", 0.002)),
         "0.98, 0.96, 0.0005",
     ),
     Reaches(
-        f"{STANDING}: segmentation, IoU of the dynamic faces", _labels(STANDING), (Bound("iou_mean", 0.85),), "0.94"
+        f"{STANDING}: segmentation, IoU of the dynamic faces",
+        Which(STANDING, "segmentation"),
+        (Bound("iou_mean", 0.85),),
+        "0.94",
     ),
     Reaches(
         f"{ROOM}: background: median error to the clean room, share covered within 20 mm, bytes",
         DEFAULT,
         (
-            _most("truth_background_median_m", 1.2e-3, "m"),
+            at_most("truth_background_median_m", 1.2e-3, "m"),
             Bound("truth_background_covered", 0.99),
-            _most("background_bytes", 60_000, "bytes"),
+            at_most("background_bytes", 60_000, "bytes"),
         ),
         "0.8 mm, 99.5 %, 40 kB",
     ),
@@ -67,7 +62,7 @@ PROMISES: tuple[Promise, ...] = (
         f"{ROOM}: rate with the background once in 10 s, D2 and SSIM to the truth",
         SYSTEM,
         (
-            _most("mbps_background_10s", 0.8, "Mbps"),
+            at_most("mbps_background_10s", 0.8, "Mbps"),
             Bound("truth_d2_psnr_backward", 62.5, "dB"),
             Bound("truth_ssim_masked", 0.76, "SSIM"),
         ),
@@ -84,9 +79,9 @@ PROMISES: tuple[Promise, ...] = (
         ),
         "2.2 mm, 16 degrees, no loss of coverage",
     ),
-    Always(f"{ROOM}: encode", SYSTEM, _most("encode_s", 6.0, "CPU s/frame")),
-    Always(f"{ROOM}: decode", SYSTEM, _most("decode_ms", 5.0, "ms")),
-    Always(f"{ROOM}: first frame", SYSTEM, _most("first_frame_ms", 200.0, "ms")),
+    Always(f"{ROOM}: encode", SYSTEM, at_most("encode_s", 6.0, "CPU s/frame")),
+    Always(f"{ROOM}: decode", SYSTEM, at_most("decode_ms", 5.0, "ms")),
+    Always(f"{ROOM}: first frame", SYSTEM, at_most("first_frame_ms", 200.0, "ms")),
     Flat(Which(LOOPED, BEST)),
     *(
         Gains(ROOM, BEST, (name, f"{name}, subdivided"), (D2_INPUT, SSIM_INPUT), most, below_floor=True)

@@ -57,6 +57,11 @@ class Bound:
     over_floor: bool = False
 
 
+def at_most(key: str, limit: float, unit: str = "") -> Bound:
+    """Return the bound of a value that must not be larger."""
+    return Bound(key, limit, unit, least=False)
+
+
 @dataclass(frozen=True, slots=True)
 class Which:
     """Rows that a promise is about: a sequence, a curve, and options."""
@@ -123,7 +128,18 @@ class Flat:
     within: float = 0.1
 
 
-Promise = Reaches | Always | Gains | LeastRate | Rises | Flat
+@dataclass(frozen=True, slots=True)
+class NoMore:
+    """Promise that a value is at most so many times the sum of what others have, one row each."""
+
+    text: str
+    which: Which
+    key: str
+    factor: float
+    than: tuple[Which, ...]
+
+
+Promise = Reaches | Always | Gains | LeastRate | Rises | Flat | NoMore
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..names import TUNED
-from .study import D2, MASKED, NORMALS, SYMMETRIC, Always, Bound, Flat, Promise, Reaches, Study, Sweep, Which
+from .study import D2, MASKED, NORMALS, SYMMETRIC, Always, Bound, Flat, Promise, Reaches, Study, Sweep, Which, at_most
 
 BODIES = ("dancer", "basketball_player", "mitch")
 # The authors' released code on dancer, one group of 10 frames, K = 2000: m -> Mbps, D2 in dB (`report.published`).
@@ -24,18 +24,14 @@ PROMISES: tuple[Promise, ...] = (
         Reaches(
             f"dancer, m = {m}: against the released code",
             _of_m(m),
-            (Bound("mbps", mbps, "Mbps", least=False), Bound("d2_psnr_paper", db, "dB")),
+            (at_most("mbps", mbps, "Mbps"), Bound("d2_psnr_paper", db, "dB")),
         )
         for m, (mbps, db) in RELEASED.items()
     ),
     Reaches(
         "dancer: one point by rate-distortion",
         Which("dancer", TUNED),
-        (
-            Bound("mbps", 1.8, "Mbps", least=False),
-            Bound("d2_psnr_paper", 61.0, "dB"),
-            Bound("normal_error_deg", 6.0, "degrees", least=False),
-        ),
+        (at_most("mbps", 1.8, "Mbps"), Bound("d2_psnr_paper", 61.0, "dB"), at_most("normal_error_deg", 6.0, "degrees")),
     ),
     *(
         Always(f"{body}: worst frame of the whole curve", Which(body, TUNED), Bound("d2_psnr_paper_worst", 55.0, "dB"))
@@ -44,24 +40,22 @@ PROMISES: tuple[Promise, ...] = (
     Always(
         "collision: decoded triangles that bridge the bodies once they are apart",
         Which("collision", TUNED, {"centers": None}),
-        Bound("bridges", 0, least=False),
+        at_most("bridges", 0),
     ),
     Reaches(
         "dancer, quality 50: D2 of the first and last frame below that of the middle",
         HALF,
-        (Bound("fall_at_ends_db", 3.0, "dB", least=False),),
+        (at_most("fall_at_ends_db", 3.0, "dB"),),
     ),
     Reaches(
         "dancer, quality 50: faces with less than a thousandth of the median area",
         HALF,
-        (Bound("degenerate_faces", 0, least=False),),
+        (at_most("degenerate_faces", 0),),
     ),
-    Reaches("volume tracking, dancer, K = 2000", HALF, (Bound("encode_s.track", 2.0, "CPU s/frame", least=False),)),
-    Reaches("encode, dancer at quality 50", HALF, (Bound("encode_s", 8.0, "CPU s/frame", least=False),)),
+    Reaches("volume tracking, dancer, K = 2000", HALF, (at_most("encode_s.track", 2.0, "CPU s/frame"),)),
+    Reaches("encode, dancer at quality 50", HALF, (at_most("encode_s", 8.0, "CPU s/frame"),)),
     Flat(Which("collision", TUNED, {"centers": 200})),
-    Reaches(
-        "decode, dancer at m = 10", Which("dancer", f"{TUNED} m", LARGEST), (Bound("decode_ms", 25.0, "ms", False),)
-    ),
+    Reaches("decode, dancer at m = 10", Which("dancer", f"{TUNED} m", LARGEST), (at_most("decode_ms", 25.0, "ms"),)),
 )
 STUDY = Study(
     title="Targets of the preset `paper`",

@@ -1,28 +1,96 @@
-"""Processor time by stage, and peak memory."""
+"""Processor time by stage, the time of a fixed loop meanwhile, work, and peak memory."""
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
+
+import numpy as np
+
+from meshreel.geometry.work import since, so_far
+
+from ..rows import Encoding
+
+NUMBERS, STEPS = 200_000, 200_000  # of the fixed loop
+SAMPLES, PAUSE = 5, 1.0  # of the loop before and after what is measured, and s between two meanwhile (guess)
+ON_TIME = hasattr(signal, "setitimer")  # not on Windows
+LATE = ("open3d", "scipy.spatial", "scipy.sparse.csgraph", "fast_simplification", "igl")  # imported where first needed
+
+
+def reference_s() -> float:
+    """Return the processor time of a fixed loop that sorts, sums and counts, s: the speed of the machine at present."""
+    numbers = np.random.default_rng(0).random(NUMBERS)
+    start, total = time.process_time(), 0
+    np.cumsum(numbers[np.argsort(numbers)])
+    for number in range(STEPS):
+        total += number ^ (number >> 3)
+    return time.process_time() - start
 
 
 class StageTimer:
-    """Progress callback that charges processor time to the stage that reports."""
+    """Progress callback that charges processor time to the stage that reports.
 
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
+    As a context manager it also counts work, and runs the fixed loop before, after and, where the system has timers,
+    meanwhile: a machine that others use is slower at one time than at another. The loop's time is not charged.
+    """
+
+    def __enter__(self) -> StageTimer:
+        self.stages: dict[str, float] = {}
+        self.references = [reference_s() for _ in range(SAMPLES)]
+        self._work, self._apart = so_far(), 0.0
         self._start = self._last = time.process_time()
+        if ON_TIME:
+            signal.signal(signal.SIGALRM, self._sample)  # on this thread, so that nothing runs beside the loop
+            signal.setitimer(signal.ITIMER_REAL, PAUSE)
+        return self
 
     def __call__(self, stage: str, _done: int, _total: int) -> None:
         """Charge the time since the last report to `stage`."""
-        now = time.process_time()
-        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
+        now = time.process_time() - self._apart
+        self.stages[stage] = self.stages.get(stage, 0.0) + now - self._last
         self._last = now
 
-    def stop(self) -> float:
-        """Return the processor time since the start, s."""
-        return time.process_time() - self._start
+    def __exit__(self, *_error: object) -> None:
+        if ON_TIME:
+            signal.signal(signal.SIGALRM, signal.SIG_IGN)  # first: a sample that is due would start the timer again
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        self.seconds, self.work = time.process_time() - self._apart - self._start, since(self._work)
+        self.references += [reference_s() for _ in range(SAMPLES)]
+
+    def _sample(self, *_signal: object) -> None:
+        start = time.process_time()
+        self.references.append(reference_s())
+        self._apart += time.process_time() - start
+        signal.setitimer(signal.ITIMER_REAL, PAUSE)
+
+
+def cost_of(timers: Sequence[StageTimer], frames: int) -> Encoding:
+    """Return what was spent on a frame while these timers ran, and this process's peak memory."""
+
+    def a_frame(totals: Sequence[Mapping[str, float]]) -> dict[str, float]:
+        names = dict.fromkeys(name for total in totals for name in total)
+        return {name: sum(total.get(name, 0.0) for total in totals) / frames for name in names}
+
+    references = [each for timer in timers for each in timer.references]
+    return Encoding(
+        s=sum(timer.seconds for timer in timers) / frames,
+        stages_s=a_frame([timer.stages for timer in timers]),
+        peak_rss_mb=peak_rss_mb(),
+        reference_s=float(np.mean(references)),
+        work=a_frame([timer.work for timer in timers]),
+    )
+
+
+def import_late() -> None:
+    """Import what codecs import when they first need it, so that no frame pays for it."""
+    for name in LATE:
+        with suppress(ImportError):  # the codec reports what it lacks
+            import_module(name)
 
 
 def peak_rss_mb() -> float | None:

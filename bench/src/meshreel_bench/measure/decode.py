@@ -16,7 +16,7 @@ from meshreel.errors import InputError
 from meshreel.types import Mesh
 
 from ..rows import Decoding
-from .clock import peak_rss_mb
+from .clock import peak_rss_mb, reference_s
 from .worker import in_fresh_process
 
 PASSES = 3
@@ -39,13 +39,14 @@ def _decode(decoder: bytes, data: bytes, numbers: Sequence[int], frames: int) ->
     while len(passes) < PASSES and len(passes) * passes[0] < SLOW_MS:
         passes.append(_pass_ms(decode, data))
     peak_mb, vertices, kept = peak_rss_mb(), list[int](), dict[int, Mesh]()
+    reference = min(reference_s() for _ in range(PASSES))  # the best, as of the passes
     for number, mesh in enumerate(decode(data)):
         vertices.append(len(_checked(mesh, number).vertices))
         if number in numbers:
             kept[number] = mesh
     if len(vertices) != frames:
         raise InputError(f"decodes {len(vertices)} frames of {frames}")
-    yield Decoding(first_ms, min(passes), float(np.mean(vertices)), peak_mb)
+    yield Decoding(first_ms, min(passes), float(np.mean(vertices)), peak_mb, reference)
     yield from (kept[number] for number in numbers)
 
 

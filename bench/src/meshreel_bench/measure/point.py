@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -28,7 +28,7 @@ from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, SceneFrames
 from ..rows import Encoding, Group, Point, Row, Stream
-from .clock import StageTimer, peak_rss_mb
+from .clock import StageTimer, cost_of, import_late
 from .decode import decoded_apart
 from .maker import maker
 from .metrics import Measured, measure_frames
@@ -57,9 +57,9 @@ def measure_point(point: Point, store: Store) -> Row:
     if point.codec == SEGMENTATION:
         return msgspec.structs.replace(row, metrics=_segmentation(known))
     if point.codec == TRUTH:
-        if known.truth is None:
+        if known.scene is None:
             raise InputError("the truth itself is known of simulated scenes only")
-        clean = [known.truth[number].mesh for number in numbers]
+        clean = [known.scene.truth[number].mesh for number in numbers]
         metrics, per_frame = measure_frames(Measured(known, numbers, clean), point.metrics)
         return msgspec.structs.replace(row, name=TRUTH_NAME, metrics=metrics, per_frame=per_frame)
     codec = make_codec(point.codec, point.options)
@@ -109,8 +109,7 @@ class _Analysed:
 
     key: object = None
     analysis: Any = None
-    timer: StageTimer | None = None
-    seconds: float = 0.0
+    timers: list[StageTimer] = field(default_factory=list)
 
 
 _LAST = _Analysed()
@@ -118,29 +117,23 @@ _LAST = _Analysed()
 
 def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, Encoding]:
     """Return the bytes and what they cost; a shared analysis counts in each of its points."""
-    timer, seconds, stages = StageTimer(), 0.0, dict[str, float]()
+    import_late()
+    before = list[StageTimer]()
     if isinstance(codec, TwoStepCodec):
         key = (what, codec.analysis_key)
         if _LAST.key != key:
             _LAST.key = _LAST.analysis = None  # one in memory is enough
-            _LAST.analysis = codec.analyse(source, timer)
-            _LAST.seconds, _LAST.timer, _LAST.key = timer.stop(), timer, key
-            timer = StageTimer()
-        assert _LAST.timer is not None
-        seconds, stages = _LAST.seconds, dict(_LAST.timer.seconds)
-        data = codec.code(_LAST.analysis, timer)
-    else:
-        data = codec.encode(source, timer)
-    seconds += timer.stop()
+            with StageTimer() as timer:
+                _LAST.analysis = codec.analyse(source, timer)
+            _LAST.timers, _LAST.key = [timer], key
+        before = _LAST.timers
+    with StageTimer() as timer:
+        data = codec.code(_LAST.analysis, timer) if isinstance(codec, TwoStepCodec) else codec.encode(source, timer)
     if type(data) is not bytes or not data:
         raise InputError(
             f"{codec.name} encodes to {type(data).__name__} of length {len(data)}; give bytes, one at least"
         )
-    for stage, spent in timer.seconds.items():
-        stages[stage] = stages.get(stage, 0.0) + spent
-    count = len(source)
-    shares = {stage: spent / count for stage, spent in stages.items()}
-    return data, Encoding(seconds / count, shares, peak_rss_mb())
+    return data, cost_of([*before, timer], len(source))
 
 
 def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
@@ -165,5 +158,4 @@ def _segmentation(known: Dataset) -> dict[str, float | None]:
     if known.scene is None:
         raise InputError("a segmentation is judged on simulated scenes only, whose labels are known")
     scene, numbers = known.scene, range(len(known.sequence))
-    score = score_labels((scene.labels(i, FOUND) for i in numbers), (scene.labels(i) for i in numbers))
-    return {"iou_mean": score.mean, "iou_worst": score.worst, "static_called_dynamic": score.static_called_dynamic}
+    return score_labels((scene.labels(i, FOUND) for i in numbers), (scene.labels(i) for i in numbers))

@@ -7,7 +7,6 @@ and the share of the static faces that are called dynamic.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool
@@ -17,30 +16,14 @@ from meshreel.errors import InputError
 Labels = Bool[np.ndarray, " _"]  # True: the face moves; one a face of the frame
 
 
-@dataclass(frozen=True, slots=True)
-class SegmentationScore:
-    """Score of a segmentation; 1, 1 and 0 are perfect."""
+def score_labels(found: Iterable[Labels], true: Iterable[Labels]) -> dict[str, float | None]:
+    """Return the scores of labels that are given frame by frame: 1, 1 and 0 are perfect.
 
-    iou: tuple[float, ...]  # of the dynamic faces, by frame; 1 where there are none, found or true
-    static_called_dynamic: float  # share of all static faces of all frames
-
-    @property
-    def mean(self) -> float:
-        """IoU over the frames."""
-        return float(np.mean(self.iou))
-
-    @property
-    def worst(self) -> float:
-        """IoU of the worst frame."""
-        return min(self.iou)
-
-
-def score_labels(found: Iterable[Labels], true: Iterable[Labels]) -> SegmentationScore:
-    """The score of labels that are given frame by frame. Raises InputError where frames or faces do not fit."""
-    overlaps, called, static = [], 0, 0
-    pairs = zip(iter(found), iter(true), strict=True)
+    The IoU of a frame without dynamic faces, found or true, is 1. Raises InputError where frames or faces do not fit.
+    """
+    overlaps, called, static = list[float](), 0, 0
     try:
-        for number, (a, b) in enumerate(pairs):
+        for number, (a, b) in enumerate(zip(found, true, strict=True)):
             if a.shape != b.shape:
                 raise InputError(f"frame {number}: {len(a)} labels for {len(b)} faces; label every face once")
             either = int((a | b).sum())
@@ -50,4 +33,5 @@ def score_labels(found: Iterable[Labels], true: Iterable[Labels]) -> Segmentatio
         raise InputError(f"only {len(overlaps)} frames have labels both found and true; label every frame") from None
     if not overlaps:
         raise InputError("labels of 0 frames; give one frame at least")
-    return SegmentationScore(tuple(overlaps), called / max(static, 1))
+    mean, worst = float(np.mean(overlaps)), min(overlaps)
+    return {"iou_mean": mean, "iou_worst": worst, "static_called_dynamic": called / max(static, 1)}

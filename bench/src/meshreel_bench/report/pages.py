@@ -17,22 +17,12 @@ from ..experiments import EXPERIMENTS
 from ..experiments.study import D2, MASKED, Study
 from ..names import title
 from ..rows import Row, failed_rows, measured_rows
+from . import tables
 from .equal import rate_table
 from .headline import headline
 from .looks import looks_of
 from .plots import plot_curves
 from .reproducing import reproducing_page
-from .tables import (
-    bd_table,
-    comparable_table,
-    failure_table,
-    maker_table,
-    point_table,
-    summary_table,
-    text,
-    value_table,
-    verdict_table,
-)
 from .values import curve_of, rated, sequences
 from .verdicts import verdicts
 
@@ -117,7 +107,7 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
         "{plots}": [
             line
             for part, name in _shown(parts)
-            for line in (f"![{text(name)}: quality against rate]({FOLDER}/{_plot_name(part, name)})", "")
+            for line in (f"![{tables.text(name)}: quality against rate]({FOLDER}/{_plot_name(part, name)})", "")
         ],
         "{table}": [line for part in parts if part.name == OPEN for line in _summary(part)],
         "{appendices}": [f"- [{p.study.title}]({FOLDER}/appendix-{p.name}.md), {_counted(p)}" for p in parts],
@@ -135,12 +125,12 @@ def _kept_promises(parts: Sequence[Part]) -> list[str]:
     if not missed:
         return [f"All {len(found)} targets that were measured are met."]
     head = f"Of {len(found)} targets {len(found) - len(missed)} are met. Missed:"
-    return [head, "", *(f"- {text(v.text)} ({v.bound}): {text(v.value)}" for v in missed)]
+    return [head, "", *(f"- {tables.text(v.text)} ({v.bound}): {tables.text(v.value)}" for v in missed)]
 
 
 def _summary(part: Part) -> list[str]:
     """Return BD-rates of the best codec against all others on all sequences, by D2."""
-    return summary_table(part.rows, part.study.best, D2) if part.study.best else []
+    return tables.summary_table(part.rows, part.study.best, D2) if part.study.best else []
 
 
 def _counted(part: Part) -> str:
@@ -154,29 +144,36 @@ def _appendix(part: Part) -> Iterator[str]:
     yield from ("```", f"meshreel-bench run {part.name} -o {part.name}.jsonl --data DATA", "```", "")
     yield from (*study.notes, "") if study.notes else ()
     if found := verdicts(study, part.rows):
-        yield from ("## Targets", "", *verdict_table(found), "")
+        yield from ("## Targets", "", *tables.verdict_table(found), "")
     if part.rated:
         yield from (f"![{title(part.name)}: quality against rate]({part.name}.png)", "")
     for name in sequences(part.rows):
         own = rated(part.rows, name)
-        yield from (f"## {text(name)}", "")
-        for table in (*_comparisons(study, own), point_table(own, study.measures)):
+        yield from (f"## {tables.text(name)}", "")
+        for table in (*_comparisons(study, own), tables.point_table(own, study.measures)):
             yield from (*table, "") if table else ()
     for measure, wanted in ((None, study.common_mbps), *([study.common] if study.common else [])):
         if wanted is not None:
             near = f"{wanted:g} Mbps" if measure is None else measure.shown(wanted)
-            yield from (f"## Near {near}", "", *comparable_table(part.rows, wanted, measure), "")
+            yield from (f"## Near {near}", "", *tables.comparable_table(part.rows, wanted, measure), "")
     if others := [row for row in part.rows if not (row.stream and row.metrics)]:
-        yield from ("## Without rate or quality", "", *value_table(others), "")
+        yield from ("## Without rate or quality", "", *tables.value_table(others), "")
     if part.failed:
-        yield from ("## Failed", "", "Nothing was measured of these points.", "", *failure_table(part.failed), "")
-    yield from ("## Machines and versions", "", *maker_table([*part.rows, *part.failed]))
+        yield from (
+            "## Failed",
+            "",
+            "Nothing was measured of these points.",
+            "",
+            *tables.failure_table(part.failed),
+            "",
+        )
+    yield from ("## Machines and versions", "", *tables.maker_table([*part.rows, *part.failed]))
 
 
 def _comparisons(study: Study, rows: Sequence[Row]) -> Iterator[list[str]]:
     """Yield tables of rates at equal quality."""
     if study.best:
         yield rate_table(rows, study.best, study.measures[:2])
-        yield bd_table(rows, study.best, study.measures)
+        yield tables.bd_table(rows, study.best, study.measures)
     if study.anchor:
-        yield bd_table(rows, study.anchor, study.measures, is_anchor=True)
+        yield tables.bd_table(rows, study.anchor, study.measures, is_anchor=True)

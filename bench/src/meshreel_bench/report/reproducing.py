@@ -10,7 +10,7 @@ from importlib.resources import files
 
 from ..names import BEST, TSMC, TUNED
 from ..rows import Row
-from .published import RELEASED, RELEASED_TVMC, TABLE_1, TABLE_2, Published
+from .published import RELEASED, TABLE_1, TABLE_2, Published
 from .values import curve_of, rated, value
 
 SCENES = ("room2", "living_room", "procedural_room")
@@ -49,8 +49,7 @@ def _table_2(rows: Sequence[Row]) -> Iterator[str]:
 def _released(rows: Sequence[Row]) -> Iterator[str]:
     yield "| sequence | released code | the same system here | `best` |"
     yield "|---|---|---|---|"
-    shown = [(name, each) for name, several in RELEASED.items() for each in several]
-    for name, each in (*shown, (SYNTHETIC, RELEASED_TVMC)):
+    for name, each in [(name, each) for name, several in RELEASED.items() for each in several]:
         own = rated(rows, name)
         cells = [_as_good(own, codec, each.d2_psnr) for codec in (each.codec, BEST)]
         ssim = "" if each.ssim is None else f", SSIM {each.ssim:.3f}"

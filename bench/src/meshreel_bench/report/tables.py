@@ -68,7 +68,7 @@ def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
     records = []
     for row in sorted(rows, key=lambda row: (order.index(curve_of(row)), row.mbps)):
         assert row.stream is not None
-        stages = row.encoding.stages_s if row.encoding else {}
+        stages, work = (row.encoding.stages_s, row.encoding.work) if row.encoding else ({}, {})
         record: dict[str, object] = {"codec": text(row.name), "operating point": text(_point(row)), "Mbps": row.mbps}
         record |= {measure.label: value(row, measure.key) for measure in measures}
         record |= {
@@ -77,11 +77,37 @@ def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
             "groups": _group_sizes(row),
             "encode (s/frame)": value(row, "encode_s"),
             "by stage": text(", ".join(f"{stage} {s:.2g}" for stage, s in stages.items())),
+            "at rest (s/frame)": value(row, "encode_s_at_rest"),
+            "work a frame": text(", ".join(f"{kind} {number:.3g}" for kind, number in work.items())) or None,
             "decode (ms/frame)": value(row, "decode_ms"),
             "decode peak (MB)": value(row, "decode_mb"),
         }
         records.append(record)
     return markdown(pd.DataFrame(records))
+
+
+def change_table(before: Sequence[Row], after: Sequence[Row]) -> list[str]:
+    """Return what the points that both have cost before and after a change, as `before → after`."""
+    known, records = {row.point.key: row for row in before}, list[dict[str, object]]()
+    for row in [row for row in after if row.point.key in known]:
+        records.append({"sequence": text(row.point.sequence), "codec": text(row.name), "point": text(_point(row))})
+        for label, key in _COSTS.items():
+            pair = [_cell(value(each, key)) for each in (known[row.point.key], row)]
+            records[-1][label] = " → ".join(pair) if any(pair) else None
+    return markdown(pd.DataFrame(records)) if records else []
+
+
+_COSTS = {
+    "encode at rest (CPU s/frame)": "encode_s_at_rest",
+    "peak (MB)": "encode_mb",
+    "Mbps": "mbps",
+    "D2 (dB)": "d2_psnr_paper",
+    "decode at rest (ms)": "decode_ms_at_rest",
+    **{
+        f"{kind} a frame": f"work.{kind}"
+        for kind in ("frames read", "frames tracked", "frames fitted", "closest points")
+    },
+}
 
 
 def value_table(rows: Sequence[Row]) -> list[str]:

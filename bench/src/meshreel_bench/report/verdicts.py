@@ -10,7 +10,7 @@ from math import inf
 
 from meshreel.metrics.bd_rate import BdRate, bd_bound, beats, gain_end
 
-from ..experiments.study import Always, Bound, Flat, Gains, LeastRate, Promise, Reaches, Rises, Study, Which
+from ..experiments.study import Always, Bound, Flat, Gains, LeastRate, NoMore, Promise, Reaches, Rises, Study, Which
 from ..rows import Row
 from .values import curve, curve_of, floors, hull_of, rated, sequences, value
 
@@ -166,6 +166,19 @@ def _(promise: Flat, rows: Sequence[Row]) -> list[Verdict]:
     before, after = value(few, "encode_mb") or 0.0, value(many, "encode_mb") or 0.0
     found = f"{before:.0f} MB at {few.frames} frames, {after:.0f} at {many.frames}: {100 * (after / before - 1):+.1f} %"
     return [Verdict(text, bound, found, after / before - 1 <= promise.within)]
+
+
+@_judged.register
+def _(promise: NoMore, rows: Sequence[Row]) -> list[Verdict]:
+    bound = f"<= {promise.factor:g} times"
+    found = [value(row, promise.key) for which in (promise.which, *promise.than) for row in _chosen(rows, which)[:1]]
+    own, *others = [number for number in found if number is not None] or [0.0]
+    if len(others) < len(promise.than):
+        return [Verdict(promise.text, bound)]
+    ratio = own / sum(others)
+    return [
+        Verdict(promise.text, bound, f"{own:.4g} against {sum(others):.4g}: {ratio:.3g} times", ratio <= promise.factor)
+    ]
 
 
 def _chosen(rows: Sequence[Row], which: Which) -> list[Row]:

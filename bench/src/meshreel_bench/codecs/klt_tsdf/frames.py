@@ -13,19 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
-from meshreel.errors import FormatError, InputError
 from meshreel.geometry.closest_points import Surface
 from meshreel.types import Mesh
 
 from .blobs import join, split
 from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols
 from .grid import SIDE, block_keys, prepared, sample
-from .surface import Field, cells_of, count_crossed, crossed, field_of, polygonize, without
+from .surface import Field, cells_of, crossed, field_of, polygonize, without
 from .weights import Model, forward
 
 _FAR = 1.5  # voxels from the surface beyond which decoded surface is left out
 _PAST = 0.5  # voxels past a border
-MOST_CROSSED = 1 << 22  # cells of a frame with surface: as many blocks as there may be, of noise, would have 16 million
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +36,7 @@ class Group:
 
 
 def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndarray, " M"]) -> bytes:
-    """The bytes of some frames in voxel units, and of what mean square weights are expected.
-
-    Raises InputError where a frame has more blocks, or more surface, than a decoder takes.
-    """
+    """The bytes of some frames in voxel units, and of what mean square weights are expected."""
     group = Group([], [], [])
     for mesh in meshes:
         mesh = prepared(mesh)
@@ -49,16 +44,13 @@ def encode_group(meshes: Iterable[Mesh], model: Model, energies: Float64[np.ndar
         symbols = forward(blocks, model, energies)
         group.places.append(blocks.places)
         group.symbols.append(symbols)
-        field = field_of(blocks.places, symbols, model)
-        if (count := count_crossed(field)) > MOST_CROSSED:
-            raise InputError(f"surface in {count} cells of a frame, over {MOST_CROSSED}; give fewer cells")
-        group.omitted.append(_encode_omitted(mesh, field))
+        group.omitted.append(_encode_omitted(mesh, field_of(blocks.places, symbols, model)))
     coded = encode_symbols(np.concatenate(group.symbols), group.places)
     return join([encode_places(group.places), coded, *group.omitted])
 
 
 def decode_group(data: bytes, count: int, width: int) -> Group:
-    """The group of `count` frames. Raises FormatError where the bytes are damaged."""
+    """The group of `count` frames."""
     first, second, *omitted = split(data, 2 + count)
     places = decode_places(first, count)
     symbols = decode_symbols(second, places, width)
@@ -66,10 +58,8 @@ def decode_group(data: bytes, count: int, width: int) -> Group:
 
 
 def decode_frame(group: Group, number: int, model: Model) -> Mesh:
-    """A frame of a group, in voxel units. Raises FormatError where its bytes are damaged."""
+    """A frame of a group, in voxel units."""
     field = field_of(group.places[number], group.symbols[number], model)
-    if (count := count_crossed(field)) > MOST_CROSSED:
-        raise FormatError(f"surface in {count} cells of a frame, over {MOST_CROSSED}; the stream is damaged")
     return without(polygonize(field), _decode_omitted(group.omitted[number], field))
 
 

@@ -84,23 +84,13 @@ def _outsiders(
 
 def crossed(field: Field, chosen: Bool[np.ndarray, " B"]) -> Int64[np.ndarray, "C 3"]:
     """The cells of the chosen blocks that the zero level passes through, sorted."""
-    block, *cell = np.nonzero(_passed(field, chosen))
-    cells = SIDE * field.places[chosen][block] + np.stack(cell, axis=1)
-    return cells[np.argsort(block_keys(cells))]
-
-
-def count_crossed(field: Field) -> int:
-    """How many cells the zero level passes through: a face or more each."""
-    return int(np.count_nonzero(_passed(field, np.ones(len(field.places), bool))))
-
-
-def _passed(field: Field, chosen: Bool[np.ndarray, " B"]) -> Bool[np.ndarray, "C S S S"]:
-    """Of the cells of the chosen blocks, those with corners on both sides."""
     inside = (field.values < 0)[field.index[chosen]].reshape(-1, POINTS, POINTS, POINTS)
     count = np.zeros((len(inside), SIDE, SIDE, SIDE), np.int8)
     for x, y, z in np.indices((2, 2, 2)).reshape(3, -1).T:
         count += inside[:, x : x + SIDE, y : y + SIDE, z : z + SIDE]
-    return np.asarray((count > 0) & (count < 8))
+    block, *cell = np.nonzero((count > 0) & (count < 8))  # corners on both sides
+    cells = SIDE * field.places[chosen][block] + np.stack(cell, axis=1)
+    return cells[np.argsort(block_keys(cells))]
 
 
 def polygonize(field: Field) -> Mesh:

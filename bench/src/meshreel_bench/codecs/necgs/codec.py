@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float16, Float32
@@ -23,16 +23,6 @@ from .stream import Coded, decode_stream, encode_stream
 
 # For tests and a first look: limbs and heads, no faces, in seconds.
 QUICK: dict[str, Any] = {"resolution": 32, "channels": 8, "epochs": 60, "fitting": 10}
-# The publication's operating point (section 4.1), for a GPU.
-FULL: dict[str, Any] = {
-    "resolution": 128,
-    "channels": 64,
-    "epochs": 400,
-    "fitting": 100,
-    "batch": 4,
-    "rate": 1e-3,
-    "structure": 10.0,
-}
 MOST_STRUCTURE = 1000.0  # a guess
 KEPT = 0.1  # least share of inside points that original and decoded volume have in common; a guess
 
@@ -51,6 +41,7 @@ class FittedVolumes:
 class NecgsCodec(TwoSteps):
     """A set of frames as one network and one feature per frame. Needs the extra `necgs` on both sides."""
 
+    name: ClassVar[str] = "necgs"
     resolution: int = 64  # K, points along a side of the grid: 16, 32, 64 or 128
     features: int = 16  # C, channels of an embedded feature of 4 x 4 x 4 points
     channels: int = 16  # of the network's first module; sets the rate
@@ -83,11 +74,6 @@ class NecgsCodec(TwoSteps):
             raise InputError(f"structure {self.structure}: give a weight of 0 to {MOST_STRUCTURE:g}")
 
     @property
-    def name(self) -> str:
-        """The name in rows and plots."""
-        return "necgs"
-
-    @property
     def shape(self) -> Shape:
         """Sizes of the network."""
         return Shape(self.resolution, self.features, self.channels, self.bits)
@@ -117,15 +103,13 @@ class NecgsCodec(TwoSteps):
     def code(self, analysis: FittedVolumes, progress: Progress | None = None) -> bytes:
         """Return the stream. Raises InputError where training ends without the surface of a frame."""
         _need_torch()
-        from .train import Training, train
+        from .train import train
 
         volumes = analysis.fitted
         report = partial(progress, "train") if progress else lambda _done, _total: None
-        options = Training(self.epochs, self.batch, self.rate, self.structure, self.seed)
         features, parameters = np.zeros((0, self.shape.feature_size), np.int32), list[np.ndarray]()
         if volumes:
-            trained = train(volumes, self.shape, options, self.device, report)
-            features, parameters = trained.features, trained.parameters
+            features, parameters = train(volumes, self, report)
         coded = Coded(self.shape, analysis.trimmed, analysis.full, analysis.placement, features, parameters)
         self._check_surfaces(coded, volumes)
         return encode_stream(coded)

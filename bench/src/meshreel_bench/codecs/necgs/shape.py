@@ -33,11 +33,6 @@ class Shape:
         return self.features * SIDE**3
 
     @property
-    def most(self) -> int:
-        """Largest symbol, of the value 1; the smallest is its negative."""
-        return 1 << (self.bits - 1)
-
-    @property
     def layers(self) -> tuple[tuple[int, int], ...]:
         """Input and output channels of each convolution: L modules that double the resolution, and the last."""
         modules = round(math.log2(self.resolution // SIDE))

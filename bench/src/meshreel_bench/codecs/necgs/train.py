@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from .codec import NecgsCodec
 from .network import choose_device, decode_volumes, initial_parameters, repeatable, rounded, to_symbols
-from .shape import SIDE, Shape
+from .shape import SIDE
 
 NEAR = 5.0  # lambda 1 of eq. 3
 SMALL_FEATURES = 0.1  # weight of the features' mean size, as in the authors' code
@@ -27,29 +27,13 @@ Volumes = Sequence[np.ndarray]  # K x K x K x 4 each
 Report = Callable[[int, int], None]  # epochs done, epochs
 
 
-@dataclass(frozen=True, slots=True)
-class Training:
-    """Options of training."""
-
-    epochs: int
-    batch: int  # frames per step
-    rate: float  # highest learning rate of Adam
-    structure: float  # lambda 2 of eq. 3, weight of the structural similarities
-    seed: int
-
-
-@dataclass(frozen=True, slots=True)
-class Trained:
-    """Symbols of the features of all frames and of the tensors of the network, flat."""
-
-    features: np.ndarray  # N x features, int32
-    parameters: list[np.ndarray]
-
-
 @repeatable()
-def train(volumes: Volumes, shape: Shape, options: Training, device: str, report: Report) -> Trained:
-    """Return the symbols of at least one volume; equal for the same seed on the same machine."""
-    place = choose_device(device)
+def train(volumes: Volumes, options: NecgsCodec, report: Report) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return the symbols of at least one volume's features, N x features, and of the network's tensors, flat.
+
+    They are equal for the same seed on the same machine.
+    """
+    place, shape = choose_device(options.device), options.shape
     generator = torch.Generator().manual_seed(options.seed)
     size = (len(volumes), shape.features, SIDE, SIDE, SIDE)
     features = (torch.randn(size, generator=generator) / 3).to(place).requires_grad_()
@@ -69,7 +53,7 @@ def train(volumes: Volumes, shape: Shape, options: Training, device: str, report
             adam.step()
         report(epoch + 1, options.epochs)
     symbols = to_symbols(features, shape.bits).reshape(len(volumes), -1)
-    return Trained(symbols, [to_symbols(p, shape.bits) for p in parameters])
+    return symbols, [to_symbols(p, shape.bits) for p in parameters]
 
 
 def _pace(done: float) -> float:

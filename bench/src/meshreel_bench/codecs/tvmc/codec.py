@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,11 +14,10 @@ from meshreel.encoder.presets import preset_options, quality_of_vertices
 from meshreel.encoder.progress import Stages
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError
-from meshreel.types import Mesh, MeshSequence
+from meshreel.types import Mesh
 
 from ...codec import Progress
-from ..base import TwoSteps
-from ..meshreel import analysis_key, prepared
+from ..meshreel import Prepared
 from .layout import MAGIC, VERSION, Group, Kind, State, Stream, pack_stream
 from .tracked import MOST_CELLS, encode_tracked
 from .tracking import Tracked, Tracking, Untracked, track_sequence
@@ -27,9 +27,10 @@ LEAST_QP, MOST_QP = 2, 16  # bits; guesses
 
 
 @dataclass(frozen=True, slots=True)
-class TvmcCodec(TwoSteps):
+class TvmcCodec(Prepared):
     """TVMC* with displacements of `qp` bits; operating points that differ in `qp` alone share an analysis."""
 
+    name: ClassVar[str] = "tvmc"
     qp: int = 9  # bits along the longest side of the widest frame's displacements
     vertices: int = 2000  # of the reference, before its subdivision
     group_size: int = 10  # largest number of frames in a group
@@ -41,11 +42,6 @@ class TvmcCodec(TwoSteps):
         _ = self.encoder_options  # raises InputError for invalid options
 
     @property
-    def name(self) -> str:
-        """The name in rows and plots."""
-        return "tvmc"
-
-    @property
     def encoder_options(self) -> EncoderOptions:
         """Options of preset `paper` at the quality with `vertices` vertices, which sets the target of references."""
         quality = quality_of_vertices(self.vertices)
@@ -53,15 +49,6 @@ class TvmcCodec(TwoSteps):
         assert isinstance(options.method, PaperOptions)
         reference = replace(options.method.reference, vertices=self.vertices)
         return replace(options, method=replace(options.method, reference=reference))
-
-    @property
-    def analysis_key(self) -> str:
-        """The key of preset `paper`, which shares the analysis; independent of `qp`."""
-        return analysis_key(self.encoder_options)
-
-    def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
-        """Return an encoder that has tracked the frames. Raises InputError for frames that cannot be used."""
-        return prepared(sequence, self.encoder_options, progress)
 
     def code(self, analysis: Encoder, progress: Progress | None = None) -> bytes:
         """Return the stream of an analysed sequence."""

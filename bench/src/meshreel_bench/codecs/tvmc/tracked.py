@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
-from meshreel.coding.mesh import COMPRESSION_LEVEL, check_growth, check_step, decode_mesh
+from meshreel.coding.mesh import COMPRESSION_LEVEL, decode_mesh
 from meshreel.coding.reference_mesh import CodedReference
-from meshreel.errors import FormatError, InputError
+from meshreel.errors import InputError
 from meshreel.format.records import pack, unpack_all
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
@@ -28,19 +28,14 @@ def encode_tracked(reference: CodedReference, field: Float64[np.ndarray, "V T 3"
     return pack(TrackedPayload(reference.levels, reference.step, reference.data, frames))
 
 
-def decode_tracked(data: bytes, frame_count: int, step: float) -> list[Mesh]:
-    """Return the frames of a group, normalised. Raises FormatError where the bytes are damaged or of other frames."""
+def decode_tracked(data: bytes, step: float) -> list[Mesh]:
+    """Return the frames of a group, normalised."""
     record = unpack_all(TrackedPayload, data)
-    if len(record.displacements) != frame_count:
-        raise FormatError(f"displacements of {len(record.displacements)} frames in a group of {frame_count}")
-    check_step(record.spacing)
-    reference = decode_mesh(record.reference, record.spacing)
-    check_growth(reference, record.levels, frame_count)
-    base = subdivide_midpoint(reference, record.levels)
+    base = subdivide_midpoint(decode_mesh(record.reference, record.spacing), record.levels)
     order, meshes = surface_order(base), list[Mesh]()
     for frame in record.displacements:
         vertices = base.vertices.copy()
-        vertices[order] += decode_cloud(frame, len(order), step)
+        vertices[order] += decode_cloud(frame, step)
         meshes.append(Mesh(vertices, base.faces))
     return meshes
 
@@ -54,7 +49,7 @@ def encode_cloud(points: Float64[np.ndarray, "V 3"], step: float) -> bytes:
         raise InputError(f"displacements of {np.abs(cells).max():g} steps; give a larger step, and finite vertices")
     low = cells.min(axis=0)
     bits = max(1, int((cells - low).max()).bit_length())
-    data = bytes(
+    return bytes(
         DracoPy.encode(
             cells,
             None,
@@ -65,23 +60,13 @@ def encode_cloud(points: Float64[np.ndarray, "V 3"], step: float) -> bytes:
             preserve_order=True,
         )
     )
-    assert data.startswith(_head(len(points))), "another version of Draco's bitstream"
-    return data
 
 
-def decode_cloud(data: bytes, count: int, step: float) -> Float64[np.ndarray, "V 3"]:
-    """Return the points of a cloud. Raises FormatError, before taking memory, where there are not `count` of them."""
+def decode_cloud(data: bytes, step: float) -> Float64[np.ndarray, "V 3"]:
+    """Return the points of a cloud."""
     import DracoPy
 
-    if not data.startswith(_head(count)):
-        raise FormatError(f"displacements: {len(data)} bytes are no sequential Draco cloud of {count} points")
-    try:
-        cells = np.asarray(DracoPy.decode(bytes(data)).points, dtype=np.float64)
-    except Exception as error:  # DracoPy raises various types on damaged bytes
-        raise FormatError(f"displacements: damaged Draco data ({len(data)} bytes): {error}") from error
-    if cells.shape != (count, 3) or not np.abs(cells).max(initial=0) <= 2 * MOST_CELLS:
-        raise FormatError(f"displacements: {cells.shape} numbers for {count} vertices, or beyond {2 * MOST_CELLS}")
-    return np.rint(cells) * step
+    return np.rint(np.asarray(DracoPy.decode(bytes(data)).points, dtype=np.float64)) * step
 
 
 def surface_order(mesh: Mesh) -> Int64[np.ndarray, " V"]:
@@ -91,11 +76,3 @@ def surface_order(mesh: Mesh) -> Int64[np.ndarray, " V"]:
     """
     names: Int32[np.ndarray, " N"] = np.append(mesh.faces.ravel(), np.arange(len(mesh.vertices), dtype=np.int32))
     return np.argsort(np.unique(names, return_index=True)[1], kind="stable").astype(np.int64)
-
-
-def _head(count: int) -> bytes:
-    """Return the first bytes of a sequential Draco cloud with one attribute, as in Draco's bitstream specification."""
-    version, cloud, sequential, flags = (2, 3), 0, 0, (0, 0)
-    decoders, attributes, position, float32, components, normalised, number, quantised = 1, 1, 0, 9, 3, 0, 0, 2
-    attribute = bytes([decoders, attributes, position, float32, components, normalised, number, quantised])
-    return b"DRACO" + bytes([*version, cloud, sequential, *flags]) + count.to_bytes(4, "little") + attribute

@@ -7,14 +7,12 @@ from collections.abc import Iterator
 
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.intra import decode_intra
-from meshreel.decoder.tracks import MOST_TOGETHER
 from meshreel.encoder.options import MOST_FRAMES
-from meshreel.errors import FormatError
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement
 
 from ..base import DecodedFrames
-from .layout import Group, Kind, is_bare, is_patch, unpack_stream
+from .layout import Kind, is_bare, is_patch, unpack_stream
 from .tracked import decode_tracked
 
 
@@ -33,19 +31,14 @@ class TvmcVideo(DecodedFrames):
         return self.stream.frame_count
 
     def frame(self, number: int) -> Mesh:
-        """Return a frame in metres: the background, then the bodies. Raises FormatError where its bytes are damaged."""
+        """Return a frame in metres: the background, then the bodies."""
         return self._place.of(concatenate([*self._still(number), *self._moving(number)]))
 
     def _moving(self, frame: int) -> Iterator[Mesh]:
         """Return the bodies of a frame, normalised."""
         near = range(bisect_left(self._firsts, frame - MOST_FRAMES + 1), bisect_right(self._firsts, frame))
         groups = [number for number in near if frame < self._end(number)]
-        before, self._decoded, size = self._decoded, {}, 0
-        for number in groups:
-            self._decoded[number] = meshes = before.get(number) or self._decode(number)
-            size += sum(mesh.vertices.nbytes + mesh.faces.nbytes for mesh in meshes)
-            if size > MOST_TOGETHER:
-                raise FormatError(f"the groups of frame {frame} take over {MOST_TOGETHER} bytes")
+        self._decoded = {number: self._decoded.get(number) or self._decode(number) for number in groups}
         return (meshes[frame - self._firsts[number]] for number, meshes in self._decoded.items())
 
     def _end(self, number: int) -> int:
@@ -53,10 +46,9 @@ class TvmcVideo(DecodedFrames):
 
     def _decode(self, number: int) -> list[Mesh]:
         group = self.stream.groups[number]
-        try:
-            return _frames(group, self.stream.step)
-        except FormatError as error:
-            raise FormatError(f"group {number}, from frame {group.first_frame} on: {error}") from error
+        if group.kind == Kind.TRACKED:
+            return decode_tracked(group.payload, self.stream.step)
+        return decode_intra(group.payload)
 
     def _still(self, frame: int) -> Iterator[Mesh]:
         """Yield the background of a frame, normalised, if it has one."""
@@ -73,12 +65,3 @@ class TvmcVideo(DecodedFrames):
                 mesh = decode_change(state.payload, mesh)
             self._background = (number, mesh)
         yield self._background[1]
-
-
-def _frames(group: Group, step: float) -> list[Mesh]:
-    if group.kind == Kind.TRACKED:
-        return decode_tracked(group.payload, group.frame_count, step)
-    meshes = decode_intra(group.payload)
-    if len(meshes) != group.frame_count:
-        raise FormatError(f"{len(meshes)} meshes, {group.frame_count} frames")
-    return meshes
