@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
 
+from ..shapes import Bool, Float64, Int32, Int64
 from ..types import Mesh
 
 
