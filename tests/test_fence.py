@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -21,7 +22,12 @@ HEAVY = (
     "trimesh",
     "rich",
     "cyclopts",
+    "jaxtyping",
+    "importlib.metadata",
+    "unittest",
 )
+LATER = ("meshreel.coding.paper", "DracoPy", "html", *HEAVY)  # what some files need, or none
+MOST_OPENING = 2.0  # CPU times of importing NumPy that opening a file may take (guess; with jaxtyping it takes more)
 ENCODER_SIDE = ("analysis", "capture", "metrics", "encoder", "export", "server", "cli", "io")
 
 LOOK = f"""
@@ -40,6 +46,26 @@ def test_decoding_loads_no_heavy_package_and_nothing_of_the_encoder():
     command = [sys.executable, "-c", LOOK, *(str(GOLDEN / f"{name}.reel") for name in ("mixed", "layers", "scene"))]
     answer = subprocess.run(command, capture_output=True, text=True, check=True)
     assert answer.stdout.split("\n")[:2] == ["[]", "[]"]
+
+
+def test_opening_loads_nothing_that_only_some_files_need():
+    opened = f"import sys, meshreel; meshreel.open({str(GOLDEN / 'layers.reel')!r})"
+    command = [sys.executable, "-c", f"{opened}; print([name for name in {LATER!r} if name in sys.modules])"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+def test_opening_takes_hardly_longer_than_importing_numpy():
+    opening = least_seconds(f"import meshreel; meshreel.open({str(GOLDEN / 'layers.reel')!r})")
+    assert opening <= MOST_OPENING * least_seconds("import numpy")
+
+
+def least_seconds(code: str) -> float:
+    """Return the least CPU time of fresh processes that run `code`, with compiled modules and one thread of BLAS."""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    command = [sys.executable, "-c", f"{code}\nimport time; print(time.process_time())"]
+    answers = [subprocess.run(command, capture_output=True, env=environment, check=True) for _ in range(7)]
+    return min(float(answer.stdout) for answer in answers)
 
 
 def test_the_promised_names_are_these():

@@ -36,6 +36,12 @@ def test_another_axis_is_refused() -> None:
         check_up("x")
 
 
+@pytest.mark.parametrize("vertices", [np.zeros((1, 2)), np.zeros((1, 3), np.float32)])
+def test_shapes_and_dtypes_are_checked_while_tests_run(vertices: np.ndarray) -> None:
+    with pytest.raises(TypeError, match="vertices"):
+        Mesh(vertices, np.zeros((0, 3), np.int32))
+
+
 TRIANGLE = Mesh.of([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 
 

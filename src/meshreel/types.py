@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float64, Int32
 
 from .errors import InputError
+from .shapes import Float64, Int32
 
 if TYPE_CHECKING:
     import trimesh

@@ -7,13 +7,13 @@ of dropped faces is run-length coded in the order of Draco's faces, which is coh
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool
 
 from ..errors import FormatError
 from ..format.budget import Size, change_cost, check_cost
 from ..format.layout import Form, StaticPatch
 from ..format.records import pack, unpack_all
 from ..geometry.topology import concatenate, part_of
+from ..shapes import Bool
 from ..types import Mesh, Placement
 from . import entropy
 from .intra import decode_intra, encode_intra

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int32, Int64, UInt8
 
 from .. import _core
 from ..errors import FormatError
+from ..shapes import Float64, Int32, Int64, UInt8
 
 SYMBOLS_PER_BYTE = 22_800  # no stream says more: a coded bit costs at least 1 / 2840 bit
 

@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
 
 from .. import _core
 from ..geometry import strict
+from ..shapes import Float64, Int64
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator, Sequence
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -163,6 +162,8 @@ class Video(Sequence[Mesh]):
 
     def _repr_html_(self) -> str:
         """Return a table for notebooks."""
+        from html import escape
+
         rows = (f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in self._facts().items())
         return f"<table>{''.join(rows)}</table>"
 

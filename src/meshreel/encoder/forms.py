@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float64
 
-from ..coding.group import decode_group, encode_group
+from ..coding.group import decode_group
 from ..coding.intra import encode_empty
 from ..coding.paper.displacements import DisplacementOptions
+from ..coding.paper.group import encode_laplacian
 from ..coding.reference_mesh import CodedReference
 from ..container.writer import Stored
 from ..errors import InputError
@@ -53,7 +54,7 @@ def laplacian(
 ) -> EncodedGroup:
     """Encode a group in the `laplacian` form. Raises CostlyError where readers would refuse it."""
     try:
-        payload, layers = encode_group(reference, displacement_field(reference, positions), options)
+        payload, layers = encode_laplacian(reference, displacement_field(reference, positions), options)
     except ValueError as error:  # least squares that are singular, or whose elimination fills in
         raise CostlyError(f"laplacian: {error}") from error
     fidelity = measure(frames, decode_group(payload, len(frames)))

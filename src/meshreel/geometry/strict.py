@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from jaxtyping import Float, Float64
 
 from .. import _core
+from ..shapes import Float, Float64
 
 Array = Float[np.ndarray, "..."]  # of float32 or float64
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int32
 
 from .. import _core
 from ..errors import FormatError
+from ..shapes import Float64, Int32
 from ..types import Mesh, Placement
 from .topology import vertex_normals
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
 
 from .. import _core
+from ..shapes import Bool, Float64, Int32, Int64
 from ..types import Mesh
 
 

@@ -17,9 +17,10 @@ from meshreel.analysis.reference.centers import affinity, largest_distances
 from meshreel.analysis.reference.deform import neighbours
 from meshreel.analysis.reference.extraction import MDS
 from meshreel.analysis.reference.fuse import Group, GroupCenters
-from meshreel.coding.group import decode_group, encode_group
+from meshreel.coding.group import decode_group
 from meshreel.coding.paper import quantize
 from meshreel.coding.paper.displacements import DisplacementOptions, decode_displacements, encode_displacements
+from meshreel.coding.paper.group import encode_laplacian
 from meshreel.coding.paper.laplacian import System, anchors
 from meshreel.coding.reference_mesh import code_reference
 from meshreel.encoder.draco import cheapest_intra
@@ -141,7 +142,7 @@ def second_fit_rows(stages: Stages) -> Iterator[Row]:
     for sent in (3, 10, None):
         for start, fit in zip(starts, fits, strict=True):
             field = np.ascontiguousarray(np.moveaxis(fit.positions, 0, 1) - stages.coded.base.vertices[:, None])
-            payload, layers = encode_group(stages.coded, field, replace(options.displacements, basis_size=sent))
+            payload, layers = encode_laplacian(stages.coded, field, replace(options.displacements, basis_size=sent))
             shown = measure(stages.frames, decode_group(payload, len(stages.frames)))
             yield {
                 "start": start,

@@ -18,7 +18,8 @@ from meshreel.analysis.reference.track import track_centers
 from meshreel.analysis.survey import survey
 from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.coding import klt
-from meshreel.coding.group import decode_group, encode_group, payload_bytes_by_purpose
+from meshreel.coding.group import decode_group, payload_bytes_by_purpose
+from meshreel.coding.paper.group import encode_laplacian
 from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.encoder.options import PaperOptions
 from meshreel.geometry.topology import vertex_normals
@@ -78,7 +79,7 @@ def compute(sequence: MeshList, options: PaperOptions) -> Stages:
     predictions = predict(reference, coded.base, centers, options.reference.deform)
     fit = fit_frames(coded.base.faces, predictions, frames, options.fit, Guides(key=reference.key))
     field = np.moveaxis(fit.positions, 0, 1) - coded.base.vertices[:, None]
-    payload, layers = encode_group(coded, field, options.displacements)
+    payload, layers = encode_laplacian(coded, field, options.displacements)
     moved = tuple(
         _moved(frame, own, spread.positions, reference, options)
         for frame, own in zip(frames, centers.positions, strict=True)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
 import numpy as np
-from jaxtyping import Float64, Int32
 
 from ...errors import FormatError, InputError
 from ...format.budget import Size, check_cost, layers_cost
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ...format.records import pack, unpack, unpack_all
 from ...geometry.subdivision import frames_of, heights, refine, subdivide
+from ...shapes import Float64, Int32
 from ...types import Mesh, Placement
 from ..mesh import check_growth, check_step, decode_mesh
 from ..reference_mesh import CodedReference

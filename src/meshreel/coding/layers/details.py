@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
 
 from ... import _core
 from ...format.layout import LayersLevel, Origin
 from ...geometry.subdivision import Level
+from ...shapes import Float64
 from ...types import Placement
 from .fields import EncodedField, Rate, encode_field
 from .graph import Connectivity, siblings

@@ -9,13 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
 
 from ... import _core
 from ...errors import InputError
 from ...format.layout import CodedField
 from ...format.records import pack
 from ...geometry import strict
+from ...shapes import Bool, Float64, Int32, Int64
 from .. import entropy, klt
 from ..steps import step_of
 from . import orthonormal

@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int32, Int64
 
 from ... import _core
 from ...errors import FormatError
 from ...geometry.subdivision import Level, subdivide
+from ...shapes import Float64, Int32, Int64
 from ...types import Mesh
 
 

@@ -7,11 +7,11 @@ again. It saves a third to a half of the integers (docs/decisions/0012-layers-co
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64, Int32
 
 from ... import _core
 from ...errors import FormatError
 from ...geometry.strict import dot, norm, products
+from ...shapes import Float64, Int32
 
 
 def forward(vectors: Float64[np.ndarray, "M C"], scales: Float64[np.ndarray, " M"]) -> Int32[np.ndarray, " N"]:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
 
 from ... import _core
 from ...errors import FormatError, InputError
 from ...format.layout import LayersPatches
+from ...shapes import Bool, Float64, Int32, Int64
 from ...types import Mesh, Placement
 from .. import entropy
 from ..mesh import check_growth, decode_mesh, encode_mesh

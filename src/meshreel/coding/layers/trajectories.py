@@ -7,10 +7,10 @@ in a hierarchy that both sides build from it (docs/decisions).
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64
 
 from ... import _core
 from ...geometry.topology import vertex_normals
+from ...shapes import Float64
 from ...types import Mesh
 from .fields import EncodedField, Rate, SurfaceWeight, encode_field
 from .graph import hierarchy

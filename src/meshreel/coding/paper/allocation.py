@@ -10,12 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int32, Int64
 
 from ...errors import InputError
 from ...format.layout import AnchorRule
 from ...geometry.strict import log2
 from ...geometry.topology import components
+from ...shapes import Bool, Float64, Int32, Int64
 from .. import entropy, klt
 from ..steps import RUNGS, rung_of, step_of
 from . import quantize

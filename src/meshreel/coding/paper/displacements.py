@@ -8,11 +8,11 @@ head and the first k components decode without the rest.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64
 
 from ...errors import FormatError, InputError
 from ...format import records
 from ...format.layout import Component, DisplacementHead
+from ...shapes import Float64
 from ...types import Mesh
 from .. import entropy, klt
 from ..steps import RUNGS

@@ -10,11 +10,11 @@ faces has the identity as its row; the anchors' rows may weigh more than 1, whic
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64, Int32
 
 from ... import _core
 from ...format.layout import AnchorRule
 from ...geometry.topology import components
+from ...shapes import Float64, Int32
 from ...types import Mesh
 
 

@@ -7,9 +7,9 @@ In -> out: values (N x M, any unit) and steps (M, the same unit) -> symbols (N x
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float64, Int32
 
 from ...errors import InputError
+from ...shapes import Float64, Int32
 
 LARGEST = 2**31 - 1  # largest magnitude of a symbol, an int32
 
