@@ -12,8 +12,9 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.queues import SimpleQueue
 
-from ..encoder.worker import end_with_parent
+from ..encoder.worker import Told, end_with_parent, tell_to
 
 _BLOCKS = hasattr(signal, "pthread_sigmask")
 _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of Linux's prctl
@@ -25,7 +26,7 @@ def workers(jobs: int) -> Iterator[Executor | None]:
     if jobs == 1:
         yield None
         return
-    executor = ProcessPoolExecutor(jobs, mp_context=_Context(), initializer=_begin)
+    executor = _Workers(jobs)
     try:
         yield executor
     except BaseException:
@@ -34,6 +35,20 @@ def workers(jobs: int) -> Iterator[Executor | None]:
             child.terminate()
         raise
     executor.shutdown()
+
+
+class _Workers(ProcessPoolExecutor):
+    """Worker processes that tell how far they are."""
+
+    def __init__(self, jobs: int) -> None:
+        context = _Context()
+        self._queue = context.SimpleQueue()
+        super().__init__(jobs, mp_context=context, initializer=_begin, initargs=(self._queue,))
+
+    def told(self) -> Iterator[Told]:
+        """Yield what the workers have told since the last call."""
+        while not self._queue.empty():
+            yield self._queue.get()
 
 
 class _Process(SpawnProcess):
@@ -55,8 +70,9 @@ class _Context(SpawnContext):
     Process = _Process
 
 
-def _begin() -> None:
+def _begin(queue: SimpleQueue[Told]) -> None:
     """Let the parent heed Ctrl-C, and let SIGTERM and the parent's end end a worker without a message."""
+    tell_to(queue.put)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     # At once, too, where a library holds Python's lock. The signal follows the thread that started the worker:

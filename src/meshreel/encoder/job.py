@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..geometry.derived_sequences import CapturedSequence
+from ..geometry.derived_sequences import DerivedSequence
 from .digests import WriteLines, line_of
 from .interval import Interval
 from .journal import Journal
@@ -49,7 +49,7 @@ class GroupStore:
 class Job:
     """A sequence to encode, its options, and the means to do it."""
 
-    sequence: CapturedSequence
+    sequence: DerivedSequence
     options: EncoderOptions
     executor: Executor | None
     stages: Stages

@@ -23,7 +23,7 @@ from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.masks import Masker
 from ..analysis.scene.probe import is_scene
 from ..analysis.scene.segmentation import SegmentOptions
-from ..analysis.survey import Survey, survey
+from ..analysis.survey import Survey
 from ..coding.background import decode_background
 from ..container.writer import ReelWriter
 from ..decoder.video import open as open_video
@@ -49,11 +49,13 @@ from .recipe import encode_intervals, longest_interval
 from .scene import (
     Static,
     TrackGroup,
+    Tracks,
     encode_bodies,
     encode_static,
     scene_intervals,
 )
 from .summary import GroupSummary, SceneSummary, Summary
+from .surveying import surveyed
 
 QUALITY, PRESET = 50.0, "best"  # the default operating point (decision 0009)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
@@ -155,7 +157,7 @@ class Encoder:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
         before = so_far()
         job, parts = replace(self._job(options), journal=journal), self.parts(options)
-        seen = survey(job.sequence, job.stages) if parts is None else parts.seen
+        seen = surveyed(job) if parts is None else parts.seen
         journal.begin(made_of(self.sequence, options, self._masker))
         summary = _encode_bodies(job, file, seen) if parts is None else _encode_scene(job, file, parts)
         return replace(summary, work=since(before))
@@ -175,7 +177,7 @@ class Encoder:
         """Return the parts of the scene; they are found again where the options of the scene changed."""
         how = (job.scene.segment, job.scene.background)
         if self._scene is None or self._scene[:2] != how:
-            seen = survey(job.sequence, job.stages, cleaned=False)
+            seen = surveyed(job, cleaned=False)
             self._scene = (*how, take_apart(job.sequence, seen, job.scene, job.stages, self._masker))
         return self._scene[2]
 
@@ -186,7 +188,7 @@ def _encode_bodies(job: Job, file: BinaryIO, seen: Survey) -> Summary:
     groups: list[GroupSummary] = []
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped)
     with _writer(job, file, seen) as writer:
-        for encoded in encode_intervals(job, _body_intervals(job, seen), job.stages):
+        for encoded in encode_intervals(job, _body_intervals(job, seen)):
             for group in encoded:
                 each = TrackGroup(0, writer.frame_count, group)
                 groups.append(_added(writer, each, [], seen.diagonal))
@@ -314,8 +316,8 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
 def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
     """Yield the intervals of a sequence, of a scene where there are parts."""
     if parts is None:
-        return _body_intervals(job, survey(job.sequence, job.stages))
-    return scene_intervals(job, parts)
+        return _body_intervals(job, surveyed(job))
+    return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))
 
 
 def _body_intervals(job: Job, seen: Survey) -> Iterator[Interval]:
