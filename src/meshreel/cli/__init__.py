@@ -138,6 +138,8 @@ def _text_of(error: Exception) -> str:
         return f"{text} (see meshreel --help)"
     if isinstance(error, BrokenProcessPool):
         return "a worker process died, out of memory perhaps; give fewer --jobs"
+    if type(error).__module__.startswith("distributed."):
+        return f"the cluster failed: {text}"
     if isinstance(error, MemoryError):
         return "out of memory; give fewer --jobs or smaller meshes"
     if isinstance(error, (MeshreelError, OSError)):

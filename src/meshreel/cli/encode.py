@@ -107,6 +107,7 @@ def command(
     parting: Parting = Parting(),
     masking: Masking = Masking(),
     jobs: int = 1,
+    cluster: str | None = None,
     resume: bool | None = None,
     debug_digests: Path | None = None,
     common: Common = Common(),
@@ -125,6 +126,9 @@ def command(
         The .reel file to write; it appears only when it is complete.
     jobs
         Number of intervals to encode side by side; the file is the same.
+    cluster
+        Address of a Dask scheduler, as tcp://10.0.0.7:8786, whose workers encode in place of this machine (extra
+        `cluster`). They read the inputs by the same paths or URLs; the file is the same.
     resume
         Continue an encode that was stopped, from the intervals that OUTPUT.part has: give the same inputs and options.
         --no-resume starts over. By default, what could be continued is an error.
@@ -134,8 +138,6 @@ def command(
     """
     if output.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
-    if jobs < 1:
-        raise InputError(f"--jobs must be at least 1, got {jobs}")
     parting.check(masking)
     if debug_digests is not None and (resume or coding.goal() is not None):
         raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
@@ -150,7 +152,7 @@ def command(
     sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
     with (
         common.stages(len(sequence)) as progress,
-        workers(jobs) as executor,
+        workers(jobs, cluster) as executor,
         _lines(debug_digests, output, sequence.files) as digests,
     ):
         encoder = Encoder(sequence, executor, progress, masker, digests)
