@@ -10,6 +10,7 @@ import numpy as np
 
 from ..geometry.derived_sequences import DerivedSequence
 from .digests import WriteLines, line_of
+from .excerpt import Excerpt
 from .interval import Interval
 from .journal import Journal
 from .options import EncoderOptions, PaperOptions, SceneOptions
@@ -56,6 +57,7 @@ class Job:
     store: GroupStore = field(default_factory=GroupStore)
     journal: Journal | None = None  # of the output; None where groups are not kept
     digests: WriteLines | None = None  # of what the stages compute; None where nobody asks
+    excerpt: Excerpt | None = None  # the frames that are encoded; None: all
 
     def note(self, stage: str, *values: object) -> None:
         """Write the line of a stage where digests are wanted."""
