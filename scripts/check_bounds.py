@@ -15,8 +15,8 @@ from typing import Any
 
 from scripts.reliability import ROOT, add_row
 
-EXTRAS = ("encode", "play", "usd")  # which scripts/test-versions installs
-FORM = re.compile(r"([\w.-]+)>=([\d.]+)")  # of a requirement that is tested here
+EXTRAS = ("encode", "play", "usd", "cluster", "remote")  # which scripts/test-versions installs
+FORM = re.compile(r"([\w.-]+)(?:\[\w+\])?>=([\d.]+)")  # of a requirement that is tested here
 
 
 def requirements() -> list[str]:

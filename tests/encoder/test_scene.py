@@ -128,7 +128,7 @@ def test_the_same_scene_gives_the_same_bytes_with_an_executor_too(tmp_path):
         encoded(ROLLING, tmp_path / "b.reel", executor=executor, progress=record)
     assert (tmp_path / "b.reel").read_bytes() == (tmp_path / "a.reel").read_bytes()
     assert {stage: done[-1] for stage, done in stages.items()} == dict.fromkeys(
-        ("survey", "segment", "background", "code"), 4
+        ("survey", "segment", "background", "code", "track", "fit"), 4
     )
     for stage in ("segment", "background"):  # frame by frame, and not all at the end
         assert sorted(stages[stage]) == stages[stage] and len(set(stages[stage])) > 2
@@ -167,7 +167,7 @@ def test_bodies_need_not_be_nearer_to_noisy_frames_than_the_truth_is(preset, mon
     monkeypatch.setattr(
         scene,
         "encode_intervals",
-        lambda job, some, stages: noises.extend(i.noise for i in some) or coded(job, some, stages),
+        lambda job, some: coded(job, (noises.append(i.noise) or i for i in some)),
     )
     video, _ = encoded(ROLLING, tmp_path / "a.reel", quick_scene(preset, group_size=1))
     assert noises

@@ -5,8 +5,8 @@ In -> out: MeshSequence -> Survey. Errors in any frame surface here, before minu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
@@ -52,6 +52,10 @@ class Survey:
         """Return whether a frame has no surface."""
         return self.diagonals[frame] == 0
 
+    def without_frames(self) -> Survey:
+        """Return what normalising needs: all but the facts about single frames, of any number of frames."""
+        return replace(self, diagonals=(), flattened=())
+
     def normalise(self, mesh: Mesh) -> Mesh:
         """Return the mesh cleaned and in normalised coordinates: centered, in multiples of `unit`."""
         mesh = clean(mesh)
@@ -88,12 +92,15 @@ def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool 
 
     Unless `cleaned`, faces without area count like any others: scenes have too many faces to search for them.
     """
-    if len(sequence) == 0:
-        raise InputError("the sequence has no frames; give at least one mesh")
+    return joined([survey_of(sequence, range(len(sequence)), stages, cleaned)])
+
+
+def survey_of(sequence: MeshSequence, numbers: range, stages: Counter | None = None, cleaned: bool = True) -> Survey:
+    """Survey some frames of a sequence as `survey` does; `joined` makes one of the surveys of all its parts."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped = list[float](), list[int](), 0
-    for number, mesh in enumerate(sequence):
-        check(mesh, f"frame {number}")
+    for number in numbers:
+        check(mesh := sequence[number], f"frame {number}")
         had_faces, before = not mesh.is_empty, len(mesh.faces)
         mesh = clean(mesh) if cleaned else drop_unreferenced(mesh)
         dropped += before - len(mesh.faces)
@@ -103,9 +110,19 @@ def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool 
             low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
         if stages is not None:
             stages.add("survey", 1)
-    if not np.isfinite(low).all():
-        low, high = np.zeros(3), np.zeros(3)
     return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped)
+
+
+def joined(parts: Sequence[Survey]) -> Survey:
+    """Return the survey of a sequence from those of its parts, in order. Raises InputError where there is no frame."""
+    diagonals = tuple(diagonal for part in parts for diagonal in part.diagonals)
+    if not diagonals:
+        raise InputError("the sequence has no frames; give at least one mesh")
+    low, high = np.min([part.low for part in parts], axis=0), np.max([part.high for part in parts], axis=0)
+    if not np.isfinite(low).all():  # no frame has a surface
+        low, high = np.zeros(3), np.zeros(3)
+    flattened = tuple(number for part in parts for number in part.flattened)
+    return Survey(low, high, diagonals, flattened, dropped=sum(part.dropped for part in parts))
 
 
 def check_one_unit(seen: Survey) -> None:

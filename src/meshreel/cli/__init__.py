@@ -1,4 +1,4 @@
-"""The command line `meshreel capture|segment|encode|decode|export|info|compare|play|serve|bench|demo`.
+"""The command line `meshreel capture|segment|survey|encode|concat|decode|export|info|compare|play|serve|bench|demo`.
 
 Errors take one line on standard error and exit code 2; `--debug` shows the traceback. The module of a command is
 imported when the command is called, so that `decode` and `info` work without the extra `encode`. This module imports
@@ -32,7 +32,9 @@ _STOPPED = {False: "interrupted", True: "terminated"}  # by whether it was SIGTE
 COMMANDS = {
     "capture": "Fuse recordings of depth cameras into one mesh per frame.",
     "segment": "Label which faces of a scene move, and with which body.",
+    "survey": "Survey a sequence once, for encodes of its parts on many machines.",
     "encode": "Encode a sequence of meshes into one .reel file.",
+    "concat": "Join .reel files that are parts of one sequence, without encoding them again.",
     "decode": "Decode a .reel file into a directory of meshes.",
     "export": "Write a .reel file as one animated file, GLB or USD, that other programs play.",
     "info": "Show the rate by content, tracks over time, groups and forms, and what the encoder recorded.",
@@ -138,6 +140,8 @@ def _text_of(error: Exception) -> str:
         return f"{text} (see meshreel --help)"
     if isinstance(error, BrokenProcessPool):
         return "a worker process died, out of memory perhaps; give fewer --jobs"
+    if type(error).__module__.startswith("distributed."):
+        return f"the cluster failed: {text}"
     if isinstance(error, MemoryError):
         return "out of memory; give fewer --jobs or smaller meshes"
     if isinstance(error, (MeshreelError, OSError)):

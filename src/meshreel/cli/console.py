@@ -1,13 +1,15 @@
-"""Terminal output: warnings, a progress bar for each stage, results as text or JSON."""
+"""Terminal output: warnings, a progress bar for each stage or a line now and then, results as text or JSON."""
 
 from __future__ import annotations
 
 import json
 import shutil
 import sys
+import threading
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
+from datetime import timedelta
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,12 +19,16 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     SpinnerColumn,
+    Task,
     TaskID,
     TextColumn,
     TimeElapsedColumn,
-    TimeRemainingColumn,
 )
+from rich.text import Text
+
+EVERY = 10.0  # s, between two lines of progress outside a terminal
 
 
 @Parameter(name="*")
@@ -61,7 +67,7 @@ class Common:
 
     @contextmanager
     def stages(self, total: int) -> Iterator[StageBars]:
-        """Show progress bars, one per stage, on standard error; none if quiet or not a terminal."""
+        """Show progress bars, one per stage, on standard error, or lines where that is no terminal; none if quiet."""
         console = Console(stderr=True)
         columns = (
             SpinnerColumn(),
@@ -71,9 +77,11 @@ class Common:
             TextColumn("frames"),
             TimeElapsedColumn(),
             TextColumn("left"),
-            TimeRemainingColumn(),
+            _LeftColumn(),
         )
-        with Progress(*columns, console=console, disable=self.quiet or not console.is_terminal) as bars:
+        shown = console.is_terminal and not self.quiet
+        bars = Progress(*columns, console=console, disable=not shown)
+        with bars, nullcontext() if shown or self.quiet else _lines(bars):
             yield StageBars(bars, total)
 
 
@@ -99,5 +107,57 @@ class StageBars:
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Show that `done` of `total` frames have passed `stage`."""
         if stage not in self.tasks:
-            self.tasks[stage] = self.bars.add_task(stage, total=total)
+            self.tasks[stage] = self.bars.add_task(stage, total=total, first=done)
         self.bars.update(self.tasks[stage], completed=done, total=total)
+
+
+def left(task: Task) -> float | None:
+    """Return the seconds that a stage still takes at the pace so far; None where none of its frames was seen pass."""
+    gained = task.completed - task.fields["first"]  # those of an earlier run took no time
+    if gained <= 0 or task.elapsed is None or task.remaining is None:
+        return None
+    return task.elapsed * task.remaining / gained
+
+
+class _LeftColumn(ProgressColumn):
+    """The time left, from all frames so far: a frame's time varies too much for the last few to tell."""
+
+    def render(self, task: Task) -> Text:
+        """Return the text of a bar."""
+        return Text(_clock(left(task)), style="progress.remaining")
+
+
+@contextmanager
+def _lines(bars: Progress) -> Iterator[None]:
+    """Print a line of progress on standard error every `EVERY` seconds, until the block ends."""
+    ended = threading.Event()
+
+    def run() -> None:
+        with suppress(OSError, ValueError):  # standard error is closed
+            while not ended.wait(EVERY):
+                if text := line_of(bars.tasks):
+                    print(text, file=sys.stderr, flush=True)
+
+    thread = threading.Thread(target=run, name="lines of progress", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def line_of(tasks: Iterable[Task]) -> str:
+    """Return a line that tells how far the unfinished stages are, empty where there is none."""
+    open_ones = [task for task in tasks if not task.finished]
+    if not open_ones:
+        return ""
+    counts = ", ".join(f"{task.description} {task.completed:.0f}" for task in open_ones)
+    lefts = [seconds for task in open_ones if (seconds := left(task)) is not None]
+    so_far = _clock(max(task.elapsed or 0.0 for task in open_ones))
+    rest = f", about {_clock(max(lefts))} left" if lefts else ""
+    return f"meshreel: {counts} of {open_ones[0].total:.0f} frames; {so_far} so far{rest}"
+
+
+def _clock(seconds: float | None) -> str:
+    return "-:--:--" if seconds is None else str(timedelta(seconds=round(seconds)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -12,13 +13,17 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from ..encoder.digests import WriteLines, machine_line
+from ..encoder.excerpt import Excerpt, part_of, read_survey
 from ..encoder.options import EncoderOptions, SceneOptions
 from ..encoder.presets import preset_options
 from ..encoder.quality import Goal, encode_to
+from ..encoder.recipe import longest_interval
 from ..encoder.sequence import Encoder
 from ..encoder.summary import SceneSummary, Summary
 from ..errors import InputError
+from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing
+from ..types import MeshSequence
 from .console import Common
 from .flags import Reading
 from .sources import Masking, open_source
@@ -97,6 +102,44 @@ class Parting:
         return replace(options, segment=masking.options(options.segment), background=background)
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Flags for a file of some frames, which `concat` joins with the others."""
+
+    survey: Path | None = None
+    """The survey of the whole sequence, which `meshreel survey` wrote: with it, --frames or --part say which frames to
+    encode, and `meshreel concat` joins the files without encoding them again. Not for scenes."""
+    part: str | None = None
+    """Which of how many parts of the sequence to encode, as 3/100; needs --survey. Parts end where frames decode alone,
+    so that the joined file has the bytes of one encode of the whole."""
+
+    def excerpt(self, sequence: MeshSequence, frames: str, options: EncoderOptions) -> Excerpt | None:
+        """Return the frames to encode, None for all of a sequence without a survey. Raises InputError."""
+        if self.survey is None:
+            if self.part is not None:
+                raise InputError(
+                    f"--part {self.part}: needs the --survey that all parts share; meshreel survey writes it"
+                )
+            return None
+        surveyed, chosen = read_survey(self.survey), SequenceOptions(frames=frames).chosen(len(sequence))
+        if self.part is None:
+            return Excerpt(surveyed, chosen)
+        found = _PART.fullmatch(self.part)
+        if found is None or len(chosen) < len(sequence):
+            raise InputError(f"--part {self.part}: give K/N, as 3/100, and leave --frames out")
+        intervals = surveyed.seen.intervals(longest_interval(options, sequence.frame_rate))
+        return Excerpt(surveyed, part_of(intervals, int(found[1]), int(found[2])))
+
+    def check(self, coding: Coding, masking: Masking) -> None:
+        """Raise InputError for flags that no part can have."""
+        if self.survey is not None and (coding.goal() is not None or masking.wanted):
+            raise InputError("--survey is for a part: give --quality in place of a target, and no masks or views")
+
+
+_PART = re.compile(r"(\d{1,9})/(\d{1,9})")
+
+
 def command(
     inputs: list[str],
     /,
@@ -106,7 +149,9 @@ def command(
     reading: Reading = Reading(),
     parting: Parting = Parting(),
     masking: Masking = Masking(),
+    parts: Parts = Parts(),
     jobs: int = 1,
+    cluster: str | None = None,
     resume: bool | None = None,
     debug_digests: Path | None = None,
     common: Common = Common(),
@@ -125,6 +170,9 @@ def command(
         The .reel file to write; it appears only when it is complete.
     jobs
         Number of intervals to encode side by side; the file is the same.
+    cluster
+        Address of a Dask scheduler, as tcp://10.0.0.7:8786, whose workers encode in place of this machine (extra
+        `cluster`). They read the inputs by the same paths or URLs; the file is the same.
     resume
         Continue an encode that was stopped, from the intervals that OUTPUT.part has: give the same inputs and options.
         --no-resume starts over. By default, what could be continued is an error.
@@ -134,12 +182,11 @@ def command(
     """
     if output.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
-    if jobs < 1:
-        raise InputError(f"--jobs must be at least 1, got {jobs}")
     parting.check(masking)
     if debug_digests is not None and (resume or coding.goal() is not None):
         raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
-    source = open_source(inputs, reading)
+    parts.check(coding, masking)
+    source = open_source(inputs, reading if parts.survey is None else replace(reading, frames=":"))
     scene = parting.scene(preset_options().scene or SceneOptions(), masking)
 
     def options_at(quality: float) -> EncoderOptions:
@@ -148,12 +195,13 @@ def command(
     goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
     sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
+    excerpt = parts.excerpt(sequence, reading.frames, options)
     with (
-        common.stages(len(sequence)) as progress,
-        workers(jobs) as executor,
+        common.stages(len(sequence if excerpt is None else excerpt.frames)) as progress,
+        workers(jobs, cluster) as executor,
         _lines(debug_digests, output, sequence.files) as digests,
     ):
-        encoder = Encoder(sequence, executor, progress, masker, digests)
+        encoder = Encoder(sequence, executor, progress, masker, digests, excerpt)
         if goal is None:
             summary = encoder.encode(output, options, resume)
         else:

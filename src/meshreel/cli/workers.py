@@ -1,4 +1,4 @@
-"""Worker processes of commands, which Ctrl-C in the terminal reaches only through the command itself.
+"""Workers of commands: processes here, which Ctrl-C reaches only through the command itself, or those of a cluster.
 
 Imports nothing heavy: each worker imports this module before it can heed its parent's end.
 """
@@ -12,20 +12,39 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.queues import SimpleQueue
+from typing import Any
 
-from ..encoder.worker import end_with_parent
+from .. import __version__
+from ..encoder.worker import Told, end_with_parent, tell_to
+from ..errors import InputError
+from ..io.differences import first_difference
 
 _BLOCKS = hasattr(signal, "pthread_sigmask")
 _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of Linux's prctl
+CONNECTS = 10.0  # s, in which a scheduler answers (guess)
 
 
 @contextmanager
-def workers(jobs: int) -> Iterator[Executor | None]:
-    """Start processes that encode `jobs` intervals at a time, none for one job; an interrupt ends them at once."""
+def workers(jobs: int, cluster: str | None = None) -> Iterator[Executor | None]:
+    """Start processes that encode `jobs` intervals at a time, none for one job; an interrupt ends them at once.
+
+    With the address of a Dask scheduler, its workers encode. Raises InputError where jobs are asked for, too.
+    """
+    if jobs < 1:
+        raise InputError(f"--jobs must be at least 1, got {jobs}")
+    if cluster is not None:
+        if jobs > 1:
+            raise InputError(
+                f"--jobs {jobs} and --cluster {cluster}: the cluster has workers of its own, give one of both"
+            )
+        with _cluster(cluster) as executor:
+            yield executor
+        return
     if jobs == 1:
         yield None
         return
-    executor = ProcessPoolExecutor(jobs, mp_context=_Context(), initializer=_begin)
+    executor = _Workers(jobs)
     try:
         yield executor
     except BaseException:
@@ -34,6 +53,49 @@ def workers(jobs: int) -> Iterator[Executor | None]:
             child.terminate()
         raise
     executor.shutdown()
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    """Connect to a Dask scheduler; an interrupt cancels what its workers still have to do."""
+    try:
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        raise InputError("--cluster needs the extra `cluster`: pip install 'meshreel[cluster]'") from error
+    with Client(address, timeout=CONNECTS) as client:
+        own = installed()
+        for worker, theirs in client.run(installed).items():
+            if theirs != own:
+                text = f"{worker}: is not installed as this machine is: {first_difference(theirs, own)}"
+                raise InputError(f"{text} here; bytes would depend on who encodes: install the same versions")
+        executor: Executor = client.get_executor(pure=False)  # what is at a path may change
+        try:
+            yield executor
+        except BaseException:
+            executor.shutdown(wait=False)
+            raise
+        executor.shutdown()
+
+
+def installed() -> dict[str, Any]:
+    """Return the versions on which bytes depend."""
+    from ..encoder.digests import versions
+
+    return {"meshreel": __version__, "libraries": versions()}
+
+
+class _Workers(ProcessPoolExecutor):
+    """Worker processes that tell how far they are."""
+
+    def __init__(self, jobs: int) -> None:
+        context = _Context()
+        self._queue = context.SimpleQueue()
+        super().__init__(jobs, mp_context=context, initializer=_begin, initargs=(self._queue,))
+
+    def told(self) -> Iterator[Told]:
+        """Yield what the workers have told since the last call."""
+        while not self._queue.empty():
+            yield self._queue.get()
 
 
 class _Process(SpawnProcess):
@@ -55,8 +117,9 @@ class _Context(SpawnContext):
     Process = _Process
 
 
-def _begin() -> None:
+def _begin(queue: SimpleQueue[Told]) -> None:
     """Let the parent heed Ctrl-C, and let SIGTERM and the parent's end end a worker without a message."""
+    tell_to(queue.put)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     # At once, too, where a library holds Python's lock. The signal follows the thread that started the worker:

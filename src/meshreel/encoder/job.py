@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..geometry.derived_sequences import CapturedSequence
+from ..geometry.derived_sequences import DerivedSequence
 from .digests import WriteLines, line_of
+from .excerpt import Excerpt
 from .interval import Interval
 from .journal import Journal
 from .options import EncoderOptions, PaperOptions, SceneOptions
@@ -49,13 +50,14 @@ class GroupStore:
 class Job:
     """A sequence to encode, its options, and the means to do it."""
 
-    sequence: CapturedSequence
+    sequence: DerivedSequence
     options: EncoderOptions
     executor: Executor | None
     stages: Stages
     store: GroupStore = field(default_factory=GroupStore)
     journal: Journal | None = None  # of the output; None where groups are not kept
     digests: WriteLines | None = None  # of what the stages compute; None where nobody asks
+    excerpt: Excerpt | None = None  # the frames that are encoded; None: all
 
     def note(self, stage: str, *values: object) -> None:
         """Write the line of a stage where digests are wanted."""

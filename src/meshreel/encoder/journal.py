@@ -1,8 +1,8 @@
 """Journal of an encode: the intervals that are done, in a file beside the output, from which another run can continue.
 
-In: the groups of each interval, in order, and what their bytes depend on. Out: the same groups, from `NAME.part`, which
-is no .reel file: MAGIC, and records of their length, their CRC-32, and their bytes: the length of a JSON text, the
-text, and payloads. The first record says what the bytes depend on, each other one has the groups of an interval.
+In: the groups of each interval, in any order, and what their bytes depend on. Out: the same groups, from `NAME.part`,
+which is no .reel file: MAGIC, and records of their length, their CRC-32, and their bytes: the length of a JSON text,
+the text, and payloads. The first record says what the bytes depend on, each other one has the groups of an interval.
 Where a record is torn or damaged, the journal ends before it.
 """
 
@@ -49,8 +49,8 @@ class Journal:
         self.continued = 0  # intervals that an earlier run had done
         self._resume, self._lasting = resume, lasting
         self._made: dict[str, Any] | None = None  # what the bytes of the records depend on
-        self._records: list[tuple[int, int]] = []  # of intervals done before: begin and length
-        self._done = self._taken = self._end = 0
+        self._records: dict[tuple[Any, Any], tuple[int, int]] = {}  # of intervals done before: begin and length
+        self._done = self._end = 0
         self._begun = False
 
     def __enter__(self) -> Journal:
@@ -97,26 +97,26 @@ class Journal:
             self._file.seek(0)
             self._file.write(MAGIC)
             self._file.flush()
-        self._made, self._records, self._end = None, [], len(MAGIC)
-        self._done = self._taken = self.continued = 0
+        self._made, self._records, self._end = None, {}, len(MAGIC)
+        self._done = self.continued = 0
 
     def take(self, interval: Interval) -> list[EncodedGroup] | None:
-        """Return the groups of the next interval, None where no earlier run encoded it."""
-        if self._taken == len(self._records):
+        """Return the groups of an interval, None where no earlier run encoded it."""
+        place = _place(interval)
+        if (record := self._records.get((place["first_frame"], place["track"]))) is None:
             return None
-        head, offset = self._read(*self._records[self._taken])
-        self._taken += 1
-        if (place := _place(interval)) != (before := head.get("interval")):
-            text = f"{self.path}: interval {self._taken} is of another surface: {first_difference(before, place)}"
+        head, offset = self._read(*record)
+        if place != (before := head.get("interval")):
+            text = f"{self.path}: {_named(interval)} is of another surface: {first_difference(before, place)}"
             raise InputError(f"{text}; have masks or depth changed? Start over with --no-resume (resume=False)")
-        return self._groups(head, offset)
+        return self._groups(interval, head, offset)
 
     def keep(self, interval: Interval, groups: Sequence[EncodedGroup]) -> list[EncodedGroup]:
-        """Store the groups of the next interval; return them with payloads that are read when they are needed."""
+        """Store the groups of an interval; return them with payloads that are read when they are needed."""
         head = {"interval": _place(interval), "groups": [_packed(group) for group in groups]}
         offset = self._append(head, b"".join(group.payload for group in groups))
         self._done += 1
-        return self._groups(head, offset)
+        return self._groups(interval, head, offset)
 
     def _open(self) -> None:
         """Find what an earlier run left, and start over where that is nothing, or not wanted."""
@@ -127,7 +127,7 @@ class Journal:
         made = self._read(*whole[0])[0].get("made") if whole else None
         count = len(whole) - 1 if isinstance(made, dict) else 0
         if count and self._resume is None:
-            text = f"{self.path}: has the first {count} intervals of an encode that was stopped"
+            text = f"{self.path}: has {count} intervals of an encode that was stopped"
             raise InputError(
                 f"{text}; continue with --resume (resume=True), or start over with --no-resume (resume=False)"
             )
@@ -136,7 +136,11 @@ class Journal:
         if not count or not self._resume:
             self.restart()
             return
-        self._made, self._records, self._end = made, whole[1:], sum(whole[-1])
+        self._made, self._end = made, sum(whole[-1])
+        for record in whole[1:]:
+            place = self._read(*record)[0].get("interval")
+            place = place if isinstance(place, dict) else {}
+            self._records[place.get("first_frame"), place.get("track")] = record
         self._done = self.continued = count
         self._file.truncate(self._end)
 
@@ -183,7 +187,7 @@ class Journal:
         self._end += _HEAD.size + len(body)
         return self._end - len(payloads)
 
-    def _groups(self, head: dict[str, Any], offset: int) -> list[EncodedGroup]:
+    def _groups(self, interval: Interval, head: dict[str, Any], offset: int) -> list[EncodedGroup]:
         """Return the groups that a record tells of. Raises InputError where no encoder wrote it."""
         found = []
         try:
@@ -193,7 +197,7 @@ class Journal:
                 found.append(EncodedGroup(Form(form), count, b"", ends, error, predicted, key, stored))
                 offset += stored.size
         except (KeyError, TypeError, ValueError) as error:
-            text = f"{self.path}: interval {self._taken} cannot be read ({error})"
+            text = f"{self.path}: {_named(interval)} cannot be read ({error})"
             raise InputError(f"{text}; start over with --no-resume (resume=False)") from None
         return found
 
@@ -223,6 +227,11 @@ def _place(interval: Interval) -> dict[str, Any]:
         "noise": interval.noise,
         "surface": interval.surface,
     }
+
+
+def _named(interval: Interval) -> str:
+    """Return the name of an interval in error messages."""
+    return f"the interval of frame {interval.first_frame}, track {interval.track},"
 
 
 def _packed(group: EncodedGroup) -> list[Any]:

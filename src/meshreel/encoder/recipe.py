@@ -6,61 +6,109 @@ intervals can be encoded side by side, and those that an earlier run had done ar
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from ..geometry.work import add, since, so_far
+from ..geometry.work import add, heard, since, so_far
 from . import layers, paper
 from .digests import Digests, note
 from .forms import EncodedGroup
 from .interval import Interval
 from .job import Job
 from .options import EncoderOptions, LayersOptions, MethodOptions
-from .progress import Stages
-from .worker import end_with_parent
+from .progress import IntervalStages, Stages
+from .side_by_side import Call, as_done
+from .worker import end_with_parent, tell
 
 
-def encode_intervals(job: Job, intervals: Iterable[Interval], stages: Stages) -> Iterator[list[EncodedGroup]]:
-    """Yield the groups of each interval, in order; with an executor, as many intervals ahead as it has workers.
+def encode_intervals(job: Job, intervals: Iterable[Interval]) -> Iterator[list[EncodedGroup]]:
+    """Yield the groups of each interval, in order; with an executor, its workers encode them in any order.
 
-    Where the job has a journal, the groups are those that it has, or are stored in it.
+    Where the job has a journal, the groups are those that it has, or are stored in it as soon as they are there: what
+    waits here for an earlier interval has no payloads.
     """
-    ahead = 0 if job.executor is None else getattr(job.executor, "_max_workers", 8)
-    waiting: deque[Callable[[], list[EncodedGroup]]] = deque()
-    for interval in intervals:
-        waiting.append(_begun(job, interval, stages))
-        if len(waiting) > ahead:
-            yield waiting.popleft()()
-    while waiting:
-        yield waiting.popleft()()
+    job.stages.add("code", 0)  # the time that a frame takes is counted from here
+    for groups, lines in _one_by_one(job, intervals) if job.executor is None else _side_by_side(job, intervals):
+        if job.digests is not None:
+            job.digests(lines)
+        yield groups
 
 
-def _begun(job: Job, interval: Interval, stages: Stages) -> Callable[[], list[EncodedGroup]]:
-    """Begin with an interval; return what waits for its groups."""
-    method, journal, count = job.options.method, job.journal, len(interval.frames)
-    if job.digests is not None:
-        interval = replace(interval, digests=Digests(interval.track, interval.first_frame))
+_Done = tuple[list[EncodedGroup], str]  # and lines of digests
 
-    def arrived(groups: list[EncodedGroup]) -> list[EncodedGroup]:
-        stages.add("code", count)
+
+def _one_by_one(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
+    """Encode intervals here, each when it is asked for."""
+    for interval in map(partial(_noting, job), intervals):
+        stages = _stages_of(job, interval)
+        if (known := _known(job, interval, stages)) is not None:
+            yield known, ""
+            continue
+        with heard(stages.hear):
+            groups = list(encode_interval(interval, job.options.method, stages, job.store.find))
+        yield _kept(job, interval, groups)
+
+
+def _side_by_side(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
+    """Encode intervals in workers: which read their frames themselves, where frames are in files."""
+    assert job.executor is not None
+    ready, sent, next_one = dict[int, _Done](), dict[int, tuple[Interval, IntervalStages]](), 0
+    told = getattr(job.executor, "told", None)  # workers of the command line tell of each frame
+
+    def calls() -> Iterator[Call]:
+        for number, interval in enumerate(map(partial(_noting, job), intervals)):
+            stages = _stages_of(job, interval)
+            if (known := _known(job, interval, stages)) is not None:
+                ready[number] = known, ""
+                continue
+            sent[number] = interval, stages
+            yield number, encode_apart, (interval.to_send(), job.options.method, number)
+
+    def look() -> None:
+        for number, stage, done in told() if told is not None else ():
+            if number in sent:
+                sent[number][1].reach_frame(stage, done)
+
+    for number, (groups, observed) in as_done(job.executor, calls(), None if told is None else look):
+        interval, stages = sent.pop(number)
+        interval.learn(observed)
+        stages.reach("code", 1.0)
         for group in groups:
             add(group.work)
-        return groups
+        ready[number] = _kept(job, interval, groups)
+        while next_one in ready:
+            yield ready.pop(next_one)
+            next_one += 1
+    yield from (ready[number] for number in sorted(ready))
 
-    def kept(groups: list[EncodedGroup]) -> list[EncodedGroup]:
-        if job.digests is not None:
-            job.digests("".join(line for group in groups for line in group.digests))
-        return groups if journal is None else journal.keep(interval, groups)
 
-    if journal is not None and (known := journal.take(interval)) is not None:
-        return lambda: arrived(known)
-    if job.executor is None:
-        return lambda: kept(list(encode_interval(interval, method, stages, job.store.find)))
-    future = job.executor.submit(encode_apart, interval.in_memory(), method)
-    return lambda: kept(arrived(future.result()))
+def _noting(job: Job, interval: Interval) -> Interval:
+    """Return the interval with what collects its digests, where they are wanted."""
+    if job.digests is None:
+        return interval
+    return replace(interval, digests=Digests(interval.track, interval.first_frame))
+
+
+def _stages_of(job: Job, interval: Interval) -> IntervalStages:
+    return IntervalStages(job.stages, len(interval.frames), job.options.method.group_size, interval.weight)
+
+
+def _known(job: Job, interval: Interval, stages: IntervalStages) -> list[EncodedGroup] | None:
+    """Return the groups of an interval from the journal of an earlier run, None where it has them not."""
+    known = None if job.journal is None else job.journal.take(interval)
+    if known is not None:
+        stages.reach("code", 1.0)
+    return known
+
+
+def _kept(job: Job, interval: Interval, groups: list[EncodedGroup]) -> _Done:
+    """Store the groups of an interval where there is a journal; return them and their lines of digests."""
+    lines = "".join(line for group in groups for line in group.digests)
+    return groups if job.journal is None else job.journal.keep(interval, groups), lines
 
 
 def encode_interval(
@@ -79,13 +127,18 @@ def encode_interval(
         yield group if interval.digests is None else replace(group, digests=interval.digests.take())
 
 
-def encode_apart(interval: Interval, options: MethodOptions) -> list[EncodedGroup]:
-    """Encode an interval in a worker process, which ends with its parent; the result can be pickled."""
+def encode_apart(interval: Interval, options: MethodOptions, number: int) -> tuple[list[EncodedGroup], Any]:
+    """Encode an interval in a worker process, which ends with its parent; the result can be pickled.
+
+    Return the groups, and what reading the frames has shown.
+    """
     end_with_parent()
-    with threadpool_limits(1):
+    count = len(interval.frames)
+    stages = IntervalStages(Stages(partial(tell, number), count), count, options.group_size)
+    with threadpool_limits(1), heard(stages.hear):
         before = so_far()
-        *others, last = encode_interval(interval, options)
-        return [*others, replace(last, work=since(before))]
+        *others, last = encode_interval(interval, options, stages)
+        return [*others, replace(last, work=since(before))], interval.observed
 
 
 def longest_interval(options: EncoderOptions, frame_rate: float) -> int:

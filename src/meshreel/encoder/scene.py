@@ -9,8 +9,10 @@ quality means the same for a person in a room as for one alone.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import pairwise
 
 import numpy as np
@@ -32,7 +34,6 @@ from .interval import Interval
 from .job import Job
 from .options import EncoderOptions
 from .parts import Change, Parts
-from .progress import Stages
 from .recipe import encode_intervals, longest_interval
 
 # Of the background's vertices, tried in order (decision 0019).
@@ -128,39 +129,33 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
 
 
 def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
-    """Encode the groups of all tracks; each track has all frames, and no group has frames with surface and without."""
+    """Encode the groups of all tracks; each track has all frames, and no group has frames with surface and without.
+
+    The intervals of the whole scene are one stream: workers need not wait for the last body of a key interval.
+    """
     tracks, found = Tracks(parts.segmentation.cell, job.scene.bodies), list[TrackGroup]()
-    for frames in key_intervals(job.sequence, parts.segmentation, job.options):
-        intervals = track_intervals(job, parts, frames, tracks)
-        stages = _StagesOfTracks(job.stages, len(frames), sum(len(interval.frames) for interval in intervals))
-        for interval, groups in zip(intervals, encode_intervals(job, intervals, stages), strict=True):
-            first = interval.first_frame
-            for group in groups:
-                found.append(TrackGroup(interval.track, first, group))
-                first += group.frame_count
-        found += tracks.late(frames)
+    places = deque[tuple[int, int]]()  # track and first frame of intervals that are not encoded yet
+
+    def intervals() -> Iterator[Interval]:
+        for interval in scene_intervals(job, parts, tracks):
+            places.append((interval.track, interval.first_frame))
+            yield interval
+
+    for groups in encode_intervals(job, intervals()):
+        track, first = places.popleft()
+        for group in groups:
+            found.append(TrackGroup(track, first, group))
+            first += group.frame_count
+    found += tracks.late()
     return CodedBodies(sorted(found, key=lambda each: (each.first_frame, each.track)), tracks.dropped)
 
 
-class _StagesOfTracks(Stages):
-    """Counts coded frames of all tracks of a key interval as frames of the scene."""
-
-    def __init__(self, stages: Stages, frames: int, count: int) -> None:
-        self._stages, self._frames, self._count, self._coded = stages, frames, count, 0
-
-    def add(self, stage: str, count: int) -> None:
-        """Count `count` further frames of a track; stages before the last are not told."""
-        if stage == "code":
-            before, self._coded = self._coded, self._coded + count
-            done, told = (coded * self._frames // self._count for coded in (self._coded, before))
-            self._stages.add("code", done - told)
-
-
-def scene_intervals(job: Job, parts: Parts) -> Iterator[Interval]:
+def scene_intervals(job: Job, parts: Parts, tracks: Tracks) -> Iterator[Interval]:
     """Yield the intervals of all tracks of a scene, in the order of time."""
-    tracks = Tracks(parts.segmentation.cell, job.scene.bodies)
     for frames in key_intervals(job.sequence, parts.segmentation, job.options):
-        yield from track_intervals(job, parts, frames, tracks)
+        found = track_intervals(job, parts, frames, tracks)
+        weight = Fraction(len(frames), sum(len(interval.frames) for interval in found))
+        yield from (replace(interval, weight=weight) for interval in found)
 
 
 def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> list[Interval]:
@@ -210,6 +205,7 @@ class Tracks:
         self._cell, self._options = cell, options
         self._last: list[Mesh] = []  # of each track, in the last frame so far
         self._frames = 0
+        self._began: list[int] = []  # the first frame of each track's first key interval
         self.dropped = 0  # faces that are in no track
 
     def of(self, moving: Sequence[Mesh]) -> list[tuple[int, list[Mesh]]]:
@@ -224,16 +220,16 @@ class Tracks:
         found = [empty] * count
         for number, body in zip(numbers, bodies, strict=True):
             found[number] = body
-        self._new = range(len(self._last), count) if self._frames else range(0)
+        self._began += [self._frames] * (count - len(self._began))
         self._last = [meshes[-1] for meshes in found]
         self._frames += len(moving)
         return list(enumerate(found))
 
-    def late(self, frames: range) -> Iterator[TrackGroup]:
-        """Yield the empty frames, up to this key interval, of tracks that began in it."""
-        for track in self._new:
+    def late(self) -> Iterator[TrackGroup]:
+        """Yield the empty frames that tracks have before the key interval in which they began."""
+        for track, began in enumerate(self._began):
             first = 0
-            for group in empty_groups(frames.start):
+            for group in empty_groups(began):
                 yield TrackGroup(track, first, group)
                 first += group.frame_count
 

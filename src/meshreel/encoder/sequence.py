@@ -7,7 +7,6 @@ over processes, and memory does not grow with the length of the sequence.
 from __future__ import annotations
 
 import json
-import math
 import warnings
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -23,7 +22,7 @@ from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.masks import Masker
 from ..analysis.scene.probe import is_scene
 from ..analysis.scene.segmentation import SegmentOptions
-from ..analysis.survey import Survey, survey
+from ..analysis.survey import Survey
 from ..coding.background import decode_background
 from ..container.writer import ReelWriter
 from ..decoder.video import open as open_video
@@ -36,11 +35,13 @@ from ..geometry.work import since, so_far
 from ..io.unfinished import unfinished
 from ..io.write import check_apart
 from ..metrics.distance import PSNR_CEILING, psnr
-from ..types import MeshSequence, Up, as_sequence, evenly
+from ..types import MeshSequence, as_sequence, evenly
 from .digests import WriteLines
+from .excerpt import Excerpt, write_survey
 from .interval import Interval, NormalisedFrames
 from .job import GroupStore, Job
 from .journal import Journal, made_of
+from .metadata import metadata_of, rounded, upright
 from .options import EncoderOptions, PaperOptions
 from .parts import Parts, take_apart
 from .presets import preset_options
@@ -49,11 +50,13 @@ from .recipe import encode_intervals, longest_interval
 from .scene import (
     Static,
     TrackGroup,
+    Tracks,
     encode_bodies,
     encode_static,
     scene_intervals,
 )
 from .summary import GroupSummary, SceneSummary, Summary
+from .surveying import surveyed
 
 QUALITY, PRESET = 50.0, "best"  # the default operating point (decision 0009)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
@@ -104,13 +107,15 @@ class Encoder:
         progress: Progress | None = None,
         masker: Masker | None = None,
         digests: WriteLines | None = None,
+        excerpt: Excerpt | None = None,
     ) -> None:
         """Take executor and progress as `encode` does; with a `masker`, whose masks mark moving pixels, it is a scene.
 
-        `digests` takes lines of JSON, one for each stage. The attribute `progress` may be replaced between encodes.
+        `digests` takes lines of JSON, one for each stage. Of an `excerpt`, only its frames are encoded. The attribute
+        `progress` may be replaced between encodes.
         """
         self.sequence, self._executor, self._masker = Unchanging(captured(sequence)), executor, masker
-        self.progress, self.digests = progress, digests
+        self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.store = GroupStore()  # groups that `prepare` found
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
@@ -153,16 +158,29 @@ class Encoder:
         """Encode the sequence into an open, empty file; its groups wait in the journal."""
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
-        before = so_far()
+        before, excerpt = so_far(), self._excerpt
+        if excerpt is not None:
+            excerpt.surveyed.check(self.sequence)
+            if self._is_scene(options):
+                text = "a scene has one background for all frames, and is not encoded in parts"
+                raise InputError(f"{text}; encode it in one run, with --cluster perhaps, or with --dynamic-only")
         job, parts = replace(self._job(options), journal=journal), self.parts(options)
-        seen = survey(job.sequence, job.stages) if parts is None else parts.seen
-        journal.begin(made_of(self.sequence, options, self._masker))
+        seen = parts.seen if parts is not None else surveyed(job) if excerpt is None else excerpt.surveyed.seen
+        made = made_of(self.sequence, options, self._masker)
+        journal.begin(made if excerpt is None else made | {"part": str(excerpt.frames)})
         summary = _encode_bodies(job, file, seen) if parts is None else _encode_scene(job, file, parts)
         return replace(summary, work=since(before))
 
+    def survey(self, path: Path) -> Survey:
+        """Survey the sequence, and write a file of it for encodes of its parts."""
+        seen = surveyed(self._job(EncoderOptions()))
+        write_survey(seen, self.sequence, path)
+        return seen
+
     def _job(self, options: EncoderOptions) -> Job:
-        stages = Stages(self.progress, len(self.sequence))
-        return Job(self.sequence, options, self._executor, stages, self.store, digests=self.digests)
+        stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
+        job = Job(self.sequence, options, self._executor, stages, self.store, digests=self.digests)
+        return replace(job, excerpt=self._excerpt)
 
     def _is_scene(self, options: EncoderOptions) -> bool:
         if options.scene is None or not len(self.sequence):
@@ -175,7 +193,7 @@ class Encoder:
         """Return the parts of the scene; they are found again where the options of the scene changed."""
         how = (job.scene.segment, job.scene.background)
         if self._scene is None or self._scene[:2] != how:
-            seen = survey(job.sequence, job.stages, cleaned=False)
+            seen = surveyed(job, cleaned=False)
             self._scene = (*how, take_apart(job.sequence, seen, job.scene, job.stages, self._masker))
         return self._scene[2]
 
@@ -186,12 +204,14 @@ def _encode_bodies(job: Job, file: BinaryIO, seen: Survey) -> Summary:
     groups: list[GroupSummary] = []
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped)
     with _writer(job, file, seen) as writer:
-        for encoded in encode_intervals(job, _body_intervals(job, seen), job.stages):
+        for encoded in encode_intervals(job, _body_intervals(job, seen)):
             for group in encoded:
                 each = TrackGroup(0, writer.frame_count, group)
                 groups.append(_added(writer, each, [], seen.diagonal))
-        writer.header = make_header(sequence.frame_rate, seen, _metadata(options, groups) | _upright(sequence.up))
-    return Summary(writer.size, tuple(groups), _warnings(seen), continued=_continued(job))
+        metadata = metadata_of(options, groups, sequence.up, is_part=job.excerpt is not None)
+        writer.header = make_header(sequence.frame_rate, seen, metadata)
+    texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
+    return Summary(writer.size, tuple(groups), texts, continued=_continued(job))
 
 
 def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
@@ -204,15 +224,15 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     with _writer(job, file, seen) as writer:
         coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
-        metadata = {"preset": options.preset, "quality": _rounded(options.quality), "noise_m": _rounded(parts.noise)}
-        writer.header = make_header(sequence.frame_rate, seen, metadata | _upright(sequence.up))
+        metadata = {"preset": options.preset, "quality": rounded(options.quality), "noise_m": rounded(parts.noise)}
+        writer.header = make_header(sequence.frame_rate, seen, metadata | upright(sequence.up))
     measured = evenly(len(sequence), MEASURED)
     psnr = _measured(sequence, file, seen.diagonal, measured)
     size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
-    texts = (*_warnings(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
+    texts = (*warnings_of(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
     return Summary(writer.size, tuple(groups), texts, scene, _continued(job))
 
 
@@ -264,7 +284,8 @@ def _measured(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: 
     return float(np.mean(found))
 
 
-def _warnings(seen: Survey) -> tuple[str, ...]:
+def warnings_of(seen: Survey) -> tuple[str, ...]:
+    """Return warnings of surface that no file of the sequence has."""
     found = []
     if seen.dropped:
         found.append(f"{seen.dropped} faces without area or with the vertices of another face are not kept")
@@ -314,36 +335,12 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
 def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
     """Yield the intervals of a sequence, of a scene where there are parts."""
     if parts is None:
-        return _body_intervals(job, survey(job.sequence, job.stages))
-    return scene_intervals(job, parts)
+        return _body_intervals(job, surveyed(job))
+    return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))
 
 
 def _body_intervals(job: Job, seen: Survey) -> Iterator[Interval]:
     """Yield the intervals of a sequence that is no scene."""
-    for numbers in seen.intervals(longest_interval(job.options, job.sequence.frame_rate)):
+    numbered = seen.intervals(longest_interval(job.options, job.sequence.frame_rate))
+    for numbers in numbered if job.excerpt is None else job.excerpt.of(numbered):
         yield Interval(NormalisedFrames(job.sequence, seen, numbers), first_frame=numbers.start)
-
-
-def _metadata(options: EncoderOptions, groups: Sequence[GroupSummary]) -> dict[str, Any]:
-    """Return the metadata that `info` shows; decoding does not need it, but the rate includes it."""
-    frames = sum(group.frame_count for group in groups)
-    mean_square = sum(group.frame_count * group.fidelity.distance**2 for group in groups) / frames
-    return {
-        "preset": options.preset,
-        "quality": _rounded(options.quality),
-        "key_frames": [group.key for group in groups if group.key is not None],
-        "rms_m": _rounded(mean_square**0.5),
-        "worst_rms_m": _rounded(max(group.fidelity.worst for group in groups)),
-        "d2_psnr_paper": _rounded(sum(g.frame_count * g.fidelity.psnr for g in groups) / frames),
-        "normal_error_deg": _rounded(sum(g.frame_count * g.fidelity.angle for g in groups) / frames),
-    }
-
-
-def _upright(up: Up) -> dict[str, Any]:
-    """Return the metadata that tells players which axis points up; none for y, their default."""
-    return {} if up == "y" else {"up": up}
-
-
-def _rounded(value: float) -> float | None:
-    """Round to four significant digits; None where JSON has no number."""
-    return float(f"{value:.4g}") if math.isfinite(value) else None

@@ -6,12 +6,13 @@ A sequence may know which axis points up and the depth pictures behind its meshe
 
 from __future__ import annotations
 
+import copy
 import hashlib
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool
@@ -51,6 +52,38 @@ def captured(sequence: MeshSequence) -> CapturedSequence:
     return known
 
 
+def only(sequence: MeshSequence, numbers: Sequence[int]) -> MeshSequence:
+    """Return the sequence with these of its frames and no others, under the same numbers, to send to another process.
+
+    Frames that are in files stay there, and what is sent is their names; others are read now.
+    """
+    cut = getattr(sequence, "only", None)
+    found: MeshSequence = Held.of(sequence, numbers) if cut is None else cut(numbers)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Held(MeshSequence):
+    """Some frames of a sequence in memory, under their numbers in it."""
+
+    meshes: Mapping[int, Mesh]
+    count: int  # frames of the whole sequence
+    frame_rate: float  # 1/s
+    up: Up = "y"
+
+    @staticmethod
+    def of(sequence: MeshSequence, numbers: Iterable[int]) -> Held:
+        """Read these frames of a sequence."""
+        up: Up = getattr(sequence, "up", "y")
+        return Held({number: sequence[number] for number in numbers}, len(sequence), sequence.frame_rate, up)
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __getitem__(self, index: int) -> Mesh:
+        return self.meshes[index]
+
+
 class DerivedSequence(MeshSequence):
     """Base class of sequences derived frame by frame; by itself, the source with all capabilities."""
 
@@ -76,6 +109,27 @@ class DerivedSequence(MeshSequence):
     def files(self) -> tuple[Path, ...]:
         """The files that the frames are read from; none where the source names none."""
         return getattr(self._source, "files", ())
+
+    @property
+    def is_stored(self) -> bool:
+        """Whether the frames are in files, which other processes can read."""
+        return getattr(self._source, "is_stored", False)
+
+    def only(self, numbers: Sequence[int]) -> DerivedSequence:
+        """Return the sequence with these of its frames, as the function `only` does."""
+        part = copy.copy(self)
+        part._source = only(self._source, numbers)
+        return part
+
+    @property
+    def observed(self) -> Any:
+        """What the frames that were read have shown, for `learn` of the sequence that this one is a part of."""
+        return getattr(self._source, "observed", None)
+
+    def learn(self, observed: Any) -> None:
+        """Take what another process observed when it read frames of this sequence."""
+        if observed is not None and (learn := getattr(self._source, "learn", None)) is not None:
+            learn(observed)
 
     def name(self, index: int) -> str:
         """Return the name of a frame in error messages."""
@@ -134,11 +188,29 @@ class Unchanging(DerivedSequence):
     def _read(self, index: int) -> Mesh:
         work.count("frames read")
         mesh = super().__getitem__(index)
-        now = digest([mesh])
+        self._check(index, digest([mesh]))
+        return mesh
+
+    def only(self, numbers: Sequence[int]) -> Unchanging:
+        """Return the sequence with these of its frames, of which none has been read."""
+        return Unchanging(only(self._source, numbers))
+
+    @property
+    def observed(self) -> tuple[dict[int, str], Any]:
+        """The digests of the frames that were read, and what the source observed."""
+        return self._digests, super().observed
+
+    def learn(self, observed: tuple[dict[int, str], Any]) -> None:
+        """Take what another process observed; raises InputError for a frame that was another when it was read first."""
+        digests, of_source = observed
+        for index, now in digests.items():
+            self._check(index, now)
+        super().learn(of_source)
+
+    def _check(self, index: int, now: str) -> None:
         if self._digests.setdefault(index, now) != now:
             text = f"{self.name(index)}: has changed while it was encoded"
             raise InputError(f"{text}; encode again when nothing writes to it any more")
-        return mesh
 
     @property
     def digests(self) -> list[str]:
@@ -195,11 +267,17 @@ class Chosen(DerivedSequence):
         super().__init__(source)
         self._numbers = tuple(numbers)
 
+    is_stored = False  # it is what it chooses from that may be
+
     @property
     def depth(self) -> DepthFrames | None:
         """The depth pictures of the chosen frames; None where the source knows none."""
         known = super().depth
         return None if known is None else _ChosenDepth(known, self._numbers)
+
+    def only(self, numbers: Sequence[int]) -> DerivedSequence:
+        """Return these of the chosen frames, which are read now: what chooses among faces cannot always be sent."""
+        return DerivedSequence(Held.of(self, numbers))
 
     def name(self, index: int) -> str:
         """Return the name of a frame in error messages."""

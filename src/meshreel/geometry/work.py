@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Literal
 
 Kind = Literal["frames read", "frames tracked", "frames fitted", "surfaces fused", "decimations", "closest points"]
@@ -18,6 +20,18 @@ _here = threading.local()
 def count(kind: Kind, number: int = 1) -> None:
     """Count work that this thread does."""
     _counts()[kind] += number
+    if (hear := getattr(_here, "hear", None)) is not None:
+        hear(kind, number)
+
+
+@contextmanager
+def heard(hear: Callable[[Kind, int], object]) -> Iterator[None]:
+    """Tell `hear` of the work that this thread counts in the block."""
+    before, _here.hear = getattr(_here, "hear", None), hear
+    try:
+        yield
+    finally:
+        _here.hear = before
 
 
 def so_far() -> Work:

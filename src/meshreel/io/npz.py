@@ -5,11 +5,14 @@ In: a path. Out: frames by number. The stream is read forward, with one frame in
 
 from __future__ import annotations
 
+import threading
 import tokenize
 import zipfile
 import zlib
+from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -30,6 +33,7 @@ class Archive:
     def __init__(self, path: Path) -> None:
         self.path, self.paths = path, (path,)
         self._stream: IO[bytes] | None = None
+        self._lock = threading.Lock()  # of the stream, which has one place
         try:
             with zipfile.ZipFile(path) as archive:
                 names = sorted(name.removesuffix(".npy") for name in archive.namelist())
@@ -47,9 +51,15 @@ class Archive:
         self._corners: Int64[np.ndarray, " C"] = faces.astype(np.int64).reshape(-1)
         self._sizes: Int64[np.ndarray, " P"] = np.full(len(faces), faces.shape[1], dtype=np.int64)
 
-    def __reduce__(self) -> tuple[type[Archive], tuple[Path]]:
-        """Pickle the path: another process opens the file for itself."""
-        return Archive, (self.path,)
+    def __reduce__(self) -> tuple[Any, tuple[Path, int, int]]:
+        """Pickle the path: another process opens the file for itself, and keeps it open for what it reads next."""
+        state = self.path.stat()
+        return _opened, (self.path.absolute(), state.st_size, state.st_mtime_ns)
+
+    def only(self, numbers: Sequence[int]) -> Archive:
+        """Return the archive: it is one file, whatever is read of it."""
+        del numbers
+        return self
 
     def __len__(self) -> int:
         return int(self._shape[0])
@@ -69,13 +79,21 @@ class Archive:
 
     def _vertices(self, index: int) -> Float64[np.ndarray, "V 3"]:
         size = self._shape[1] * 3 * self._dtype.itemsize
-        if self._stream is None:
-            self._stream = zipfile.ZipFile(self.path).open("vertices.npy")  # noqa: SIM115 (open while the sequence lives)
-        self._stream.seek(self._begin + index * size)
-        data = self._stream.read(size)
+        with self._lock:
+            if self._stream is None:
+                self._stream = zipfile.ZipFile(self.path).open("vertices.npy")  # noqa: SIM115 (while the sequence lives)
+            self._stream.seek(self._begin + index * size)
+            data = self._stream.read(size)
         if len(data) < size:
             raise Unreadable(f"'vertices' has {len(data)} of {size} bytes (truncated?)")
         return np.frombuffer(data, dtype=self._dtype).astype(np.float64).reshape(-1, 3)
+
+
+@lru_cache(maxsize=4)  # archives at a time (guess)
+def _opened(path: Path, size: int, changed: int) -> Archive:
+    """Return the archive of a path, which is opened again where the file has changed since."""
+    del size, changed
+    return Archive(path)
 
 
 def _head(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtype, int]:

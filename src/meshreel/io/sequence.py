@@ -5,10 +5,11 @@ In: a folder, a glob, a list of files, one file or an .npz, and SequenceOptions.
 
 from __future__ import annotations
 
+import copy
 import json
 import operator
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -56,18 +57,27 @@ class SequenceOptions:
 class Files:
     """Frames stored as one file each."""
 
-    paths: tuple[Path, ...]
+    named: Sequence[Path] | Mapping[int, Path]  # by number
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files."""
+        return tuple(self.named.values() if isinstance(self.named, Mapping) else self.named)
 
     def __len__(self) -> int:
-        return len(self.paths)
+        return len(self.named)
+
+    def only(self, numbers: Sequence[int]) -> Files:
+        """Return these files, wherever another process has its working directory."""
+        return Files({number: self.named[number].absolute() for number in numbers})
 
     def name(self, index: int) -> str:
         """Return the name of a frame in error messages."""
-        return str(self.paths[index])
+        return str(self.named[index])
 
     def load(self, index: int, where: str) -> Loaded:
         """Read and check one frame."""
-        return read_mesh(self.paths[index], where)
+        return read_mesh(self.named[index], where)
 
 
 @dataclass(slots=True)
@@ -80,6 +90,15 @@ class _Seen:
     dropped: dict[str, int] = field(default_factory=dict)  # kind of dropped data: first frame that has it
     smallest: tuple[float, int] | None = None  # diagonal, frame
     largest: tuple[float, int] | None = None
+
+    def add(self, other: _Seen) -> None:
+        """Add the counts of other frames, or of the same."""
+        self.merged |= other.merged
+        for what, first in other.dropped.items():
+            self.dropped[what] = min(first, self.dropped.get(what, first))
+        if other.smallest is not None and other.largest is not None:
+            self.smallest = min(self.smallest or other.smallest, other.smallest)
+            self.largest = max(self.largest or other.largest, other.largest)
 
 
 class FileSequence(MeshSequence):
@@ -108,6 +127,23 @@ class FileSequence(MeshSequence):
         """The files that the frames are read from."""
         return self._frames.paths
 
+    is_stored = True  # other processes can read the frames
+
+    def only(self, numbers: Sequence[int]) -> FileSequence:
+        """Return the sequence with these of its frames, under the same numbers; to pickle it takes their names."""
+        part = copy.copy(self)
+        part._frames, part._seen = self._frames.only([self._chosen[number] for number in numbers]), _Seen()
+        return part
+
+    @property
+    def observed(self) -> _Seen:
+        """What `warnings` count, for `learn` of the sequence that this one is a part of."""
+        return self._seen
+
+    def learn(self, observed: _Seen) -> None:
+        """Take the counts of frames that another process read."""
+        self._seen.add(observed)
+
     def __len__(self) -> int:
         return len(self._chosen)
 
@@ -131,12 +167,9 @@ class FileSequence(MeshSequence):
 
     def _note(self, number: int, mesh: Mesh, loaded: Loaded) -> None:
         seen = self._seen
-        for what in loaded.dropped:
-            seen.dropped[what] = min(number, seen.dropped.get(what, number))
         size = mesh.diagonal
-        if size > 0:
-            seen.smallest = min(seen.smallest or (np.inf, 0), (size, number))
-            seen.largest = max(seen.largest or (0.0, 0), (size, number))
+        sized = (size, number) if size > 0 else None
+        seen.add(_Seen({}, dict.fromkeys(loaded.dropped, number), sized, sized))
 
 
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:

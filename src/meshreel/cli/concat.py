@@ -1,0 +1,36 @@
+"""`meshreel concat`: join .reel files that are parts of one sequence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..encoder.concat import concat
+from ..errors import InputError
+from .console import Common
+
+
+def command(
+    inputs: list[Path],
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    common: Common = Common(),
+) -> None:
+    """Join .reel files one after the other; nothing is encoded again.
+
+    Parameters
+    ----------
+    inputs
+        The files in the order of their frames, encoded with one --survey and the same options. Scenes cannot be joined:
+        each has a background and tracks of its own.
+    output
+        The .reel file to write; it appears only when it is complete.
+    """
+    if output.suffix != ".reel":
+        raise InputError(f"{output}: the output must end in .reel")
+    joined = concat(inputs, output)
+    row = {"output": str(output), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
+    common.result(row, f"{output}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")

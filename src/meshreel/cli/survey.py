@@ -1,0 +1,56 @@
+"""`meshreel survey`: the facts about a whole sequence that encodes of its parts share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from ..encoder.sequence import Encoder, warnings_of
+from ..errors import InputError
+from ..io.write import check_apart
+from ..types import Up
+from .console import Common
+from .flags import Reading
+from .sources import Masking, open_source
+from .workers import workers
+
+
+def command(
+    inputs: list[str],
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    reading: Reading = Reading(),
+    up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
+    jobs: int = 1,
+    cluster: str | None = None,
+    common: Common = Common(),
+) -> None:
+    """Read all frames of a sequence once, and write what encodes of its parts have to know of the whole.
+
+    Parameters
+    ----------
+    inputs
+        The meshes, as `encode` takes them.
+    output
+        The .json file to write: box, size and digest of the frames. Give it to `encode --survey`.
+    up
+        Axis that points up, as `encode` takes it.
+    jobs
+        Number of processes that read side by side; the file is the same.
+    cluster
+        Address of a Dask scheduler whose workers read, as `encode` takes it.
+    """
+    if output.suffix != ".json":
+        raise InputError(f"{output}: the output must end in .json")
+    source = open_source(inputs, reading)
+    sequence = Masking(up=up).upright(source)
+    check_apart(output, sequence.files)
+    with common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
+        seen = Encoder(sequence, executor, progress).survey(output)
+    warnings = (*source.warnings, *warnings_of(seen))
+    common.warn(warnings)
+    row = {"output": str(output), "frames": len(sequence), "warnings": warnings}
+    common.result(row, f"{output}: {len(sequence)} frames, {seen.diagonal:.3g} m large")

@@ -1,0 +1,103 @@
+"""Joining of files: parts of one sequence become one file, and no payload is encoded again.
+
+In: files whose frames follow one another, encoded from one survey. Out: a file, to the bytes of one encode of the whole
+where the parts end at its intervals. Needs nothing of the extra `encode`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from itertools import accumulate
+from pathlib import Path
+
+from ..container.reader import ReelReader
+from ..container.sources import FileSource
+from ..container.writer import ReelWriter
+from ..errors import FormatError, InputError
+from ..format.layout import ChunkKind, Header
+from ..io.differences import first_difference
+from ..io.write import check_apart
+from .metadata import joined_metadata, of_all_parts
+
+
+@dataclass(frozen=True, slots=True)
+class Joined:
+    """What became of the files."""
+
+    frames: int
+    size: int  # bytes
+
+
+def concat(inputs: Sequence[Path], output: Path) -> Joined:
+    """Join files one after the other as `output`, which appears when it is complete.
+
+    One file is open at a time. Raises InputError where files are no parts of one sequence, or are scenes: each has a
+    background and tracks of its own. Raises FormatError for a damaged file.
+    """
+    if not inputs:
+        raise InputError("no files to join; give at least one")
+    check_apart(output, inputs)
+    with ReelWriter(output, _joined_header(inputs)) as writer:
+        for path in inputs:
+            _add(writer, path)
+    return Joined(writer.frame_count, writer.size)
+
+
+def _joined_header(inputs: Sequence[Path]) -> Header:
+    """Return the header of the whole, after a look at that of each file."""
+    header, parts = None, list[tuple[dict[str, object], int]]()
+    for path in inputs:
+        with closing(FileSource(path)) as source:
+            reader = _opened(source, path)
+        if reader.has_background or len(reader.tracks) > 1:
+            raise InputError(f"{path}: is a scene, whose background and tracks are its own; encode it in one run")
+        if reader.header.first_time or reader.header.intervals:
+            raise InputError(f"{path}: its frames have times of their own, which cannot be joined")
+        header = reader.header if header is None else header
+        _check_alike(path, reader, header, parts[0][0] if parts else reader.metadata, inputs[0])
+        parts.append((reader.metadata, reader.frame_count))
+    assert header is not None
+    try:
+        metadata = joined_metadata(parts)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{inputs[0]} ...: the metadata are not those of meshreel encode ({error!r})") from None
+    return replace(header, metadata=json.dumps(metadata, separators=(",", ":")))
+
+
+def _check_alike(path: Path, reader: ReelReader, header: Header, metadata: dict[str, object], first: Path) -> None:
+    """Raise InputError where a file is no part of the sequence that the first is of."""
+    for name in ("frame_rate", "origin", "scale", "minimum", "maximum"):
+        ours, theirs = getattr(header, name), getattr(reader.header, name)
+        if ours != theirs:
+            text = f"{path}: {name} {theirs}, and of {first} {ours}: they are not encoded from one survey"
+            raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
+    ours, theirs = of_all_parts(metadata), of_all_parts(reader.metadata)
+    if ours != theirs:
+        text = f"{path}: differs from {first}: {first_difference(ours, theirs)}"
+        raise InputError(f"{text}; encode both with the same options")
+
+
+def _add(writer: ReelWriter, path: Path) -> None:
+    """Add all groups of a file."""
+    with closing(FileSource(path)) as source:
+        reader, before = _opened(source, path), writer.last_of(0)
+        base = 0 if before is None else before + 1
+        for chunk in reader.chunks:
+            assert chunk.kind == ChunkKind.GROUP
+            try:
+                payload = reader.read_chunk(chunk.number)
+            except FormatError as error:
+                raise FormatError(f"{path}: {error}") from error
+            ends = tuple(accumulate(layer.size for layer in chunk.layers))
+            depends_on = [base + number for number in chunk.depends_on]
+            writer.add_group(writer.frame_count, chunk.frame_count, payload, ends, depends_on)
+
+
+def _opened(source: FileSource, path: Path) -> ReelReader:
+    try:
+        return ReelReader(source)
+    except FormatError as error:
+        raise FormatError(f"{path}: {error}") from error

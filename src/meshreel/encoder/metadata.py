@@ -1,0 +1,115 @@
+"""Metadata of a file: what `info` shows, and in a part of a sequence what the metadata of the whole is made of.
+
+In: options, the groups of a file or the metadata of its parts. Out: values for a JSON object. Decoding needs none of
+them, but the rate includes them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass
+from typing import Any
+
+from ..types import Up
+from .options import EncoderOptions
+from .summary import GroupSummary
+
+PART = "part"  # the exact totals, in a file that is a part
+_KEYS, _MEANS = "key_frames", ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
+
+
+@dataclass(frozen=True, slots=True)
+class Totals:
+    """Sums over frames, from which the means in the metadata are made."""
+
+    frames: int
+    squares: float  # m^2, of the distance
+    worst: float  # m, the largest
+    psnr: float  # dB
+    angle: float  # degrees
+
+    @staticmethod
+    def of(groups: Sequence[GroupSummary]) -> Totals:
+        """Return the totals of the groups of a file."""
+        return Totals.added(
+            [
+                Totals(
+                    count := group.frame_count,
+                    count * group.fidelity.distance**2,
+                    group.fidelity.worst,
+                    count * group.fidelity.psnr,
+                    count * group.fidelity.angle,
+                )
+                for group in groups
+            ]
+        )
+
+    @staticmethod
+    def added(parts: Sequence[Totals]) -> Totals:
+        """Return the totals of all parts; sums are exact before they are rounded once."""
+        frames, squares, worst, psnr, angle = zip(*map(astuple, parts), strict=True)
+        return Totals(sum(frames), math.fsum(squares), max(worst), math.fsum(psnr), math.fsum(angle))
+
+    @staticmethod
+    def from_metadata(metadata: dict[str, Any], frames: int) -> Totals:
+        """Return the totals of a file of `frames` frames; where it is no part, from its rounded means.
+
+        Raises TypeError or ValueError for metadata that no encoder wrote.
+        """
+        if PART in metadata:
+            return Totals(frames, *map(_number, metadata[PART]))
+        rms, worst, psnr, angle = (_number(metadata[name]) for name in _MEANS)
+        return Totals(frames, frames * rms**2, worst, frames * psnr, frames * angle)
+
+    @property
+    def exact(self) -> list[float | None]:
+        """The sums without rounding, for JSON."""
+        return [value if math.isfinite(value) else None for value in astuple(self)[1:]]
+
+    @property
+    def means(self) -> dict[str, float | None]:
+        """The means by their names, rounded."""
+        root = (self.squares / self.frames) ** 0.5
+        values = (root, self.worst, self.psnr / self.frames, self.angle / self.frames)
+        return {name: rounded(value) for name, value in zip(_MEANS, values, strict=True)}
+
+
+def metadata_of(options: EncoderOptions, groups: Sequence[GroupSummary], up: Up, is_part: bool) -> dict[str, Any]:
+    """Return the metadata of a file that is no scene."""
+    totals, keys = Totals.of(groups), [group.key for group in groups if group.key is not None]
+    found = {"preset": options.preset, "quality": rounded(options.quality), _KEYS: keys, **totals.means}
+    return found | upright(up) | ({PART: totals.exact} if is_part else {})
+
+
+def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
+    """Return the metadata of a whole from those of its parts and their numbers of frames, in order.
+
+    Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
+    """
+    keys, first = list[int](), 0
+    for metadata, frames in parts:
+        keys += [first + key for key in metadata[_KEYS]]
+        first += frames
+    means = Totals.added([Totals.from_metadata(metadata, frames) for metadata, frames in parts]).means
+    shared = {name: value for name, value in parts[0][0].items() if name != PART}
+    return shared | {_KEYS: keys} | means
+
+
+def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
+    """Return the metadata that all parts of a sequence have in common."""
+    return {name: value for name, value in metadata.items() if name not in (PART, _KEYS, *_MEANS)}
+
+
+def upright(up: Up) -> dict[str, Any]:
+    """Return the metadata that tells players which axis points up; none for y, their default."""
+    return {} if up == "y" else {"up": up}
+
+
+def rounded(value: float) -> float | None:
+    """Round to four significant digits; None where JSON has no number."""
+    return float(f"{value:.4g}") if math.isfinite(value) else None
+
+
+def _number(value: float | None) -> float:
+    return math.inf if value is None else float(value)

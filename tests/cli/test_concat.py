@@ -1,0 +1,139 @@
+"""Parts of a sequence, encoded apart from one survey, join to the bytes of one encode of the whole."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.container.reader import ReelReader
+from meshreel.container.sources import BytesSource, FileSource
+from meshreel.container.writer import ReelWriter
+from meshreel.io.write import write_mesh
+from meshreel.types import Mesh
+from tests.cli.conftest import FILE, SCENE, failed
+
+pytestmark = pytest.mark.usefixtures("quick_presets")
+FLAGS = ("--fps", "10", "--key-interval", "0.2", "--dynamic-only")
+
+
+@pytest.fixture(scope="module")
+def slide(tmp_path_factory):
+    """A folder of seven frames, of which one is empty; the last is larger than the others."""
+    folder = tmp_path_factory.mktemp("slide")
+    frames = [*sliding_sphere(5, levels=1), Mesh.empty()]
+    for number, mesh in enumerate([*frames, Mesh(2 * frames[0].vertices, frames[0].faces)]):
+        write_mesh(mesh, folder / f"frame_{number:05}.ply")
+    return folder
+
+
+@pytest.fixture
+def surveyed(run, slide, tmp_path):
+    """The path of the survey of the slide."""
+    path = tmp_path / "survey.json"
+    assert run("survey", slide, "-o", path, "--fps", "10").code == 0
+    return path
+
+
+def part(run, slide, survey, name, *flags):
+    path = survey.with_name(name)
+    assert run("encode", slide, "-o", path, *FLAGS, "--survey", survey, *flags).code == 0
+    return path
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_parts_join_to_the_bytes_of_the_whole(run, slide, surveyed, tmp_path, count):
+    whole, joined = tmp_path / "whole.reel", tmp_path / "joined.reel"
+    assert run("encode", slide, "-o", whole, *FLAGS).code == 0
+    parts = [part(run, slide, surveyed, f"{k}.reel", "--part", f"{k}/{count}") for k in range(1, count + 1)]
+    row = run("concat", *parts, "-o", joined, "--json").row
+    assert row == {"output": str(joined), "frames": 7, "bytes": whole.stat().st_size, "files": count}
+    assert joined.read_bytes() == whole.read_bytes()
+    if count > 1:
+        assert all(path.read_bytes() != whole.read_bytes() for path in parts)
+
+
+def test_frames_that_end_inside_an_interval_join_too_to_other_groups(run, slide, surveyed, tmp_path):
+    parts = [part(run, slide, surveyed, f"{k}.reel", "--frames", frames) for k, frames in enumerate((":3", "3:"))]
+    assert run("concat", *parts, "-o", tmp_path / "joined.reel").code == 0
+    with FileSource(tmp_path / "joined.reel") as source:
+        reader = ReelReader(source)
+        assert [group.first_frame for group in reader.groups][-2:] == [5, 6] and reader.frame_count == 7
+    assert run("decode", tmp_path / "joined.reel", "-o", tmp_path / "out").code == 0
+
+
+def test_files_that_no_survey_unites_are_refused(run, slide, surveyed, tmp_path):
+    first, other = part(run, slide, surveyed, "a.reel", "--frames", ":2"), tmp_path / "b.reel"
+    assert run("encode", slide, "-o", other, *FLAGS, "--frames", ":2").code == 0
+    out = ("-o", tmp_path / "c.reel")
+    assert failed(run("concat", first, other, *out), "b.reel: origin", "meshreel survey")
+    finer = part(run, slide, surveyed, "d.reel", "--frames", "2:4", "--quality", "60")
+    assert failed(run("concat", first, finer, *out), "d.reel: differs from", "quality 50.0, now 60.0", "same options")
+    assert failed(run("concat", SCENE, *out), "scene.reel: is a scene")
+    damaged = first.read_bytes()[:-1] + b"?"
+    (tmp_path / "e.reel").write_bytes(damaged)
+    assert failed(run("concat", first, tmp_path / "e.reel", *out), "e.reel: chunk", "damaged")
+    assert failed(run("concat", tmp_path / "no.reel", *out), "no.reel: cannot be opened")
+    assert failed(run("concat", first, "-o", first), "is the input")
+    assert not out[1].exists()
+
+
+@pytest.mark.parametrize("metadata", ["{}", '{"key_frames": [1]}', '{"key_frames": [], "part": [1]}'])
+def test_metadata_that_no_encoder_wrote_are_refused(run, tmp_path, metadata):
+    with FileSource(FILE) as source:
+        reader = ReelReader(source)
+        payload, header = reader.read_chunk(reader.groups[0].number), reader.header
+    plain = replace(header, metadata=metadata, first_time=0, intervals=())
+    with ReelWriter(tmp_path / "a.reel", plain) as writer:
+        writer.add_group(0, reader.groups[0].frame_count, payload)
+    assert ReelReader(BytesSource((tmp_path / "a.reel").read_bytes())).metadata == json.loads(metadata)
+    said = run("concat", tmp_path / "a.reel", "-o", tmp_path / "b.reel")
+    assert failed(said, "a.reel", "metadata are not those of meshreel encode")
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (["--part", "1/2"], ["needs the --survey"]),
+        (["--survey", "S", "--part", "0/2"], ["part 0/2: give 1/2 to 2/2"]),
+        (["--survey", "S", "--part", "2"], ["--part 2: give K/N"]),
+        (["--survey", "S", "--part", "1/2", "--frames", ":3"], ["leave --frames out"]),
+        (["--survey", "S", "--part", "1/99"], ["there are 5 intervals"]),
+        (["--survey", "S", "--target-mbps", "1"], ["--quality in place of a target"]),
+        (["--survey", "S", "--fps", "20"], ["frame_rate 10.0, and here 20.0"]),
+        (["--survey", "S", "--up", "z"], ["up y, and here z"]),
+    ],
+)
+def test_parts_that_cannot_be_are_refused(run, slide, surveyed, tmp_path, flags, words):
+    given = [surveyed if flag == "S" else flag for flag in flags]
+    rate = FLAGS[2:] if "--fps" in flags else FLAGS
+    assert failed(run("encode", slide, "-o", tmp_path / "a.reel", *rate, *given), *words)
+
+
+def test_a_frame_that_has_changed_since_the_survey_is_refused(run, slide, surveyed, tmp_path):
+    record = json.loads(surveyed.read_bytes())
+    record["digests"][4] = "0" * 16
+    surveyed.write_text(json.dumps(record))
+    said = run("encode", slide, "-o", tmp_path / "a.reel", *FLAGS, "--survey", surveyed, "--frames", "3:6")
+    assert failed(said, "frame 4 (", "has changed")
+
+
+@pytest.mark.parametrize(
+    "change", [{"kind": "x"}, {"low": [0, 1]}, {"low": [9, 9, 9]}, {"digests": []}, {"up": None}, None]
+)
+def test_a_file_that_is_no_survey_is_refused(run, slide, surveyed, tmp_path, change):
+    record = json.loads(surveyed.read_bytes())
+    surveyed.write_text("[" if change is None else json.dumps(record | change))
+    assert failed(
+        run("encode", slide, "-o", tmp_path / "a.reel", *FLAGS, "--survey", surveyed), "survey.json", "survey"
+    )
+
+
+def test_a_scene_is_not_encoded_in_parts(run, scan, tmp_path):
+    assert run("survey", scan, "-o", tmp_path / "s.json", "--fps", "10").code == 0
+    said = run(
+        "encode", scan, "-o", tmp_path / "a.reel", "--fps", "10", "--survey", tmp_path / "s.json", "--frames", ":2"
+    )
+    assert failed(said, "a scene has one background", "--dynamic-only")

@@ -1,0 +1,59 @@
+"""Progress on standard error: lines outside a terminal, and the time that is left."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from rich.progress import Progress
+
+from meshreel.cli import console
+from meshreel.cli.console import Common, StageBars, left, line_of
+
+
+class Clock:
+    now = 0.0
+
+    def __call__(self):
+        return self.now
+
+
+@pytest.fixture
+def staged():
+    """Stages without a display, and the clock that they go by."""
+    clock = Clock()
+    return StageBars(Progress(disable=True, get_time=clock), 100), clock
+
+
+def test_the_time_left_is_that_of_the_frames_so_far(staged):
+    progress, clock = staged
+    progress("code", 20, 100)  # of an earlier run
+    (task,) = progress.bars.tasks
+    assert left(task) is None
+    for clock.now, done in ((30.0, 21), (80.0, 40)):
+        progress("code", done, 100)
+    assert left(task) == 80.0 * 60 / 20
+
+
+def test_a_line_tells_of_all_stages_that_are_not_done(staged):
+    progress, clock = staged
+    assert line_of(progress.bars.tasks) == ""
+    for stage, done in (("survey", 100), ("code", 0), ("track", 1)):
+        progress(stage, done, 100)
+    clock.now = 90.0
+    assert line_of(progress.bars.tasks) == "meshreel: code 0, track 1 of 100 frames; 0:01:30 so far"
+    progress("code", 10, 100)
+    assert line_of(progress.bars.tasks).endswith("code 10, track 1 of 100 frames; 0:01:30 so far, about 0:13:30 left")
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_outside_a_terminal_lines_come_as_long_as_it_lasts(monkeypatch, capsys, quiet):
+    monkeypatch.setattr(console, "EVERY", 0.02)
+    with Common(quiet=quiet).stages(8) as progress:
+        progress("code", 3, 8)
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    time.sleep(0.1)
+    assert capsys.readouterr().err == ""
+    assert (len(lines) > 2 and lines[0].startswith("meshreel: code 3 of 8 frames; ")) != quiet
+    assert not quiet or not lines
