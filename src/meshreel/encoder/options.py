@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..analysis.fit.surface_fit import FitOptions
-from ..analysis.follow.correspond import PLACES
 from ..analysis.follow.embedded import EmbeddedOptions
 from ..analysis.follow.fused_template import FusedOptions
 from ..analysis.follow.template import TemplateOptions
 from ..analysis.groups import GroupOptions
+from ..analysis.plan import PlanOptions
 from ..analysis.reference.extraction import ReferenceOptions
 from ..analysis.reference.track import TrackOptions
 from ..analysis.scene.background import BackgroundOptions
@@ -57,13 +57,12 @@ class LayersOptions:
 
     group_size: int = 16  # most frames in a group
     target: Fidelity = Fidelity(0.2 * STEP + 0.00005, 7.0, STEP)  # that every frame should reach, of its own diagonal
-    keys: int = 5  # frames tried as the key of a group, at most
     predict: bool = True  # groups from the one before, where its template still fits
     embedded: EmbeddedOptions = field(default_factory=EmbeddedOptions)
     template: TemplateOptions = field(default_factory=TemplateOptions)
     fused: FusedOptions = field(default_factory=FusedOptions)
     fit: FitOptions = FitOptions(restart=False, pull=0.3, second_smoothing=0.7)
-    groups: GroupOptions = GroupOptions(worth=0.9)
+    plan: PlanOptions = PlanOptions()
     layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)  # where layers miss the target
@@ -71,8 +70,6 @@ class LayersOptions:
 
     def __post_init__(self) -> None:
         _check_group_size(self.group_size)
-        if not 1 <= self.keys <= len(PLACES):
-            raise InputError(f"{self.keys} keys: give 1 to {len(PLACES)}")
 
 
 MethodOptions = PaperOptions | LayersOptions  # the class names the recipe

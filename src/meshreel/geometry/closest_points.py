@@ -64,6 +64,7 @@ class Surface:
         """Give the vertices other positions; the search structure is kept, which takes a tenth of a new one's time."""
         self.mesh = Mesh(vertices, self.mesh.faces)
         self.tree.move(vertices)
+        self.__dict__.pop("_oriented", None)
 
     def past_border(self, hits: Hits) -> Bool[np.ndarray, " N"]:
         """Return which closest points are on the mesh's border: their queries lie beside the surface, not above it."""

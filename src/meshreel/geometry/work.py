@@ -11,7 +11,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Literal
 
-Kind = Literal["frames read", "frames tracked", "frames fitted", "surfaces fused", "decimations", "closest points"]
+Kind = Literal[
+    "frames read",
+    "frames tracked",
+    "frames fitted",  # from a prediction; those of an accepted group are fitted again
+    "frames fitted again",
+    "surfaces fused",
+    "decimations",
+    "closest points",
+]
 Work = dict[str, int]  # number of times by kind
 
 _here = threading.local()

@@ -163,16 +163,20 @@ def fit_surfaces(
     guides: Guides = Guides(),
 ) -> Float64[np.ndarray, "T V 3"]:
     """Fit a template to prepared frames (None: an empty one); return its positions without residuals."""
-    work.count("frames fitted", len(surfaces))
-    key, template = _key(surfaces, guides.key), _core.FitTemplate(faces, predictions.shape[1])
-    registration = _Registration(template, surfaces, options, key, guides.noise)
-    positions = registration.first(predictions, guides.rest)
+    positions = predictions.copy()
+    key, fitting = _key(surfaces, guides.key), Fitting(faces, predictions.shape[1], options, guides.noise)
+    for at in [key] + [t for t in range(len(surfaces)) if t != key]:
+        own = predictions if at == key else positions  # until the key is fitted, its prediction
+        rest = own[key] if guides.rest is None else guides.rest
+        positions[at] = fitting.first(surfaces[at], rest, predictions[at])
     if options.components and len(surfaces) > 1:
         if guides.coherence is None:
-            coherent = strongest_components(positions, registration.key, options.components)
+            coherent = strongest_components(positions, key, options.components)
         else:
             coherent = guides.coherence(positions)
-        positions = registration.second(positions, coherent)
+        for at in range(len(surfaces)):
+            if not (at == key and options.restart):
+                positions[at] = fitting.second(surfaces[at], coherent[at], positions[at])
     return positions
 
 
@@ -183,56 +187,49 @@ def _key(surfaces: Sequence[FrameSurface | None], key: int | None) -> int:
     return min(there, key=lambda t: (abs(t - middle), t), default=middle)
 
 
-@dataclass(frozen=True, slots=True)
-class _Registration:
-    """First and second fit of one template to prepared frames."""
+class Fitting:
+    """A template of V vertices prepared for fits to frames, one frame at a time."""
 
-    template: _core.FitTemplate
-    surfaces: Sequence[FrameSurface | None]
-    options: FitOptions
-    key: int
-    noise: float  # RMS distance of the frames from the truth
+    def __init__(self, faces: Int32[np.ndarray, "F 3"], vertices: int, options: FitOptions, noise: float = 0.0) -> None:
+        """`noise` is the RMS distance of the frames from the truth; 0: a clean capture."""
+        self._template, self._options = _core.FitTemplate(faces, vertices), options
+        rounds, gates = options.rounds(noise), options.rounds(noise).gates[-2:]
+        self._first = _Schedule(rounds.gates, rounds.smoothing, options.anchor, turn=True)
+        self._second = _Schedule(gates, (rounds.second_smoothing,) * len(gates), rounds.pull, turn=False)
 
     def first(
-        self, predictions: Float64[np.ndarray, "T V 3"], given: Float64[np.ndarray, "V 3"] | None
-    ) -> Float64[np.ndarray, "T V 3"]:
-        """Fit every frame from its prediction, the key frame first: its fit is the rest shape if none is given."""
-        rounds = self.options.rounds(self.noise)
-        schedule = _Schedule(rounds.gates, rounds.smoothing, self.options.anchor, turn=True)
-        positions = predictions.copy()
-        for at in [self.key] + [t for t in range(len(self.surfaces)) if t != self.key]:
-            own = predictions if at == self.key else positions  # until the key is fitted, its prediction
-            rest = own[self.key] if given is None else given
-            positions[at] = self._fitted(at, rest, predictions[at], predictions[at], schedule)
-        return positions
+        self,
+        surface: FrameSurface | None,
+        rest: Float64[np.ndarray, "V 3"],
+        prediction: Float64[np.ndarray, "V 3"],
+    ) -> Float64[np.ndarray, "V 3"]:
+        """Fit a frame from its prediction, keeping the shape of the `rest` where nothing is near."""
+        work.count("frames fitted")
+        return self._fitted(surface, rest, prediction, prediction, self._first)
 
     def second(
-        self, first: Float64[np.ndarray, "T V 3"], coherent: Float64[np.ndarray, "T V 3"]
-    ) -> Float64[np.ndarray, "T V 3"]:
-        """Fit the frames again, near coherent positions made from the first fit."""
-        rounds, restart = self.options.rounds(self.noise), self.options.restart
-        gates = rounds.gates[-2:]
-        schedule = _Schedule(gates, (rounds.second_smoothing,) * len(gates), rounds.pull, turn=False)
-        positions = first.copy()
-        for at in range(len(self.surfaces)):
-            if not (at == self.key and restart):
-                start = coherent[at] if restart else first[at]
-                positions[at] = self._fitted(at, coherent[at], coherent[at], start, schedule)
-        return positions
+        self,
+        surface: FrameSurface | None,
+        coherent: Float64[np.ndarray, "V 3"],
+        first: Float64[np.ndarray, "V 3"],
+    ) -> Float64[np.ndarray, "V 3"]:
+        """Fit a frame again, near coherent positions made from the first fit."""
+        work.count("frames fitted again")
+        return self._fitted(surface, coherent, coherent, coherent if self._options.restart else first, self._second)
 
     def _fitted(
         self,
-        at: int,
+        surface: FrameSurface | None,
         rest: Float64[np.ndarray, "V 3"],
         place: Float64[np.ndarray, "V 3"],
         start: Float64[np.ndarray, "V 3"],
         schedule: _Schedule,
     ) -> Float64[np.ndarray, "V 3"]:
-        """Fit one frame in the core; an empty one keeps where it starts."""
-        surface, o = self.surfaces[at], self.options
+        """Fit a frame in the core; an empty one keeps where it starts."""
+        o = self._options
         if surface is None:
             return start
-        return self.template.fit(
+        return self._template.fit(
             surface.target,
             rest,
             place,

@@ -145,9 +145,17 @@ class Tracker:
         self._poses[frame], self._residuals[frame] = pose, residual
         return residual
 
-    def residual(self, frame: int) -> float:
-        """Return the RMS distance of the moved key mesh and a registered frame: the larger of both directions."""
-        return self._residuals[frame]
+    def residual(self, frame: int) -> float | None:
+        """Return the RMS distance of the moved key mesh and a frame, the larger of both directions; None before `step`."""
+        return self._residuals.get(frame)
+
+    def bound(self, mesh: Mesh) -> Binding:
+        """Bind the vertices of a mesh on or near the key mesh, for `placed`."""
+        return self.motion([self.key]).bound(mesh.vertices, vertex_normals(mesh))
+
+    def placed(self, frame: int, points: Float64[np.ndarray, "P 3"], binding: Binding) -> Float64[np.ndarray, "P 3"]:
+        """Move bound points to a registered frame."""
+        return moved(points, self._graph.nodes, binding, self._poses[frame])
 
     def motion(self, frames: Sequence[int]) -> Motion:
         """Return the motion through some registered frames, in the given order."""
@@ -269,12 +277,16 @@ class Motion:
         self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None
     ) -> Float64[np.ndarray, "T P 3"]:
         """Move points on or near the key mesh to each frame; normals keep them off a near sheet that faces away."""
+        binding = self.bound(points, normals)
+        poses = (Pose(r, p) for r, p in zip(self.rotations, self.positions, strict=True))
+        return np.stack([moved(points, self.graph.nodes, binding, pose) for pose in poses])
+
+    def bound(self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None) -> Binding:
+        """Bind points on or near the key mesh to the nodes of the nearest vertices."""
         own = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
         asked = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
         vertices = cKDTree(own[:, : asked.shape[1]]).query(asked)[1].reshape(-1)
-        binding = self.graph.bind(points, self.graph.cells[vertices], self.neighbours)
-        poses = (Pose(r, p) for r, p in zip(self.rotations, self.positions, strict=True))
-        return np.stack([moved(points, self.graph.nodes, binding, pose) for pose in poses])
+        return self.graph.bind(points, self.graph.cells[vertices], self.neighbours)
 
     def back(self, frame: int, mesh: Mesh) -> Mesh:
         """Move a mesh on or near a frame to the pose of the key frame, by the inverse of `move`.

@@ -1,0 +1,49 @@
+"""How near a fitted template lies to a frame, by samples of both surfaces: what keys and cuts are decided by.
+
+In: a template; its positions on a frame. Out: the RMS distance, the larger of both directions, since either alone misses
+surface that the other lacks; infinite where a template is wrong: where
+much surface of a clean frame has no counterpart, or one that faces away (folds, shards turned inside out).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float64, Int32
+
+from ...geometry.closest_points import Surface, area_samples
+from ...geometry.topology import vertex_normals
+from ...types import Mesh
+from .frame import ON_BORDER, FrameSurface
+
+SAMPLES = 4000  # of each surface: as many as tracking matches
+STRAY = 0.01  # share of a noisy frame's area that may be stray surface: a guess
+FAR = 0.006  # diagonals: samples farther than that have no counterpart (1 cm on a body; decision 24)
+WRONG = 0.01  # share of the samples that may have no counterpart or face away from it: .3 % of good fits do (decision 24)
+
+
+class Closeness:
+    """A template prepared for measuring how near its positions are to frames."""
+
+    def __init__(self, faces: Int32[np.ndarray, "F 3"], rest: Float64[np.ndarray, "V 3"], noise: float) -> None:
+        """`noise` is the RMS distance of the frames from the truth; with noise, their holes do not count."""
+        mesh = Mesh(rest, faces)
+        self._surface, self._samples, self._noise = Surface(mesh), area_samples(mesh, SAMPLES), noise
+
+    def of(self, positions: Float64[np.ndarray, "V 3"], frame: FrameSurface) -> float:
+        """Return the RMS distance between the template at these positions and a frame; infinite where it is wrong."""
+        self._surface.move(positions)
+        chosen = frame.samples(SAMPLES)
+        own, theirs = positions[self._samples], frame.mesh.vertices[chosen]
+        to_frame, to_fit = frame.surface.closest(own), self._surface.closest(theirs)
+        normals = vertex_normals(self._surface.mesh)[self._samples]
+        here, there = self._surface.normals[to_fit.faces], frame.surface.normals[to_frame.faces]
+        back, ahead = ((to_frame.points - own) ** 2).sum(axis=1), ((to_fit.points - theirs) ** 2).sum(axis=1)
+        if self._noise > 0:  # holes of noisy frames are no reason for another template
+            back = np.where(frame.inside_at(to_frame) > ON_BORDER, back, 0.0)
+            ahead = np.sort(ahead)[: len(ahead) - int(STRAY * len(ahead))]
+            return float(np.sqrt(max(back.mean(), ahead.sum() / len(theirs))))
+        wrong = (np.einsum("nd,nd->n", normals, there) < 0) | (back > FAR**2)
+        lacking = (np.einsum("nd,nd->n", frame.normals[chosen], here) < 0) | (ahead > FAR**2)
+        if max(wrong.mean(), lacking.mean()) > WRONG:
+            return np.inf
+        return float(np.sqrt(max(back.mean(), ahead.mean())))

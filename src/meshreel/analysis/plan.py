@@ -1,0 +1,121 @@
+"""Plan groups: cut the next frames where another template pays, and nowhere else (decision 24).
+
+In -> out: the residuals that each template leaves on each frame -> pieces of successive frames, each with its template
+or with none. Residuals are in units of the distance to reach; a cost is a sum of their squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import InputError
+
+NOBODY = -1  # in place of a template: its frames are coded one by one
+CODED = 0.7  # squared targets that coding adds to a residual (measured on bodies at quality 50)
+USUAL = 2.0  # squared targets that a good template may leave, at most (guess)
+LOST = 1e6  # targets, in place of an infinite residual
+SMALL = 0.1  # squared targets that are no reason for another key (guess)
+REACHED = 1.0  # squared targets that a frame has that is coded alone
+
+
+@dataclass(frozen=True, slots=True)
+class PlanOptions:
+    """Prices of a plan, and when another template is looked for."""
+
+    limit: float = 2.0  # a frame is lost if its residual is larger than this many times the target
+    worth: float = 14.0  # price of a template: the sum of squared residuals that it must save (decision 24)
+    alone: float = 1.2  # price of a frame without a template, in prices of a template (guess)
+    pop: float = 1.5  # dB that the quality may step at a cut without a price
+    keys: int = 5  # frames tried as keys for one plan, at most
+    misses: int = 2  # keys in a row without gain after which no other is tried (guess)
+    gain: float = 0.25  # that a key must bring, in prices of a template (guess)
+
+    def __post_init__(self) -> None:
+        if self.limit < 1 or not (self.worth > 0 and self.alone > 0 and self.pop > 0):
+            raise InputError(
+                f"limit {self.limit:g}, worth {self.worth:g}, alone {self.alone:g}, pop {self.pop:g}: "
+                "give >= 1, and > 0 for the others"
+            )
+        if self.keys < 1 or self.misses < 1 or self.gain < 0:
+            raise InputError(f"keys {self.keys}, misses {self.misses}, gain {self.gain:g}: give >= 1, >= 1, >= 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Successive frames with one template."""
+
+    template: int  # its number, or `NOBODY`
+    first: int
+    stop: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Pieces that cover some frames, and what they cost."""
+
+    pieces: tuple[Piece, ...]
+    cost: float
+    squares: Float64[np.ndarray, " T"]  # squared residual of each frame, or the price of one without a template
+
+    @property
+    def excess(self) -> Float64[np.ndarray, " T"]:
+        """Squared residuals beyond those of the better half of the frames, which any template would leave, too."""
+        usual = np.median(np.sort(self.squares)[: (len(self.squares) + 1) // 2])
+        return np.maximum(self.squares - min(usual, USUAL), 0.0)
+
+
+def best_plan(
+    residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions
+) -> Plan:
+    """Return the plan of least cost (dynamic programming); residuals of frames that a template does not follow are inf.
+
+    The cost is the sum of the squared residuals, the price of each piece's template, and that of steps of the quality
+    at cuts. A template that is `onward`, known from the frames before, costs nothing, but can only begin.
+    """
+    (count, frames), price = residuals.shape, options.worth
+    squares = np.vstack([residuals**2, np.full(frames, options.alone * price)])
+    starts = np.array([0.0 if known else price for known in onward] + [0.0])
+    changes = np.array([np.inf if known else price for known in onward] + [0.0])
+    errors = 10 * np.log10(np.vstack([np.minimum(residuals, LOST) ** 2 + CODED, np.full(frames, REACHED)]))  # dB
+    best, before = starts + squares[:, 0], np.zeros((frames, count + 1), int)
+    for t in range(1, frames):
+        steps = np.abs(errors[:, t][None] - errors[:, t - 1][:, None])
+        pops = price * np.maximum(steps / options.pop - 1, 0.0)
+        ways = best[:, None] + changes[None] + pops
+        np.fill_diagonal(ways, best)
+        before[t] = np.argmin(ways, axis=0)
+        best = ways[before[t], np.arange(count + 1)] + squares[:, t]
+    last = int(np.argmin(best))
+    path = [last]
+    for t in range(frames - 1, 0, -1):
+        path.append(int(before[t, path[-1]]))
+    path.reverse()
+    pieces, at = list[Piece](), 0
+    for template, same in groupby(path):
+        stop = at + len(list(same))
+        pieces.append(Piece(NOBODY if template == count else template, at, stop))
+        at = stop
+    return Plan(tuple(pieces), float(best[last]), squares[path, np.arange(frames)])
+
+
+def next_key(plan: Plan, tried: Collection[int]) -> int | None:
+    """Return the frame to try as a key next: the middle of the run that costs most; None where all were tried."""
+    excess = plan.excess
+    bad = excess >= max(0.999 * float(excess.mean()), SMALL)
+    runs, at = list[range](), 0
+    for is_bad, same in groupby(bad):
+        stop = at + len(list(same))
+        if is_bad and not set(range(at, stop)) <= set(tried):
+            runs.append(range(at, stop))
+        at = stop
+    if not runs:
+        return None
+    worst = max(runs, key=lambda run: float(excess[run.start : run.stop].sum()))
+    middle, whole = (worst.start + worst.stop - 1) / 2, (len(excess) - 1) / 2
+    left = (frame for frame in worst if frame not in tried)
+    return min(left, key=lambda frame: (abs(frame - middle), abs(frame - whole), -frame))

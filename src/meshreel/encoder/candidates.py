@@ -1,0 +1,184 @@
+"""Templates that may follow the next frames: of a key frame or of the group before, followed outward until lost.
+
+In: a window of frames. Out: for each candidate its residual on each frame that it follows, and its fit to those of a
+group. What is known of a candidate stays with it, so that no frame is tracked or fitted twice with one template.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..analysis.fit.closeness import Closeness
+from ..analysis.fit.frame import FrameSurface
+from ..analysis.fit.surface_fit import Fitting
+from ..analysis.follow.embedded import Tracker
+from ..analysis.follow.fused_template import fused_mesh
+from ..analysis.follow.template import base_mesh, shared_detail
+from ..coding.layers.coder import LayersState
+from ..coding.reference_mesh import CodedReference, code_on_lattice
+from ..types import Mesh
+from .digests import Digests, note
+from .options import LayersOptions
+from .target import Fidelity
+
+LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 0014)
+LATTICE_ALONE = 0.8  # the same for a single frame, whose base need not move (decision 0014)
+LATER, EARLIER = 1, -1  # sides of a key
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """The frames that the next group may have, prepared for matching."""
+
+    first: int  # number of the first of them in its interval
+    surfaces: list[FrameSurface]
+    noise: float  # RMS distance of the frames from the truth, normalised
+    target: Fidelity  # that the frames should reach, normalised
+    digests: Digests | None = None
+
+    def __len__(self) -> int:
+        return len(self.surfaces)
+
+    @property
+    def numbers(self) -> range:
+        """Numbers of the frames in their interval."""
+        return range(self.first, self.first + len(self))
+
+    def at(self, number: int) -> FrameSurface:
+        """Return the frame with a number."""
+        return self.surfaces[number - self.first]
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """The template at the end of a group, from which the next group may be predicted."""
+
+    reference: CodedReference
+    state: LayersState  # as decoded
+    positions: Float64[np.ndarray, "V 3"]  # its fit to the last frame
+    closeness: Closeness
+    residual: float  # usual residual of its fits, RMS
+
+
+class Candidate:
+    """A template that is followed outward from its key, the frame on which it lies, for as long as it fits."""
+
+    def __init__(self, window: Window, key: int, options: LayersOptions, before: Followed | None = None) -> None:
+        """Take the template of a key frame in the window, or that of the group `before` the window."""
+        self.key, self.before, self._options, self._noise = key, before, options, window.noise
+        self._fits, self._residuals = dict[int, Float64[np.ndarray, "V 3"]](), dict[int, float]()
+        self._ends = dict[int, int]()  # by side, the frame where the template is lost
+        if before is not None:
+            surface = Mesh(before.positions, before.reference.base.faces)
+            self._tracker = Tracker(surface, key, options.embedded, window.noise)
+            self._take(before.reference, before.positions, before.closeness)
+            self._rest, self._usual = before.positions, before.residual
+            return
+        self._tracker = Tracker(window.at(key).mesh, key, options.embedded, window.noise)
+        if window.noise == 0 or not self._lay_fused(window):
+            self._lay(window)
+
+    @property
+    def is_lost(self) -> bool:
+        """True where nothing is left of a key's surface as it would be coded."""
+        return self._usual == np.inf
+
+    def follow(self, window: Window) -> None:
+        """Track and fit the frames of the window on both sides of the key, up to one that is lost."""
+        for side in (LATER, EARLIER):
+            for number in self._tracked(window, side):
+                if number not in self._residuals:
+                    self._fit(window, number)
+                if self._residuals[number] > self._limit(window):
+                    self._ends[side] = number
+                    break
+
+    def residuals(self, window: Window) -> Float64[np.ndarray, " T"]:
+        """Return the residuals on the window's frames, in units of the distance to reach; infinite where it is lost."""
+        found = np.array([self._residuals.get(number, np.inf) for number in window.numbers])
+        return np.where(found <= self._limit(window), found / window.target.distance, np.inf)
+
+    def fit(self, window: Window, numbers: range) -> Float64[np.ndarray, "T V 3"]:
+        """Return the final fits to successive frames that it follows: near what one shape explains."""
+        first = np.stack([self._fits[number] for number in numbers])
+        if not self._options.fit.components or len(numbers) == 1:
+            return first
+        detail = shared_detail(self.reference.mesh.faces, len(self.reference.mesh.vertices), self.reference.levels)
+        triples = zip(numbers, detail(first), first, strict=True)
+        return np.stack([self._fitting.second(window.at(number), *both) for number, *both in triples])
+
+    def followed(self, state: LayersState, positions: Float64[np.ndarray, "T V 3"], numbers: range) -> Followed:
+        """Return the template at the end of a group, for the group after it."""
+        usual = float(np.median([self._residuals[number] for number in numbers]))
+        usual = usual if self.before is None else self.before.residual
+        return Followed(self.reference, state, positions[-1], self._closeness, usual)
+
+    def _limit(self, window: Window) -> float:
+        """Return the residual beyond which a frame is lost: there is none below a key that is lost itself."""
+        limit, target = self._options.plan.limit, window.target.distance
+        return 0.0 if self._usual > limit * target and self.before is None else limit * max(target, self._usual)
+
+    def _tracked(self, window: Window, side: int) -> Iterator[int]:
+        """Yield frames outward from the key for as long as the key's surface is tracked."""
+        numbers = window.numbers
+        for number in range(self.key + 1, numbers.stop) if side == LATER else range(self.key - 1, numbers.start - 1, -1):
+            if number == self._ends.get(side):
+                return
+            residual = self._tracker.residual(number)
+            if residual is None:
+                residual = self._tracker.step(number, window.at(number))
+            if residual > self._tracker.limits.lost:
+                self._ends[side] = number
+                return
+            yield number
+
+    def _lay_fused(self, window: Window) -> bool:
+        """Make the template of what all tracked frames have in common; return False where nothing is left of it."""
+        tracked = sorted([self.key, *(number for side in (LATER, EARLIER) for number in self._tracked(window, side))])
+        surfaces = [window.at(number) for number in tracked]
+        fused = fused_mesh(self._tracker.motion(tracked), surfaces, self._noise, self._options.fused)
+        if fused.is_empty or (reference := self._coded(window, fused)) is None:
+            return False
+        placed = reference.base.vertices
+        fitting = Fitting(reference.base.faces, len(placed), self._options.fit, self._noise)
+        self._rest = fitting.first(FrameSurface(fused), placed, placed)
+        self._take(reference, self._rest)
+        self._fit(window, self.key)
+        self._usual = self._residuals[self.key]
+        return True
+
+    def _lay(self, window: Window) -> None:
+        """Make the template of the key frame's surface."""
+        self._usual = np.inf
+        if (reference := self._coded(window, window.at(self.key).mesh)) is not None:
+            self._rest = reference.base.vertices
+            self._take(reference, self._rest)
+            self._fit(window, self.key)
+            self._rest, self._usual = self._fits[self.key], self._residuals[self.key]
+
+    def _coded(self, window: Window, surface: Mesh) -> CodedReference | None:
+        """Return a base mesh of a surface as decoded; None where nothing is left of it."""
+        o = self._options
+        lattice = o.layers.step_above(self._noise) * (LATTICE if len(window) > 1 else LATTICE_ALONE)
+        reference = code_on_lattice(base_mesh(surface, o.template, self._noise), lattice, o.template.levels)
+        note(window.digests, "template, coded", reference.base.vertices, reference.base.faces)
+        return None if reference.mesh.is_empty else reference
+
+    def _take(
+        self, reference: CodedReference, points: Float64[np.ndarray, "V 3"], closeness: Closeness | None = None
+    ) -> None:
+        """Let the template's vertices at the key be carried by the tracked surface."""
+        faces = reference.base.faces
+        self.reference, self._points, self._binding = reference, points, self._tracker.bound(Mesh(points, faces))
+        self._fitting = Fitting(faces, len(points), self._options.fit, self._noise)
+        self._closeness = closeness or Closeness(faces, points, self._noise)
+
+    def _fit(self, window: Window, number: int) -> None:
+        prediction = self._tracker.placed(number, self._points, self._binding)
+        positions = self._fitting.first(window.at(number), self._rest, prediction)
+        self._fits[number], self._residuals[number] = positions, self._closeness.of(positions, window.at(number))
+        note(window.digests, f"first fit, key {self.key}, frame {number}", positions)
