@@ -7,7 +7,7 @@ or with none. Residuals are in units of the distance to reach; a cost is a sum o
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -18,6 +18,7 @@ from ..errors import InputError
 NOBODY = -1  # in place of a template: its frames are coded one by one
 CODED = 0.7  # squared targets that coding adds to a residual (measured on bodies at quality 50)
 USUAL = 2.0  # squared targets that a good template may leave, at most (guess)
+CLOSE = 2.0  # times dearer or cheaper that templates may be in a plan that is coded for comparison (guess)
 LOST = 1e6  # targets, in place of an infinite residual
 SMALL = 0.1  # squared targets that are no reason for another key (guess)
 REACHED = 1.0  # squared targets that a frame has that is coded alone
@@ -69,9 +70,7 @@ class Plan:
         return np.maximum(self.squares - min(usual, USUAL), 0.0)
 
 
-def best_plan(
-    residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions
-) -> Plan:
+def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions) -> Plan:
     """Return the plan of least cost (dynamic programming); residuals of frames that a template does not follow are inf.
 
     The cost is the sum of the squared residuals, the price of each piece's template, and that of steps of the quality
@@ -101,6 +100,17 @@ def best_plan(
         pieces.append(Piece(NOBODY if template == count else template, at, stop))
         at = stop
     return Plan(tuple(pieces), float(best[last]), squares[path, np.arange(frames)])
+
+
+def rivals(
+    plan: Plan, residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions
+) -> list[Plan]:
+    """Return another plan, if one would be the best were templates a little dearer or cheaper."""
+    for price in (options.worth * CLOSE, options.worth / CLOSE):
+        other = best_plan(residuals, onward, replace(options, worth=price))
+        if other.pieces != plan.pieces:
+            return [other]
+    return []
 
 
 def next_key(plan: Plan, tried: Collection[int]) -> int | None:

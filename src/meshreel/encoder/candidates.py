@@ -82,11 +82,6 @@ class Candidate:
         if window.noise == 0 or not self._lay_fused(window):
             self._lay(window)
 
-    @property
-    def is_lost(self) -> bool:
-        """True where nothing is left of a key's surface as it would be coded."""
-        return self._usual == np.inf
-
     def follow(self, window: Window) -> None:
         """Track and fit the frames of the window on both sides of the key, up to one that is lost."""
         for side in (LATER, EARLIER):
@@ -111,11 +106,10 @@ class Candidate:
         triples = zip(numbers, detail(first), first, strict=True)
         return np.stack([self._fitting.second(window.at(number), *both) for number, *both in triples])
 
-    def followed(self, state: LayersState, positions: Float64[np.ndarray, "T V 3"], numbers: range) -> Followed:
-        """Return the template at the end of a group, for the group after it."""
-        usual = float(np.median([self._residuals[number] for number in numbers]))
-        usual = usual if self.before is None else self.before.residual
-        return Followed(self.reference, state, positions[-1], self._closeness, usual)
+    def followed(self, state: LayersState, positions: Float64[np.ndarray, "V 3"], numbers: range) -> Followed:
+        """Return the template at the end of a group of these frames, for the group after it."""
+        usual = self._usual if self.before else float(np.median([self._residuals[number] for number in numbers]))
+        return Followed(self.reference, state, positions, self._closeness, usual)
 
     def _limit(self, window: Window) -> float:
         """Return the residual beyond which a frame is lost: there is none below a key that is lost itself."""
@@ -125,7 +119,8 @@ class Candidate:
     def _tracked(self, window: Window, side: int) -> Iterator[int]:
         """Yield frames outward from the key for as long as the key's surface is tracked."""
         numbers = window.numbers
-        for number in range(self.key + 1, numbers.stop) if side == LATER else range(self.key - 1, numbers.start - 1, -1):
+        later, earlier = range(self.key + 1, numbers.stop), range(self.key - 1, numbers.start - 1, -1)
+        for number in later if side == LATER else earlier:
             if number == self._ends.get(side):
                 return
             residual = self._tracker.residual(number)

@@ -14,6 +14,7 @@ from ..coding.intra import decode_intra, encode_intra
 from ..coding.mesh import MAX_BITS
 from ..format.budget import CostlyError
 from ..geometry.decimate import decimate
+from ..metrics.distance import Original
 from ..types import Mesh
 from .target import Fidelity, measure
 
@@ -34,14 +35,14 @@ def cheapest_intra(
 
     Candidates are tried on the middle frame and ordered by their size there; the first that holds on all is taken.
     """
-    middle = frames[len(frames) // 2]
+    originals, middle = [Original(frame) for frame in frames], len(frames) // 2
     budget = most_bytes / len(frames)
-    for _, fraction, step, levels in sorted(_on_one_frame(middle, target, budget, options)):
+    for _, fraction, step, levels in sorted(_on_one_frame(originals[middle], target, budget, options)):
         meshes = [_reduced(frame, fraction) for frame in frames]
         payload = encode_intra(meshes, step, levels)
         if len(payload) >= most_bytes:
             continue
-        fidelity = _fidelity(frames, payload)
+        fidelity = _fidelity(originals, payload)
         if fidelity is not None and fidelity.reaches(target):
             return payload, fidelity
     return None
@@ -63,9 +64,10 @@ def coarse_enough(frames: Sequence[Mesh], step: float) -> float:
 
 
 def _on_one_frame(
-    frame: Mesh, target: Fidelity, budget: float, options: IntraOptions
+    original: Original, target: Fidelity, budget: float, options: IntraOptions
 ) -> Iterator[tuple[int, float, float, int]]:
     """Yield bytes, fraction, step and levels of candidates that reach the target on one frame within the budget."""
+    frame = original.mesh
     for fraction in sorted(options.fractions):
         reduced = _reduced(frame, fraction)
         steps = [coarse_enough([frame], step * target.distance) for step in options.steps]
@@ -74,23 +76,23 @@ def _on_one_frame(
             return  # more vertices cost more
         affordable = [(step, size) for step, size in zip(steps, sizes, strict=True) if size <= budget]
         for levels in options.levels:
-            if not _reaches(frame, reduced, affordable[-1][0], levels, target):
+            if not _reaches(original, reduced, affordable[-1][0], levels, target):
                 continue  # the finest step is the best one
             for step, size in affordable:
-                if step == affordable[-1][0] or _reaches(frame, reduced, step, levels, target):
+                if step == affordable[-1][0] or _reaches(original, reduced, step, levels, target):
                     yield size, fraction, step, levels
                     break
 
 
-def _reaches(frame: Mesh, reduced: Mesh, step: float, levels: int, target: Fidelity) -> bool:
-    fidelity = _fidelity([frame], encode_intra([reduced], step, levels))
+def _reaches(original: Original, reduced: Mesh, step: float, levels: int, target: Fidelity) -> bool:
+    fidelity = _fidelity([original], encode_intra([reduced], step, levels))
     return fidelity is not None and fidelity.reaches(target)
 
 
-def _fidelity(frames: Sequence[Mesh], payload: bytes) -> Fidelity | None:
+def _fidelity(originals: Sequence[Original], payload: bytes) -> Fidelity | None:
     """Return the fidelity of a payload, None where readers would refuse so few bytes for it."""
     try:
-        return measure(frames, decode_intra(payload))
+        return measure(originals, decode_intra(payload))
     except CostlyError:
         return None
 

@@ -1,19 +1,21 @@
 """The recipe of layers: base meshes of key frames follow the frames around them for as long as they fit.
 
 In -> out: an interval, whose frames are read in order -> groups with their fidelity. A window of the next frames is
-planned: which templates, of key frames or of the group before, follow which of its frames (`analysis.plan`). Frames that
-no template follows are coded one by one.
+planned: which templates, of key frames or of the group before, follow which of its frames (`analysis.plan`). Frames
+that no template follows are coded one by one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float64
 
 from ..analysis.fit.frame import FrameSurface
-from ..analysis.plan import NOBODY, Piece, Plan, best_plan, next_key
+from ..analysis.plan import NOBODY, Piece, Plan, best_plan, next_key, rivals
 from .candidates import Candidate, Followed, Window
 from .digests import note
 from .forms import EncodedGroup, empty_groups
@@ -25,6 +27,8 @@ from .target import target_of
 
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
 NOISY_KEYS = 2  # keys tried at most under noise: the fused template completes them (decision 16)
+EXCHANGE = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 0013)
+Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that the next may begin with
 
 
 def encode_interval(interval: Interval, options: LayersOptions, stages: Stages | None = None) -> Iterator[EncodedGroup]:
@@ -48,21 +52,12 @@ class _Planner:
 
     def groups(self) -> Iterator[EncodedGroup]:
         """Yield the groups of the interval."""
-        end = len(self._interval.frames)
-        while self._at < end:
+        while self._at < len(self._interval.frames):
             window = self._window()
-            if (still := self._standing(window)) is not None:
-                yield still
-                continue
-            plan, candidates = self._planned(window)
-            pieces = plan.pieces if window.numbers.stop == end else plan.pieces[:-1] or plan.pieces
-            for piece in pieces:  # the last one may go on beyond the window: it is planned again
-                group = self._coded(window, piece, None if piece.template == NOBODY else candidates[piece.template])
-                if piece is not plan.pieces[-1]:
-                    self._before = None  # another template is better
+            for group, after in self._standing(window) or self._moving(window):
+                self._at += group.frame_count
+                self._before = after
                 yield group
-                if group.frame_count < piece.stop - piece.first:
-                    break
 
     def _window(self) -> Window:
         """Return the next frames."""
@@ -74,6 +69,33 @@ class _Planner:
         target = target_of(meshes, self._options.target, noise)
         return Window(self._at, list(self._surfaces.values()), noise, target, digests)
 
+    def _standing(self, window: Window) -> list[Coded]:
+        """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""
+        before = self._before
+        if before is None or not self._options.predict:
+            return []
+        for surface in reversed(window.surfaces):  # most bodies have moved by the last frame
+            if before.closeness.of(before.positions, surface) > STILL * before.residual:
+                return []
+        positions = np.repeat(before.positions[None], len(window), axis=0)
+        group, state = self._coder(window, slice(None)).layers(before.reference, positions, before.state)
+        return [(group, None if state is None else replace(before, state=state))]
+
+    def _moving(self, window: Window) -> list[Coded]:
+        """Code the window by its plan, or by one with other cuts where that costs hardly more and turns out better."""
+        plan, candidates = self._planned(window)
+        others = rivals(plan, *_known(window, candidates), self._options.plan)
+        note(window.digests, "plans", *(one.pieces for one in (plan, *others)))
+        used = {piece.template for one in (plan, *others) for piece in one.pieces}
+        self._candidates = [one for k, one in enumerate(candidates) if k in used and one.before is None]
+        is_last = window.numbers.stop == len(self._interval.frames)
+        if others:
+            tried = [self._pieces(window, one.pieces, candidates) for one in (plan, *others)]
+            coded = min(tried, key=lambda groups: _cost(groups, len(window)))
+            return coded if is_last else coded[:-1] or coded
+        some = plan.pieces if is_last else plan.pieces[:-1] or plan.pieces  # the last may go on: it is planned again
+        return self._pieces(window, some, candidates)
+
     def _planned(self, window: Window) -> tuple[Plan, list[Candidate]]:
         """Return the plan of a window, and the candidates that its pieces name; keys are tried while they may pay."""
         o, candidates = self._options.plan, [one for one in self._candidates if one.key >= window.first]
@@ -81,7 +103,7 @@ class _Planner:
             candidates.append(Candidate(window, window.first - 1, self._options, self._before))
         for one in candidates:
             one.follow(window)
-        plan, misses = self._best(window, candidates), 0
+        plan, misses = best_plan(*_known(window, candidates), o), 0
         for _ in range(min(o.keys, NOISY_KEYS) if window.noise else o.keys):
             tried = {number - window.first for number in self._tried}
             if plan.excess.sum() <= o.worth or misses == o.misses or (key := next_key(plan, tried)) is None:
@@ -89,52 +111,53 @@ class _Planner:
             self._tried.add(window.first + key)
             candidates.append(Candidate(window, window.first + key, self._options))
             candidates[-1].follow(window)
-            better = self._best(window, candidates)
+            better = best_plan(*_known(window, candidates), o)
             misses = 0 if plan.cost - better.cost > o.gain * o.worth else misses + 1
             plan = better
-        used = {piece.template for piece in plan.pieces}
-        self._candidates = [one for k, one in enumerate(candidates) if k in used and one.before is None]
-        note(window.digests, "plan", plan.pieces, plan.squares)
         return plan, candidates
 
-    def _best(self, window: Window, candidates: list[Candidate]) -> Plan:
-        residuals = np.array([one.residuals(window) for one in candidates]).reshape(-1, len(window))
-        return best_plan(residuals, [one.before is not None for one in candidates], self._options.plan)
+    def _pieces(self, window: Window, pieces: Sequence[Piece], candidates: Sequence[Candidate]) -> list[Coded]:
+        """Code pieces of a plan; the last group is shorter than its piece where a group may not hold more frames."""
+        found = list[Coded]()
+        for piece in pieces:
+            one = None if piece.template == NOBODY else candidates[piece.template]
+            group, after = self._piece(window, piece, one)
+            is_over = piece.stop == len(window) or group.frame_count < piece.stop - piece.first
+            found.append((group, after if is_over else None))  # else another template is better
+            if group.frame_count < piece.stop - piece.first:
+                break
+        return found
 
-    def _standing(self, window: Window) -> EncodedGroup | None:
-        """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""
-        before = self._before
-        if before is None or not self._options.predict:
-            return None
-        for surface in reversed(window.surfaces):  # most bodies have moved by the last frame
-            if before.closeness.of(before.positions, surface) > STILL * before.residual:
-                return None
-        positions = np.repeat(before.positions[None], len(window), axis=0)
-        group, state = self._coder(window, 0, len(window)).layers(before.reference, positions, before.state)
-        self._at += group.frame_count
-        self._before = None if state is None else replace(before, state=state)
-        return group
-
-    def _coded(self, window: Window, piece: Piece, candidate: Candidate | None) -> EncodedGroup:
-        """Code a piece of the plan, or the first of its frames where a group may not hold more."""
-        coder, self._before = self._coder(window, piece.first, piece.stop), None
-        if candidate is None:
-            group = coder.alone()
-            self._at += group.frame_count
-            return group
+    def _piece(self, window: Window, piece: Piece, candidate: Candidate | None) -> Coded:
+        """Code a piece of a plan, or the first of its frames."""
+        coder = self._coder(window, slice(piece.first, piece.stop))
+        if candidate is None or candidate.reference is None:
+            return coder.alone(), None
         numbers = window.numbers[piece.first : piece.stop]
         positions = candidate.fit(window, numbers)
         note(window.digests, "fit", positions)
         previous = candidate.before.state if candidate.before else None
         group, state = coder.layers(candidate.reference, positions, previous)
-        self._at += group.frame_count
+        if state is None:
+            return group, None
         numbers = numbers[: group.frame_count]
-        if state is not None:
-            self._before = candidate.followed(state, positions[: len(numbers)], numbers)
-            if candidate.key in numbers:
-                group = replace(group, key=numbers.index(candidate.key))
-        return group
+        key = numbers.index(candidate.key) if candidate.key in numbers else None
+        return replace(group, key=key), candidate.followed(state, positions[len(numbers) - 1], numbers)
 
-    def _coder(self, window: Window, first: int, stop: int) -> GroupCoder:
-        meshes = [surface.mesh for surface in window.surfaces[first:stop]]
-        return GroupCoder(meshes, window.target, window.noise, self._options, digests=window.digests)
+    def _coder(self, window: Window, some: slice) -> GroupCoder:
+        return GroupCoder(window.surfaces[some], window.target, window.noise, self._options, digests=window.digests)
+
+
+def _known(window: Window, candidates: Sequence[Candidate]) -> tuple[Float64[np.ndarray, "C T"], list[bool]]:
+    """Return the candidates' residuals on the window's frames, and which of them come from the group before."""
+    residuals = np.array([one.residuals(window) for one in candidates]).reshape(-1, len(window))
+    return residuals, [one.before is not None for one in candidates]
+
+
+def _cost(coded: Sequence[Coded], frames: int) -> float:
+    """Return the logarithm of error and rate, exchanged; infinite where groups hold not all of the frames."""
+    groups = [group for group, _ in coded]
+    if sum(group.frame_count for group in groups) < frames:
+        return math.inf
+    squared = sum(group.frame_count * group.fidelity.distance**2 for group in groups) / frames
+    return math.log(max(squared, 1e-30)) + EXCHANGE * math.log(sum(len(group.payload) for group in groups))

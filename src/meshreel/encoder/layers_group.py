@@ -1,6 +1,6 @@
 """Coding of one group of layers: its template's motion, patches where they pay, or the form that is cheaper.
 
-In: frames, the positions of a template on them. Out: an EncodedGroup with its fidelity, and the decoder's state after it.
+In: frames, the positions of a template on them. Out: an EncodedGroup with its fidelity, and the decoder's state.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float64, Int32
 
+from ..analysis.fit.frame import FrameSurface
 from ..coding.layers.coder import EncodedLayers, LayersState, encode_layers
 from ..coding.reference_mesh import CodedReference
 from ..format.budget import CostlyError
@@ -19,11 +20,14 @@ from ..format.layout import Form
 from ..format.records import pack
 from ..types import Mesh
 from .digests import Digests, note
+from .draco import cheapest_intra
 from .forms import EncodedGroup, cheaper, intra_only, laplacian
 from .options import LayersOptions
 from .tails import find_tails
 from .target import Fidelity, measure
 
+FLAT = 2.0  # times the wanted normal error beyond which edges are lost (guess)
+MOST_FOR_EDGES = 4  # times the bytes that frames with their edges may cost (guess)
 TOO_COARSE = 1.5  # targets that the layers' distance may reach before the Laplacian form is tried (guess)
 
 
@@ -31,11 +35,16 @@ TOO_COARSE = 1.5  # targets that the layers' distance may reach before the Lapla
 class GroupCoder:
     """What the coding of a group depends on, beside its template."""
 
-    frames: Sequence[Mesh]
+    surfaces: Sequence[FrameSurface]
     target: Fidelity  # that the frames should reach, normalised
     noise: float  # RMS distance of the frames from the truth, normalised
     options: LayersOptions
     digests: Digests | None = field(default=None, kw_only=True)
+
+    @property
+    def frames(self) -> list[Mesh]:
+        """The frames themselves."""
+        return [surface.mesh for surface in self.surfaces]
 
     def alone(self) -> EncodedGroup:
         """Encode the frames one by one; only the first of them where bytes may not hold more."""
@@ -52,17 +61,17 @@ class GroupCoder:
         try:
             encoded = encode_layers(reference, positions, self.options.layers, previous, self.noise)
         except CostlyError:
-            if len(self.frames) == 1:
+            if len(self.surfaces) == 1:
                 return self.alone(), None
-            half = len(self.frames) // 2
-            return replace(self, frames=self.frames[:half]).layers(reference, positions[:half], previous)
+            half = len(self.surfaces) // 2
+            return replace(self, surfaces=self.surfaces[:half]).layers(reference, positions[:half], previous)
         note(self.digests, "fields and symbols", encoded.payload)
         shown = self._with_tails(encoded, reference.base.faces)
         note(self.digests, "patches", shown.payload[len(encoded.payload) :])
         fidelity = measure(self.frames, shown.frames)
         note(self.digests, "fidelity", fidelity)
         is_predicted = previous is not None
-        chosen = EncodedGroup(Form.LAYERS, len(self.frames), shown.payload, shown.layers, fidelity, is_predicted)
+        chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), shown.payload, shown.layers, fidelity, is_predicted)
         if self.noise == 0 and fidelity.distance > TOO_COARSE * self.target.distance:
             with suppress(CostlyError):
                 other = laplacian(self.frames, reference, positions, self.options.displacements)
@@ -70,8 +79,15 @@ class GroupCoder:
                     chosen = other
         if not np.isfinite(chosen.fidelity.distance):
             return self.alone(), None  # the template has collapsed: nothing is comparable
-        chosen = cheaper(self.frames, chosen, self.options.intra)
+        chosen = self._sharp(chosen) or cheaper(self.frames, chosen, self.options.intra)
         return chosen, encoded.state if chosen.form == Form.LAYERS else None
+
+    def _sharp(self, group: EncodedGroup) -> EncodedGroup | None:
+        """Return the `draco` form of a group whose edges are lost, as those of few, large faces; else None."""
+        if group.fidelity.angle <= FLAT * self.target.angle:
+            return None
+        found = cheapest_intra(self.frames, self.target, MOST_FOR_EDGES * len(group.payload), self.options.intra)
+        return found and EncodedGroup(Form.DRACO, len(self.frames), found[0], (), found[1])
 
     def _with_tails(self, encoded: EncodedLayers, faces: Int32[np.ndarray, "F 3"]) -> _Shown:
         """Return the encoded layers, with a layer of patches where that pays."""
@@ -79,7 +95,8 @@ class GroupCoder:
         decoded = [Mesh(positions, faces) for positions in encoded.positions]
         if self.options.tails is None:
             return _Shown(payload, layers, decoded)
-        found = find_tails(self.frames, decoded, len(payload), self.options.tails, noise=self.noise)
+        known = [surface.surface for surface in self.surfaces]
+        found = find_tails(known, decoded, len(payload), self.options.tails, noise=self.noise)
         if found is None:
             return _Shown(payload, layers, decoded)
         payload += pack(found.record)

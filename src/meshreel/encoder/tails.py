@@ -62,7 +62,7 @@ class Tails:
 
 
 def find_tails(
-    frames: Sequence[Mesh],
+    frames: Sequence[Mesh | Surface],
     decoded: Sequence[Mesh],
     size: int,
     options: TailOptions = TailOptions(),
@@ -75,14 +75,16 @@ def find_tails(
     distance of the frames from the truth: thresholds count from there where the rest is nearer. Neither the mean nor
     the larger of both directions' errors rises by more than the layer's bytes are worth.
     """
-    shown = [_Frame(frame, mesh) for frame, mesh in zip(frames, decoded, strict=True)]
+    surfaces = [frame if isinstance(frame, Surface) else Surface(frame) for frame in frames]
+    shown = [_Frame(surface, mesh) for surface, mesh in zip(surfaces, decoded, strict=True)]
     faces = decoded[0].faces
     usual = float(np.mean([frame.body() for frame in shown]))  # squared
     if not EXACT**2 < usual < np.inf:
         return None
     price = options.exchange * len(frames) * usual / size
     usual = max(usual, noise**2)
-    search = _Search(shown, faces, usual, price, options, _rung(frames, options.lattice * usual**0.5))
+    rung = _rung([surface.mesh for surface in surfaces], options.lattice * usual**0.5)
+    search = _Search(shown, faces, usual, price, options, rung)
     best, least = None, search.cost(None)
     better = list[_Coded]()  # each than those before it
     for dropped in search.masks():
@@ -227,9 +229,9 @@ def _within(far: Float64[np.ndarray, " 3"], rung: int, frames: int) -> bool:
 class _Frame:
     """A frame and its decoded mesh, sampled at vertices and centroids, with the distances between both."""
 
-    def __init__(self, original: Mesh, decoded: Mesh) -> None:
-        self.original, self.decoded = original, decoded
-        self.surface = Surface(original)
+    def __init__(self, surface: Surface, decoded: Mesh) -> None:
+        original = surface.mesh
+        self.original, self.decoded, self.surface = original, decoded, surface
         self.points, areas = _samples(original)
         shares = np.bincount(original.faces.reshape(-1), np.repeat(areas / 12, 3), len(original.vertices))
         weights = np.concatenate([shares, 0.75 * areas])

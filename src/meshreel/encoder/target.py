@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ..metrics.distance import PSNR_CEILING, surface_errors
+from ..metrics.distance import PSNR_CEILING, Original, surface_errors
 from ..metrics.normals import WORST_ANGLE
 from ..types import Mesh
 
@@ -36,7 +36,7 @@ class Fidelity:
 NO_ERROR = Fidelity(0.0, 0.0, 0.0, PSNR_CEILING)
 
 
-def measure(originals: Sequence[Mesh], decoded: Sequence[Mesh]) -> Fidelity:
+def measure(originals: Sequence[Mesh | Original], decoded: Sequence[Mesh]) -> Fidelity:
     """Measure decoded frames; a frame with a surface on one side only has an infinite distance."""
     errors = [surface_errors(a, b) for a, b in zip(originals, decoded, strict=True)]
     distances = [e.symmetric_rms for e in errors]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float64
@@ -16,7 +17,7 @@ from jaxtyping import Float64
 from ..geometry.strict import dot
 from ..types import Mesh
 from .normals import WORST_ANGLE, angles
-from .surface_samples import RESOLUTION, Matches, Samples, match, sample_pair, used_surface
+from .surface_samples import RESOLUTION, Matches, Samples, box_center, match, sample, used_surface
 
 _LEAST, _MOST = 1e-3, 1e6  # m, extents of meshes that are measured in metres; others are scaled (guess)
 PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; stands for an infinite PSNR in a mean over frames
@@ -102,16 +103,29 @@ class SurfaceErrors:
         return 100 * distance / self.diagonal if self.diagonal > 0 else math.inf
 
 
-def surface_errors(original: Mesh, decoded: Mesh) -> SurfaceErrors:
+class Original:
+    """An original mesh prepared for comparisons with decoded ones."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = used_surface(mesh)
+
+    @cached_property
+    def samples(self) -> Samples:
+        """The mesh's samples, around the middle of its box."""
+        return sample(self.mesh, box_center(self.mesh))
+
+
+def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
     """Measure all distances and normal errors between two meshes of one frame.
 
     Faces without area and vertices without faces are no surface: they are ignored, also in the diagonal.
     """
-    original, decoded = used_surface(original), used_surface(decoded)
+    prepared = original if isinstance(original, Original) else Original(original)
+    original, decoded = prepared.mesh, used_surface(decoded)
     if original.is_empty or decoded.is_empty:
         both = _PERFECT if original.is_empty and decoded.is_empty else _WORST
         return SurfaceErrors(original.diagonal, both, both)
-    a, b = sample_pair(original, decoded)
+    a, b = prepared.samples, sample(decoded, box_center(original))
     if (unit := _unit(a.mesh, b.mesh)) != 1:  # in metres, squares of the queries' float32 would be inf or 0
         smaller = surface_errors(_scaled(original, 1 / unit), _scaled(decoded, 1 / unit))
         return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))

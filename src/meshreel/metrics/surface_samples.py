@@ -7,6 +7,7 @@ that one round of queries serves both the vertex-based metrics and the area-weig
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float64, Int32
@@ -21,7 +22,7 @@ _ENOUGH_FACES = 12_000  # a coarser mesh is subdivided before it is sampled (gue
 _MOST_LEVELS = 6  # of that subdivision (guess)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Samples:
     """Points on one mesh, weights that integrate over its area (they sum to 1), and the mesh's normals."""
 
@@ -30,6 +31,11 @@ class Samples:
     points: Float64[np.ndarray, "N 3"]  # the V vertices of the mesh first
     normals: Float64[np.ndarray, "N 3"]  # interpolated at the points
     weights: Float64[np.ndarray, " N"]
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The mesh, prepared for closest-point queries."""
+        return Surface(self.mesh)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +47,14 @@ class Matches:
     normals: Float64[np.ndarray, "N 3"]  # interpolated at the closest point
 
 
-def sample_pair(original: Mesh, decoded: Mesh) -> tuple[Samples, Samples]:
-    """Sample two meshes, both results of `used_surface`, moved so that the original's box is centered on 0."""
-    center = box_center(original)
-    return _sample(_moved(original, -center)), _sample(_moved(decoded, -center))
+def sample(mesh: Mesh, center: Float64[np.ndarray, " 3"]) -> Samples:
+    """Sample a mesh, a result of `used_surface`, moved so that `center` is the origin."""
+    return _sample(_moved(mesh, -center))
 
 
 def match(source: Samples, target: Samples, resolution: float) -> Matches:
     """Find the closest points of the target to the source's samples; distances below `resolution` (m) become 0."""
-    hits = Surface(target.mesh).closest(source.points)
+    hits = target.surface.closest(source.points)
     offsets = hits.points - source.points
     distances = np.sqrt(np.einsum("nd,nd->n", offsets, offsets))
     noise = distances < resolution

@@ -5,7 +5,6 @@ In -> out: EncoderOptions -> EncoderOptions. A variant is one line of VARIANTS; 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -33,9 +32,7 @@ def _background_from_meshes(options: EncoderOptions) -> EncoderOptions:
 
 VARIANTS: dict[str, Change] = {
     "no shared detail": _layers(lambda o: replace(o, fit=replace(o.fit, components=0))),
-    "middle key, no cuts": _layers(
-        lambda o: replace(o, keys=1, groups=replace(o.groups, limit=1e9, tolerance=1e9, worth=math.inf))
-    ),
+    "middle key, no cuts": _layers(lambda o: replace(o, plan=replace(o.plan, keys=1, limit=1e9, worth=1e9))),
     "flat midpoints": _layers(lambda o: replace(o, layers=replace(o.layers, curvatures=(0,)))),
     "plain rounding": _layers(lambda o: replace(o, layers=replace(o.layers, price=0.0))),
     "errors along the surface count": _layers(lambda o: replace(o, layers=replace(o.layers, tangential=1.0))),

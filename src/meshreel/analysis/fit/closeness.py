@@ -1,8 +1,8 @@
-"""How near a fitted template lies to a frame, by samples of both surfaces: what keys and cuts are decided by.
+"""How near a fitted template lies to a frame, by samples of both surfaces: keys and cuts are decided by it.
 
-In: a template; its positions on a frame. Out: the RMS distance, the larger of both directions, since either alone misses
-surface that the other lacks; infinite where a template is wrong: where
-much surface of a clean frame has no counterpart, or one that faces away (folds, shards turned inside out).
+In: a template; its positions on a frame. Out: the RMS distance, the larger of both directions, since either alone
+misses surface that the other lacks; infinite where a template is wrong: where more surface of a clean frame than usual
+has no counterpart, or one that faces away (folds, shards turned inside out).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .frame import ON_BORDER, FrameSurface
 SAMPLES = 4000  # of each surface: as many as tracking matches
 STRAY = 0.01  # share of a noisy frame's area that may be stray surface: a guess
 FAR = 0.006  # diagonals: samples farther than that have no counterpart (1 cm on a body; decision 24)
-WRONG = 0.01  # share of the samples that may have no counterpart or face away from it: .3 % of good fits do (decision 24)
+WRONG = 0.03  # share of samples beyond the usual one, a sum of folds that show; good fits have up to .012 (decision 24)
 
 
 class Closeness:
@@ -28,6 +28,7 @@ class Closeness:
         """`noise` is the RMS distance of the frames from the truth; with noise, their holes do not count."""
         mesh = Mesh(rest, faces)
         self._surface, self._samples, self._noise = Surface(mesh), area_samples(mesh, SAMPLES), noise
+        self._usual = 1.0  # share without counterpart where it fits best: wheels in mesh face each other
 
     def of(self, positions: Float64[np.ndarray, "V 3"], frame: FrameSurface) -> float:
         """Return the RMS distance between the template at these positions and a frame; infinite where it is wrong."""
@@ -44,6 +45,8 @@ class Closeness:
             return float(np.sqrt(max(back.mean(), ahead.sum() / len(theirs))))
         wrong = (np.einsum("nd,nd->n", normals, there) < 0) | (back > FAR**2)
         lacking = (np.einsum("nd,nd->n", frame.normals[chosen], here) < 0) | (ahead > FAR**2)
-        if max(wrong.mean(), lacking.mean()) > WRONG:
+        share = float(max(wrong.mean(), lacking.mean()))
+        self._usual = min(self._usual, share)
+        if share > self._usual + WRONG:
             return np.inf
         return float(np.sqrt(max(back.mean(), ahead.mean())))

@@ -146,7 +146,7 @@ class Tracker:
         return residual
 
     def residual(self, frame: int) -> float | None:
-        """Return the RMS distance of the moved key mesh and a frame, the larger of both directions; None before `step`."""
+        """Return the RMS distance of the moved key mesh and a frame, the larger of both directions; None if unknown."""
         return self._residuals.get(frame)
 
     def bound(self, mesh: Mesh) -> Binding:
