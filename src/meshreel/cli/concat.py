@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -13,10 +12,10 @@ from .console import Common
 
 
 def command(
-    inputs: list[Path],
+    inputs: list[str],
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[str, Parameter(name=["--output", "-o"])],
     common: Common = Common(),
 ) -> None:
     """Join .reel files one after the other; nothing is encoded again.
@@ -27,10 +26,10 @@ def command(
         The files in the order of their frames, encoded with one --survey and the same options. Scenes cannot be joined:
         each has a background and tracks of its own.
     output
-        The .reel file to write; it appears only when it is complete.
+        The .reel file to write; it appears only when it is complete. Inputs and output may be URLs (extra `remote`).
     """
-    if output.suffix != ".reel":
+    if not output.endswith(".reel"):
         raise InputError(f"{output}: the output must end in .reel")
     joined = concat(inputs, output)
-    row = {"output": str(output), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
+    row = {"output": output, "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
     common.result(row, f"{output}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")

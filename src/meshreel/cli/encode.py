@@ -21,6 +21,7 @@ from ..encoder.recipe import longest_interval
 from ..encoder.sequence import Encoder
 from ..encoder.summary import SceneSummary, Summary
 from ..errors import InputError
+from ..io.remote import located
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing
 from ..types import MeshSequence
@@ -107,7 +108,7 @@ class Parting:
 class Parts:
     """Flags for a file of some frames, which `concat` joins with the others."""
 
-    survey: Path | None = None
+    survey: str | None = None
     """The survey of the whole sequence, which `meshreel survey` wrote: with it, --frames or --part say which frames to
     encode, and `meshreel concat` joins the files without encoding them again. Not for scenes."""
     part: str | None = None
@@ -144,7 +145,7 @@ def command(
     inputs: list[str],
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[str, Parameter(name=["--output", "-o"])],
     coding: Coding = Coding(),
     reading: Reading = Reading(),
     parting: Parting = Parting(),
@@ -167,7 +168,8 @@ def command(
         fused from the depth itself. A sequence that mostly stands still is a scene: the file holds its background once,
         and a track for each moving body.
     output
-        The .reel file to write; it appears only when it is complete.
+        The .reel file to write; it appears only when it is complete. It may be a URL, as the inputs may: s3://, https://
+        and what else fsspec knows (extra `remote`).
     jobs
         Number of intervals to encode side by side; the file is the same.
     cluster
@@ -180,7 +182,7 @@ def command(
         A text file to write: digests of what each stage computed. Where two machines write different files, the first
         line in which theirs differ says where the difference starts. Not with --resume, nor with a target.
     """
-    if output.suffix != ".reel":
+    if not output.endswith(".reel"):
         raise InputError(f"{output}: the output must end in .reel")
     parting.check(masking)
     if debug_digests is not None and (resume or coding.goal() is not None):
@@ -211,17 +213,17 @@ def command(
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
     common.warn(warnings)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
-    common.result({"output": str(output), "warnings": warnings} | row, f"{output}: {describe(row)}; {_reached(row)}")
+    common.result({"output": output, "warnings": warnings} | row, f"{output}: {describe(row)}; {_reached(row)}")
 
 
 @contextmanager
-def _lines(path: Path | None, output: Path, inputs: Iterable[Path]) -> Iterator[WriteLines | None]:
+def _lines(path: Path | None, output: str, inputs: Iterable[Path]) -> Iterator[WriteLines | None]:
     """Yield what writes lines to the file of digests, which appears when the encode is done; None without a path."""
     if path is None:
         yield None
         return
     check_apart(path, inputs)
-    if path.absolute() == output.absolute():
+    if path.absolute() == located(output).absolute():
         raise InputError(f"{path}: is the output, too; give another --debug-digests")
     with replacing(path) as file:
         file.write(machine_line().encode())

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from ..encoder.sequence import Encoder, warnings_of
 from ..errors import InputError
-from ..io.write import check_apart
 from ..types import Up
 from .console import Common
 from .flags import Reading
@@ -21,7 +19,7 @@ def command(
     inputs: list[str],
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[str, Parameter(name=["--output", "-o"])],
     reading: Reading = Reading(),
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
     jobs: int = 1,
@@ -35,7 +33,7 @@ def command(
     inputs
         The meshes, as `encode` takes them.
     output
-        The .json file to write: box, size and digest of the frames. Give it to `encode --survey`.
+        The .json file to write: box, size and digest of the frames. Give it to `encode --survey`. May be a URL.
     up
         Axis that points up, as `encode` takes it.
     jobs
@@ -43,14 +41,13 @@ def command(
     cluster
         Address of a Dask scheduler whose workers read, as `encode` takes it.
     """
-    if output.suffix != ".json":
+    if not output.endswith(".json"):
         raise InputError(f"{output}: the output must end in .json")
     source = open_source(inputs, reading)
     sequence = Masking(up=up).upright(source)
-    check_apart(output, sequence.files)
     with common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
         seen = Encoder(sequence, executor, progress).survey(output)
     warnings = (*source.warnings, *warnings_of(seen))
     common.warn(warnings)
-    row = {"output": str(output), "frames": len(sequence), "warnings": warnings}
+    row = {"output": output, "frames": len(sequence), "warnings": warnings}
     common.result(row, f"{output}: {len(sequence)} frames, {seen.diagonal:.3g} m large")

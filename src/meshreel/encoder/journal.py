@@ -11,8 +11,8 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, astuple
 from pathlib import Path
 from types import TracebackType
@@ -24,6 +24,7 @@ from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.derived_sequences import Unchanging
 from ..io.differences import first_difference
+from ..io.remote import Remote, located, uploaded
 from ..io.unfinished import cannot_be_written, claim, discard, part_of, sync, sync_folder
 from .digests import versions
 from .forms import EncodedGroup
@@ -200,6 +201,18 @@ class Journal:
             text = f"{self.path}: {_named(interval)} cannot be read ({error})"
             raise InputError(f"{text}; start over with --no-resume (resume=False)") from None
         return found
+
+
+@contextmanager
+def output_of(path: str | Path, resume: bool | None) -> Iterator[Path]:
+    """Yield the path to write an output to: a file that is uploaded where the output is a URL, which keeps no journal.
+
+    Raises InputError where the encode of one should continue.
+    """
+    if resume and isinstance(located(path), Remote):
+        raise InputError(f"{path}: only an output on this machine can be continued; leave --resume (resume=True) out")
+    with uploaded(path) as place:
+        yield place
 
 
 def made_of(sequence: Unchanging, options: EncoderOptions, masker: object) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from ..geometry.closest_points import distances
 from ..geometry.derived_sequences import Unchanging, Welded, captured
 from ..geometry.topology import drop_unreferenced
 from ..geometry.work import since, so_far
+from ..io.remote import uploaded
 from ..io.unfinished import unfinished
 from ..io.write import check_apart
 from ..metrics.distance import PSNR_CEILING, psnr
@@ -40,7 +41,7 @@ from .digests import WriteLines
 from .excerpt import Excerpt, write_survey
 from .interval import Interval, NormalisedFrames
 from .job import GroupStore, Job
-from .journal import Journal, made_of
+from .journal import Journal, made_of, output_of
 from .metadata import metadata_of, rounded, upright
 from .options import EncoderOptions, PaperOptions
 from .parts import Parts, take_apart
@@ -74,7 +75,7 @@ def encode(
     progress: Progress | None = None,
     resume: bool | None = None,
 ) -> Summary:
-    """Encode meshes as a .reel file at `path`, which appears only when it is complete.
+    """Encode meshes as a .reel file at `path`, which appears only when it is complete; it may be a URL (extra `remote`).
 
     `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`, which also takes a frame rate); vertices
     at equal positions are welded. `options` replace quality and preset; make them with `preset_options`. Most of a
@@ -148,10 +149,10 @@ class Encoder:
 
     def encode(self, path: str | Path, options: EncoderOptions, resume: bool | None = None) -> Summary:
         """Encode the sequence as the function `encode` does, with the same errors."""
-        path = Path(path)
-        check_apart(path, self.sequence.files)
-        with Journal(path, resume) as journal, unfinished(path) as file:
-            return self.encode_into(file, options, journal)
+        with output_of(path, resume) as place:
+            check_apart(place, self.sequence.files)
+            with Journal(place, resume) as journal, unfinished(place) as file:
+                return self.encode_into(file, options, journal)
 
     @threadpool_limits.wrap(limits=1)  # idle threads of BLAS would take a third of the processor's time
     def encode_into(self, file: BinaryIO, options: EncoderOptions, journal: Journal) -> Summary:
@@ -171,10 +172,12 @@ class Encoder:
         summary = _encode_bodies(job, file, seen) if parts is None else _encode_scene(job, file, parts)
         return replace(summary, work=since(before))
 
-    def survey(self, path: Path) -> Survey:
-        """Survey the sequence, and write a file of it for encodes of its parts."""
-        seen = surveyed(self._job(EncoderOptions()))
-        write_survey(seen, self.sequence, path)
+    def survey(self, path: str | Path) -> Survey:
+        """Survey the sequence, and write a file of it for encodes of its parts; `path` may be a URL."""
+        with uploaded(path) as place:
+            check_apart(place, self.sequence.files)
+            seen = surveyed(self._job(EncoderOptions()))
+            write_survey(seen, self.sequence, place)
         return seen
 
     def _job(self, options: EncoderOptions) -> Job:

@@ -5,6 +5,7 @@ In: a folder, a glob pattern, a file or a list of files. Out: paths in the order
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from collections.abc import Iterable
@@ -13,6 +14,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from .meshes import EXTENSIONS
+from .remote import Remote, located
 
 _MAGIC = re.compile(r"[*?\[]")
 _LAST = re.compile(r"(\d+)(?!.*\d)")
@@ -32,11 +34,16 @@ def is_pattern(name: str) -> bool:
     return _MAGIC.search(name) is not None
 
 
-def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+Found = tuple[tuple[Path | Remote, ...], tuple[str, ...]]  # files and warnings
+
+
+def find_frames(source: str | Path | Iterable[str | Path]) -> Found:
     """Return the frame files of a source and warnings about their order. A list keeps its order."""
     if not isinstance(source, str | Path):
-        return tuple(Path(path) for path in source), ()
-    path = Path(source)
+        return tuple(located(path) for path in source), ()
+    path = located(source)
+    if isinstance(path, Remote):
+        return _find_remote(path)
     try:
         is_folder = path.is_dir()
     except OSError as error:  # a name that is too long, or a folder without permission
@@ -59,6 +66,22 @@ def last_number(name: str) -> int | None:
     return None if found is None else int(found[1])
 
 
+def _find_remote(place: Remote) -> Found:
+    """Return the frame files behind a URL: of a folder, of a pattern, or the file."""
+    wild = is_pattern(place.url)
+    if (files := place.files(wild)) is None:
+        return (place,), ()
+    by_path = {Path(path): file for path, file in files.items()}
+    found = [path for path in by_path if path.suffix.lower() in EXTENSIONS and not path.name.startswith(".")]
+    if not wild:
+        found = _checked_kind(place, found)
+    elif not found:
+        raise InputError(f"{place}: no mesh file fits this pattern; check it, or name the folder")
+    root = Path(os.path.commonpath([path.parent for path in found]))
+    paths, remarks = _ordered(root, found)
+    return tuple(by_path[path] for path in paths), remarks
+
+
 def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
     fixed = next(k for k, part in enumerate(pattern.parts) if _MAGIC.search(part))
     root = Path(*pattern.parts[:fixed])
@@ -78,6 +101,11 @@ def _of_one_kind(folder: Path) -> list[Path]:
         found = [path for path in folder.iterdir() if _is_mesh(path)]
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); check its rights") from None
+    return _checked_kind(folder, found)
+
+
+def _checked_kind(folder: Path | Remote, found: list[Path]) -> list[Path]:
+    """Return the mesh files of a folder. Raises InputError where there is none, or more than one kind."""
     kinds = Counter(path.suffix.lower() for path in found)
     if not found:
         raise InputError(f"{folder}: holds 0 mesh files; give a folder with {', '.join(EXTENSIONS)} files")

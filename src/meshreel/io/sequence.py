@@ -21,6 +21,7 @@ from ..types import Mesh, MeshSequence, Up, known_up
 from .file_names import find_frames
 from .meshes import Loaded, read_mesh
 from .npz import Archive
+from .remote import Remote, located
 
 CAPTURED = "capture.json"  # in a folder that `meshreel capture` wrote: how the frames were made
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
@@ -57,12 +58,13 @@ class SequenceOptions:
 class Files:
     """Frames stored as one file each."""
 
-    named: Sequence[Path] | Mapping[int, Path]  # by number
+    named: Sequence[Path | Remote] | Mapping[int, Path | Remote]  # by number
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """The files."""
-        return tuple(self.named.values() if isinstance(self.named, Mapping) else self.named)
+        """The files on this machine."""
+        named = self.named.values() if isinstance(self.named, Mapping) else self.named
+        return tuple(path for path in named if isinstance(path, Path))
 
     def __len__(self) -> int:
         return len(self.named)
@@ -175,18 +177,21 @@ class FileSequence(MeshSequence):
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
     """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
 
+    All but an .npz may be URLs (s3://, https:// ...), with the extra `remote`.
+
     The up axis is the one that `meshreel capture` recorded in the folder, otherwise y.
     """
     options = options or SequenceOptions()
-    if isinstance(source, str | Path) and Path(source).suffix.lower() == ".npz" and Path(source).is_file():
-        archive = Archive(Path(source))
+    place = located(source) if isinstance(source, str | Path) else None
+    if isinstance(place, Path) and place.suffix.lower() == ".npz" and place.is_file():
+        archive = Archive(place)
         if len(archive) == 0:
             raise InputError(f"{source}: has 0 frames; save at least one")
         return FileSequence(archive, options)
     paths, remarks = find_frames(source)
     if not paths:
         raise InputError("the list of files has 0 frames; give at least one")
-    up = known_up(captured(Path(source)).get("up")) if isinstance(source, str | Path) else "y"
+    up = known_up(captured(place).get("up")) if isinstance(place, Path) else "y"
     return FileSequence(Files(paths), options, remarks, up)
 
 
