@@ -65,9 +65,13 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     std::vector<double> shown(rows.size()), wanted(rows.size());
     const mr_placement placement{in.scale(), {0.5, 1e6, -2.0}};
     const bool is_placed = in.u8() % 2 == 1;
-    const mr_frames to{shown.data(), is_placed ? &placement : nullptr}, expected{wanted.data(), to.placement};
+    const mr_frames to{shown.data(), is_placed ? &placement : nullptr, nullptr},
+        expected{wanted.data(), to.placement, nullptr};
     const int status = mr_decode_level(&bytes, &level, rows.data(), last.data());
     const int at_end = mr_decode_last_level(&bytes, &level, known.data(), end.data(), &to);
+    std::vector<double> alone(last.size());
+    LAW(mr_decode_last_scalars(&bytes, &level, alone.data()) == status);
+    if (status == MR_OK) LAW(are_same(alone, last));
     LAW(at_end == status || (status == MR_OK && at_end == MR_NOT_FINITE));
     if (status != MR_OK) return 0;
     LAW(mr_frames_of_rows(rows.data(), frames, count, &expected) == at_end);

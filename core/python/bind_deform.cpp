@@ -14,13 +14,24 @@ class DeformTarget {
 public:
     DeformTarget(nb::object tree, In<double, 2> positions, In<int32_t, 2> faces, In<double, 2> normals,
                  In<uint8_t, 1> inside, In<double, 2> points, In<double, 2> point_normals, double spacing)
-        : held_{tree, nb::cast(positions), nb::cast(faces), nb::cast(normals), nb::cast(inside), nb::cast(points),
+        : held_{tree,
+                nb::cast(positions),
+                nb::cast(faces),
+                nb::cast(normals),
+                nb::cast(inside),
+                nb::cast(points),
                 nb::cast(point_normals)} {
         const size_t count = points.shape(0);
         expect(are_vectors(normals, positions.shape(0)) && inside.shape(0) == positions.shape(0));
         expect(are_vectors(points, count) && are_vectors(point_normals, count));
-        frame_ = {mesh_of(positions, faces), nb::cast<const PySurfaceTree&>(tree).handle(), normals.data(),
-                  inside.data(), points.data(), point_normals.data(), count, spacing};
+        frame_ = {mesh_of(positions, faces),
+                  nb::cast<const PySurfaceTree&>(tree).handle(),
+                  normals.data(),
+                  inside.data(),
+                  points.data(),
+                  point_normals.data(),
+                  count,
+                  spacing};
     }
 
     const mr_seen& view() const { return frame_; }
@@ -34,19 +45,19 @@ class Deformation {
 public:
     Deformation(In<double, 2> nodes, In<int32_t, 2> edges, In<double, 1> held, In<double, 2> points,
                 In<double, 2> normals, In<int32_t, 2> bound, In<double, 2> weights)
-        : held_{nb::cast(nodes), nb::cast(edges), nb::cast(held), nb::cast(points), nb::cast(normals),
-                nb::cast(bound), nb::cast(weights)} {
+        : held_{nb::cast(nodes),   nb::cast(edges), nb::cast(held),   nb::cast(points),
+                nb::cast(normals), nb::cast(bound), nb::cast(weights)} {
         const size_t count = points.shape(0);
         expect(are_vectors(nodes, nodes.shape(0)) && edges.shape(1) == 2 && held.shape(0) == edges.shape(0));
         expect(are_vectors(points, count) && are_vectors(normals, count) && bound.shape(0) == count);
         expect(weights.shape(0) == count && weights.shape(1) == bound.shape(1));
-        graph_ = {nodes.data(), nodes.shape(0), edges.data(), edges.shape(0), held.data(), points.data(),
-                  normals.data(), count, bound.data(), weights.data(), bound.shape(1)};
+        graph_ = {nodes.data(),   nodes.shape(0), edges.data(), edges.shape(0), held.data(),   points.data(),
+                  normals.data(), count,          bound.data(), weights.data(), bound.shape(1)};
     }
 
-    nb::tuple deform(const DeformTarget& frame, In<double, 3> rotations, In<double, 2> positions,
-                     In<double, 1> gates, In<double, 1> rigidity, double torn, double place, double agreement,
-                     double tolerance, int iterations) const {
+    nb::tuple deform(const DeformTarget& frame, In<double, 3> rotations, In<double, 2> positions, In<double, 1> gates,
+                     In<double, 1> rigidity, double torn, double place, double agreement, double tolerance,
+                     int iterations) const {
         check_pose(rotations, positions);
         expect(gates.shape(0) == rigidity.shape(0));
         const mr_deform_rounds rounds{gates.shape(0), gates.data(), rigidity.data(), torn,
@@ -92,8 +103,8 @@ void bind_deform(nb::module_& m) {
         .def(nb::init<In<double, 2>, In<int32_t, 2>, In<double, 1>, In<double, 2>, In<double, 2>, In<int32_t, 2>,
                       In<double, 2>>(),
              "nodes"_a, "edges"_a, "held"_a, "points"_a, "normals"_a, "bound"_a, "weights"_a)
-        .def("deform", &Deformation::deform, "frame"_a, "rotations"_a, "positions"_a, "gates"_a, "rigidity"_a,
-             "torn"_a, "place"_a, "agreement"_a, "tolerance"_a, "iterations"_a,
+        .def("deform", &Deformation::deform, "frame"_a, "rotations"_a, "positions"_a, "gates"_a, "rigidity"_a, "torn"_a,
+             "place"_a, "agreement"_a, "tolerance"_a, "iterations"_a,
              "The pose after Gauss-Newton rounds towards a frame.")
         .def("matched", &Deformation::matched, "frame"_a, "rotations"_a, "positions"_a, "gate"_a, "agreement"_a,
              "The sum of the weights of all pairs at a pose.")

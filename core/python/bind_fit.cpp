@@ -14,13 +14,22 @@ class FitTarget {
 public:
     FitTarget(nb::object tree, In<double, 2> positions, In<int32_t, 2> faces, In<double, 2> normals,
               In<uint8_t, 1> inside, In<double, 2> points, In<double, 2> point_normals, In<double, 2> outward)
-        : held_{tree, nb::cast(positions), nb::cast(faces), nb::cast(normals), nb::cast(inside), nb::cast(points),
-                nb::cast(point_normals), nb::cast(outward)} {
+        : held_{tree,
+                nb::cast(positions),
+                nb::cast(faces),
+                nb::cast(normals),
+                nb::cast(inside),
+                nb::cast(points),
+                nb::cast(point_normals),
+                nb::cast(outward)} {
         const size_t count = points.shape(0);
         expect(are_vectors(normals, positions.shape(0)) && inside.shape(0) == positions.shape(0));
         expect(are_vectors(points, count) && are_vectors(point_normals, count) && are_vectors(outward, count));
-        target_ = {mesh_of(positions, faces), nb::cast<const PySurfaceTree&>(tree).handle(), normals.data(),
-                   inside.data(), {points.data(), point_normals.data(), outward.data(), count}};
+        target_ = {mesh_of(positions, faces),
+                   nb::cast<const PySurfaceTree&>(tree).handle(),
+                   normals.data(),
+                   inside.data(),
+                   {points.data(), point_normals.data(), outward.data(), count}};
     }
 
     const mr_target& view() const { return target_; }
@@ -40,8 +49,8 @@ public:
     }
 
     Out<double, 2> fit(const FitTarget& target, In<double, 2> rest, In<double, 2> place, In<double, 2> start,
-                       In<double, 1> gates, In<double, 1> smoothing, double agreement, double anchor,
-                       double tolerance, int iterations, bool turn) {
+                       In<double, 1> gates, In<double, 1> smoothing, double agreement, double anchor, double tolerance,
+                       int iterations, bool turn) {
         expect(are_vectors(rest, vertices_) && are_vectors(place, vertices_) && are_vectors(start, vertices_));
         expect(gates.shape(0) == smoothing.shape(0));
         const mr_fit_rounds rounds{gates.shape(0), gates.data(), smoothing.data(), agreement,

@@ -14,7 +14,9 @@ struct Destroy {
     void operator()(T* handle) const { destroy(handle); }
 };
 
-inline bool are_vectors(const In<double, 2>& rows, size_t count) { return rows.shape(0) == count && rows.shape(1) == 3; }
+inline bool are_vectors(const In<double, 2>& rows, size_t count) {
+    return rows.shape(0) == count && rows.shape(1) == 3;
+}
 
 class PySurfaceTree {
 public:

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kNormalReach = 0.01;  // diagonals, weight of a difference of unit normals in a search (guess)
 constexpr double kLargestTurn = 0.5;   // rad, of a node in one step (guess)
-constexpr double kStill = 1e-4;  // squared row weight of a turn times its lever, for nodes without data (guess)
+constexpr double kStill = 1e-4;        // squared row weight of a turn times its lever, for nodes without data (guess)
 
 struct Pair {
     size_t sample;
@@ -46,10 +46,8 @@ public:
         move_samples();
         std::vector<Pair> all;
         for (size_t s = 0; s < graph_.sample_count; ++s) towards(s, gate, agreement, all);
-        if (tree_)
-            tree_->move(placed_);
-        else
-            tree_.emplace(placed_);
+        if (tree_) tree_->move(placed_);
+        else tree_.emplace(placed_);
         for (size_t k = 0; k < frame_.sample_count; ++k) back(k, gate, agreement, all);
         return all;
     }
@@ -84,9 +82,7 @@ private:
     Vec place_of(int32_t n) const { return load(positions_ + 3 * static_cast<size_t>(n)); }
     int32_t end(size_t e, size_t side) const { return graph_.edges[2 * e + side]; }
     Vec arm_of(size_t e) const { return node(end(e, 1)) - node(end(e, 0)); }
-    Vec tear(size_t e) const {
-        return turn_of(end(e, 0)) * arm_of(e) + place_of(end(e, 0)) - place_of(end(e, 1));
-    }
+    Vec tear(size_t e) const { return turn_of(end(e, 0)) * arm_of(e) + place_of(end(e, 0)) - place_of(end(e, 1)); }
 
     void move_samples() {
         for (size_t s = 0; s < graph_.sample_count; ++s) {

@@ -13,8 +13,8 @@ namespace meshreel {
 
 constexpr size_t kTwist = 8;  // floats of a node: turn x y z, step x y z, and two zeros
 
-// Least squares (rows^T rows + prior) x = rows^T miss, by conjugate gradients that multiply with the rows; inverse blocks
-// of the nodes are the preconditioner.
+// Least squares (rows^T rows + prior) x = rows^T miss, by conjugate gradients that multiply with the rows; inverse
+// blocks of the nodes are the preconditioner.
 class TwistEquations {
 public:
     explicit TwistEquations(size_t nodes) : nodes_(nodes), blocks_(nodes), right_(nodes) {}

@@ -8,6 +8,7 @@
 #include "guarded.h"
 #include "magnitude_classes.h"
 #include "range_coder.h"
+#include "wide.h"
 
 namespace meshreel {
 namespace {
@@ -48,11 +49,7 @@ public:
 
     // The places of a block in a column are coded between these two.
     void begin_block(size_t first, size_t places) {
-        const uint32_t* past = past_.data() + first;
-        uint32_t* base = bases_.data() + first;
-        for (size_t k = 0; k < places; ++k) expected_ += past[k];
-        for (size_t k = 0; k < places; ++k) base[k] = 3 * static_cast<uint32_t>(past[k] * ratio_ >> 16);
-        for (size_t v = first; v < first + places; ++v) classes_[v] = class_of(v);
+        wide([&] { expect(first, places); });
     }
     // The past predicts where a column is large; the ratio to the past is learned, with a memory of 400 places.
     void end_block(size_t places) {
@@ -73,7 +70,7 @@ public:
         for (size_t k = starts_[v], end = starts_[v + 1]; k < end; ++k) {
             const size_t follower = static_cast<size_t>(followers_[k]);
             sums_[follower] += known;
-            classes_[follower] = class_of(follower);  // beyond the block it is not final
+            classes_[follower] = kClassOf[expected_at(follower)];  // beyond the block it is not final
         }
     }
 
@@ -88,11 +85,18 @@ public:
     }
 
 private:
-    uint8_t class_of(size_t v) const {
-        const uint32_t around =
-            static_cast<uint32_t>(static_cast<uint64_t>(sums_[v]) * shares_[v] >> 16);  // sixteenths
-        const uint32_t expected = around * trust_ + bases_[v];
-        return kClassOf[expected];
+    void expect(size_t first, size_t places) {
+        const uint32_t* past = past_.data() + first;
+        uint32_t* base = bases_.data() + first;
+        uint32_t expected[kBlock];
+        for (size_t k = 0; k < places; ++k) expected_ += past[k];
+        for (size_t k = 0; k < places; ++k) base[k] = 3 * static_cast<uint32_t>(past[k] * ratio_ >> 16);
+        for (size_t k = 0; k < places; ++k) expected[k] = expected_at(first + k);
+        for (size_t k = 0; k < places; ++k) classes_[first + k] = kClassOf[expected[k]];
+    }
+    uint32_t expected_at(size_t v) const {  // the product fits: a share is 2^20 / n, a sum at most n magnitudes of 255
+        const uint32_t around = sums_[v] * shares_[v] >> 16;  // sixteenths
+        return around * trust_ + bases_[v];
     }
 
     size_t count_;

@@ -124,8 +124,10 @@ bool parse(const mr_bytes& bytes, LayersLevel& record) {
     return fields.is_done();
 }
 
-Field FieldStreams::over(const mr_graph& graph) const {
-    return {graph, columns, means.size(), vectors.data(), means.data(), symbols.data(), step, nullptr};
+Field FieldStreams::over(const mr_graph& graph, size_t first) const {
+    const size_t width = means.size();
+    return {graph,          columns, width - first, width, vectors.data() + first, means.data() + first,
+            symbols.data(), step,    nullptr};
 }
 
 int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, bool has_mean, FieldStreams& out) {

@@ -40,7 +40,8 @@ struct FieldStreams {
     size_t columns;
     double step;
 
-    Field over(const mr_graph& graph) const;
+    // The numbers of each row from the first-th on.
+    Field over(const mr_graph& graph, size_t first = 0) const;
 };
 
 // Returns a status. The graph must be causal. May throw std::bad_alloc.

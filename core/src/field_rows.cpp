@@ -1,30 +1,65 @@
 #include "field_rows.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "wide.h"
 
 namespace meshreel {
 namespace {
 
+// Numbers side by side: compilers turn loops over an array of four into worse code.
+#if defined(__GNUC__)
+typedef double Register __attribute__((vector_size(32)));
+#else
+typedef double Register;
+#endif
+constexpr size_t kRegister = sizeof(Register) / sizeof(double);
 constexpr size_t kLanes = 2;  // columns side by side, each summed as if it were alone
 
 void add(const double* __restrict more, double weight, size_t count, double* __restrict sums) {
     for (size_t c = 0; c < count; ++c) sums[c] += weight * more[c];
 }
 
-// sums[t] and four terms weights[k] * v[k][t] in a pass over memory, added one after the other.
-void add_four(const double* __restrict v, const double* __restrict weights, size_t width, double* __restrict sums) {
-    const double w0 = weights[0], w1 = weights[1], w2 = weights[2], w3 = weights[3];
-    for (size_t t = 0; t < width; ++t)
-        sums[t] = (((sums[t] + w0 * v[t]) + w1 * v[width + t]) + w2 * v[2 * width + t]) + w3 * v[3 * width + t];
+// Numbers t, t + 1 ... of a row that fill a register: their sums stay in it over all columns.
+void transform_register(const double* row, const Field& field, size_t t, double* out) {
+    Register sum, term;
+    std::memcpy(&sum, field.means + t, sizeof sum);
+    const double* vector = field.vectors + t;
+    for (size_t k = 0; k < field.columns; ++k, vector += field.pitch) {
+        std::memcpy(&term, vector, sizeof term);
+        sum += row[k] * term;
+    }
+    std::memcpy(out + t, &sum, sizeof sum);
+}
+
+// The same of two registers: the sums of one are made while those of the other are waited for.
+void transform_two(const double* row, const Field& field, size_t t, double* out) {
+    Register sum, next, term;
+    std::memcpy(&sum, field.means + t, sizeof sum);
+    std::memcpy(&next, field.means + t + kRegister, sizeof next);
+    const double* vector = field.vectors + t;
+    for (size_t k = 0; k < field.columns; ++k, vector += field.pitch) {
+        std::memcpy(&term, vector, sizeof term);
+        sum += row[k] * term;
+        std::memcpy(&term, vector + kRegister, sizeof term);
+        next += row[k] * term;
+    }
+    std::memcpy(out + t, &sum, sizeof sum);
+    std::memcpy(out + t + kRegister, &next, sizeof next);
 }
 
 void transform(const double* row, const Field& field, double* out) {
-    std::copy(field.means, field.means + field.width, out);
-    size_t k = 0;
-    for (; k + 4 <= field.columns; k += 4) add_four(field.vectors + k * field.width, row + k, field.width, out);
-    for (; k < field.columns; ++k) add(field.vectors + k * field.width, row[k], field.width, out);
+    const size_t width = field.width;
+    size_t t = 0;
+    for (; t + 2 * kRegister <= width; t += 2 * kRegister) transform_two(row, field, t, out);
+    for (; t + kRegister <= width; t += kRegister) transform_register(row, field, t, out);
+    if (t < width && width >= kRegister) return transform_register(row, field, width - kRegister, out);  // some again
+    for (; t < width; ++t) {
+        double sum = field.means[t];
+        for (size_t k = 0; k < field.columns; ++k) sum += row[k] * field.vectors[k * field.pitch + t];
+        out[t] = sum;
+    }
 }
 
 // What predicts a row, added to it. A sum of none or one needs no beginning at zero: no number of `row` is -0.

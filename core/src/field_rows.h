@@ -16,7 +16,8 @@ constexpr size_t kRowBlock = 64;  // rows, few enough for the nearest cache whil
 struct Field {
     mr_graph graph;
     size_t columns, width;
-    const double* vectors;  // columns x width
+    size_t pitch;           // numbers from a vector to the next
+    const double* vectors;  // columns, width numbers each
     const double* means;
     const int32_t* symbols;  // column after column
     double step;

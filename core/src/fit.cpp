@@ -88,7 +88,8 @@ private:
                 inside += hit.weights[k] * fitted_.inside[static_cast<size_t>(corner)];
             }
             const double agree = dot(normal, face_normals_[static_cast<size_t>(hit.face)]);
-            const double weight = pair_weight(length(point - closest) / gate, agree, rounds_.agreement) * inside * evenly;
+            const double weight =
+                pair_weight(length(point - closest) / gate, agree, rounds_.agreement) * inside * evenly;
             add(hit.face, hit.weights, normal, point, weight);
         }
     }
@@ -124,7 +125,8 @@ private:
             inside += hit.weights[k] * target_.inside[corner];
         }
         normal = unit(normal);
-        const double weight = pair_weight(length(point - closest) / gate, dot(normal, own), rounds_.agreement) * inside * share;
+        const double weight =
+            pair_weight(length(point - closest) / gate, dot(normal, own), rounds_.agreement) * inside * share;
         add(face, corners, normal, closest, weight);
     }
 
@@ -154,10 +156,8 @@ private:
         const mr_rim& rim = target_.rim;
         if (fitted_.sides.empty() || rim.count == 0) return;
         const Samples own = own_samples();
-        if (fitted_.rim)
-            fitted_.rim->move(own.points.data());
-        else
-            fitted_.rim = tree_of_points(own.points.data(), own.count());
+        if (fitted_.rim) fitted_.rim->move(own.points.data());
+        else fitted_.rim = tree_of_points(own.points.data(), own.count());
         if (!rim_) rim_ = tree_of_points(rim.points, rim.count);
         for (size_t k = 0; k < own.count(); ++k) {
             const Hit hit = rim_->closest(load(&own.points[3 * k]), gate, -1);

@@ -144,8 +144,7 @@ void Equations::solve(double smoothing, const std::vector<Vec>& shape, double an
     const float s = static_cast<float>(squared), a = static_cast<float>(anchored);
     precondition(s, a);
     const auto conditioned = [&] {
-        for (size_t v = 0; v < count; ++v)
-            store_lanes(&z[kWide * v], times(&inverses_[3 * kWide * v], &r[kWide * v]));
+        for (size_t v = 0; v < count; ++v) store_lanes(&z[kWide * v], times(&inverses_[3 * kWide * v], &r[kWide * v]));
         return product(r, z);
     };
     double rz = conditioned();

@@ -32,7 +32,8 @@ bool place_rows(FieldRows& field, const int32_t* order, const mr_mesh& base, siz
     return waste == 0.0;
 }
 
-int decode_motion(const LayersGroup& record, const mr_mesh& base, double* rows) {
+// Rows of the frames from the first-th on.
+int decode_motion(const LayersGroup& record, const mr_mesh& base, size_t first, double* rows) {
     mr_hierarchy* made = nullptr;
     int status = mr_hierarchy_create(&base, &made);
     if (status != MR_OK) return status;
@@ -41,8 +42,8 @@ int decode_motion(const LayersGroup& record, const mr_mesh& base, double* rows) 
     FieldStreams streams;
     status = decode_streams(record.motion, graph, size_t{3} * record.frames, record.has_mean, streams);
     if (status != MR_OK) return status;
-    FieldRows field(streams.over(graph));
-    return place_rows(field, mr_hierarchy_order(made), base, record.frames, rows) ? MR_OK : MR_NOT_FINITE;
+    FieldRows field(streams.over(graph, 3 * first));
+    return place_rows(field, mr_hierarchy_order(made), base, record.frames - first, rows) ? MR_OK : MR_NOT_FINITE;
 }
 
 }  // namespace
@@ -65,5 +66,11 @@ int mr_decode_field(const mr_bytes* record, const mr_graph* graph, size_t width,
 int mr_decode_motion(const mr_bytes* record, const mr_mesh* base, size_t frames, double* rows) {
     LayersGroup group;
     if (!parse(*record, group) || group.frames != frames) return MR_BAD_RECORD;
-    return guarded(MR_NO_MEMORY, [&] { return decode_motion(group, *base, rows); });
+    return guarded(MR_NO_MEMORY, [&] { return decode_motion(group, *base, 0, rows); });
+}
+
+int mr_decode_last_places(const mr_bytes* record, const mr_mesh* base, size_t frames, double* positions) {
+    LayersGroup group;
+    if (!parse(*record, group) || group.frames != frames || frames == 0) return MR_BAD_RECORD;
+    return guarded(MR_NO_MEMORY, [&] { return decode_motion(group, *base, frames - 1, positions); });
 }

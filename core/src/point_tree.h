@@ -26,7 +26,8 @@ public:
         refit();
     }
 
-    // The point nearest to a query within a squared reach, the first of several; -1 for none. `guess` may be near, or -1.
+    // The point nearest to a query within a squared reach, the first of several; -1 for none. `guess` may be near, or
+    // -1.
     int32_t nearest(const Point6& query, float reach, int32_t guess) const {
         int32_t found = -1;
         float best = reach;

@@ -117,8 +117,11 @@ public:
                 place(rows + 3 * count_ * (begin + v), placed_.data() + 3 * count_ * v);
                 if (v % 2 == 0) fetch(first + begin + v + kRowBlock);
             }
-            for (size_t t = 0; t < count_; ++t)
-                turn(placed_.data() + t, some, out_.positions + 3 * (t * vertices_ + first + begin));
+            for (size_t t = 0; t < count_; ++t) {
+                const size_t at = 3 * (t * vertices_ + first + begin);
+                if (out_.singles) turn(placed_.data() + t, some, out_.singles + at);
+                else turn(placed_.data() + t, some, out_.positions + at);
+            }
         }
     }
     bool are_finite() const {  // before they were placed
@@ -144,11 +147,15 @@ private:
     // Where a vertex goes in each frame: memory that is far away by then, and on its way while others are placed.
     void fetch(size_t vertex) const {
         if (vertex >= vertices_) return;
-        for (size_t t = 0; t < count_; ++t) will_write(out_.positions + 3 * (t * vertices_ + vertex));
+        for (size_t t = 0; t < count_; ++t) {
+            const size_t at = 3 * (t * vertices_ + vertex);
+            out_.singles ? will_write(out_.singles + at) : will_write(out_.positions + at);
+        }
     }
-    void turn(const double* __restrict in, size_t count, double* __restrict out) const {
+    template <class Number>
+    void turn(const double* __restrict in, size_t count, Number* __restrict out) const {
         for (size_t v = 0; v < count; ++v, in += 3 * count_, out += 3)
-            out[0] = in[0], out[1] = in[count_], out[2] = in[2 * count_];
+            for (size_t k = 0; k < 3; ++k) out[k] = static_cast<Number>(in[k * count_]);
     }
 
     mr_frames out_;
@@ -166,8 +173,8 @@ void each_block(const mr_level& level, const double* scalars, Visit visit) {
 // The scalars of a LayersLevel record, decoded block after block so that they need not go through memory.
 class LevelScalars {
 public:
-    // A status; the other calls are for MR_OK.
-    int decode(const LayersLevel& record, const mr_level& level) {
+    // Scalars of the frames from the first-th on. A status; the other calls are for MR_OK.
+    int decode(const LayersLevel& record, const mr_level& level, size_t first = 0) {
         weights_.resize(static_cast<size_t>(level.starts[level.edge_count]));
         for (size_t e = 0; e < level.edge_count; ++e) {
             const int64_t begin = level.starts[e], end = level.starts[e + 1];
@@ -176,7 +183,7 @@ public:
         }
         const mr_graph graph{level.edge_count, level.starts, level.near, weights_.data()};
         const int status = decode_streams(record.scalars, graph, level.frames, false, streams_);
-        field_ = streams_.over(graph);
+        field_ = streams_.over(graph, first);
         field_.before = record.follows ? level.previous : nullptr;
         return status == MR_OK && record.follows && !level.previous ? int{MR_NO_PREVIOUS} : status;
     }
@@ -293,6 +300,18 @@ int mr_decode_last_level(const mr_bytes* bytes, const mr_level* level, const dou
             const Refinement refinement(*level, record.curvature, rows);
             return refine_to_frames(*level, refinement, *frames, [&](auto visit) { scalars.each_block(last, visit); });
         });
+    });
+}
+
+int mr_decode_last_scalars(const mr_bytes* bytes, const mr_level* level, double* last) {
+    LayersLevel record;
+    int status = open_level(*bytes, *level, record);
+    if (status != MR_OK) return status;
+    return guarded(MR_NO_MEMORY, [&]() -> int {
+        LevelScalars scalars;
+        status = scalars.decode(record, *level, level->frames - 1);
+        if (status == MR_OK) scalars.each_block(last, [](size_t, size_t, const double*) {});
+        return status;
     });
 }
 

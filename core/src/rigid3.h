@@ -51,8 +51,8 @@ inline Matrix product(const Matrix& a, const Matrix& b) {
 }
 
 // Turns `r` towards the rotation nearest to `s` (maximal trace of r^T s). Directions that s does not determine keep r:
-// so a degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice. It ends after a
-// step of `still`, rad^2.
+// so a degenerate neighbourhood (a line, a point) stays well defined. Warm-started, a few steps suffice. It ends after
+// a step of `still`, rad^2.
 inline void follow(Matrix& r, const Matrix& s, int steps, double still = 1e-16) {
     for (int step = 0; step < steps; ++step) {
         Vec torque{0, 0, 0};

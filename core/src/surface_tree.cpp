@@ -13,7 +13,7 @@
 namespace meshreel {
 namespace {
 
-constexpr int kBins = 16;    // of centroids, at whose borders a box may be split
+constexpr int kBins = 16;       // of centroids, at whose borders a box may be split
 constexpr int kCurveBits = 10;  // per coordinate, of the cells along the curve
 // Nodes on a path. A node halves twice; a half has either half of its faces, or its size shrinks by a bin at least,
 // which 2^252, the range of single precision, allows 63 times an axis at 16 bins; and halving 2^31 faces takes 31.
@@ -31,8 +31,7 @@ struct Bounds {
         for (int d = 0; d < 3; ++d) low[d] = std::min(low[d], p[d]), high[d] = std::max(high[d], p[d]);
     }
     void add(const Bounds& other) {
-        for (int d = 0; d < 3; ++d)
-            low[d] = std::min(low[d], other.low[d]), high[d] = std::max(high[d], other.high[d]);
+        for (int d = 0; d < 3; ++d) low[d] = std::min(low[d], other.low[d]), high[d] = std::max(high[d], other.high[d]);
     }
     float area() const {
         const float x = high[0] - low[0], y = high[1] - low[1], z = high[2] - low[2];
@@ -65,8 +64,7 @@ std::vector<uint32_t> along_curve(const double* queries, size_t count) {
     std::vector<uint64_t> keyed(count);
     for (size_t k = 0; k < count; ++k) {
         uint32_t code = 0;
-        for (size_t d = 0; d < 3; ++d)
-            code |= spread(cell_of((queries[3 * k + d] - low[d]) * scale)) << d;
+        for (size_t d = 0; d < 3; ++d) code |= spread(cell_of((queries[3 * k + d] - low[d]) * scale)) << d;
         keyed[k] = static_cast<uint64_t>(code) << 32 | k;
     }
     std::sort(keyed.begin(), keyed.end());
@@ -364,7 +362,7 @@ int mr_tree_move(mr_tree* tree, const double* positions) {
 }
 
 int mr_tree_closest(const mr_tree* tree, const double* queries, size_t count, double reach, int32_t* faces,
-                       double* weights) {
+                    double* weights) {
     return guarded(MR_NO_MEMORY, [&]() -> int {
         if (count > UINT32_MAX) return MR_BAD_INPUT;
         for (size_t k = 0; k < count; ++k)

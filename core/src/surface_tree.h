@@ -12,7 +12,7 @@
 namespace meshreel {
 
 struct Hit {
-    int32_t face;               // -1: nothing within reach
+    int32_t face;                   // -1: nothing within reach
     std::array<double, 3> weights;  // of its corners, at the closest point
 };
 
@@ -47,8 +47,9 @@ private:
     };
     struct Block {  // of four triangles a, a + e, a + f, side by side; a free place repeats the last one
         float a[3][kWide], e[3][kWide], f[3][kWide];
-        float ee[kWide], ef[kWide], ff[kWide];                              // products of edges
-        float by_ee[kWide], by_ff[kWide], by_gg[kWide], by_det[kWide];  // inverses; 0 for edges and triangles without size
+        float ee[kWide], ef[kWide], ff[kWide];  // products of edges
+        float by_ee[kWide], by_ff[kWide], by_gg[kWide],
+            by_det[kWide];  // inverses; 0 for edges and triangles without size
         int32_t face[kWide];
     };
     struct Range {
@@ -71,7 +72,7 @@ private:
     std::vector<std::array<int32_t, 3>> faces_;
     std::vector<double> positions_;  // relative to origin_
     Vec origin_;
-    double slack_;  // of a distance: single precision may miss so much
+    double slack_;                               // of a distance: single precision may miss so much
     std::vector<std::array<float, 3>> middles_;  // of faces, while the tree is built
     std::vector<int32_t> order_;
     std::vector<Node> nodes_;  // children after their parents

@@ -31,6 +31,22 @@ TEST(a_motion_without_columns_moves_all_vertices_by_the_mean) {
                 CHECK(rows[(3 * v + k) * 2 + t] == base.positions[3 * v + k] + 1 + k + 3 * t);
 }
 
+TEST(places_of_the_last_frame_are_those_of_the_motion) {
+    const Shape base = tetrahedron();
+    const Bytes record = group(kMean, 1);
+    const mr_bytes bytes{record.data(), record.size()};
+    const mr_mesh mesh = base.view();
+    std::vector<double> rows, last(12);
+    CHECK(decode(record, base, 2, rows) == MR_OK);
+    CHECK(mr_decode_last_places(&bytes, &mesh, 2, last.data()) == MR_OK);
+    for (size_t k = 0; k < last.size(); ++k) CHECK(last[k] == rows[2 * k + 1]);
+    CHECK(mr_decode_last_places(&bytes, &mesh, 3, last.data()) == MR_BAD_RECORD);
+    Bytes none = record;
+    none[2] = 0;
+    const mr_bytes frameless{none.data(), none.size()};
+    CHECK(mr_decode_last_places(&frameless, &mesh, 0, last.data()) == MR_BAD_RECORD);
+}
+
 TEST(a_motion_record_has_one_length_and_form_and_number_of_frames) {
     const Bytes record = group(kMean, 1);
     std::vector<double> rows;

@@ -36,6 +36,16 @@ Bytes record_of(uint8_t origin, uint8_t curvature, const Bytes& field) {
     return out;
 }
 
+Bytes symbols_of(std::vector<int32_t> symbols, const Level& level) {
+    const size_t links = static_cast<size_t>(level.starts[level.edge_count]);
+    const mr_weights weights{symbols.data(), level.edge_count, 1, level.starts.data(), level.near.data(), links};
+    Bytes out(2 * symbols.size() + 64);
+    size_t size = 0, end = 0;
+    CHECK(mr_encode_field(&weights, out.data(), out.size(), &size, &end) == MR_OK);
+    out.resize(size);
+    return out;
+}
+
 const Bytes kNothing = coded_field(0, 0, {}, {});
 
 int decode(const Bytes& record, Level& level, const double* previous = nullptr) {
@@ -73,7 +83,8 @@ TEST(the_last_level_is_the_same_as_another_placed) {
     Level level(3, 0.2);
     const Bytes record = record_of(0, 48, kNothing);
     std::vector<double> shown(level.rows.size()), wanted(shown), plain(shown);
-    const mr_frames to{shown.data(), &placement}, expected{wanted.data(), &placement}, unplaced{plain.data(), nullptr};
+    const mr_frames to{shown.data(), &placement, nullptr}, expected{wanted.data(), &placement, nullptr},
+        unplaced{plain.data(), nullptr, nullptr};
     const mr_bytes bytes{record.data(), record.size()};
     const mr_level view = level.view();
     CHECK(mr_decode_last_level(&bytes, &view, level.rows.data(), level.last.data(), &to) == MR_OK);
@@ -82,8 +93,36 @@ TEST(the_last_level_is_the_same_as_another_placed) {
     CHECK(mr_frames_of_rows(level.rows.data(), 3, level.all(), &unplaced) == MR_OK);
     for (size_t k = 0; k < plain.size(); ++k) CHECK(shown[k] == placement.origin[k % 3] + 2.0 * plain[k]);
     std::vector<double> scalars(3 * level.edge_count), refined(plain);
-    const mr_frames out{refined.data(), nullptr};
+    const mr_frames out{refined.data(), nullptr, nullptr};
     CHECK(mr_refine(&view, level.rows.data(), 48, scalars.data(), &out) == MR_OK && refined == plain);
+}
+
+TEST(singles_are_the_nearest_floats_of_the_positions) {
+    const mr_placement placement{2.0, {1.0, -1.0, 0.5}};
+    Level level(3, 0.2);
+    std::vector<double> wanted(level.rows.size());
+    std::vector<float> singles(wanted.size());
+    const mr_frames to{nullptr, &placement, singles.data()}, expected{wanted.data(), &placement, nullptr};
+    const Bytes record = record_of(0, 48, kNothing);
+    const mr_bytes bytes{record.data(), record.size()};
+    const mr_level view = level.view();
+    CHECK(mr_decode_last_level(&bytes, &view, level.rows.data(), level.last.data(), &expected) == MR_OK);
+    CHECK(mr_decode_last_level(&bytes, &view, level.rows.data(), level.last.data(), &to) == MR_OK);
+    for (size_t k = 0; k < wanted.size(); ++k) CHECK(singles[k] == static_cast<float>(wanted[k]));
+}
+
+TEST(scalars_of_the_last_frame_are_those_of_the_level) {
+    Level level(3);
+    const std::vector<int32_t> symbols(level.edge_count, 2);
+    const Bytes record = record_of(0, 48, coded_field(1, 8, integers({1, 2, 3}), symbols_of(symbols, level)));
+    const mr_bytes bytes{record.data(), record.size()};
+    const mr_level view = level.view();
+    std::vector<double> alone(level.edge_count);
+    CHECK(decode(record, level) == MR_OK && level.last[0] != 0.0);
+    CHECK(mr_decode_last_scalars(&bytes, &view, alone.data()) == MR_OK && alone == level.last);
+    const Bytes follows = record_of(1, 48, kNothing);
+    const mr_bytes lacking{follows.data(), follows.size()};
+    CHECK(mr_decode_last_scalars(&lacking, &view, alone.data()) == MR_NO_PREVIOUS);
 }
 
 TEST(edge_frames_are_where_refinement_puts_vertices) {
@@ -113,6 +152,6 @@ TEST(hostile_levels_are_refused) {
     CHECK(mr_refine(&view, nullptr, 0, nullptr, nullptr) == MR_BAD_INPUT);
     level.rows[3] = NAN;
     std::vector<double> shown(level.rows.size());
-    const mr_frames to{shown.data(), nullptr};
+    const mr_frames to{shown.data(), nullptr, nullptr};
     CHECK(mr_frames_of_rows(level.rows.data(), 1, level.all(), &to) == MR_NOT_FINITE);
 }

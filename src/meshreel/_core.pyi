@@ -3,7 +3,7 @@
 from typing import TypeAlias
 
 import numpy as np
-from jaxtyping import Float64, Int32, Int64, UInt8
+from jaxtyping import Float, Float64, Int32, Int64, UInt8
 
 # bind_draco.cpp
 
@@ -173,6 +173,9 @@ def decode_field(record: bytes, graph: Graph, width: int, has_mean: bool) -> Flo
 def decode_motion(
     record: bytes, positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], frames: int
 ) -> Float64[np.ndarray, "V 3 T"]: ...
+def decode_last_places(
+    record: bytes, positions: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], frames: int
+) -> Float64[np.ndarray, "V 3"]: ...
 def orthonormal_inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64[np.ndarray, "M C"]: ...
 def subdivide(
     faces: Int32[np.ndarray, "F 3"], vertices: int
@@ -205,9 +208,14 @@ def decode_last_level(
     rows: Float64[np.ndarray, "V 3 T"],
     previous: Float64[np.ndarray, " E"] | None,
     place: _Place | None,
-    positions: Float64[np.ndarray, "T W 3"],
+    positions: Float[np.ndarray, "T W 3"],
 ) -> Float64[np.ndarray, " E"]: ...
-def frames_of_rows(rows: Float64[np.ndarray, "V 3 T"], place: _Place | None) -> Float64[np.ndarray, "T V 3"]: ...
+def decode_last_scalars(
+    record: bytes, level: Level, frames: int, vertices: int, previous: Float64[np.ndarray, " E"] | None
+) -> Float64[np.ndarray, " E"]: ...
+def frames_of_rows(
+    rows: Float64[np.ndarray, "V 3 T"], place: _Place | None, positions: Float[np.ndarray, "T V 3"]
+) -> None: ...
 def keep_faces(
     faces: Int32[np.ndarray, "F 3"], dropped: UInt8[np.ndarray, " F"], room: Int32[np.ndarray, "N 3"]
 ) -> int: ...

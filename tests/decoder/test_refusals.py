@@ -42,7 +42,7 @@ def shortened(payload: bytes) -> bytes:
 def decoded(monkeypatch: pytest.MonkeyPatch) -> Counter[int]:
     """How often each payload was decoded, by its length and the background's by their form."""
     counts: Counter[int] = Counter()
-    for name in ("continue_group", "decode_background", "decode_change"):
+    for name in ("continue_group", "skip_group", "decode_background", "decode_change"):
 
         def count(data: bytes, *arguments: object, of=getattr(tracks, name)) -> object:
             counts[data[0], len(data)] += 1
@@ -52,7 +52,7 @@ def decoded(monkeypatch: pytest.MonkeyPatch) -> Counter[int]:
     return counts
 
 
-def test_a_refused_group_and_those_that_need_it_are_decoded_once(decoded: Counter[int]):
+def test_a_refused_group_is_decoded_once_for_its_frames_and_once_for_those_that_need_it(decoded: Counter[int]):
     video = meshreel.open(with_payload(DATA, 1, shortened))
     messages = set()
     for frame in [*range(3, 9)] * 3:
@@ -61,11 +61,22 @@ def test_a_refused_group_and_those_that_need_it_are_decoded_once(decoded: Counte
         messages.add(str(refused.value))
     [message] = messages
     assert message.startswith("chunk 1 (frames 3 to 4): ")
-    assert sorted(decoded.values()) == [1, 1]  # chunks 0 and 1
+    assert sorted(decoded.values()) == [2, 2]  # chunks 0 and 1
     assert [frame_record(video[frame]) for frame in SECOND] == [WHOLE[frame] for frame in SECOND]
     assert frame_record(video.at(layers=0)[3]) == frame_record(
         meshreel.open(DATA).at(layers=0)[3]
     )  # needs no byte of it
+
+
+@pytest.mark.parametrize("frames", [(5, 3, 5), (3, 5)])
+def test_damaged_patches_cost_no_frame_of_the_groups_behind_in_any_order(frames: tuple[int, ...]):
+    video = meshreel.open(with_payload(DATA, 1, lambda payload: payload + b"no patches"))
+    for frame in frames:
+        if frame == 5:  # of chunk 2
+            assert frame_record(video[frame]) == WHOLE[frame]
+            continue
+        with pytest.raises(FormatError, match="chunk 1"):
+            video[frame]
 
 
 def test_a_group_that_could_not_be_read_is_tried_again():

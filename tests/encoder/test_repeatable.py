@@ -96,7 +96,7 @@ def test_the_encoder_and_its_callers_have_threads_of_their_own(tmp_path: Path):
 
 def test_lines_of_digests_name_each_stage_in_the_order_of_the_file(tmp_path: Path):
     lines, options = list[str](), quick(key_interval=0.2)
-    encoder = Encoder(MeshList(tuple(body(0, 3)), 10.0), digests=lines.append)
+    encoder = Encoder(MeshList(tuple(body(1, 3)), 10.0), digests=lines.append)
     encoder.encode(tmp_path / "a.reel", options)
     rows = [json.loads(line) for line in "".join(lines).splitlines()]
     assert [row.get("frame") for row in rows if row["stage"] == "payload"] == [0, 1]
@@ -108,7 +108,7 @@ def test_lines_of_digests_name_each_stage_in_the_order_of_the_file(tmp_path: Pat
     assert rows[0]["stage"] == "survey"
     again = list[str]()
     with ThreadPoolExecutor(2) as executor:
-        Encoder(MeshList(tuple(body(0, 3)), 10.0), executor, digests=again.append).encode(tmp_path / "b.reel", options)
+        Encoder(MeshList(tuple(body(1, 3)), 10.0), executor, digests=again.append).encode(tmp_path / "b.reel", options)
     assert again == lines
 
 

@@ -174,9 +174,9 @@ def test_a_set_whose_training_lost_a_frame_is_refused_by_its_number():
 def test_a_frame_that_became_another_body_is_refused(monkeypatch):
     from meshreel_bench.codecs.necgs import train
 
-    def other(volumes, shape, options, device, told):
+    def other(volumes, codec, told):
         turned = [np.ascontiguousarray(-volume) for volume in volumes]
-        return trained(turned, shape, options, device, told)
+        return trained(turned, codec, told)
 
     trained = train.train
     monkeypatch.setattr(train, "train", other)

@@ -1,10 +1,10 @@
-// Embedded deformation (Sumner et al. 2007): Gauss-Newton rounds that move a graph of nodes on a mesh to a frame. Encoder
-// only. One thread, sums in a fixed order; equations are solved in single precision, poses are double.
+// Embedded deformation (Sumner et al. 2007): Gauss-Newton rounds that move a graph of nodes on a mesh to a frame.
+// Encoder only. One thread, sums in a fixed order; equations are solved in single precision, poses are double.
 //
-// A point p bound to nodes j with weights w goes to sum w_j (R_j (p - g_j) + t_j). A round matches samples of the mesh and
-// of the frame by closest points, both ways, as point-to-plane rows; rows for each edge (i, j) keep R_i (g_j - g_i) + t_i
-// at t_j. A pair counts by a Gaussian of its distance, sigma half the gate, and not past the gate, where normals disagree,
-// or on the frame's open borders.
+// A point p bound to nodes j with weights w goes to sum w_j (R_j (p - g_j) + t_j). A round matches samples of the mesh
+// and of the frame by closest points, both ways, as point-to-plane rows; rows for each edge (i, j) keep R_i (g_j - g_i)
+// + t_i at t_j. A pair counts by a Gaussian of its distance, sigma half the gate, and not past the gate, where normals
+// disagree, or on the frame's open borders.
 #pragma once
 
 #include "meshreel/tree.h"
@@ -49,8 +49,8 @@ struct mr_deform_rounds {
     int32_t iterations;
 };
 
-// Moves the pose (rotations, node_count x 9, row by row; positions, x 3) by all rounds, or by those before the first that
-// gives numbers that are not finite.
+// Moves the pose (rotations, node_count x 9, row by row; positions, x 3) by all rounds, or by those before the first
+// that gives numbers that are not finite.
 int mr_deform(const struct mr_deformation* graph, const struct mr_seen* frame, const struct mr_deform_rounds* rounds,
               double* rotations, double* positions);
 

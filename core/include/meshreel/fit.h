@@ -1,5 +1,5 @@
-// The fit of a template, a mesh of constant connectivity, to the surface of a frame. Encoder only. One thread, sums in a
-// fixed order; equations are solved in single precision, positions are double.
+// The fit of a template, a mesh of constant connectivity, to the surface of a frame. Encoder only. One thread, sums in
+// a fixed order; equations are solved in single precision, positions are double.
 //
 // A round matches the closest points of both surfaces, both ways, as point-to-plane rows, and samples of their open
 // borders as rows along and across the surface. It then takes one step from positions x to those that minimise
@@ -50,7 +50,8 @@ struct mr_fit_rounds {
 // Samples on a border edge of the template.
 enum { MR_RIM_SAMPLES = 8 };
 
-// Fits `positions`, vertices x 3: in, where to begin; out, the fit. `rest` has the shape to keep, `place` where to stay.
+// Fits `positions`, vertices x 3: in, where to begin; out, the fit. `rest` has the shape to keep, `place` where to
+// stay.
 int mr_fit(mr_template* fitted, const struct mr_target* target, const struct mr_fit_rounds* rounds, const double* rest,
            const double* place, double* positions);
 

@@ -62,6 +62,9 @@ int mr_decode_field(const struct mr_bytes* record, const struct mr_graph* graph,
 // all frames, then their y, then their z.
 int mr_decode_motion(const struct mr_bytes* record, const struct mr_mesh* base, size_t frames, double* rows);
 
+// The same places in the last frame alone: three numbers for each vertex. MR_BAD_RECORD where there is no frame.
+int mr_decode_last_places(const struct mr_bytes* record, const struct mr_mesh* base, size_t frames, double* positions);
+
 // The sorted edges of a mesh and its faces cut in four. `edges` has room for 3 face_count pairs, of which `edge_count`
 // are set.
 int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* finer,
@@ -91,6 +94,7 @@ struct mr_placement {
 struct mr_frames {
     double* positions;
     const struct mr_placement* placement;  // or null: coordinates stay as they are
+    float* singles;                        // or null: gets the nearest floats, and `positions` nothing
 };
 // Curved midpoints of the edges of one frame, and at each midpoint a direction: the unit sum of the normals at both
 // ends, zero where there is none. `curvature`, 64ths, is the share of the bend of an edge, as the normals at its ends
@@ -107,6 +111,8 @@ int mr_refine(const struct mr_level* level, const double* rows, int curvature, c
 int mr_decode_level(const struct mr_bytes* record, const struct mr_level* level, double* rows, double* last);
 int mr_decode_last_level(const struct mr_bytes* record, const struct mr_level* level, const double* rows, double* last,
                          const struct mr_frames* frames);
+// The last frame's scalars alone, from which the next group is predicted: nothing is placed.
+int mr_decode_last_scalars(const struct mr_bytes* record, const struct mr_level* level, double* last);
 // Rows as frames, without a further level.
 int mr_frames_of_rows(const double* rows, size_t count, size_t vertices, const struct mr_frames* frames);
 

@@ -6,13 +6,23 @@ which few files have, is imported where it is met.
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..errors import FormatError
 from ..format.layout import DracoGroup, Form, LayersPatches
 from ..format.records import unpack_all
+from ..shapes import Float
 from ..types import Mesh, Placement
 from .intra import decode_empty, decode_intra
-from .layers.coder import LayersState, layers_bytes_by_purpose, place_layers, read_layers
-from .layers.patches import decode_patches
+from .layers.coder import (
+    LayersRecords,
+    LayersState,
+    layers_bytes_by_purpose,
+    place_layers,
+    read_layers,
+    state_after,
+)
+from .layers.patches import Patches, decode_patches
 
 
 def decode_group(data: bytes, frame_count: int, layers: int | None = None) -> list[Mesh]:
@@ -32,16 +42,49 @@ def continue_group(
     `previous` is the state returned for the previous group with the same `layers`; only the form `layers` has one. With
     `place`, the frames are in metres, if the form allows without another pass over them. Errors as in `decode_group`.
     """
-    form = data[0] if data else None
+    form = _form_of(data)
     if form == Form.LAYERS:
         meshes, state = _decode_layers(data, layers, previous, place)
     else:
         meshes, state = _decode_alone(data, form, frame_count, layers), None
         if place is not None and form != Form.EMPTY:  # whose frames are one mesh
             meshes = [place.of(mesh) for mesh in meshes]
-    if len(meshes) != frame_count:
-        raise FormatError(f"a group of {len(meshes)} frames where the index says {frame_count}")
+    _check_count(len(meshes), frame_count)
     return meshes, state
+
+
+def skip_group(data: bytes, frame_count: int, layers: int | None, previous: LayersState | None) -> LayersState | None:
+    """Return the state that `continue_group` returns, without decoding the frames of the group. Errors as there."""
+    if _form_of(data) != Form.LAYERS:
+        return None
+    records = read_layers(data, layers)
+    _check_count(records.head.frames, frame_count)
+    return state_after(records, previous)
+
+
+def write_vertices(
+    data: bytes, layers: int | None, previous: LayersState | None, place: Placement, out: Float[np.ndarray, "T V 3"]
+) -> LayersState | None:
+    """Decode the vertices of a group of form `layers` into an array; return the state that predicts the next one.
+
+    Return None where patches add vertices: these frames are decoded one by one. Raises InputError if the frames do not
+    fit the array, and FormatError as `continue_group` does.
+    """
+    records = read_layers(data, layers)
+    decoded = place_layers(records, previous, place, out=out)
+    patches = _patches(data, records, layers, len(decoded.faces))
+    if patches is not None and not all(mesh.is_empty for mesh in patches.meshes):
+        return None
+    return decoded.state
+
+
+def _form_of(data: bytes) -> int | None:
+    return data[0] if data else None
+
+
+def _check_count(frames: int, frame_count: int) -> None:
+    if frames != frame_count:
+        raise FormatError(f"a group of {frames} frames where the index says {frame_count}")
 
 
 def _decode_alone(data: bytes, form: int | None, frame_count: int, layers: int | None) -> list[Mesh]:
@@ -62,18 +105,26 @@ def _decode_layers(
 ) -> tuple[list[Mesh], LayersState | None]:
     """Decode a `layers` group, with its patches if it has them and `levels` does not exclude them."""
     records = read_layers(data, levels)
-    plain = records.end == len(data) or (levels is not None and levels <= records.head.levels)
-    decoded = place_layers(records, previous, place, spare=not plain)
-    if plain:
+    decoded = place_layers(records, previous, place, spare=_has_patches(data, records, levels))
+    patches = _patches(data, records, levels, len(decoded.faces))
+    if patches is None:
         return [Mesh(frame, decoded.faces) for frame in decoded.positions], decoded.state
-    record = unpack_all(LayersPatches, data[records.end :])
-    patches = decode_patches(record, records.head.frames, len(decoded.faces))
     return patches.apply(decoded.positions, decoded.faces, place, decoded.spare), decoded.state
+
+
+def _has_patches(data: bytes, records: LayersRecords, levels: int | None) -> bool:
+    return records.end < len(data) and (levels is None or levels > records.head.levels)
+
+
+def _patches(data: bytes, records: LayersRecords, levels: int | None, faces: int) -> Patches | None:
+    if not _has_patches(data, records, levels):
+        return None
+    return decode_patches(unpack_all(LayersPatches, data[records.end :]), records.head.frames, faces)
 
 
 def payload_bytes_by_purpose(data: bytes) -> dict[str, int]:
     """Return the bytes of a payload by purpose. Raises FormatError on damaged bytes."""
-    form = data[0] if data else None
+    form = _form_of(data)
     if form == Form.LAPLACIAN:
         from .paper.group import laplacian_bytes_by_purpose
 

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from ..coding.background import decode_background, decode_change
-from ..coding.group import continue_group
+from ..coding.group import continue_group, skip_group, write_vertices
 from ..coding.layers.coder import MOST_NUMBERS, LayersState
 from ..container.reader import Chunk, ReelReader
-from ..errors import FormatError
+from ..errors import FormatError, InputError
 from ..format.budget import Chain, together
 from ..format.layout import Form
+from ..shapes import Float
 from ..types import Frames, Mesh, Placement
 from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
 
@@ -32,7 +35,8 @@ class Track(Frames):
         self._place = placement(reader)
         self._group = NO_GROUP
         self._states = CachedStates({})
-        self._refusals = Refusals()
+        self._refusals = Refusals()  # of frames
+        self._lost = Refusals()  # of states, which may be whole where frames of the same group are damaged
 
     def __len__(self) -> int:
         return self.reader.frame_count
@@ -47,34 +51,75 @@ class Track(Frames):
         group = self._decoded(chunk)
         return group.frames[index - chunk.first_frame], group.nbytes
 
+    def write_vertices(self, first: int, out: Float[np.ndarray, "T V 3"]) -> None:
+        """Write the vertices of frames `first`, `first` + 1 ... in metres, as many as `out` has; float64 or float32.
+
+        Whole groups of form `layers` are decoded into the array, which is faster than to decode and copy them. Raises
+        InputError where a frame has another number of vertices, and otherwise as indexing does.
+        """
+        done = 0
+        while done < len(out):
+            chunk = self.reader.chunk_of_frame(first + done, self.number)
+            rows = out[done : chunk.first_frame + chunk.frame_count - first]
+            whole = chunk.form == Form.LAYERS and len(rows) == chunk.frame_count and self._group.number != chunk.number
+            if not (whole and self._write_group(chunk, rows)):
+                for frame, row in enumerate(rows, first + done):
+                    copy_vertices(self[frame], frame, row)
+            done += len(rows)
+
+    def _write_group(self, chunk: Chunk, out: Float[np.ndarray, "T V 3"]) -> bool:
+        """Decode the vertices of a group into an array; False where patches add vertices."""
+        state, states = self._state_before(chunk)
+        payload = self._read(chunk)
+        with self._refusals.of(chunk):
+            try:
+                after = write_vertices(payload, self.layers, state, self._place, out)
+            except InputError as error:
+                raise InputError(f"{chunk}: {error}") from error
+        if after is not None:
+            self._states = states.add(chunk.number, after, state, self._most)
+        return after is not None
+
     def _decoded(self, chunk: Chunk) -> CachedGroup:
         """Return a group, from the cache if it was the last one decoded."""
         group = self._group  # read once: another thread may replace it
         if group.number == chunk.number:
             return group
+        state, states = self._state_before(chunk)
+        payload = self._read(chunk)
+        with self._refusals.of(chunk):
+            meshes, after = continue_group(payload, chunk.frame_count, self.layers, state, self._place)
+        shown = {id(mesh): read_only(mesh) for mesh in meshes}  # the frames of an empty group are one mesh
+        meshes = [shown[id(mesh)] for mesh in meshes]
+        self._states = states.add(chunk.number, after, state, self._most)
+        self._group = group = CachedGroup(chunk.number, meshes, memory_of(meshes))
+        return group
+
+    def _state_before(self, chunk: Chunk) -> tuple[LayersState | None, CachedStates]:
+        """Return the state that a group is predicted from, and a cache of it; the frames before are not decoded."""
         chain = [chunk]
         states = self._states
         self._refusals.check(chunk)
         while (before := self.reader.group_before(chain[-1])) is not None and before.number not in states.known:
-            self._refusals.check(before, chain)
+            self._lost.check(before, chain)
             chain.append(before)
         state = None if before is None else states.known[before.number]
         states = CachedStates({}) if before is None else states.copy()
-        most = MOST_KEPT // len(self.reader.tracks)  # all tracks together keep no more than a single one would
-        for link in reversed(chain):
-            meshes, after = self._decode(link, state)
-            states = states.add(link.number, after, state, most)
+        for link in reversed(chain[1:]):
+            payload = self._read(link)
+            with self._lost.of(link):
+                after = skip_group(payload, link.frame_count, self.layers, state)
+            states = states.add(link.number, after, state, self._most)
             state = after
-        self._states = states
-        self._group = group = CachedGroup(chunk.number, meshes, memory_of(meshes))
-        return group
+        return state, states
 
-    def _decode(self, chunk: Chunk, before: LayersState | None) -> tuple[list[Mesh], LayersState | None]:
-        payload = self.reader.read_chunk(chunk.number, None if self.layers is None else self.layers + 1)
-        with self._refusals.of(chunk):
-            meshes, state = continue_group(payload, chunk.frame_count, self.layers, before, self._place)
-        shown = {id(mesh): read_only(mesh) for mesh in meshes}  # the frames of an empty group are one mesh
-        return [shown[id(mesh)] for mesh in meshes], state
+    @property
+    def _most(self) -> int:
+        """Bytes of states to keep: all tracks together keep no more than a single one would."""
+        return MOST_KEPT // len(self.reader.tracks)
+
+    def _read(self, chunk: Chunk) -> bytes:
+        return self.reader.read_chunk(chunk.number, None if self.layers is None else self.layers + 1)
 
 
 class Background:
@@ -125,6 +170,13 @@ class Background:
                 after = decode_change(payload, before, self._place)
                 return after, led.then(before, after, len(payload))
             return decode_background(payload, self._place), Chain(0, len(payload))
+
+
+def copy_vertices(mesh: Mesh, frame: int, out: Float[np.ndarray, "V 3"]) -> None:
+    """Copy the vertices of a frame into an array. Raises InputError if it has another shape."""
+    if mesh.vertices.shape != out.shape:
+        raise InputError(f"frame {frame} has {len(mesh.vertices)} vertices: the array has room for {len(out)}")
+    out[:] = mesh.vertices
 
 
 def placement(reader: ReelReader) -> Placement:

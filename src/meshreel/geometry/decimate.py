@@ -67,7 +67,7 @@ def decimate_faces(mesh: Mesh, faces: int) -> Mesh:
 
 
 def _roughly(mesh: Mesh, vertices: int) -> Mesh:
-    """Decimate a much finer mesh to about `vertices` vertices, without regard for its borders, in a tenth of the time."""
+    """Decimate a much finer mesh to about `vertices` vertices, regardless of its borders, in a tenth of the time."""
     if len(mesh.vertices) < 2 * vertices:
         return mesh
     rough = clean(_collapse_closed(mesh, 2 * vertices))

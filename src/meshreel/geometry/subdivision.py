@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import FormatError
-from ..shapes import Float64, Int32
+from ..shapes import Float, Float64, Int32
 from ..types import Mesh, Placement
 from .topology import vertex_normals
 
@@ -91,6 +91,8 @@ def refine(
     return _core.refine(rows, level.coarse, level.edges, np.ascontiguousarray(scalars.T), curvature)
 
 
-def frames_of(rows: Float64[np.ndarray, "V 3 T"], place: Placement | None = None) -> Float64[np.ndarray, "T V 3"]:
-    """Transpose rows, which hold all frames of a number, to frames. Raises FormatError if a number is not finite."""
-    return _core.frames_of_rows(rows, None if place is None else place.numbers)
+def write_frames(
+    rows: Float64[np.ndarray, "V 3 T"], place: Placement | None, frames: Float[np.ndarray, "T V 3"]
+) -> None:
+    """Transpose rows, which hold all frames of a number, into `frames`. Raises FormatError if one is not finite."""
+    _core.frames_of_rows(rows, None if place is None else place.numbers, frames)

@@ -17,16 +17,16 @@ from ...errors import FormatError, InputError
 from ...format.budget import Size, check_cost, layers_cost
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
 from ...format.records import pack, unpack, unpack_all
-from ...geometry.subdivision import frames_of, heights, refine, subdivide
-from ...shapes import Float64, Int32
+from ...geometry.subdivision import heights, refine, subdivide, write_frames
+from ...shapes import Float, Float64, Int32
 from ...types import Mesh, Placement
 from ..mesh import check_growth, check_step, decode_mesh
 from ..reference_mesh import CodedReference
 from ..steps import RUNGS, rung_of, step_of
-from .details import Shown, decode_last, decode_level, encode_level
+from .details import Shown, decode_last, decode_last_scalars, decode_level, encode_level
 from .fields import Rate
 from .graph import Connectivity, connectivity
-from .trajectories import decode_trajectories, encode_trajectories
+from .trajectories import decode_last_places, decode_trajectories, encode_trajectories
 
 NOISY_STEP = 0.8  # RMS distances of the noise that a step is wide in addition (decision 0016)
 MOST_FRAMES = 255  # of a group: a byte in the head
@@ -179,55 +179,83 @@ class DecodedLayers:
     """Decoded group, with spare memory behind its positions."""
 
     faces: Int32[np.ndarray, "F 3"]
-    positions: Float64[np.ndarray, "T V 3"]
+    positions: Float[np.ndarray, "T V 3"]
     state: LayersState
     spare: Int32[np.ndarray, "N 3"]  # memory for faces, behind the positions
 
 
 def place_layers(
-    records: LayersRecords, previous: LayersState | None, place: Placement | None = None, spare: bool = False
+    records: LayersRecords,
+    previous: LayersState | None,
+    place: Placement | None = None,
+    spare: bool = False,
+    out: Float[np.ndarray, "T V 3"] | None = None,
 ) -> DecodedLayers:
     """Decode records; with `place`, the positions are placed by it, but never the state.
 
     With `spare`, the block of memory also has room for the faces of each frame: the next group gets one block again
-    without the page faults that would take as long as decoding.
+    without the page faults that would take as long as decoding. With `out`, of float64 or float32, the positions are
+    written there. Raises InputError if it has another shape.
     """
     head = records.head
-    previous = previous if head.origin == Origin.PREVIOUS else None
-    base = _base(head, previous)
-    check_cost(layers_cost(Size.of(base, len(records.layers) - 1), head.frames), records.end, "layers")
+    base, previous = _start(records, previous)
     known = decode_trajectories(records.layers[0], base, head.frames)
     last = np.ascontiguousarray(known[:, :, -1])
-    faces, room = base.faces, _Room.of(head.frames, 0, 0)
+    faces, finest = base.faces, len(records.layers) - 1
+    room = None if finest else _Room.of(head.frames, len(known), 0, out)
     scalars: list[Float64[np.ndarray, " _"]] = []
     finer: list[Connectivity] = []
     for number, record in enumerate(records.layers[1:], 1):
-        near = _connectivity(previous, number) or connectivity(faces, len(known))
-        if 3 * head.frames * near.level.count > MOST_NUMBERS:
-            raise FormatError(f"{head.frames} frames of {len(near.level.faces)} faces exceed {MOST_NUMBERS} numbers")
+        near = _level(previous, number, faces, len(known), head.frames)
         before = _before(previous, number)
-        if number < len(records.layers) - 1:
+        if number < finest:
             known, offsets = decode_level(record, near, known, before)
         else:
-            room = _Room.of(head.frames, near.level.count, len(near.level.faces) * spare)
+            room = _Room.of(head.frames, near.level.count, len(near.level.faces) * spare, out)
             offsets = decode_last(record, near, known, before, Shown(room.positions, place))
         faces = near.level.faces
         finer.append(near)
         scalars.append(offsets)
-    positions = room.positions if finer else frames_of(known, place)
-    return DecodedLayers(faces, positions, LayersState(base.faces, last, tuple(scalars), tuple(finer)), room.faces)
+    assert room is not None
+    if not finer:
+        write_frames(known, place, room.positions)
+    state = LayersState(base.faces, last, tuple(scalars), tuple(finer))
+    return DecodedLayers(faces, room.positions, state, room.faces)
+
+
+def state_after(records: LayersRecords, previous: LayersState | None) -> LayersState:
+    """Decode the state that predicts the next group, and no frame: a fraction of the work of `place_layers`.
+
+    Raises FormatError as that does, but not for places of other frames than the last one, nor for those of levels.
+    """
+    frames = records.head.frames
+    base, previous = _start(records, previous)
+    last = decode_last_places(records.layers[0], base, frames)
+    faces, vertices = base.faces, len(last)
+    scalars: list[Float64[np.ndarray, " _"]] = []
+    finer: list[Connectivity] = []
+    for number, record in enumerate(records.layers[1:], 1):
+        near = _level(previous, number, faces, vertices, frames)
+        scalars.append(decode_last_scalars(record, near, frames, _before(previous, number)))
+        faces, vertices = near.level.faces, near.level.count
+        finer.append(near)
+    return LayersState(base.faces, last, tuple(scalars), tuple(finer))
 
 
 @dataclass(frozen=True, slots=True)
 class _Room:
     """One block of memory for the positions of a group and for faces."""
 
-    positions: Float64[np.ndarray, "T V 3"]
+    positions: Float[np.ndarray, "T V 3"]
     faces: Int32[np.ndarray, "N 3"]
 
     @staticmethod
-    def of(frames: int, vertices: int, faces: int) -> _Room:
-        """Allocate memory for `vertices` vertices and `faces` faces in each of `frames` frames."""
+    def of(frames: int, vertices: int, faces: int, out: Float[np.ndarray, "_ _ 3"] | None) -> _Room:
+        """Allocate memory for `vertices` vertices, unless `out` is theirs, and `faces` faces in each frame."""
+        if out is not None:
+            if out.shape != (frames, vertices, 3):
+                raise InputError(f"{frames} frames of {vertices} vertices: give an array for them, not {out.shape}")
+            return _Room(out, np.empty((frames * faces, 3), np.int32))
         size = 3 * frames * vertices
         block = np.empty(size + (3 * frames * faces + 1) // 2)
         rows = block[size:].view(np.int32)[: 3 * frames * faces]
@@ -246,6 +274,15 @@ def layers_bytes_by_purpose(data: bytes) -> dict[str, int]:
         patches = unpack_all(LayersPatches, data[offset:])
         sizes |= {"dropped faces": len(patches.dropped), "patches": len(patches.mesh)}
     return sizes
+
+
+def _start(records: LayersRecords, previous: LayersState | None) -> tuple[Mesh, LayersState | None]:
+    """Return the base mesh of a group and the state that it is predicted from, if it is."""
+    head = records.head
+    previous = previous if head.origin == Origin.PREVIOUS else None
+    base = _base(head, previous)
+    check_cost(layers_cost(Size.of(base, len(records.layers) - 1), head.frames), records.end, "layers")
+    return base, previous
 
 
 def _base(head: LayersGroup, previous: LayersState | None) -> Mesh:
@@ -278,6 +315,17 @@ def _before(previous: LayersState | None, number: int) -> Float64[np.ndarray, " 
     return previous.scalars[number - 1] if previous is not None and number <= len(previous.scalars) else None
 
 
-def _connectivity(previous: LayersState | None, number: int) -> Connectivity | None:
-    """Return the connectivity of a level of the previous group, whose faces a predicted group shares, or None."""
-    return previous.finer[number - 1] if previous is not None and number <= len(previous.finer) else None
+def _level(
+    previous: LayersState | None, number: int, faces: Int32[np.ndarray, "F 3"], vertices: int, frames: int
+) -> Connectivity:
+    """Return the connectivity of a level; a predicted group shares that of the previous one.
+
+    Raises FormatError if the level has too many numbers.
+    """
+    if previous is not None and number <= len(previous.finer):
+        near = previous.finer[number - 1]
+    else:
+        near = connectivity(faces, vertices)
+    if 3 * frames * near.level.count > MOST_NUMBERS:
+        raise FormatError(f"{frames} frames of {len(near.level.faces)} faces exceed {MOST_NUMBERS} numbers")
+    return near

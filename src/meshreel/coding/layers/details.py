@@ -13,7 +13,7 @@ import numpy as np
 from ... import _core
 from ...format.layout import LayersLevel, Origin
 from ...geometry.subdivision import Level
-from ...shapes import Float64
+from ...shapes import Float, Float64
 from ...types import Placement
 from .fields import EncodedField, Rate, encode_field
 from .graph import Connectivity, siblings
@@ -34,7 +34,7 @@ class EncodedLevel:
 class Shown:
     """Destination of the vertices of the last decoded level."""
 
-    positions: Float64[np.ndarray, "T W 3"]  # written by the decoder
+    positions: Float[np.ndarray, "T W 3"]  # written by the decoder; float64 or float32
     place: Placement | None  # applied to the vertices
 
 
@@ -81,6 +81,13 @@ def decode_last(
     """
     place = None if shown.place is None else shown.place.numbers
     return _core.decode_last_level(record, near.core, known, previous, place, shown.positions)
+
+
+def decode_last_scalars(
+    record: bytes, near: Connectivity, frames: int, previous: Float64[np.ndarray, " E"] | None
+) -> Float64[np.ndarray, " E"]:
+    """Decode the last frame's scalars alone, from which the next group is predicted. Errors as in `decode_level`."""
+    return _core.decode_last_scalars(record, near.core, frames, near.level.vertices, previous)
 
 
 def _cost(field: EncodedField, offsets: Float64[np.ndarray, "E T"], rate: Rate) -> float:

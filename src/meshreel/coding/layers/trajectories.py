@@ -40,3 +40,8 @@ def decode_trajectories(record: bytes, base: Mesh, frames: int) -> Float64[np.nd
     `record` is a packed LayersGroup of `frames` frames. Raises FormatError if it is damaged.
     """
     return _core.decode_motion(record, base.vertices, base.faces, frames)
+
+
+def decode_last_places(record: bytes, base: Mesh, frames: int) -> Float64[np.ndarray, "V 3"]:
+    """Decode the positions of the base's vertices in the last frame alone; otherwise as `decode_trajectories`."""
+    return _core.decode_last_places(record, base.vertices, base.faces, frames)

@@ -99,7 +99,8 @@ function sizesOf({ frames, near }: Coarser): { edgeCount: number; size: number }
 /** A struct mr_frames. */
 function framesOf(arena: Arena, positions: number, place: Placement): number {
   const [x, y, z] = place.origin;
-  return arena.struct(["u32", positions], ["u32", arena.struct(["f64", place.scale], ["f64", x], ["f64", y], ["f64", z])]);
+  const placement = arena.struct(["f64", place.scale], ["f64", x], ["f64", y], ["f64", z]);
+  return arena.struct(["u32", positions], ["u32", placement], ["u32", 0]);
 }
 
 /** A struct mr_level. */

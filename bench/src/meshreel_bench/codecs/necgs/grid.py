@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32, Int64
+from jaxtyping import Bool, Float32, Float64, Int, Int32
 
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Hits, Surface
@@ -125,7 +125,7 @@ class _Signs:
         areas = self.surface.areas[some]
         return bool(areas[self._sheets(some)].sum() > SHEETS * areas.sum())
 
-    def _sheets(self, faces: Int64[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+    def _sheets(self, faces: Int[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
         """Return which faces have no inside on either side."""
         mesh = self.surface.mesh
         middles, offsets = mesh.vertices[mesh.faces[faces]].mean(axis=1), _PROBE * self.surface.normals[faces]

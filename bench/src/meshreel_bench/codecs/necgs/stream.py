@@ -95,7 +95,7 @@ def decode_stream(data: bytes) -> Coded:
     count = int(full.sum())
     shifts = np.zeros((len(full), 3), np.int32)
     shifts[full] = np.cumsum(decode_integers(inner.shifts, 3 * count).reshape(-1, 3), axis=0)
-    features = decode_integers(inner.symbols, count * shape.feature_size).reshape(count, -1)
+    features = decode_integers(inner.symbols, count * shape.feature_size).reshape(count, shape.feature_size)
     sizes = [int(np.prod(size)) for size in shape.tensors] if count else []
     parameters = [decode_integers(stream, size) for stream, size in zip(inner.parameters, sizes, strict=True)]
     placement = Placement(inner.cell, (inner.anchor[0], inner.anchor[1], inner.anchor[2]), shifts)

@@ -1,0 +1,78 @@
+"""Vertices of several frames in one array: the same numbers, in the caller's memory, as float64 or float32."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import meshreel
+from meshreel.decoder.tracks import Track
+from meshreel.errors import InputError
+from tests.decoder.test_chains import COUNT, DATA, EMPTY, LENGTHS
+from tests.golden import GOLDEN
+
+MOVING = COUNT - EMPTY
+
+
+def stacked(first: int, last: int) -> np.ndarray:
+    video = meshreel.open(DATA)
+    return np.stack([video[frame].vertices for frame in range(first, last)])
+
+
+@pytest.mark.parametrize(("first", "last"), [(0, MOVING), (0, 1), (1, 6), (3, 5), (8, MOVING)])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_vertices_are_those_of_the_frames_one_by_one(first: int, last: int, dtype: type):
+    wanted = stacked(first, last).astype(dtype)
+    out = np.full(wanted.shape, np.nan, dtype)
+    assert meshreel.open(DATA).vertices(first, last, out) is out
+    assert out.tobytes() == wanted.tobytes()
+
+
+def test_without_an_array_a_new_one_of_float64_is_returned():
+    assert meshreel.open(DATA).vertices(2, 7).tobytes() == stacked(2, 7).tobytes()
+
+
+def test_whole_groups_are_not_copied(monkeypatch: pytest.MonkeyPatch):
+    wanted = stacked(0, LENGTHS[0])
+    monkeypatch.setattr(Track, "__getitem__", lambda *_: pytest.fail("a frame was copied"))
+    out = np.empty_like(wanted)
+    assert meshreel.open(DATA).vertices(0, LENGTHS[0], out).tobytes() == wanted.tobytes()
+
+
+def test_frames_afterwards_do_not_change_with_the_array():
+    video, out = meshreel.open(DATA), np.empty(stacked(0, MOVING).shape)
+    video.vertices(0, MOVING, out)
+    out[:] = 0
+    assert video[MOVING - 1].vertices.tobytes() == stacked(MOVING - 1, MOVING).tobytes()
+
+
+@pytest.mark.parametrize("name", ["scene", "layers_patched", "draco", "laplacian"])
+def test_other_videos_give_the_vertices_of_their_frames_too(name: str):
+    path = GOLDEN / f"{name}.reel"
+    assert meshreel.open(path).vertices(0, 1).tobytes() == meshreel.open(path)[0].vertices.tobytes()
+
+
+@pytest.mark.parametrize(
+    "out",
+    [np.zeros((3, 9, 3), np.float16), np.zeros((4, 9, 3)), np.zeros((9, 3, 3)).swapaxes(0, 1), np.zeros((3, 9))],
+)
+def test_an_array_that_no_frames_fit_is_refused(out: np.ndarray):
+    with pytest.raises(InputError, match="3 frames: give a contiguous one of float64 or float32"):
+        meshreel.open(DATA).vertices(0, 3, out)
+
+
+@pytest.mark.parametrize(("frames", "message"), [(2, "frame 0 has"), (3, r"chunk 0 .*: 3 frames of \d+ vertices")])
+def test_an_array_for_other_meshes_is_refused(frames: int, message: str):
+    with pytest.raises(InputError, match=message):
+        meshreel.open(DATA).vertices(0, frames, np.zeros((frames, 9, 3)))
+
+
+def test_a_frame_of_another_size_is_named():
+    with pytest.raises(InputError, match=f"frame {MOVING} has 0 vertices"):
+        meshreel.open(DATA).vertices(0, COUNT)
+
+
+@pytest.mark.parametrize(("first", "last"), [(-1, 1), (0, COUNT + 1), (2, 2)])
+def test_frames_out_of_range_are_an_index_error(first: int, last: int):
+    with pytest.raises(IndexError, match=f"frames {first} to {last}"):
+        meshreel.open(DATA).vertices(first, last)
