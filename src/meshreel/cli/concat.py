@@ -8,6 +8,7 @@ from cyclopts import Parameter
 
 from ..encoder.concat import concat
 from ..errors import InputError
+from ..io.remote import located
 from .console import Common
 
 
@@ -26,10 +27,11 @@ def command(
         The files in the order of their frames, encoded with one --survey and the same options. Scenes cannot be joined:
         each has a background and tracks of its own.
     output
-        The .reel file to write; it appears only when it is complete. Inputs and output may be URLs (extra `remote`).
+        The .reel file to write; it appears only when it is complete. All may be URLs (extra `remote`).
     """
-    if not output.endswith(".reel"):
+    place = located(output)
+    if place.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
-    joined = concat(inputs, output)
-    row = {"output": output, "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
-    common.result(row, f"{output}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")
+    joined = concat([located(path) for path in inputs], place)
+    row = {"output": str(place), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
+    common.result(row, f"{place}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")

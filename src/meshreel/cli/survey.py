@@ -8,6 +8,8 @@ from cyclopts import Parameter
 
 from ..encoder.sequence import Encoder, warnings_of
 from ..errors import InputError
+from ..io.remote import located, uploaded
+from ..io.write import check_apart
 from ..types import Up
 from .console import Common
 from .flags import Reading
@@ -33,7 +35,8 @@ def command(
     inputs
         The meshes, as `encode` takes them.
     output
-        The .json file to write: box, size and digest of the frames. Give it to `encode --survey`. May be a URL.
+        The .json file to write: box, size and digest of the frames. Give it to `encode --survey`. It may be a URL, as
+        the inputs may (extra `remote`).
     up
         Axis that points up, as `encode` takes it.
     jobs
@@ -41,13 +44,15 @@ def command(
     cluster
         Address of a Dask scheduler whose workers read, as `encode` takes it.
     """
-    if not output.endswith(".json"):
+    place = located(output)
+    if place.suffix != ".json":
         raise InputError(f"{output}: the output must end in .json")
     source = open_source(inputs, reading)
     sequence = Masking(up=up).upright(source)
-    with common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
-        seen = Encoder(sequence, executor, progress).survey(output)
+    with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
+        check_apart(path, sequence.files)
+        seen = Encoder(sequence, executor, progress).survey(path)
     warnings = (*source.warnings, *warnings_of(seen))
     common.warn(warnings)
-    row = {"output": output, "frames": len(sequence), "warnings": warnings}
-    common.result(row, f"{output}: {len(sequence)} frames, {seen.diagonal:.3g} m large")
+    row = {"output": str(place), "frames": len(sequence), "warnings": warnings}
+    common.result(row, f"{place}: {len(sequence)} frames, {seen.diagonal:.3g} m large")

@@ -17,7 +17,7 @@ from ..analysis.survey import Survey
 from ..errors import InputError
 from ..geometry.derived_sequences import Unchanging
 from ..io.read import read_file
-from ..io.remote import located
+from ..io.remote import Place
 from ..io.write import replacing
 
 KIND = "meshreel survey 1"
@@ -80,10 +80,10 @@ def write_survey(seen: Survey, sequence: Unchanging, path: Path) -> None:
         file.write(json.dumps(record).encode())
 
 
-def read_survey(path: str | Path) -> Surveyed:
-    """Read the file of a survey, which may be behind a URL. Raises InputError for any other file."""
+def read_survey(path: Place) -> Surveyed:
+    """Read the file of a survey. Raises InputError for any other file."""
     try:
-        record = json.loads(read_file(located(path)))
+        record = json.loads(read_file(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); check the path") from None
     except (ValueError, RecursionError):

@@ -1,115 +1,126 @@
-"""Files behind URLs, read and written through fsspec: s3://, gs://, https://, memory:// and what else it knows.
+"""Files behind URLs, through fsspec: s3://, gs://, https:// and what else it knows (extra `remote`).
 
-In: a URL. Out: bytes, names of files, or a file here that is uploaded when it is complete. Needs the extra `remote`.
+In: a URL. Out: its bytes, the names in a folder, or a path to write to, whose file is uploaded when it is complete.
 """
 
 from __future__ import annotations
 
 import re
+import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, BinaryIO
+from typing import Any
 from urllib.parse import urlsplit
-from urllib.request import url2pathname
 
 from ..errors import InputError
 
-_URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")  # of two letters, at least: C:/ is a disk
+_URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")  # two letters at least: C:/ is a disk
+_WEB = ("http://", "https://")
 
 
 @dataclass(frozen=True, slots=True)
 class Remote:
-    """A file or a folder behind a URL; has what readers use of a Path."""
+    """A file or a folder behind a URL, with what readers use of a Path."""
 
     url: str
 
     def __str__(self) -> str:
         return self.url
 
+    def __truediv__(self, name: str) -> Remote:
+        return Remote(f"{self.url.rstrip('/')}/{name}")
+
     @property
-    def name(self) -> str:
-        """The last part of its path."""
-        return PurePosixPath(urlsplit(self.url).path).name
+    def path(self) -> PurePosixPath:
+        """Its path; in an address of the web, what follows `?` is none of it."""
+        return PurePosixPath(urlsplit(self.url).path if self.url.startswith(_WEB) else self.url)
 
     @property
     def suffix(self) -> str:
         """The extension of its name."""
-        return PurePosixPath(self.name).suffix
+        return self.path.suffix
 
     def absolute(self) -> Remote:
         """Return itself: a URL means the same everywhere."""
         return self
 
-    def open(self) -> BinaryIO:
-        """Open the file to be read. Raises InputError where it cannot be."""
-        with _as_input_error(self.url):
-            system, path = _system(self.url)
-            file: BinaryIO = system.open(path, "rb")
-            return file
-
     def read(self, most: int) -> bytes:
-        """Return its bytes. Raises InputError where it cannot be read, or has more than `most`."""
-        with _as_input_error(self.url), self.open() as file:
-            data = file.read(most + 1)
+        """Return its bytes, which are one request. Raises OSError, also for more than `most`."""
+        with _as_os_error():
+            system, path = _system(self.url)
+            data: bytes = system.cat_file(path, 0, most + 1)
         if len(data) > most:
-            raise InputError(f"{self.url}: has more than the {most} bytes that an input file may have")
+            raise OSError(f"it has more than the {most} bytes that an input file may have")
         return data
 
-    def files(self, is_pattern: bool) -> dict[PurePosixPath, Remote] | None:
-        """Return the files in a folder, or those that fit a pattern, by their paths; None where this is a file."""
-        with _as_input_error(self.url):
-            system, path = _system(self.url)
-            if not is_pattern and not system.isdir(path):
-                return None
-            names = system.glob(path) if is_pattern else system.ls(path, detail=False)
-            return {PurePosixPath(urlsplit(name).path): Remote(system.unstrip_protocol(name)) for name in names}
+    def names(self, pattern: str) -> list[str]:
+        """Return the names in this folder, or the paths from it that fit a pattern which is not "". Raises OSError."""
+        with _as_os_error():
+            system, root = _system(self.url)
+            found = system.glob(f"{root.rstrip('/')}/{pattern}") if pattern else system.ls(root, detail=False)
+            return [name.removeprefix(root).lstrip("/") for name in found]
 
 
-def located(name: str | Path) -> Path | Remote:
-    """Return where a name leads: to a path, also for file:// URLs, or to another place."""
-    if not isinstance(name, str) or not _URL.match(name):
-        return Path(name)
-    if name.lower().startswith("file://"):
-        return Path(url2pathname(urlsplit(name).path))
-    return Remote(name)
+Place = Path | Remote
+
+
+def located(name: str | Place) -> Place:
+    """Return where a name leads: to a path on this machine, or behind a URL."""
+    if not isinstance(name, str):
+        return name
+    return Remote(name) if _URL.match(name) else Path(name)
 
 
 @contextmanager
-def uploaded(output: str | Path) -> Iterator[Path]:
-    """Yield the path to write an output to; for a URL, a file here that is uploaded at the end of the block."""
-    place = located(output)
-    if isinstance(place, Path):
-        yield place
+def uploaded(output: Place) -> Iterator[Path]:
+    """Yield the path to write an output to; for a URL, one in a temporary folder, uploaded at the end of the block.
+
+    Raises InputError for a URL that takes no files, before the block or after it; after it, the file is kept.
+    """
+    if isinstance(output, Path):
+        yield output
         return
-    with _as_input_error(place.url):
-        system, path = _system(place.url)  # what cannot be written to is refused before the work
-    with tempfile.TemporaryDirectory(prefix="meshreel-") as folder:
-        here = Path(folder) / (place.name or "output")
+    if output.url.startswith(_WEB):
+        raise InputError(f"{output}: a web server takes no output; give a path, or the URL of a store, as s3://")
+    try:
+        with _as_os_error():
+            system, path = _system(output.url)
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written ({error}); check the URL") from error
+    with ExitStack() as stack:
+        folder = tempfile.mkdtemp(prefix="meshreel-")
+        stack.callback(shutil.rmtree, folder)
+        here = Path(folder, output.path.name)
         yield here
-        with _as_input_error(place.url):
-            system.put_file(str(here), path)
+        try:
+            with _as_os_error():
+                system.put_file(str(here), path)
+        except OSError as error:
+            stack.pop_all()
+            raise InputError(f"{output}: cannot be written ({error}); {here} is complete: copy it there") from error
 
 
 def _system(url: str) -> tuple[Any, str]:
-    """Return the file system of a URL, and its path there."""
+    """Return the file system of a URL, and its path there. Raises InputError where a package is missing."""
     try:
         from fsspec.core import url_to_fs
-    except ModuleNotFoundError:
-        raise InputError("a URL needs the extra `remote`: pip install 'meshreel[remote]'") from None
-    system, path = url_to_fs(url)
+
+        system, path = url_to_fs(url)
+    except ImportError as error:
+        text = "a URL needs the extra `remote`, pip install 'meshreel[remote]', and some protocols a package more"
+        raise InputError(f"{url}: {error}; {text}") from error
     return system, path
 
 
 @contextmanager
-def _as_input_error(url: str) -> Iterator[None]:
-    """Turn any error of a file system, each of which has errors of its own, into an InputError with the URL."""
+def _as_os_error() -> Iterator[None]:
+    """Turn what file systems raise, each errors of its own, into OSErrors of one line."""
     try:
         yield
     except InputError:
         raise
     except Exception as error:
-        text = " ".join(str(error).split()) or "no more is known"
-        raise InputError(f"{url}: {type(error).__name__}: {text}; check the address and your rights") from error
+        raise OSError(" ".join(f"{type(error).__name__}: {error}".split())) from error

@@ -21,7 +21,8 @@ from ..types import Mesh, MeshSequence, Up, known_up
 from .file_names import find_frames
 from .meshes import Loaded, read_mesh
 from .npz import Archive
-from .remote import Remote, located
+from .read import read_file
+from .remote import Place, Remote, located
 
 CAPTURED = "capture.json"  # in a folder that `meshreel capture` wrote: how the frames were made
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
@@ -58,7 +59,7 @@ class SequenceOptions:
 class Files:
     """Frames stored as one file each."""
 
-    named: Sequence[Path | Remote] | Mapping[int, Path | Remote]  # by number
+    named: Sequence[Place] | Mapping[int, Place]  # by number
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -177,12 +178,13 @@ class FileSequence(MeshSequence):
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
     """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
 
-    All but an .npz may be URLs (s3://, https:// ...), with the extra `remote`.
-
+    All but an .npz may be URLs, as s3:// and https:// (extra `remote`).
     The up axis is the one that `meshreel capture` recorded in the folder, otherwise y.
     """
     options = options or SequenceOptions()
     place = located(source) if isinstance(source, str | Path) else None
+    if isinstance(place, Remote) and place.suffix.lower() == ".npz":
+        raise InputError(f"{source}: an .npz is not read by URL; copy it here, or write a mesh file for each frame")
     if isinstance(place, Path) and place.suffix.lower() == ".npz" and place.is_file():
         archive = Archive(place)
         if len(archive) == 0:
@@ -191,14 +193,14 @@ def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOp
     paths, remarks = find_frames(source)
     if not paths:
         raise InputError("the list of files has 0 frames; give at least one")
-    up = known_up(captured(place).get("up")) if isinstance(place, Path) else "y"
+    up = "y" if place is None else known_up(captured(place).get("up"))
     return FileSequence(Files(paths), options, remarks, up)
 
 
-def captured(folder: Path) -> dict[str, Any]:
+def captured(folder: Place) -> dict[str, Any]:
     """Return the record that `meshreel capture` wrote beside its meshes; empty for other folders and files."""
     try:
-        record = json.loads((folder / CAPTURED).read_text(encoding="utf-8"))
+        record = json.loads(read_file(folder / CAPTURED))
     except (OSError, ValueError):
         return {}
     return record if isinstance(record, dict) else {}
