@@ -80,7 +80,12 @@ def test_names_are_chosen_and_ordered_as_on_a_disk(tmp_path, store, names, patte
         try:
             paths, remarks = find_frames(f"{root}{source}")
         except InputError as error:
-            return str(error).split(": ", 1)[1].split(";")[0].replace("no mesh file fits this pattern", "holds 0 mesh files")
+            return (
+                str(error)
+                .split(": ", 1)[1]
+                .split(";")[0]
+                .replace("no mesh file fits this pattern", "holds 0 mesh files")
+            )
         return [str(path).rsplit("take9", 1)[1] for path in paths], [text.split(": ", 1)[1] for text in remarks]
 
     assert found("memory://") == found(f"{tmp_path}/")
@@ -157,7 +162,9 @@ def test_what_cannot_be_uploaded_is_kept(store, tmp_path, monkeypatch):
     assert str(path) in str(caught.value) and path.read_bytes() == b"whole"
 
 
-@pytest.mark.parametrize(("url", "words"), [("https://a/b.reel", "takes no output"), ("moon://a", "Protocol not known")])
+@pytest.mark.parametrize(
+    ("url", "words"), [("https://a/b.reel", "takes no output"), ("moon://a", "Protocol not known")]
+)
 def test_what_takes_no_file_is_refused_before_the_work(url, words):
     with pytest.raises(InputError, match=f"^{url}: .*{words}"), uploaded(Remote(url)):
         pytest.fail("the work began")
