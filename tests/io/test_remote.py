@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -80,12 +81,7 @@ def test_names_are_chosen_and_ordered_as_on_a_disk(tmp_path, store, names, patte
         try:
             paths, remarks = find_frames(f"{root}{source}")
         except InputError as error:
-            return (
-                str(error)
-                .split(": ", 1)[1]
-                .split(";")[0]
-                .replace("no mesh file fits this pattern", "holds 0 mesh files")
-            )
+            return re.split(r"^.*?: |;", str(error))[1].replace("no mesh file fits this pattern", "holds 0 mesh files")
         return [str(path).rsplit("take9", 1)[1] for path in paths], [text.split(": ", 1)[1] for text in remarks]
 
     assert found("memory://") == found(f"{tmp_path}/")
@@ -107,7 +103,8 @@ def test_what_is_not_there_is_refused(source, words):
         open_sequence(source)
 
 
-def test_a_file_that_is_gone_is_named_with_its_frame(scan, store):
+@pytest.mark.usefixtures("scan")
+def test_a_file_that_is_gone_is_named_with_its_frame(store):
     sequence = open_sequence("memory://scan")
     store.rm("/scan/frame_2.ply")
     with pytest.raises(InputError, match=r"^frame 2 \(memory://scan/frame_2.ply\): cannot be read \(FileNotFoundError"):
