@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from itertools import islice
 from typing import Any
 
-AHEAD = 2  # calls for each worker, so that none waits for its next (scripts/cluster_model.py)
+AHEAD = 2  # calls for each worker, so that none waits for its next (guess)
 UNKNOWN = 8  # workers of an executor that does not say how many it has (guess)
 _LOOK = 0.5  # s, between two looks at what workers tell of calls that are not done (guess)
 

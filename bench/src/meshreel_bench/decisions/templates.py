@@ -46,10 +46,8 @@ def measure(sources: Sources) -> Iterator[Row]:
     for vertices, levels in TEMPLATES:
         reference = code_on_lattice(decimate(frames[course.key], vertices), LATTICE * best.layers.step, levels)
         base, faces = reference.mesh, reference.base.faces
-        shared = shared_detail(base.faces, len(base.vertices), levels)
-        positions = fit_surfaces(
-            faces, course.move(reference.base), targets, best.fit, Guides(None, shared, course.key)
-        )
+        guides = Guides(None, shared_detail(base.faces, len(base.vertices), levels), course.key)
+        positions = fit_surfaces(faces, course.move(reference.base), targets, best.fit, guides)
         name = f"{vertices} vertices, {levels} levels"
         tried: dict[str, dict[str, Any]] = {"": {}} | (CHOICES if (vertices, levels) == TRIED else {})
         for choice, changes in tried.items():
