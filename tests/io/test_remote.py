@@ -111,8 +111,9 @@ def test_a_file_that_is_gone_is_named_with_its_frame(store):
         sequence[2]
 
 
-def test_more_bytes_than_a_file_may_have_are_refused(store):
-    store.pipe("/a", b"12345")
+def test_more_bytes_than_a_file_may_have_are_refused(store, monkeypatch):
+    # Only by name: in s3fs, the version of a file comes before the range.
+    monkeypatch.setattr(store, "cat_file", lambda _, *, start, end: b"12345"[start:end])
     assert Remote("memory://a").read(5) == b"12345"
     with pytest.raises(OSError, match="more than the 4 bytes"):
         Remote("memory://a").read(4)

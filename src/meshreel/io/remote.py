@@ -51,7 +51,7 @@ class Remote:
         """Return its bytes, which are one request. Raises OSError, also for more than `most`."""
         with _as_os_error():
             system, path = _system(self.url)
-            data: bytes = system.cat_file(path, 0, most + 1)
+            data: bytes = system.cat_file(path, start=0, end=most + 1)
         if len(data) > most:
             raise OSError(f"it has more than the {most} bytes that an input file may have")
         return data
