@@ -51,18 +51,19 @@ def test_an_executor_gives_the_same_bytes(written, tmp_path):
             progress=lambda s, done, _: last.update({s: done}),
         )
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
-    assert again == summary
-    assert last == {"survey": 8, "code": 8}
+    assert replace(again, work={}) == replace(summary, work={})  # each interval reads its frames again
+    assert {last[stage] for stage in ("survey", "track", "fit", "code")} == {8}
 
 
 def test_processes_give_the_same_bytes(written, tmp_path):
     path, summary = written
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
-        assert encode(BALLS, tmp_path / "b.reel", options=OPTIONS, executor=executor) == summary
+        again = encode(BALLS, tmp_path / "b.reel", options=OPTIONS, executor=executor)
+    assert replace(again, work={}) == replace(summary, work={})
     assert (tmp_path / "b.reel").read_bytes() == path.read_bytes()
 
 
-def test_at_most_one_interval_more_than_workers_is_submitted_at_once(tmp_path):
+def test_at_most_two_intervals_for_each_worker_are_submitted_at_once(tmp_path):
     class Waiting(ThreadPoolExecutor):
         most = now = 0
 
@@ -81,7 +82,7 @@ def test_at_most_one_interval_more_than_workers_is_submitted_at_once(tmp_path):
             options=with_method(replace(OPTIONS, key_interval=0.05), group_size=1),
             executor=executor,
         )
-    assert executor.most == 3
+    assert executor.most == 4
 
 
 def test_more_empty_frames_than_a_group_holds_are_more_groups(tmp_path, monkeypatch):
@@ -93,7 +94,7 @@ def test_more_empty_frames_than_a_group_holds_are_more_groups(tmp_path, monkeypa
         frames, tmp_path / "a.reel", options=options, progress=lambda s, done, _: reported.update({s: done})
     )
     assert [group.frame_count for group in summary.groups] == [100, 50]
-    assert reported == {"survey": 150, "code": 150}
+    assert (reported["survey"], reported["code"]) == (150, 150)
     with meshreel.open(tmp_path / "a.reel") as video:
         assert len(video) == 150 and video[120].is_empty
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
@@ -56,7 +55,7 @@ def store(tmp_path, monkeypatch):
     (info / "entry_points.txt").write_text(f"[{codecs.GROUP}]\nodd = odd_codec:Odd\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    assert isinstance(codecs._entry("odd"), EntryPoint)
+    assert codecs._entry("odd").value == "odd_codec:Odd"
     return Store(tmp_path)
 
 

@@ -28,7 +28,7 @@ def as_done(
     waiting, running = iter(calls), dict[Future[Any], int]()
     try:
         while True:
-            for number, function, arguments in islice(waiting, AHEAD * workers_of(executor) - len(running)):
+            for number, function, arguments in islice(waiting, max(AHEAD * workers_of(executor) - len(running), 0)):
                 running[executor.submit(function, *arguments)] = number
             if not running:
                 return

@@ -5,7 +5,7 @@ In: the name of a codec and its operating point. Out: a Codec.
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from typing import Any
 
 from meshreel.errors import InputError
@@ -37,8 +37,8 @@ def codec_version(name: str) -> str | None:
     return f"{entry.dist.name} {entry.dist.version}"
 
 
-def _entry(name: str) -> EntryPoint | None:
-    """Return the entry point of that name. Raises InputError where two distributions have one."""
+def _entry(name: str) -> Any:  # a class of its own with `importlib_metadata`, which Dask brings
+    """Return the entry point of that name, None where there is none. Raises InputError where two distributions have one."""
     found = list(entry_points(group=GROUP, name=name))
     if len(found) > 1:
         owners = " and ".join(entry.dist.name if entry.dist else entry.value for entry in found)
