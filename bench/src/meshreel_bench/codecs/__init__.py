@@ -38,7 +38,7 @@ def codec_version(name: str) -> str | None:
 
 
 def _entry(name: str) -> Any:  # a class of its own with `importlib_metadata`, which Dask brings
-    """Return the entry point of that name, None where there is none. Raises InputError where two distributions have one."""
+    """Return the entry point of that name, None without one. Raises InputError where two distributions have one."""
     found = list(entry_points(group=GROUP, name=name))
     if len(found) > 1:
         owners = " and ".join(entry.dist.name if entry.dist else entry.value for entry in found)
