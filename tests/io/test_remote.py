@@ -82,7 +82,8 @@ def test_names_are_chosen_and_ordered_as_on_a_disk(tmp_path, store, names, patte
             paths, remarks = find_frames(f"{root}{source}")
         except InputError as error:
             return re.split(r"^.*?: |;", str(error))[1].replace("no mesh file fits this pattern", "holds 0 mesh files")
-        return [str(path).rsplit("take9", 1)[1] for path in paths], [text.split(": ", 1)[1] for text in remarks]
+        names = [str(path).replace("\\", "/").rsplit("take9", 1)[1] for path in paths]
+        return names, [text.split(": ", 1)[1] for text in remarks]
 
     assert found("memory://") == found(f"{tmp_path}/")
 
