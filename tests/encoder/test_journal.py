@@ -7,10 +7,12 @@ import json
 import shutil
 import struct
 import sys
+import tempfile
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import fsspec
 import pytest
 
 from meshreel.capture.procedural import sliding_sphere
@@ -91,6 +93,17 @@ def test_a_stopped_encode_continues_to_the_same_bytes(fake, tmp_path, stop):
     again = fake()
     assert encode(path, resume=True) == whole and again.calls == 7 - done
     assert {file.name for file in tmp_path.iterdir()} == {"a.reel", "whole.reel"}
+
+
+def test_an_encode_to_a_url_that_is_stopped_leaves_nothing_to_continue(fake, tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    fake(stop=5)
+    with pytest.raises(Stopped) as told:
+        Encoder(BALLS).encode("memory://a.reel", EACH_ALONE)
+    assert not hasattr(told.value, "__notes__") and not list(tmp_path.iterdir())
+    assert not fsspec.filesystem("memory").exists("/a.reel")
+    with pytest.raises(InputError, match=r"^memory://a.reel: only an output on a disk can be continued"):
+        Encoder(BALLS).encode("memory://a.reel", EACH_ALONE, resume=True)
 
 
 def test_a_stopped_encode_of_two_jobs_continues_with_any_number_of_them(fake, tmp_path):

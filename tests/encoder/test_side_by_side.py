@@ -7,6 +7,7 @@ import threading
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import replace
 
+import fsspec
 import numpy as np
 import pytest
 
@@ -123,15 +124,18 @@ def opened(folder):
 
 
 @pytest.mark.usefixtures("plainly")
-def test_workers_read_the_files_and_the_bytes_are_those_of_one_process(folder, tmp_path, monkeypatch):
+@pytest.mark.parametrize("by_url", [False, True])
+def test_workers_read_the_files_and_the_bytes_are_those_of_one_process(folder, tmp_path, monkeypatch, by_url):
+    if by_url:
+        fsspec.filesystem("memory").put(f"{folder}/", "/balls", recursive=True)
     readers, read = set(), io.read_mesh
     monkeypatch.setattr(io, "read_mesh", lambda *where: readers.add(threading.get_ident()) or read(*where))
-    one, many, executor = opened(folder), opened(folder), Scrambled()
+    one, many, executor = opened(folder), opened("memory://balls" if by_url else folder), Scrambled()
     Encoder(one).encode(tmp_path / "one.reel", EACH_ALONE)
     assert readers == {threading.get_ident()}
     readers.clear()
     summary = Encoder(many, executor).encode(tmp_path / "many.reel", EACH_ALONE)
-    assert readers and threading.get_ident() not in readers
+    assert readers and threading.get_ident() not in readers and max(executor.sizes) < 4000
     assert (tmp_path / "one.reel").read_bytes() == (tmp_path / "many.reel").read_bytes()
     assert summary.work["frames read"] == 2 * FRAMES and many.warnings == one.warnings
 

@@ -32,6 +32,16 @@ def test_times_at_rest_are_scaled_by_the_loop_beside_them_and_work_has_its_kind(
     assert value(made, "work.frames fitted") == 1.5 and value(made, "work.frames read") is None
 
 
+def test_the_model_of_an_hour_knows_one_worker_and_loses_time_where_intervals_are_few():
+    def busy(workers, interval):
+        encoding = Encoding(1.0, stages_s={"survey": 0.1, "code": 0.9})
+        return value(msgspec.structs.replace(ROW, encoding=encoding), f"efficiency.{workers}.{interval}")
+
+    assert value(ROW, "efficiency.8.60") is None and busy(1, 60) == pytest.approx(1.0)
+    assert 1 > busy(8, 60) > busy(100, 60) > busy(100, 120) > 0.5
+    assert busy(108_000, 108_000) < 1e-4  # one interval: all others wait for it
+
+
 def test_a_background_counts_as_sent_every_ten_seconds():
     made = with_stream(1000, coded_frames=10, background_bytes=400)
     assert value(made, "mbps_background_10s") == pytest.approx(8 * (600 * 30 / 10 + 40) / 1e6)

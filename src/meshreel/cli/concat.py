@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from ..encoder.concat import concat
 from ..errors import InputError
+from ..io.remote import located
 from .console import Common
 
 
 def command(
-    inputs: list[Path],
+    inputs: list[str],
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[str, Parameter(name=["--output", "-o"])],
     common: Common = Common(),
 ) -> None:
     """Join .reel files one after the other; nothing is encoded again.
@@ -27,10 +27,11 @@ def command(
         The files in the order of their frames, encoded with one --survey and the same options. Scenes cannot be joined:
         each has a background and tracks of its own.
     output
-        The .reel file to write; it appears only when it is complete.
+        The .reel file to write; it appears only when it is complete. All may be URLs (extra `remote`).
     """
-    if output.suffix != ".reel":
+    place = located(output)
+    if place.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
-    joined = concat(inputs, output)
-    row = {"output": str(output), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
-    common.result(row, f"{output}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")
+    joined = concat([located(path) for path in inputs], place)
+    row = {"output": str(place), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
+    common.result(row, f"{place}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")

@@ -21,6 +21,7 @@ from ..encoder.recipe import longest_interval
 from ..encoder.sequence import Encoder
 from ..encoder.summary import SceneSummary, Summary
 from ..errors import InputError
+from ..io.remote import Place, located
 from ..io.sequence import SequenceOptions
 from ..io.write import check_apart, replacing
 from ..types import MeshSequence
@@ -107,7 +108,7 @@ class Parting:
 class Parts:
     """Flags for a file of some frames, which `concat` joins with the others."""
 
-    survey: Path | None = None
+    survey: str | None = None
     """The survey of the whole sequence, which `meshreel survey` wrote: with it, --frames or --part say which frames to
     encode, and `meshreel concat` joins the files without encoding them again. Not for scenes."""
     part: str | None = None
@@ -122,7 +123,7 @@ class Parts:
                     f"--part {self.part}: needs the --survey that all parts share; meshreel survey writes it"
                 )
             return None
-        surveyed, chosen = read_survey(self.survey), SequenceOptions(frames=frames).chosen(len(sequence))
+        surveyed, chosen = read_survey(located(self.survey)), SequenceOptions(frames=frames).chosen(len(sequence))
         if self.part is None:
             return Excerpt(surveyed, chosen)
         found = _PART.fullmatch(self.part)
@@ -144,7 +145,7 @@ def command(
     inputs: list[str],
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[str, Parameter(name=["--output", "-o"])],
     coding: Coding = Coding(),
     reading: Reading = Reading(),
     parting: Parting = Parting(),
@@ -167,7 +168,8 @@ def command(
         fused from the depth itself. A sequence that mostly stands still is a scene: the file holds its background once,
         and a track for each moving body.
     output
-        The .reel file to write; it appears only when it is complete.
+        The .reel file to write; it appears only when it is complete. Inputs and output may be URLs, as s3://bucket/scan;
+        inputs also https:// (extra `remote`).
     jobs
         Number of intervals to encode side by side; the file is the same.
     cluster
@@ -180,7 +182,8 @@ def command(
         A text file to write: digests of what each stage computed. Where two machines write different files, the first
         line in which theirs differ says where the difference starts. Not with --resume, nor with a target.
     """
-    if output.suffix != ".reel":
+    place = located(output)
+    if place.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
     parting.check(masking)
     if debug_digests is not None and (resume or coding.goal() is not None):
@@ -199,23 +202,23 @@ def command(
     with (
         common.stages(len(sequence if excerpt is None else excerpt.frames)) as progress,
         workers(jobs, cluster) as executor,
-        _lines(debug_digests, output, sequence.files) as digests,
+        _lines(debug_digests, place, sequence.files) as digests,
     ):
         encoder = Encoder(sequence, executor, progress, masker, digests, excerpt)
         if goal is None:
-            summary = encoder.encode(output, options, resume)
+            summary = encoder.encode(place, options, resume)
         else:
-            summary, quality = encode_to(encoder, output, goal, options_at, resume)
+            summary, quality = encode_to(encoder, place, goal, options_at, resume)
     warnings = (*source.warnings, *getattr(masker, "remarks", ()), *summary.warnings)
     if summary.scene is None and parting.background_refresh is not None:
         warnings += ("no background was found that could be sent again: --background-refresh does nothing",)
     common.warn(warnings)
     row = summary_row(summary, sequence.frame_rate) | {"quality": quality}
-    common.result({"output": str(output), "warnings": warnings} | row, f"{output}: {describe(row)}; {_reached(row)}")
+    common.result({"output": str(place), "warnings": warnings} | row, f"{place}: {describe(row)}; {_reached(row)}")
 
 
 @contextmanager
-def _lines(path: Path | None, output: Path, inputs: Iterable[Path]) -> Iterator[WriteLines | None]:
+def _lines(path: Path | None, output: Place, inputs: Iterable[Path]) -> Iterator[WriteLines | None]:
     """Yield what writes lines to the file of digests, which appears when the encode is done; None without a path."""
     if path is None:
         yield None

@@ -16,6 +16,7 @@ from ..capture.recording import open_recording
 from ..capture.rig import RIG, SINGLE
 from ..errors import InputError
 from ..geometry.derived_sequences import Upright
+from ..io.remote import Remote, located
 from ..io.sequence import captured, open_sequence
 from ..types import MeshSequence, Up
 from .flags import Reading
@@ -41,9 +42,13 @@ def open_source(inputs: Sequence[str], reading: Reading) -> Source:
 
     The truth of a simulated rig has a description of cameras, too, but is opened as the mesh files that it holds.
     """
-    folder = Path(inputs[0])
-    described = any((folder / name).is_file() for name in (RIG, SINGLE))
-    if len(inputs) > 1 or not described or any(folder.glob("frame_*.ply")):
+    folder = located(inputs[0])
+    if (
+        isinstance(folder, Remote)
+        or len(inputs) > 1
+        or not any((folder / name).is_file() for name in (RIG, SINGLE))
+        or any(folder.glob("frame_*.ply"))
+    ):
         options, made = reading.options(), captured(folder) if len(inputs) == 1 else {}
         rate = made.get("frames_per_second")
         if reading.fps == _READ.fps and isinstance(rate, (int, float)) and rate > 0:

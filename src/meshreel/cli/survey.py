@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from ..encoder.sequence import Encoder, warnings_of
 from ..errors import InputError
+from ..io.remote import located, uploaded
 from ..io.write import check_apart
 from ..types import Up
 from .console import Common
@@ -21,7 +21,7 @@ def command(
     inputs: list[str],
     /,
     *,
-    output: Annotated[Path, Parameter(name=["--output", "-o"])],
+    output: Annotated[str, Parameter(name=["--output", "-o"])],
     reading: Reading = Reading(),
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
     jobs: int = 1,
@@ -35,7 +35,8 @@ def command(
     inputs
         The meshes, as `encode` takes them.
     output
-        The .json file to write: box, size and digest of the frames. Give it to `encode --survey`.
+        The .json file to write: box, size and digest of the frames. Give it to `encode --survey`. It may be a URL, as
+        the inputs may (extra `remote`).
     up
         Axis that points up, as `encode` takes it.
     jobs
@@ -43,14 +44,15 @@ def command(
     cluster
         Address of a Dask scheduler whose workers read, as `encode` takes it.
     """
-    if output.suffix != ".json":
+    place = located(output)
+    if place.suffix != ".json":
         raise InputError(f"{output}: the output must end in .json")
     source = open_source(inputs, reading)
     sequence = Masking(up=up).upright(source)
-    check_apart(output, sequence.files)
-    with common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
-        seen = Encoder(sequence, executor, progress).survey(output)
+    with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:
+        check_apart(path, sequence.files)
+        seen = Encoder(sequence, executor, progress).survey(path)
     warnings = (*source.warnings, *warnings_of(seen))
     common.warn(warnings)
-    row = {"output": str(output), "frames": len(sequence), "warnings": warnings}
-    common.result(row, f"{output}: {len(sequence)} frames, {seen.diagonal:.3g} m large")
+    row = {"output": str(place), "frames": len(sequence), "warnings": warnings}
+    common.result(row, f"{place}: {len(sequence)} frames, {seen.diagonal:.3g} m large")

@@ -10,15 +10,18 @@ import json
 from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
+from io import BytesIO
 from itertools import accumulate
 from pathlib import Path
 
 from ..container.reader import ReelReader
-from ..container.sources import FileSource
+from ..container.sources import FileSource, StreamSource
 from ..container.writer import ReelWriter
 from ..errors import FormatError, InputError
 from ..format.layout import ChunkKind, Header
 from ..io.differences import first_difference
+from ..io.read import read_file
+from ..io.remote import Place, uploaded
 from ..io.write import check_apart
 from .metadata import joined_metadata, of_all_parts
 
@@ -31,26 +34,29 @@ class Joined:
     size: int  # bytes
 
 
-def concat(inputs: Sequence[Path], output: Path) -> Joined:
+def concat(inputs: Sequence[Place], output: Place) -> Joined:
     """Join files one after the other as `output`, which appears when it is complete.
 
-    One file is open at a time. Raises InputError where files are no parts of one sequence, or are scenes: each has a
-    background and tracks of its own. Raises FormatError for a damaged file.
+    One file is open at a time, and in memory where it is behind a URL. Raises InputError where files are no parts of
+    one sequence, or are scenes: each has a background and tracks of its own. Raises FormatError for a damaged file.
     """
     if not inputs:
         raise InputError("no files to join; give at least one")
-    check_apart(output, inputs)
-    with ReelWriter(output, _joined_header(inputs)) as writer:
-        for path in inputs:
-            _add(writer, path)
+    if output in inputs:
+        raise InputError(f"{output}: is the input, which it would replace; choose another name")
+    with uploaded(output) as place:
+        check_apart(place, [path for path in inputs if isinstance(path, Path)])
+        with ReelWriter(place, _joined_header(inputs)) as writer:
+            for path in inputs:
+                _add(writer, path)
     return Joined(writer.frame_count, writer.size)
 
 
-def _joined_header(inputs: Sequence[Path]) -> Header:
+def _joined_header(inputs: Sequence[Place]) -> Header:
     """Return the header of the whole, after a look at that of each file."""
     header, parts = None, list[tuple[dict[str, object], int]]()
     for path in inputs:
-        with closing(FileSource(path)) as source:
+        with closing(_source(path)) as source:
             reader = _opened(source, path)
         if reader.has_background or len(reader.tracks) > 1:
             raise InputError(f"{path}: is a scene, whose background and tracks are its own; encode it in one run")
@@ -67,7 +73,7 @@ def _joined_header(inputs: Sequence[Path]) -> Header:
     return replace(header, metadata=json.dumps(metadata, separators=(",", ":")))
 
 
-def _check_alike(path: Path, reader: ReelReader, header: Header, metadata: dict[str, object], first: Path) -> None:
+def _check_alike(path: Place, reader: ReelReader, header: Header, metadata: dict[str, object], first: Place) -> None:
     """Raise InputError where a file is no part of the sequence that the first is of."""
     for name in ("frame_rate", "origin", "scale", "minimum", "maximum"):
         ours, theirs = getattr(header, name), getattr(reader.header, name)
@@ -80,9 +86,9 @@ def _check_alike(path: Path, reader: ReelReader, header: Header, metadata: dict[
         raise InputError(f"{text}; encode both with the same options")
 
 
-def _add(writer: ReelWriter, path: Path) -> None:
+def _add(writer: ReelWriter, path: Place) -> None:
     """Add all groups of a file."""
-    with closing(FileSource(path)) as source:
+    with closing(_source(path)) as source:
         reader, before = _opened(source, path), writer.last_of(0)
         base = 0 if before is None else before + 1
         for chunk in reader.chunks:
@@ -96,7 +102,16 @@ def _add(writer: ReelWriter, path: Path) -> None:
             writer.add_group(writer.frame_count, chunk.frame_count, payload, ends, depends_on)
 
 
-def _opened(source: FileSource, path: Path) -> ReelReader:
+def _source(path: Place) -> StreamSource:
+    if isinstance(path, Path):
+        return FileSource(path)
+    try:
+        return StreamSource(BytesIO(read_file(path)), str(path))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error}); check the URL and your rights") from error
+
+
+def _opened(source: StreamSource, path: Place) -> ReelReader:
     try:
         return ReelReader(source)
     except FormatError as error:

@@ -17,6 +17,7 @@ from ..analysis.survey import Survey
 from ..errors import InputError
 from ..geometry.derived_sequences import Unchanging
 from ..io.read import read_file
+from ..io.remote import Place
 from ..io.write import replacing
 
 KIND = "meshreel survey 1"
@@ -79,7 +80,7 @@ def write_survey(seen: Survey, sequence: Unchanging, path: Path) -> None:
         file.write(json.dumps(record).encode())
 
 
-def read_survey(path: Path) -> Surveyed:
+def read_survey(path: Place) -> Surveyed:
     """Read the file of a survey. Raises InputError for any other file."""
     try:
         record = json.loads(read_file(path))

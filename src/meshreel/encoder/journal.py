@@ -11,12 +11,12 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, astuple
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, BinaryIO
 
 from .. import __version__
 from ..container.writer import Stored
@@ -24,7 +24,9 @@ from ..errors import InputError
 from ..format.layout import Form
 from ..geometry.derived_sequences import Unchanging
 from ..io.differences import first_difference
-from ..io.unfinished import cannot_be_written, claim, discard, part_of, sync, sync_folder
+from ..io.remote import Place, located, uploaded
+from ..io.unfinished import cannot_be_written, claim, discard, part_of, sync, sync_folder, unfinished
+from ..io.write import check_apart
 from .digests import versions
 from .forms import EncodedGroup
 from .interval import Interval
@@ -200,6 +202,24 @@ class Journal:
             text = f"{self.path}: {_named(interval)} cannot be read ({error})"
             raise InputError(f"{text}; start over with --no-resume (resume=False)") from None
         return found
+
+
+@contextmanager
+def opened(
+    output: str | Place, inputs: Iterable[Path], resume: bool | None, lasting: bool = True
+) -> Iterator[tuple[BinaryIO, Journal]]:
+    """Open an output, which appears when the block succeeds, and its journal, which does not last where it is a URL.
+
+    Raises InputError where an output is one of the inputs, and where that of a URL should be continued.
+    """
+    place = located(output)
+    is_here = isinstance(place, Path)
+    if resume and not is_here:
+        raise InputError(f"{place}: only an output on a disk can be continued; leave --resume (resume=True) out")
+    with uploaded(place) as path:
+        check_apart(path, inputs)
+        with Journal(path, resume, lasting and is_here) as journal, unfinished(path) as file:
+            yield file, journal
 
 
 def made_of(sequence: Unchanging, options: EncoderOptions, masker: object) -> dict[str, Any]:

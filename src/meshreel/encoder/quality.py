@@ -9,12 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 from ..errors import InputError
-from ..io.unfinished import unfinished
-from ..io.write import check_apart
-from .journal import Journal
+from ..io.remote import Place, located
+from .journal import opened
 from .options import EncoderOptions
 from .sequence import Encoder
 from .summary import Summary
@@ -77,7 +75,7 @@ class Goal:
 
 def encode_to(
     encoder: Encoder,
-    path: str | Path,
+    path: str | Place,
     goal: Goal,
     options_at: Callable[[float], EncoderOptions],
     resume: bool | None = None,
@@ -88,12 +86,11 @@ def encode_to(
     meets the goal: at once where a scene's background alone is more than the rate. A search that was stopped begins
     again: `resume` may not be True, and is otherwise that of `encode`.
     """
-    search, path = Search(goal), Path(path)
+    search, path = Search(goal), located(path)
     if resume:
         text = f"{path}: a search for a target begins again, it cannot continue"
         raise InputError(f"{text}; leave --resume (resume=True) out, or give the quality in place of the target")
-    check_apart(path, encoder.sequence.files)
-    with Journal(path, resume, lasting=False) as journal, unfinished(path) as file:
+    with opened(path, encoder.sequence.files, resume, lasting=False) as (file, journal):
         for _ in range(TRIALS):
             quality = search.next()
             if quality is None:

@@ -32,15 +32,14 @@ from ..geometry.closest_points import distances
 from ..geometry.derived_sequences import Unchanging, Welded, captured
 from ..geometry.topology import drop_unreferenced
 from ..geometry.work import since, so_far
-from ..io.unfinished import unfinished
-from ..io.write import check_apart
+from ..io.remote import Place
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, as_sequence, evenly
 from .digests import WriteLines
 from .excerpt import Excerpt, write_survey
 from .interval import Interval, NormalisedFrames
 from .job import GroupStore, Job
-from .journal import Journal, made_of
+from .journal import Journal, made_of, opened
 from .metadata import metadata_of, rounded, upright
 from .options import EncoderOptions, PaperOptions
 from .parts import Parts, take_apart
@@ -74,7 +73,7 @@ def encode(
     progress: Progress | None = None,
     resume: bool | None = None,
 ) -> Summary:
-    """Encode meshes as a .reel file at `path`, which appears only when it is complete.
+    """Encode meshes as a .reel file at `path`, also a URL (extra `remote`); it appears only when it is complete.
 
     `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`, which also takes a frame rate); vertices
     at equal positions are welded. `options` replace quality and preset; make them with `preset_options`. Most of a
@@ -146,11 +145,9 @@ class Encoder:
         """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
         return self._parts(self._job(options)) if self._is_scene(options) else None
 
-    def encode(self, path: str | Path, options: EncoderOptions, resume: bool | None = None) -> Summary:
+    def encode(self, path: str | Place, options: EncoderOptions, resume: bool | None = None) -> Summary:
         """Encode the sequence as the function `encode` does, with the same errors."""
-        path = Path(path)
-        check_apart(path, self.sequence.files)
-        with Journal(path, resume) as journal, unfinished(path) as file:
+        with opened(path, self.sequence.files, resume) as (file, journal):
             return self.encode_into(file, options, journal)
 
     @threadpool_limits.wrap(limits=1)  # idle threads of BLAS would take a third of the processor's time

@@ -1,21 +1,25 @@
 """File names: the frame files of a sequence and their order, patterns, and names that are no text.
 
-In: a folder, a glob pattern, a file or a list of files. Out: paths in the order of their frame numbers, and warnings.
+In: a folder, a glob pattern, a file or a list of files, or URLs of these. Out: the files in the order of their frame
+numbers, and warnings.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from pathlib import Path
+from pathlib import Path, PurePath, PurePosixPath
+from typing import TypeVar
 
 from ..errors import InputError
 from .meshes import EXTENSIONS
+from .remote import Place, Remote, located
 
 _MAGIC = re.compile(r"[*?\[]")
 _LAST = re.compile(r"(\d+)(?!.*\d)")
+_P = TypeVar("_P", bound=PurePath)
 
 
 def is_text(name: str) -> bool:
@@ -32,24 +36,26 @@ def is_pattern(name: str) -> bool:
     return _MAGIC.search(name) is not None
 
 
-def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
+def find_frames(source: str | Path | Iterable[str | Path]) -> tuple[tuple[Place, ...], tuple[str, ...]]:
     """Return the frame files of a source and warnings about their order. A list keeps its order."""
     if not isinstance(source, str | Path):
-        return tuple(Path(path) for path in source), ()
-    path = Path(source)
+        return tuple(located(path) for path in source), ()
+    path = located(source)
+    if isinstance(path, Remote):
+        return _find_remote(path)
     try:
         is_folder = path.is_dir()
     except OSError as error:  # a name that is too long, or a folder without permission
         raise InputError(f"{source}: cannot be read ({error.strerror}); check the path and its rights") from None
     if is_folder:
-        return _ordered(path, _of_one_kind(path))
+        return _ordered(path, path, _of_one_kind(path))
     if path.exists():
         return (path,), ()
     if is_pattern(str(source)):
         root, found = _globbed(path)
         if not found:
             raise InputError(f"{source}: no mesh file fits this pattern; check it, or name the folder")
-        return _ordered(root, found)
+        return _ordered(root, root, found)
     raise InputError(f"{source}: no such file or folder; check the path")
 
 
@@ -57,6 +63,24 @@ def last_number(name: str) -> int | None:
     """Return the last whole number in a name, None without one."""
     found = _LAST.search(name)
     return None if found is None else int(found[1])
+
+
+def _find_remote(place: Remote) -> tuple[tuple[Remote, ...], tuple[str, ...]]:
+    """Return the frame files of a folder behind a URL, of a pattern, or the one."""
+    wild = _MAGIC.search(place.url)
+    if wild is None and place.suffix.lower() in EXTENSIONS:
+        return (place,), ()
+    end = len(place.url) if wild is None else place.url.rindex("/", 0, wild.start())
+    folder = Remote(place.url[:end])
+    try:
+        names = folder.names(place.url[end + 1 :])
+    except OSError as error:
+        raise InputError(f"{place}: cannot be read ({error}); check the URL and your rights") from None
+    found = [path for path in map(PurePosixPath, names) if _has_mesh_name(path)]
+    if wild is None or not found:
+        _check_kind(place, found)
+    paths, remarks = _ordered(place, PurePosixPath(), found)
+    return tuple(folder / str(path) for path in paths), remarks
 
 
 def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
@@ -70,7 +94,11 @@ def _globbed(pattern: Path) -> tuple[Path, list[Path]]:
 
 
 def _is_mesh(path: Path) -> bool:
-    return path.suffix.lower() in EXTENSIONS and not path.name.startswith(".") and not path.is_dir()
+    return _has_mesh_name(path) and not path.is_dir()
+
+
+def _has_mesh_name(path: PurePath) -> bool:
+    return path.suffix.lower() in EXTENSIONS and not path.name.startswith(".")
 
 
 def _of_one_kind(folder: Path) -> list[Path]:
@@ -78,28 +106,33 @@ def _of_one_kind(folder: Path) -> list[Path]:
         found = [path for path in folder.iterdir() if _is_mesh(path)]
     except OSError as error:
         raise InputError(f"{folder}: cannot be read ({error.strerror}); check its rights") from None
+    _check_kind(folder, found)
+    return found
+
+
+def _check_kind(folder: Place, found: Sequence[PurePath]) -> None:
+    """Raise InputError where a folder has no mesh files, or several kinds."""
     kinds = Counter(path.suffix.lower() for path in found)
     if not found:
         raise InputError(f"{folder}: holds 0 mesh files; give a folder with {', '.join(EXTENSIONS)} files")
     if len(kinds) > 1:
         counts = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
         raise InputError(f"{folder}: holds several kinds of files ({counts}); choose one, as '{folder}/*{min(kinds)}'")
-    return found
 
 
-def _ordered(root: Path, paths: list[Path]) -> tuple[tuple[Path, ...], tuple[str, ...]]:
-    """Sort paths by frame number, the last number that differs between names of one pattern."""
+def _ordered(source: Place, root: _P, paths: list[_P]) -> tuple[tuple[_P, ...], tuple[str, ...]]:
+    """Sort paths below `root` by frame number, the last number that differs between names of one pattern."""
     names = {path: path.relative_to(root).with_suffix("").as_posix() for path in sorted(paths)}
     if len(paths) == 1:
         return tuple(paths), ()
     numbers = {path: tuple(int(n) for n in re.findall(r"\d+", name)) for path, name in names.items()}
     patterns = {re.sub(r"\d+", "#", name): name for name in names.values()}
     if not any(numbers.values()):
-        return tuple(names), (f"{root}: the {len(paths)} file names have no numbers; taken in alphabetical order",)
+        return tuple(names), (f"{source}: the {len(paths)} file names have no numbers; taken in alphabetical order",)
     if len(patterns) > 1:
         first, second = sorted(patterns.values())[:2]
         raise InputError(
-            f"{root}: names follow {len(patterns)} patterns, as {first!r} and {second!r}; "
+            f"{source}: names follow {len(patterns)} patterns, as {first!r} and {second!r}; "
             "give a glob that fits one of them"
         )
     columns = list(zip(*numbers.values(), strict=True))
@@ -109,7 +142,7 @@ def _ordered(root: Path, paths: list[Path]) -> tuple[tuple[Path, ...], tuple[str
     for before, after in pairwise(order):
         if key[before] == key[after]:
             raise InputError(
-                f"{root}: {names[before]!r} and {names[after]!r} both have frame number {key[before]}; "
+                f"{source}: {names[before]!r} and {names[after]!r} both have frame number {key[before]}; "
                 "give a glob that fits only one of them"
             )
     return tuple(order), ()

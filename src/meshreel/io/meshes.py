@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from .off import parse_off
 from .ply import parse_ply
 from .polygons import Dropped, Polygons, Unreadable, triangulate
 from .read import read_file
+from .remote import Place
 from .stl import parse_stl
 
 _PARSERS: dict[str, Callable[[bytes], Polygons]] = {
@@ -41,7 +41,7 @@ class Loaded:
     dropped: Dropped
 
 
-def read_mesh(path: Path, where: str | None = None) -> Loaded:
+def read_mesh(path: Place, where: str | None = None) -> Loaded:
     """Read the mesh in a file, with its vertices and faces in the order of the file and polygons cut into triangles.
 
     A file without faces is an empty frame; its vertices are dropped and named. `where` begins each error message.

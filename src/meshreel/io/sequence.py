@@ -21,6 +21,8 @@ from ..types import Mesh, MeshSequence, Up, known_up
 from .file_names import find_frames
 from .meshes import Loaded, read_mesh
 from .npz import Archive
+from .read import read_file
+from .remote import Place, Remote, located
 
 CAPTURED = "capture.json"  # in a folder that `meshreel capture` wrote: how the frames were made
 _FRAMES = re.compile(r"(-?\d{1,18})?:(-?\d{1,18})?")
@@ -57,12 +59,13 @@ class SequenceOptions:
 class Files:
     """Frames stored as one file each."""
 
-    named: Sequence[Path] | Mapping[int, Path]  # by number
+    named: Sequence[Place] | Mapping[int, Place]  # by number
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """The files."""
-        return tuple(self.named.values() if isinstance(self.named, Mapping) else self.named)
+        """The files on this machine."""
+        named = self.named.values() if isinstance(self.named, Mapping) else self.named
+        return tuple(path for path in named if isinstance(path, Path))
 
     def __len__(self) -> int:
         return len(self.named)
@@ -175,25 +178,29 @@ class FileSequence(MeshSequence):
 def open_sequence(source: str | Path | Sequence[str | Path], options: SequenceOptions | None = None) -> FileSequence:
     """Return the frames of a folder, a glob pattern, a list of files, one file or an .npz; none is read yet.
 
+    All but an .npz may be URLs, as s3:// and https:// (extra `remote`).
     The up axis is the one that `meshreel capture` recorded in the folder, otherwise y.
     """
     options = options or SequenceOptions()
-    if isinstance(source, str | Path) and Path(source).suffix.lower() == ".npz" and Path(source).is_file():
-        archive = Archive(Path(source))
+    place = located(source) if isinstance(source, str | Path) else None
+    if isinstance(place, Remote) and place.suffix.lower() == ".npz":
+        raise InputError(f"{source}: an .npz is not read by URL; copy it here, or write a mesh file for each frame")
+    if isinstance(place, Path) and place.suffix.lower() == ".npz" and place.is_file():
+        archive = Archive(place)
         if len(archive) == 0:
             raise InputError(f"{source}: has 0 frames; save at least one")
         return FileSequence(archive, options)
     paths, remarks = find_frames(source)
     if not paths:
         raise InputError("the list of files has 0 frames; give at least one")
-    up = known_up(captured(Path(source)).get("up")) if isinstance(source, str | Path) else "y"
+    up = "y" if place is None else known_up(captured(place).get("up"))
     return FileSequence(Files(paths), options, remarks, up)
 
 
-def captured(folder: Path) -> dict[str, Any]:
+def captured(folder: Place) -> dict[str, Any]:
     """Return the record that `meshreel capture` wrote beside its meshes; empty for other folders and files."""
     try:
-        record = json.loads((folder / CAPTURED).read_text(encoding="utf-8"))
+        record = json.loads(read_file(folder / CAPTURED))
     except (OSError, ValueError):
         return {}
     return record if isinstance(record, dict) else {}

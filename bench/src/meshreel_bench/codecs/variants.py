@@ -45,11 +45,7 @@ VARIANTS: dict[str, Change] = {
 def find_variant(name: str | None) -> Change:
     """The change called `name`; None changes nothing. Raises InputError for an unknown one."""
     if name is None:
-        return _as_it_is
+        return lambda options: options
     if name not in VARIANTS:
         raise InputError(f"no variant is called {name!r}; known: {', '.join(sorted(VARIANTS))}")
     return VARIANTS[name]
-
-
-def _as_it_is(options: EncoderOptions) -> EncoderOptions:
-    return options

@@ -19,7 +19,7 @@ from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.derived_sequences import Chosen, forth_and_back
 from meshreel.geometry.topology import weld
-from meshreel.io.file_names import find_frames, is_pattern
+from meshreel.io.file_names import is_pattern
 from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
 from meshreel.types import MeshSequence
 
@@ -113,7 +113,7 @@ class Store:
         path = _found(name, self.data)
         if _is_known(path, self.data):
             return None
-        files = [path] if path.exists() else find_frames(path)[0]
+        files = [path] if path.exists() else open_sequence(path).files
         read = (*map(checksum, files), self.own.frame_rate, self.own.frames, self.own.scale)
         return hashlib.sha256(repr(read).encode()).hexdigest()
 

@@ -18,10 +18,7 @@ from meshreel.io.meshes import read_mesh
 from meshreel.types import Mesh
 
 ROOM = Path("rooms/lr_kt2.obj")  # its y axis points down
-PEOPLE = {
-    "crane": (0.2, 0.0, 3.0),
-    "samba": (-0.9, 0.0, 2.85),
-}  # m: where there is room to walk
+PEOPLE = {"crane": (0.2, 0.0, 3.0), "samba": (-0.9, 0.0, 2.85)}  # m: where there is room to walk
 SPEEDS = {"room2": 1.0, "room2-standing": 0.4}  # of the people
 FRAMES = 60
 FRAME_RATE = 30.0  # 1/s

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import log2
 
 from ..names import BEST, DECIMATED
-from .study import D2, NORMALS, NoMore, Promise, Reaches, Study, Sweep, Which, at_most
+from .study import D2, NORMALS, Bound, NoMore, Promise, Reaches, Study, Sweep, Which, at_most
 
 DEFAULT = 50.0  # quality
 # CPU s a frame of an encode at the default quality: at most, and the aim.
@@ -24,6 +24,7 @@ LIMITS = {
     "room2": HARD,
     "dancer160k": (6.0, ""),
 }
+EFFICIENCY = {8: 0.97, 32: 0.9, 100: 0.9}  # of an encode of an hour of frames, at least, by workers
 DRACO = {"fraction": 0.1, "qp": 10}  # a little worse than the default quality in D2
 TOGETHER, OF_FOUR = "synthetic4", {35.0: (5.0, "4"), 60.0: (6.0, "5"), 85.0: (7.0, "6")}  # by quality
 LEAST = min(OF_FOUR)
@@ -55,6 +56,14 @@ PROMISES: tuple[Promise, ...] = (
         (at_most("work.frames fitted", 2.5), at_most("work.frames tracked", 2.5)),
     ),
     *(Reaches(f"{body}: memory of an encode", _which(body), (at_most("encode_mb", 350, "MB"),)) for body in DIAGONALS),
+    *(
+        Reaches(
+            f"dancer: efficiency of 8, 32 and 100 workers, an hour in intervals of {frames} frames (model)",
+            _which("dancer"),
+            tuple(Bound(f"efficiency.{workers}.{frames}", least) for workers, least in EFFICIENCY.items()),
+        )
+        for frames in (60, 120)
+    ),
     Reaches("dancer: decode", _which("dancer"), (at_most("decode_ms_at_rest", 0.35, "ms"),), "0.2"),
     NoMore(
         "dancer: decode against decimated Draco that is no better in D2",

@@ -87,9 +87,8 @@ def _measured(runs: Sequence[list[Point]], sweep: Sweep) -> Iterator[Row]:
     with ThreadPoolExecutor(sweep.jobs) as executor:
         longest_first = sorted(runs, key=len, reverse=True)
         try:
-            for done in as_completed(
-                [executor.submit(lambda run: list(_rows_of(run, sweep)), r) for r in longest_first]
-            ):
+            calls = [executor.submit(lambda run: list(_rows_of(run, sweep)), each) for each in longest_first]
+            for done in as_completed(calls):
                 yield from done.result()
         except BaseException:
             executor.shutdown(wait=False, cancel_futures=True)

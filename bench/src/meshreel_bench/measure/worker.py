@@ -9,11 +9,12 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import threading
 from collections.abc import Callable, Iterator
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess, parent_process
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from typing import Any
+
+from meshreel.encoder.worker import end_with_parent
 
 _SPAWN = multiprocessing.get_context("spawn")  # a forked process would have what its parent has in memory
 _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -71,7 +72,7 @@ def _received(here: Connection, process: BaseProcess, limit_s: float | None) -> 
 def _answer(there: Connection, task: Callable[..., Iterator[Any]], about: tuple[object, ...]) -> None:
     """Run the task in the fresh process; its standard output goes to standard error."""
     os.dup2(2, 1)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     try:
         for value in task(*about):
             there.send(("value", value))
@@ -81,10 +82,3 @@ def _answer(there: Connection, task: Callable[..., Iterator[Any]], about: tuple[
         there.send(("error", " ".join(reason.split())[:_LONGEST]))
     there.close()
     os._exit(0)  # threads that a codec has left do not matter
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)

@@ -159,14 +159,8 @@ def _appendix(part: Part) -> Iterator[str]:
     if others := [row for row in part.rows if not (row.stream and row.metrics)]:
         yield from ("## Without rate or quality", "", *tables.value_table(others), "")
     if part.failed:
-        yield from (
-            "## Failed",
-            "",
-            "Nothing was measured of these points.",
-            "",
-            *tables.failure_table(part.failed),
-            "",
-        )
+        yield from ("## Failed", "", "Nothing was measured of these points.", "")
+        yield from (*tables.failure_table(part.failed), "")
     yield from ("## Machines and versions", "", *tables.maker_table([*part.rows, *part.failed]))
 
 

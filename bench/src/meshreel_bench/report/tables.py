@@ -180,14 +180,8 @@ def comparable_table(rows: Sequence[Row], wanted: float, measure: Measure | None
     for sequence in sequences(rows):
         for name, row in _nearest(rated(rows, sequence), wanted, measure).items():
             near = _distance(row, wanted, measure) <= 1 + 1e-9
-            records.append(
-                {
-                    "sequence": text(sequence),
-                    "codec": text(name) + ("" if near else f" {DAGGER}"),
-                    "Mbps": row.mbps,
-                    **{label: value(row, key) for label, key in _COMPARED.items()},
-                }
-            )
+            head = {"sequence": text(sequence), "codec": text(name) + ("" if near else f" {DAGGER}"), "Mbps": row.mbps}
+            records.append(head | {label: value(row, key) for label, key in _COMPARED.items()})
             groups.append(sequence if near else None)
     if not records:
         return []
@@ -229,19 +223,9 @@ def failure_table(rows: Sequence[Row]) -> list[str]:
 
 def maker_table(rows: Sequence[Row]) -> list[str]:
     """Return versions, commits and machines, and how many rows each has made."""
-    unknown = "not recorded"
-    records = []
-    for row in rows:
-        made = row.made_by
-        found = (
-            {"meshreel": made.meshreel, "commit": made.commit, "platform": made.platform, "processor": made.cpu}
-            if made
-            else dict.fromkeys(("meshreel", "commit", "platform", "processor"))
-        )
-        cores = str(made.cores) if made and made.cores else None
-        named = found | {"Python": made and made.python, "cores": cores}
-        records.append({key: text(known or unknown) for key, known in named.items()})
-    table = pd.DataFrame(records)
+    names = ("meshreel", "commit", "platform", "cpu", "python", "cores")
+    found = [{name: text(getattr(row.made_by, name, None) or "not recorded") for name in names} for row in rows]
+    table = pd.DataFrame(found).rename(columns={"cpu": "processor", "python": "Python"})
     counts = table.value_counts(sort=False).rename("rows").reset_index()
     return markdown(counts.assign(rows=counts["rows"].map(str)))
 

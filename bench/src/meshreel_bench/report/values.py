@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from heapq import heapreplace
+from math import log1p, sqrt
 from typing import Any
 
 import numpy as np
 
+from meshreel.encoder.surveying import SLICE
 from meshreel.metrics.bd_rate import Curve, hull
 
 from ..experiments.study import FLOOR, Measure
@@ -18,6 +21,8 @@ HALF = 30  # frames of each half of a long sequence
 # Time of `measure.clock.reference_s`, s, on the machine that rows of speed were first measured on, an AMD EPYC with two
 # cores that did nothing else: the fifth percentile of 300 runs.
 REST_S = 0.0233
+HOUR = 108_000  # frames
+VARIATION, DRAWS = 0.35, 20  # of an interval's time: its deviation over its mean (guess), and draws to average over
 
 
 def value(row: Row, key: str) -> float | None:
@@ -25,6 +30,8 @@ def value(row: Row, key: str) -> float | None:
     for prefix, found in (("encode_s.", row.encoding.stages_s), ("work.", row.encoding.work)) if row.encoding else ():
         if key.startswith(prefix):
             return found.get(key.removeprefix(prefix))
+    if key.startswith("efficiency."):
+        return _efficiency(row, *map(int, key.split(".")[1:]))
     return DERIVED[key](row) if key in DERIVED else row.metrics.get(key)
 
 
@@ -76,6 +83,29 @@ def _fall_at_ends(row: Row) -> float | None:
 def _at_rest(seconds: float | None, reference_s: float | None) -> float | None:
     """Return a time as it would be on the machine at rest, by the fixed loop's time beside it."""
     return None if seconds is None or reference_s is None else seconds * REST_S / reference_s
+
+
+def _efficiency(row: Row, workers: int, interval: int) -> float | None:
+    """Return what share of their time workers are busy with an hour of frames, by a model with a row's times.
+
+    Slices are surveyed, then intervals coded, in any order and by whoever is free; what their parent does is left out.
+    """
+    stages = row.encoding.stages_s if row.encoding else {}
+    if "survey" not in stages:
+        return None
+    surveyed, spread = np.full(HOUR // SLICE, stages["survey"] * SLICE), log1p(VARIATION**2)
+    drawn = np.random.default_rng(0).lognormal(-spread / 2, sqrt(spread), (DRAWS, HOUR // interval))
+    coded = drawn * interval * (sum(stages.values()) - stages["survey"])
+    ends = [_end(surveyed, workers) + _end(times, workers) for times in coded]
+    return float(np.mean((surveyed.sum() + coded.sum(axis=1)) / ends)) / workers
+
+
+def _end(times: np.ndarray, workers: int) -> float:
+    """Return when the last of some calls is done, s."""
+    free = [0.0] * workers
+    for seconds in times.tolist():
+        heapreplace(free, free[0] + seconds)
+    return max(free)
 
 
 DERIVED: dict[str, Callable[[Row], float | None]] = {

@@ -176,9 +176,8 @@ def _(promise: NoMore, rows: Sequence[Row]) -> list[Verdict]:
     if len(others) < len(promise.than):
         return [Verdict(promise.text, bound)]
     ratio = own / sum(others)
-    return [
-        Verdict(promise.text, bound, f"{own:.4g} against {sum(others):.4g}: {ratio:.3g} times", ratio <= promise.factor)
-    ]
+    shown = f"{own:.4g} against {sum(others):.4g}: {ratio:.3g} times"
+    return [Verdict(promise.text, bound, shown, ratio <= promise.factor)]
 
 
 def _chosen(rows: Sequence[Row], which: Which) -> list[Row]:

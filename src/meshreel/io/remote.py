@@ -1,0 +1,126 @@
+"""Files behind URLs, through fsspec: s3://, gs://, https:// and what else it knows (extra `remote`).
+
+In: a URL. Out: its bytes, the names in a folder, or a path to write to, whose file is uploaded when it is complete.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+from urllib.parse import urlsplit
+
+from ..errors import InputError
+
+_URL = re.compile(r"[a-zA-Z][a-zA-Z0-9+.-]+://")  # two letters at least: C:/ is a disk
+_WEB = ("http://", "https://")
+
+
+@dataclass(frozen=True, slots=True)
+class Remote:
+    """A file or a folder behind a URL, with what readers use of a Path."""
+
+    url: str
+
+    def __str__(self) -> str:
+        return self.url
+
+    def __truediv__(self, name: str) -> Remote:
+        return Remote(f"{self.url.rstrip('/')}/{name}")
+
+    @property
+    def path(self) -> PurePosixPath:
+        """Its path; in an address of the web, what follows `?` is none of it."""
+        return PurePosixPath(urlsplit(self.url).path if self.url.startswith(_WEB) else self.url)
+
+    @property
+    def suffix(self) -> str:
+        """The extension of its name."""
+        return self.path.suffix
+
+    def absolute(self) -> Remote:
+        """Return itself: a URL means the same everywhere."""
+        return self
+
+    def read(self, most: int) -> bytes:
+        """Return its bytes, which are one request. Raises OSError, also for more than `most`."""
+        with _as_os_error():
+            system, path = _system(self.url)
+            data: bytes = system.cat_file(path, start=0, end=most + 1)
+        if len(data) > most:
+            raise OSError(f"it has more than the {most} bytes that an input file may have")
+        return data
+
+    def names(self, pattern: str) -> list[str]:
+        """Return the names in this folder, or the paths from it that fit a pattern which is not "". Raises OSError."""
+        with _as_os_error():
+            system, root = _system(self.url)
+            found = system.glob(f"{root.rstrip('/')}/{pattern}") if pattern else system.ls(root, detail=False)
+            return [name.removeprefix(root).lstrip("/") for name in found]
+
+
+Place = Path | Remote
+
+
+def located(name: str | Place) -> Place:
+    """Return where a name leads: to a path on this machine, or behind a URL."""
+    if not isinstance(name, str):
+        return name
+    return Remote(name) if _URL.match(name) else Path(name)
+
+
+@contextmanager
+def uploaded(output: Place) -> Iterator[Path]:
+    """Yield the path to write an output to; for a URL, one in a temporary folder, uploaded at the end of the block.
+
+    Raises InputError for a URL that takes no files, before the block or after it; after it, the file is kept.
+    """
+    if isinstance(output, Path):
+        yield output
+        return
+    if output.url.startswith(_WEB):
+        raise InputError(f"{output}: a web server takes no output; give a path, or the URL of a store, as s3://")
+    try:
+        with _as_os_error():
+            system, path = _system(output.url)
+    except OSError as error:
+        raise InputError(f"{output}: cannot be written ({error}); check the URL") from error
+    with ExitStack() as stack:
+        folder = tempfile.mkdtemp(prefix="meshreel-")
+        stack.callback(shutil.rmtree, folder)
+        here = Path(folder, output.path.name)
+        yield here
+        try:
+            with _as_os_error():
+                system.put_file(str(here), path)
+        except OSError as error:
+            stack.pop_all()
+            raise InputError(f"{output}: cannot be written ({error}); {here} is complete: copy it there") from error
+
+
+def _system(url: str) -> tuple[Any, str]:
+    """Return the file system of a URL, and its path there. Raises InputError where a package is missing."""
+    try:
+        from fsspec.core import url_to_fs
+
+        system, path = url_to_fs(url)
+    except ImportError as error:
+        text = "a URL needs the extra `remote`, pip install 'meshreel[remote]', and some protocols a package more"
+        raise InputError(f"{url}: {error}; {text}") from error
+    return system, path
+
+
+@contextmanager
+def _as_os_error() -> Iterator[None]:
+    """Turn what file systems raise, each errors of its own, into OSErrors of one line."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        raise OSError(" ".join(f"{type(error).__name__}: {error}".split())) from error
