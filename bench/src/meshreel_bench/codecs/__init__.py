@@ -37,13 +37,8 @@ def codec_version(name: str) -> str | None:
     return f"{entry.dist.name} {entry.dist.version}"
 
 
-<<<<<<< HEAD
-def _entry(name: str) -> Any:  # of `importlib_metadata`, where that is installed
-    """Return the entry point of that name, or None. Raises InputError where two distributions have one."""
-=======
 def _entry(name: str) -> Any:  # a class of its own with `importlib_metadata`, which Dask brings
     """Return the entry point of that name, None without one. Raises InputError where two distributions have one."""
->>>>>>> urls
     found = list(entry_points(group=GROUP, name=name))
     if len(found) > 1:
         owners = " and ".join(entry.dist.name if entry.dist else entry.value for entry in found)
