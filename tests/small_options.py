@@ -39,7 +39,7 @@ def with_method(options: EncoderOptions, **changes: object) -> EncoderOptions:
 def _quick_layers(options: LayersOptions) -> LayersOptions:
     coarse = Stage(40, (0.1, 0.06, 0.03), (10.0, 1.0, 0.1))
     fine = Stage(120, (0.024, 0.012), (0.3, 0.1))
-    fit = replace(options.fit, gates=(0.024, 0.012), smoothing=(2.0, 0.4))
+    fit = replace(options.fit, gates=(0.024, 0.012), smoothing=(2.0, 0.4), strides=(2, 1))
     return replace(options, embedded=EmbeddedOptions(coarse, fine, samples=800), fit=fit, intra=TRIALS)
 
 

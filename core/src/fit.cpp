@@ -43,12 +43,12 @@ public:
         }
     }
 
-    void round(double gate, double smoothing, const std::vector<Vec>& shape, const double* place) {
+    void round(double gate, double smoothing, size_t stride, const std::vector<Vec>& shape, const double* place) {
         fitted_.tree->move(x_);
         find_normals();
         equations_.clear(x_);
-        from_target(gate);
-        from_template(gate);
+        from_target(gate, stride);
+        from_template(gate, stride);
         from_borders(2.0 * gate);
         equations_.solve(smoothing, shape, rounds_.anchor, place, rounds_.iterations, rounds_.tolerance, x_);
     }
@@ -72,9 +72,9 @@ private:
     }
 
     // Pulls the template to the frame's vertices.
-    void from_target(double gate) {
-        const double evenly = static_cast<double>(fitted_.count) / static_cast<double>(target_.mesh.vertices);
-        for (size_t v = 0; v < target_.mesh.vertices; ++v) {
+    void from_target(double gate, size_t stride) {
+        const double evenly = static_cast<double>(stride * fitted_.count) / static_cast<double>(target_.mesh.vertices);
+        for (size_t v = 0; v < target_.mesh.vertices; v += stride) {
             if (!target_.inside[v]) continue;
             const Vec point = load(target_.mesh.positions + 3 * v), normal = load(target_.normals + 3 * v);
             const Hit hit = fitted_.tree->closest(point, gate, seen_[v]);
@@ -96,17 +96,18 @@ private:
 
     // Pulls the template's vertices, and the middles of its faces, to the frame's surface. There are two faces a
     // vertex: each counts half.
-    void from_template(double gate) {
-        for (size_t v = 0; v < fitted_.count; ++v) {
+    void from_template(double gate, size_t stride) {
+        const double share = static_cast<double>(stride);
+        for (size_t v = 0; v < fitted_.count; v += stride) {
             if (fitted_.corners[v] < 0) continue;
             std::array<double, 3> corners{};
             corners[static_cast<size_t>(fitted_.corners[v] % 3)] = 1.0;
-            towards(at(static_cast<int32_t>(v)), normals_[v], fitted_.corners[v] / 3, corners, 1.0, gate, sees_[v]);
+            towards(at(static_cast<int32_t>(v)), normals_[v], fitted_.corners[v] / 3, corners, share, gate, sees_[v]);
         }
-        for (size_t f = 0; f < fitted_.faces.size(); ++f) {
+        for (size_t f = 0; f < fitted_.faces.size(); f += stride) {
             const auto& face = fitted_.faces[f];
             const Vec middle = (1.0 / 3.0) * (at(face[0]) + at(face[1]) + at(face[2]));
-            towards(middle, face_normals_[f], static_cast<int32_t>(f), {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}, 0.5, gate,
+            towards(middle, face_normals_[f], static_cast<int32_t>(f), {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}, 0.5 * share, gate,
                     sees_[fitted_.count + f]);
         }
     }
@@ -193,7 +194,7 @@ private:
 
 bool is_valid(const Template& fitted, const mr_target& target, const mr_fit_rounds& rounds) {
     for (size_t k = 0; k < rounds.count; ++k)
-        if (!(rounds.gates[k] > 0.0)) return false;
+        if (!(rounds.gates[k] > 0.0) || rounds.strides[k] < 1) return false;
     return !fitted.faces.empty() && target.mesh.vertices > 0 &&
            tree_of(target.tree).face_count() == target.mesh.face_count &&
            in_range(target.mesh.faces, 3 * target.mesh.face_count, target.mesh.vertices);
@@ -234,7 +235,7 @@ int mr_fit(mr_template* fitted, const mr_target* target, const mr_fit_rounds* ro
                 neighbourhood_turns(f, rest, positions, turns);
                 for (size_t v = 0; v < f.count; ++v) shape[v] = turns[v] * kept[v];
             }
-            fit.round(rounds->gates[k], rounds->smoothing[k], shape, place);
+            fit.round(rounds->gates[k], rounds->smoothing[k], static_cast<size_t>(rounds->strides[k]), shape, place);
         }
         return MR_OK;
     });

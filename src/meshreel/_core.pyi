@@ -252,6 +252,7 @@ class FitTemplate:
         start: Float64[np.ndarray, "V 3"],
         gates: Float64[np.ndarray, " R"],
         smoothing: Float64[np.ndarray, " R"],
+        strides: Int32[np.ndarray, " R"],
         agreement: float,
         anchor: float,
         tolerance: float,

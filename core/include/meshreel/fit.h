@@ -40,6 +40,7 @@ struct mr_fit_rounds {
     size_t count;
     const double* gates;      // of each round, > 0
     const double* smoothing;  // of each round, row weights
+    const int32_t* strides;   // of each round, >= 1: every so manieth point is matched, and counts so many times
     double agreement;         // smallest cosine between the normals of a pair
     double anchor;            // row weight
     double tolerance;         // of the conjugate gradients: relative residual at which they stop

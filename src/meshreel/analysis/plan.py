@@ -33,6 +33,7 @@ class PlanOptions:
     alone: float = 1.2  # price of a frame without a template, in prices of a template (guess)
     pop: float = 1.5  # dB that the quality may step at a cut without a price
     keys: int = 5  # frames tried as keys for one plan, at most
+    settled: float = 1.0  # excess beyond which another key is tried, in prices of a template
     misses: int = 2  # keys in a row without gain after which no other is tried (guess)
     gain: float = 0.25  # that a key must bring, in prices of a template (guess)
 
@@ -42,8 +43,9 @@ class PlanOptions:
                 f"limit {self.limit:g}, worth {self.worth:g}, alone {self.alone:g}, pop {self.pop:g}: "
                 "give >= 1, and > 0 for the others"
             )
-        if self.keys < 1 or self.misses < 1 or self.gain < 0:
-            raise InputError(f"keys {self.keys}, misses {self.misses}, gain {self.gain:g}: give >= 1, >= 1, >= 0")
+        if self.keys < 1 or self.misses < 1 or min(self.settled, self.gain) < 0:
+            text = f"keys {self.keys}, misses {self.misses}, settled {self.settled:g}, gain {self.gain:g}"
+            raise InputError(f"{text}: give >= 1, >= 1, >= 0, >= 0")
 
 
 @dataclass(frozen=True, slots=True)

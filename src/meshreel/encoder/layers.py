@@ -106,7 +106,7 @@ class _Planner:
         plan, misses = best_plan(*_known(window, candidates), o), 0
         for _ in range(min(o.keys, NOISY_KEYS) if window.noise else o.keys):
             tried = {number - window.first for number in self._tried}
-            if plan.excess.sum() <= o.worth or misses == o.misses or (key := next_key(plan, tried)) is None:
+            if plan.excess.sum() <= o.settled * o.worth or misses == o.misses or (key := next_key(plan, tried)) is None:
                 break
             self._tried.add(window.first + key)
             candidates.append(Candidate(window, window.first + key, self._options))

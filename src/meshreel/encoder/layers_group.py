@@ -68,7 +68,10 @@ class GroupCoder:
         note(self.digests, "fields and symbols", encoded.payload)
         shown = self._with_tails(encoded, reference.base.faces)
         note(self.digests, "patches", shown.payload[len(encoded.payload) :])
-        fidelity = measure(self.frames, shown.frames)
+        count = len(self.surfaces)
+        most = min(self.options.measured or count, count)
+        some = [(2 * k + 1) * count // (2 * most) for k in range(most)]
+        fidelity = measure([self.surfaces[k].mesh for k in some], [shown.frames[k] for k in some])
         note(self.digests, "fidelity", fidelity)
         is_predicted = previous is not None
         chosen = EncodedGroup(Form.LAYERS, len(self.surfaces), shown.payload, shown.layers, fidelity, is_predicted)
@@ -79,7 +82,8 @@ class GroupCoder:
                     chosen = other
         if not np.isfinite(chosen.fidelity.distance):
             return self.alone(), None  # the template has collapsed: nothing is comparable
-        chosen = self._sharp(chosen) or cheaper(self.frames, chosen, self.options.intra)
+        sharp = self._sharp(chosen)
+        chosen = sharp or (cheaper(self.frames, chosen, self.options.intra) if self.options.floor else chosen)
         return chosen, encoded.state if chosen.form == Form.LAYERS else None
 
     def _sharp(self, group: EncodedGroup) -> EncodedGroup | None:

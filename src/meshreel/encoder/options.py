@@ -61,11 +61,13 @@ class LayersOptions:
     embedded: EmbeddedOptions = field(default_factory=EmbeddedOptions)
     template: TemplateOptions = field(default_factory=TemplateOptions)
     fused: FusedOptions = field(default_factory=FusedOptions)
-    fit: FitOptions = FitOptions(restart=False, pull=0.3, second_smoothing=0.7)
+    fit: FitOptions = FitOptions(strides=(4, 3, 2, 1), restart=False, pull=0.3, second_smoothing=0.7)
     plan: PlanOptions = PlanOptions()
     layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)  # where layers miss the target
+    measured: int | None = None  # frames of a group whose fidelity is measured, at most; None: all
+    floor: bool = True  # Draco is tried in place of every group, not only where nothing else holds
     intra: IntraOptions = field(default_factory=IntraOptions)
 
     def __post_init__(self) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from ..analysis.follow.embedded import Stage
 from ..analysis.follow.template import TemplateOptions
 from ..analysis.reference.extraction import ReferenceOptions
 from ..analysis.reference.track import TrackOptions
@@ -20,6 +21,7 @@ from .options import EncoderOptions, LayersOptions, PaperOptions
 from .target import Fidelity
 
 PRESETS = ("best", "paper")
+EFFORTS = ("fast", "normal", "thorough")
 
 
 def preset_options(
@@ -29,10 +31,12 @@ def preset_options(
     group_size: int | None = None,
     centers: int | None = None,
     key_interval: float | None = None,
+    effort: str = "normal",
 ) -> EncoderOptions:
     """Return the encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
 
-    Raises InputError for an unknown preset or values out of range.
+    `effort` is how long the preset `best` searches: see `EFFORTS`. Raises InputError for an unknown preset or values
+    out of range.
     """
     if preset not in PRESETS:
         raise InputError(f"no preset is called {preset!r}; known: {', '.join(PRESETS)}")
@@ -42,9 +46,13 @@ def preset_options(
         raise InputError(f"basis size {basis_size}: preset `best` chooses the components; use preset `paper`")
     if preset == "best" and centers is not None:
         raise InputError(f"centers {centers}: preset `best` tracks none; use preset `paper`")
+    if effort not in EFFORTS:
+        raise InputError(f"no effort is called {effort!r}; known: {', '.join(EFFORTS)}")
+    if preset != "best" and effort != "normal":
+        raise InputError(f"effort {effort}: preset `{preset}` has one effort; use preset `best`")
     if preset != "best" and key_interval is not None:
         raise InputError(f"key interval {key_interval:g}: groups of preset `{preset}` all decode on their own")
-    method = layers_options(float(quality)) if preset == "best" else paper_options(float(quality), centers, basis_size)
+    method = layers_options(float(quality), effort) if preset == "best" else paper_options(float(quality), centers, basis_size)
     if group_size is not None:
         method = replace(method, group_size=group_size)
     options = EncoderOptions(method, quality=float(quality))
@@ -63,15 +71,38 @@ def paper_options(quality: float = 50.0, centers: int | None = None, basis_size:
     )
 
 
-def layers_options(quality: float = 50.0) -> LayersOptions:
+def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptions:
     """Return the options of the recipe of layers at a quality."""
     step = motion_step(quality)
-    return LayersOptions(
+    options = LayersOptions(
         target=Fidelity(distance=0.2 * step + 0.00005, angle=7.0, worst=step),
         template=TemplateOptions(error=rounded(0.00088 * (step / 0.0012) ** 0.55)),
         layers=LayerCodingOptions(step=step),
         displacements=DisplacementOptions(step=displacement_step(quality)),
     )
+    if effort == "fast":
+        return _fast(options)
+    return _thorough(options) if effort == "thorough" else options
+
+
+def _fast(options: LayersOptions) -> LayersOptions:
+    """Return options with fewer keys, rounds, nodes and samples, and without patches (decision 24)."""
+    coarse = Stage(150, (0.1, 0.06, 0.045, 0.024), (10.0, 3.0, 0.5, 0.1))
+    fine = Stage(600, (0.024, 0.012, 0.012), (0.3, 0.1, 0.05))
+    return replace(
+        options,
+        embedded=replace(options.embedded, coarse=coarse, fine=fine, samples=2000),
+        fit=replace(options.fit, gates=(0.024, 0.012, 0.012), smoothing=(4.0, 0.7, 0.4), strides=(6, 3, 1)),
+        plan=replace(options.plan, keys=2, misses=1),
+        tails=None,
+        measured=4,
+        floor=False,
+    )
+
+
+def _thorough(options: LayersOptions) -> LayersOptions:
+    """Return options with more keys, tried also where a plan is good already (decision 24)."""
+    return replace(options, plan=replace(options.plan, keys=8, misses=3, settled=0.25, gain=0.05))
 
 
 def motion_step(quality: float) -> float:

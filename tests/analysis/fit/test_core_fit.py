@@ -18,13 +18,18 @@ def bumpy(mesh: Mesh, seed: int, size: float = 0.003) -> Mesh:
     return Mesh(mesh.vertices + np.random.default_rng(seed).normal(0, size, mesh.vertices.shape), mesh.faces)
 
 
+def all_points(rounds: int) -> np.ndarray:
+    """Strides of the rounds."""
+    return np.ones(rounds, np.int32)
+
+
 def in_the_core(
     mesh: Mesh, frame: Mesh, rest: np.ndarray, place: np.ndarray, turn: bool, rounds: int = 1
 ) -> np.ndarray:
     template = _core.FitTemplate(mesh.faces, len(mesh.vertices))
     gates, smoothing = np.full(rounds, GATE), np.full(rounds, SMOOTHING)
     target = FrameSurface(frame).target
-    return template.fit(target, rest, place, mesh.vertices, gates, smoothing, LEAST, ANCHOR, 1e-7, 400, turn)
+    return template.fit(target, rest, place, mesh.vertices, gates, smoothing, all_points(len(gates)), LEAST, ANCHOR, 1e-7, 400, turn)
 
 
 @pytest.mark.parametrize(
@@ -72,9 +77,9 @@ def test_arrays_that_do_not_fit_are_refused() -> None:
     template, wrong = _core.FitTemplate(ball(1).faces, len(ball(1).vertices)), ball(2).vertices
     target, one = FrameSurface(ball(2)).target, np.ones(1)
     with pytest.raises(ValueError, match="sizes do not fit"):
-        template.fit(target, wrong, wrong, wrong, one, one, 0.3, 0.1, 1e-3, 9, False)
+        template.fit(target, wrong, wrong, wrong, one, one, all_points(1), 0.3, 0.1, 1e-3, 9, False)
     with pytest.raises(ValueError, match="out of range"):
         _core.FitTemplate(ball(1).faces + 999, 9)
     right = ball(1).vertices
     with pytest.raises(ValueError, match="not finite"):
-        template.fit(target, right, right, right, np.zeros(1), one, 0.3, 0.1, 1e-3, 9, False)
+        template.fit(target, right, right, right, np.zeros(1), one, all_points(1), 0.3, 0.1, 1e-3, 9, False)

@@ -38,6 +38,7 @@ class FitOptions:
 
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # largest distances of pairs, in diagonals
     smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weights of the difference from the rotated Laplacian
+    strides: tuple[int, ...] | None = None  # every so manieth point is matched in a round of a clean fit; None: all
     agreement: float = 0.3  # smallest cosine between the normals of a pair
     anchor: float = 0.02  # row weight of the offset from the prediction
     components: int = 15  # of the trajectories, in the second fit (decision 10); 0: no second fit
@@ -52,6 +53,8 @@ class FitOptions:
             raise InputError(
                 f"gates {self.gates}, smoothing {self.smoothing}: give each round a positive value of both"
             )
+        if self.strides is not None and (len(self.strides) != len(self.gates) or min(self.strides) < 1):
+            raise InputError(f"strides {self.strides}: give each round one of at least 1")
         if not -1 <= self.agreement < 1:
             raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
         if min(self.anchor, self.pull) <= 0 or self.components < 0:
@@ -69,11 +72,11 @@ class FitOptions:
         """Return the rounds for frames at this RMS distance from the truth: wider and stiffer where there is noise."""
         last = self.smoothing[-1] if self.second_smoothing is None else self.second_smoothing
         if noise == 0:
-            return Rounds(self.gates, self.smoothing, self.pull, last)
+            return Rounds(self.gates, self.smoothing, self.strides or (1,) * len(self.gates), self.pull, last)
         chosen = NOISY_ROUNDS if len(self.gates) >= NOISY_ROUNDS.stop else slice(None)
         gates = tuple(max(gate, GATE * noise) for gate in self.gates[chosen])
         stiffer = math.hypot(1.0, noise / FOLLOWED)
-        return Rounds(gates, self.smoothing[chosen], stiffer * self.pull, stiffer * last)
+        return Rounds(gates, self.smoothing[chosen], (1,) * len(gates), stiffer * self.pull, stiffer * last)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +85,7 @@ class Rounds:
 
     gates: tuple[float, ...]
     smoothing: tuple[float, ...]
+    strides: tuple[int, ...]
     pull: float
     second_smoothing: float
 
@@ -194,8 +198,9 @@ class Fitting:
         """`noise` is the RMS distance of the frames from the truth; 0: a clean capture."""
         self._template, self._options = _core.FitTemplate(faces, vertices), options
         rounds, gates = options.rounds(noise), options.rounds(noise).gates[-2:]
-        self._first = _Schedule(rounds.gates, rounds.smoothing, options.anchor, turn=True)
-        self._second = _Schedule(gates, (rounds.second_smoothing,) * len(gates), rounds.pull, turn=False)
+        self._first = _Schedule(rounds.gates, rounds.smoothing, rounds.strides, options.anchor, turn=True)
+        last = (rounds.second_smoothing,) * len(gates)
+        self._second = _Schedule(gates, last, rounds.strides[-2:], rounds.pull, turn=False)
 
     def first(
         self,
@@ -236,6 +241,7 @@ class Fitting:
             start,
             np.array(schedule.gates),
             np.array(schedule.smoothing),
+            np.array(schedule.strides, np.int32),
             o.agreement,
             schedule.anchor,
             o.tolerance,
@@ -250,5 +256,6 @@ class _Schedule:
 
     gates: tuple[float, ...]
     smoothing: tuple[float, ...]
+    strides: tuple[int, ...]
     anchor: float  # row weight
     turn: bool  # whether the shape turns with each vertex's neighbourhood
