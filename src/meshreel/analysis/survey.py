@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..geometry.strict import norm
 from ..geometry.topology import clean, drop_unreferenced
 from ..types import Mesh, MeshSequence
+from .pieces import Piece, pieces_of
 
 UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
 LARGEST_RATIO = 10.0  # largest ratio of the diagonals of two frames in one interval: a guess
@@ -32,6 +33,7 @@ class Survey:
     flattened: tuple[int, ...] = ()  # frames whose faces all have no area: they count as empty
     scale: float | None = None  # m, unit of normalised coordinates; None: the bounding box's diagonal
     dropped: int = 0  # faces, over all frames, without area or with the three vertices of another: they are dropped
+    pieces: tuple[tuple[Piece, ...], ...] = ()  # of each frame, none of one that is all one; () of a scene
 
     @property
     def center(self) -> Float64[np.ndarray, "3"]:
@@ -54,7 +56,7 @@ class Survey:
 
     def without_frames(self) -> Survey:
         """Return what normalising needs: all but the facts about single frames, of any number of frames."""
-        return replace(self, diagonals=(), flattened=())
+        return replace(self, diagonals=(), flattened=(), pieces=())
 
     def normalise(self, mesh: Mesh) -> Mesh:
         """Return the mesh cleaned and in normalised coordinates: centered, in multiples of `unit`."""
@@ -90,7 +92,8 @@ class Counter(Protocol):
 def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool = True) -> Survey:
     """Survey a sequence with one frame in memory at a time. Raises InputError if it is empty or a frame is invalid.
 
-    Unless `cleaned`, faces without area count like any others: scenes have too many faces to search for them.
+    Unless `cleaned`, faces without area count like any others, and pieces are not looked for: scenes have too many
+    faces to search for them.
     """
     return joined([survey_of(sequence, range(len(sequence)), stages, cleaned)])
 
@@ -98,7 +101,7 @@ def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool 
 def survey_of(sequence: MeshSequence, numbers: range, stages: Counter | None = None, cleaned: bool = True) -> Survey:
     """Survey some frames of a sequence as `survey` does; `joined` makes one of the surveys of all its parts."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    diagonals, flattened, dropped = list[float](), list[int](), 0
+    diagonals, flattened, dropped, pieces = list[float](), list[int](), 0, list[tuple[Piece, ...]]()
     for number in numbers:
         check(mesh := sequence[number], f"frame {number}")
         had_faces, before = not mesh.is_empty, len(mesh.faces)
@@ -106,11 +109,12 @@ def survey_of(sequence: MeshSequence, numbers: range, stages: Counter | None = N
         dropped += before - len(mesh.faces)
         diagonals.append(0.0 if mesh.is_empty else mesh.diagonal)
         flattened += [number] if had_faces and mesh.is_empty else []
+        pieces += [pieces_of(mesh)] if cleaned else []
         if not mesh.is_empty:
             low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
         if stages is not None:
             stages.add("survey", 1)
-    return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped)
+    return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped, pieces=tuple(pieces))
 
 
 def joined(parts: Sequence[Survey]) -> Survey:
@@ -122,7 +126,8 @@ def joined(parts: Sequence[Survey]) -> Survey:
     if not np.isfinite(low).all():  # no frame has a surface
         low, high = np.zeros(3), np.zeros(3)
     flattened = tuple(number for part in parts for number in part.flattened)
-    return Survey(low, high, diagonals, flattened, dropped=sum(part.dropped for part in parts))
+    pieces = tuple(some for part in parts for some in part.pieces)
+    return Survey(low, high, diagonals, flattened, dropped=sum(part.dropped for part in parts), pieces=pieces)
 
 
 def check_one_unit(seen: Survey) -> None:

@@ -25,7 +25,7 @@ def command(
     ----------
     inputs
         The files in the order of their frames, encoded with one --survey and the same options. Scenes cannot be joined:
-        each has a background and tracks of its own.
+        each has a background of its own.
     output
         The .reel file to write; it appears only when it is complete. All may be URLs (extra `remote`).
     """

@@ -38,7 +38,7 @@ def concat(inputs: Sequence[Place], output: Place) -> Joined:
     """Join files one after the other as `output`, which appears when it is complete.
 
     One file is open at a time, and in memory where it is behind a URL. Raises InputError where files are no parts of
-    one sequence, or are scenes: each has a background and tracks of its own. Raises FormatError for a damaged file.
+    one sequence, or are scenes: each has a background of its own. Raises FormatError for a damaged file.
     """
     if not inputs:
         raise InputError("no files to join; give at least one")
@@ -54,15 +54,19 @@ def concat(inputs: Sequence[Place], output: Place) -> Joined:
 
 def _joined_header(inputs: Sequence[Place]) -> Header:
     """Return the header of the whole, after a look at that of each file."""
-    header, parts = None, list[tuple[dict[str, object], int]]()
+    header, parts, tracks = None, list[tuple[dict[str, object], int]](), 0
     for path in inputs:
         with closing(_source(path)) as source:
             reader = _opened(source, path)
-        if reader.has_background or len(reader.tracks) > 1:
-            raise InputError(f"{path}: is a scene, whose background and tracks are its own; encode it in one run")
+        if reader.has_background:
+            raise InputError(f"{path}: is a scene, whose background is its own; encode it in one run")
         if reader.header.first_time or reader.header.intervals:
             raise InputError(f"{path}: its frames have times of their own, which cannot be joined")
         header = reader.header if header is None else header
+        tracks = tracks or len(reader.tracks)
+        if len(reader.tracks) != tracks:
+            text = f"{path}: {len(reader.tracks)} tracks, and {inputs[0]} has {tracks}"
+            raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
         _check_alike(path, reader, header, parts[0][0] if parts else reader.metadata, inputs[0])
         parts.append((reader.metadata, reader.frame_count))
     assert header is not None
@@ -89,8 +93,8 @@ def _check_alike(path: Place, reader: ReelReader, header: Header, metadata: dict
 def _add(writer: ReelWriter, path: Place) -> None:
     """Add all groups of a file."""
     with closing(_source(path)) as source:
-        reader, before = _opened(source, path), writer.last_of(0)
-        base = 0 if before is None else before + 1
+        reader, first_frame = _opened(source, path), writer.frame_count
+        base = 1 + max((-1 if (last := writer.last_of(track)) is None else last) for track in range(len(reader.tracks)))
         for chunk in reader.chunks:
             assert chunk.kind == ChunkKind.GROUP
             try:
@@ -99,7 +103,8 @@ def _add(writer: ReelWriter, path: Place) -> None:
                 raise FormatError(f"{path}: {error}") from error
             ends = tuple(accumulate(layer.size for layer in chunk.layers))
             depends_on = [base + number for number in chunk.depends_on]
-            writer.add_group(writer.frame_count, chunk.frame_count, payload, ends, depends_on)
+            first = first_frame + chunk.first_frame
+            writer.add_group(first, chunk.frame_count, payload, ends, depends_on, chunk.track)
 
 
 def _source(path: Place) -> StreamSource:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.pieces import Piece
 from ..analysis.survey import Survey
 from ..errors import InputError
 from ..geometry.derived_sequences import Unchanging
@@ -20,7 +21,7 @@ from ..io.read import read_file
 from ..io.remote import Place
 from ..io.write import replacing
 
-KIND = "meshreel survey 1"
+KIND = "meshreel survey 2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,9 +105,19 @@ def _surveyed(name: str, record: Any) -> Surveyed:
     flattened = tuple(int(number) for number in record["flattened"])
     facts = {name: record[name] for name in ("frames", "frame_rate", "up")}
     digests = [str(value) for value in record["digests"]]
+    pieces = tuple(tuple(map(_piece, frame)) for frame in record["pieces"])
     sizes = np.array([*low, *high, *diagonals])
-    if not (len(low) == len(high) == 3 and len(diagonals) == len(digests) == facts["frames"]):
+    if not (len(low) == len(high) == 3 and len(diagonals) == len(digests) == len(pieces) == facts["frames"]):
         raise ValueError("its parts are of different lengths")
     if not np.isfinite(sizes).all() or (low > high).any() or min(diagonals, default=-1.0) < 0:
         raise ValueError("its numbers are impossible")
-    return Surveyed(name, Survey(low, high, diagonals, flattened, scale, int(record["dropped"])), facts, digests)
+    seen = Survey(low, high, diagonals, flattened, scale, int(record["dropped"]), pieces)
+    return Surveyed(name, seen, facts, digests)
+
+
+def _piece(record: Any) -> Piece:
+    boxes = np.array([record["box"], record["around"]], np.float64)
+    if boxes.shape != (2, 6) or not np.isfinite(boxes).all() or (boxes[:, :3] >= boxes[:, 3:]).all(axis=1).any():
+        raise ValueError(f"a piece {record}")
+    own, larger = boxes.tolist()
+    return Piece(tuple(own), tuple(larger), int(record["vertices"]))

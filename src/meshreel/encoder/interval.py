@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
+from ..analysis.pieces import piece_of_faces
 from ..analysis.survey import Survey
 from ..geometry.derived_sequences import DerivedSequence
+from ..geometry.topology import clean, part_of
 from ..types import Frames, Mesh
 from .digests import Digests
 
@@ -21,9 +26,10 @@ class Interval:
     first_frame: int = 0  # its number in the sequence
     track: int = 0
     digests: Digests | None = field(default=None, kw_only=True)  # of what its stages compute; None: nobody asks
-    # Digest of the frames; empty where they are whole frames of the sequence, which has their digests.
+    # Digest of the frames; empty where they are frames of the sequence, or pieces of them: it has their digests.
     surface: str = ""
     weight: Fraction = field(default=Fraction(1), kw_only=True)  # of each frame in progress: bodies share a frame
+    larger: float = field(default=1.0, kw_only=True)  # times, the whole frames than the body: targets are of the former
 
     @property
     def stop(self) -> int:
@@ -59,7 +65,9 @@ class NormalisedFrames(Frames):
 
     def only(self) -> NormalisedFrames:
         """Return the same frames, with nothing else of their sequence."""
-        return NormalisedFrames(self._sequence.only(self._numbers), self._seen.without_frames(), self._numbers)
+        found = copy.copy(self)
+        found._sequence, found._seen = self._sequence.only(self._numbers), self._seen.without_frames()
+        return found
 
     @property
     def observed(self) -> Any:
@@ -69,3 +77,18 @@ class NormalisedFrames(Frames):
     def learn(self, observed: Any) -> None:
         """Take what the same frames observed in another process."""
         self._sequence.learn(observed)
+
+
+class BodyFrames(NormalisedFrames):
+    """One body of frames of a sequence, cut out on access."""
+
+    def __init__(
+        self, sequence: DerivedSequence, seen: Survey, numbers: range, body: int, bodies: tuple[tuple[int, ...], ...]
+    ) -> None:
+        """Take of each frame the pieces that are this body; `bodies` has the body of each piece of each frame."""
+        super().__init__(sequence, seen, numbers)
+        self._body, self._bodies = body, bodies
+
+    def __getitem__(self, index: int) -> Mesh:
+        mesh = clean(self._sequence[self._numbers[index]])
+        return self._seen.normalise(part_of(mesh, np.array(self._bodies[index])[piece_of_faces(mesh)] == self._body))

@@ -31,12 +31,12 @@ class Totals:
 
     @staticmethod
     def of(groups: Sequence[GroupSummary]) -> Totals:
-        """Return the totals of the groups of a file."""
+        """Return the totals of the groups of a file; bodies count by their share of the vertices."""
         return Totals.added(
             [
                 Totals(
-                    count := group.frame_count,
-                    count * group.fidelity.distance**2,
+                    group.frame_count if group.track == 0 else 0,
+                    (count := group.share * group.frame_count) * group.fidelity.distance**2,
                     group.fidelity.worst,
                     count * group.fidelity.psnr,
                     count * group.fidelity.angle,

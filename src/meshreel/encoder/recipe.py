@@ -118,6 +118,7 @@ def encode_interval(
 
     `find` finds the groups of the paper's recipe; pass a store's `find` to reuse an earlier analysis.
     """
+    options = replace(options, target=options.target.scaled(interval.larger))
     if isinstance(options, LayersOptions):
         groups = layers.encode_interval(interval, options, stages)
     else:

@@ -29,12 +29,13 @@ from ..geometry.closest_points import distances
 from ..geometry.decimate import decimate, decimate_faces
 from ..geometry.derived_sequences import digest
 from ..types import Mesh, MeshSequence, Placement
-from .forms import EncodedGroup, empty_groups
+from .forms import empty_groups
 from .interval import Interval
 from .job import Job
 from .options import EncoderOptions
 from .parts import Change, Parts
 from .recipe import encode_intervals, longest_interval
+from .tracks import TrackGroup
 
 # Of the background's vertices, tried in order (decision 0019).
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)
@@ -49,15 +50,6 @@ class Static:
     frame: int
     payload: bytes
     is_patch: bool
-
-
-@dataclass(frozen=True, slots=True)
-class TrackGroup:
-    """A group of frames of one track."""
-
-    track: int
-    first_frame: int
-    group: EncodedGroup
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, as_sequence, evenly
 from .digests import WriteLines
 from .excerpt import Excerpt, write_survey
-from .interval import Interval, NormalisedFrames
+from .interval import Interval
 from .job import GroupStore, Job
 from .journal import Journal, made_of, opened
 from .metadata import metadata_of, rounded, upright
@@ -45,10 +45,8 @@ from .options import EncoderOptions, PaperOptions
 from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
-from .recipe import encode_intervals, longest_interval
 from .scene import (
     Static,
-    TrackGroup,
     Tracks,
     encode_bodies,
     encode_static,
@@ -56,6 +54,7 @@ from .scene import (
 )
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
+from .tracks import TrackGroup, encode_apart, plan, plan_intervals
 
 QUALITY, PRESET = 50.0, "best"  # the default operating point (decision 0009)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
@@ -201,10 +200,8 @@ def _encode_bodies(job: Job, file: BinaryIO, seen: Survey) -> Summary:
     groups: list[GroupSummary] = []
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped)
     with _writer(job, file, seen) as writer:
-        for encoded in encode_intervals(job, _body_intervals(job, seen)):
-            for group in encoded:
-                each = TrackGroup(0, writer.frame_count, group)
-                groups.append(_added(writer, each, [], seen.diagonal))
+        for encoded in encode_apart(job, seen):
+            groups += [_added(writer, each, [], seen.diagonal) for each in encoded]
         metadata = metadata_of(options, groups, sequence.up, is_part=job.excerpt is not None)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
@@ -264,7 +261,8 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     writer.add_group(each.first_frame, group.frame_count, payload, group.layers, (*static, *before), track)
     key = None if group.key is None else each.first_frame + group.key
     fidelity = group.fidelity.scaled(unit)
-    return GroupSummary(group.form, group.frame_count, len(payload), fidelity, group.predicted, key, track)
+    size, share = len(payload), each.share
+    return GroupSummary(group.form, group.frame_count, size, fidelity, group.predicted, key, track, share)
 
 
 def _measured(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:
@@ -332,12 +330,6 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
 def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
     """Yield the intervals of a sequence, of a scene where there are parts."""
     if parts is None:
-        return _body_intervals(job, surveyed(job))
+        seen = surveyed(job)
+        return plan_intervals(job, seen, plan(job, seen))
     return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))
-
-
-def _body_intervals(job: Job, seen: Survey) -> Iterator[Interval]:
-    """Yield the intervals of a sequence that is no scene."""
-    numbered = seen.intervals(longest_interval(job.options, job.sequence.frame_rate))
-    for numbers in numbered if job.excerpt is None else job.excerpt.of(numbered):
-        yield Interval(NormalisedFrames(job.sequence, seen, numbers), first_frame=numbers.start)

@@ -19,7 +19,8 @@ class GroupSummary:
     fidelity: Fidelity
     predicted: bool = False  # from the group before
     key: int | None = None  # the frame of the sequence whose surface the others follow
-    track: int = 0  # the body of a scene
+    track: int = 0  # the body
+    share: float = 1.0  # of the vertices of its frames that the track has, where there is no background
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,4 +56,4 @@ class Summary:
         """Mean d2_psnr_paper over the frames, dB; of a scene, over the measured frames."""
         if self.scene is not None:
             return self.scene.psnr
-        return sum(group.frame_count * group.fidelity.psnr for group in self.groups) / self.frame_count
+        return sum(group.share * group.frame_count * group.fidelity.psnr for group in self.groups) / self.frame_count
