@@ -11,9 +11,12 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource, FileSource
 from meshreel.container.writer import ReelWriter
+from meshreel.format.layout import Form
+from meshreel.geometry.topology import concatenate
 from meshreel.io.write import write_mesh
 from meshreel.types import Mesh
 from tests.cli.conftest import FILE, SCENE, failed
+from tests.metrics.shapes import moved, sphere
 
 pytestmark = pytest.mark.usefixtures("quick_presets")
 FLAGS = ("--fps", "10", "--key-interval", "0.2", "--dynamic-only")
@@ -53,6 +56,25 @@ def test_parts_join_to_the_bytes_of_the_whole(run, slide, surveyed, tmp_path, co
     assert joined.read_bytes() == whole.read_bytes()
     if count > 1:
         assert all(path.read_bytes() != whole.read_bytes() for path in parts)
+
+
+def test_parts_have_the_tracks_of_the_whole(run, slide, surveyed, tmp_path):
+    """The second of two bodies is gone in the last part."""
+    (folder := tmp_path / "two").mkdir()
+    for number in range(6):
+        gone = [] if number > 3 else [moved(sphere(levels=3), (4 + 0.1 * number, 0, 0))]
+        write_mesh(concatenate([sphere(levels=3), *gone]), folder / f"frame_{number}.ply")
+    survey, whole = tmp_path / "two.json", tmp_path / "whole.reel"
+    assert run("survey", folder, "-o", survey, "--fps", "10").code == 0
+    assert run("encode", folder, "-o", whole, *FLAGS).code == 0
+    parts = [part(run, folder, survey, f"{k}.reel", "--part", f"{k}/3") for k in (1, 2, 3)]
+    joined = ("-o", tmp_path / "joined.reel")
+    assert run("concat", *parts, *joined).code == 0
+    assert joined[1].read_bytes() == whole.read_bytes()
+    with FileSource(parts[2]) as source:
+        assert [group.form == Form.EMPTY for group in ReelReader(source).groups] == [False, True]
+    other = part(run, slide, surveyed, "other.reel", "--part", "1/1")
+    assert failed(run("concat", parts[0], other, *joined), "other.reel: 1 tracks, and", "1.reel has 2", "--survey FILE")
 
 
 def test_frames_that_end_inside_an_interval_join_too_to_other_groups(run, slide, surveyed, tmp_path):
@@ -121,7 +143,7 @@ def test_a_frame_that_has_changed_since_the_survey_is_refused(run, slide, survey
 
 
 @pytest.mark.parametrize(
-    "change", [{"kind": "x"}, {"low": [0, 1]}, {"low": [9, 9, 9]}, {"digests": []}, {"up": None}, None]
+    "change", [{"kind": "x"}, {"low": [0, 1]}, {"low": [9, 9, 9]}, {"digests": []}, {"up": None}, {"pieces": []}, None]
 )
 def test_a_file_that_is_no_survey_is_refused(run, slide, surveyed, tmp_path, change):
     record = json.loads(surveyed.read_bytes())

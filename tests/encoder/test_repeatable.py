@@ -17,13 +17,20 @@ from threadpoolctl import threadpool_info
 
 from meshreel.encoder.digests import Digests, line_of
 from meshreel.encoder.sequence import Encoder
-from meshreel.types import MeshList
+from meshreel.geometry.topology import concatenate
+from meshreel.types import Mesh, MeshList
 from tests.small_bodies import body
 from tests.small_options import quick, with_method
 from tests.small_scene import scene
 
 ROOT = Path(__file__).resolve().parents[2]
-SEQUENCES = {"body": (body(1, 5), "best"), "noisy body": (body(2, 2), "best"), "paper": (body(3, 3), "paper")}
+TWO = [concatenate([a, Mesh(b.vertices + 4, b.faces)]) for a, b in zip(body(1, 2), body(3, 2), strict=True)]
+SEQUENCES = {
+    "body": (body(1, 5), "best"),
+    "noisy body": (body(2, 2), "best"),
+    "two bodies": (TWO, "best"),
+    "paper": (body(3, 3), "paper"),
+}
 PROGRAM = """
 import sys
 from tests.encoder.test_repeatable import encode_all

@@ -116,8 +116,10 @@ def _surveyed(name: str, record: Any) -> Surveyed:
 
 
 def _piece(record: Any) -> Piece:
-    boxes = np.array([record["box"], record["around"]], np.float64)
-    if boxes.shape != (2, 6) or not np.isfinite(boxes).all() or (boxes[:, :3] >= boxes[:, 3:]).all(axis=1).any():
+    boxes, vertices = np.array([record["box"], record["around"]], np.float64), int(record["vertices"])
+    if boxes.shape != (2, 6) or not np.isfinite(boxes).all() or vertices < 1:
         raise ValueError(f"a piece {record}")
+    if (boxes[:, :3] >= boxes[:, 3:]).all(axis=1).any():
+        raise ValueError(f"a piece without extent {record}")
     own, larger = boxes.tolist()
-    return Piece(tuple(own), tuple(larger), int(record["vertices"]))
+    return Piece(tuple(own), tuple(larger), vertices)

@@ -77,7 +77,7 @@ class Totals:
 
 def metadata_of(options: EncoderOptions, groups: Sequence[GroupSummary], up: Up, is_part: bool) -> dict[str, Any]:
     """Return the metadata of a file that is no scene."""
-    totals, keys = Totals.of(groups), [group.key for group in groups if group.key is not None]
+    totals, keys = Totals.of(groups), sorted({group.key for group in groups if group.key is not None})
     found = {"preset": options.preset, "quality": rounded(options.quality), _KEYS: keys, **totals.means}
     return found | upright(up) | ({PART: totals.exact} if is_part else {})
 

@@ -198,7 +198,7 @@ def _encode_bodies(job: Job, file: BinaryIO, seen: Survey) -> Summary:
     """Encode a sequence in which everything may move."""
     sequence, options = job.sequence, job.options
     groups: list[GroupSummary] = []
-    job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped)
+    job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped, seen.pieces)
     with _writer(job, file, seen) as writer:
         for encoded in encode_apart(job, seen):
             groups += [_added(writer, each, [], seen.diagonal) for each in encoded]

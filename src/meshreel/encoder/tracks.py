@@ -86,19 +86,21 @@ def plan_intervals(job: Job, seen: Survey, planned: Plan) -> Iterator[Interval]:
 
 
 def encode_apart(job: Job, seen: Survey) -> Iterator[list[TrackGroup]]:
-    """Yield the groups of each key interval in the order of the file; all tracks have all frames, some of them empty.
+    """Yield the groups of each key interval in the order of the file, whose first frame has number 0.
 
-    The PSNR of a group is that of its whole frames; its other measures are its body's own.
+    All tracks have all frames, some of them empty. The PSNR of a group is that of its whole frames; its other measures
+    are its body's own.
     """
-    planned = plan(job, seen)
+    planned, first = plan(job, seen), 0
     coded = encode_intervals(job, plan_intervals(job, seen, planned))
     for frames, bodies in planned.intervals:
         found, groups = list[TrackGroup](), [next(coded) for _ in bodies]
         psnrs = _psnrs(seen, frames, bodies, groups) if len(bodies) > 1 else None
         for body, some in zip(bodies, groups, strict=True):
-            found += _placed(body, frames.start, some, psnrs)
+            found += _placed(body, first, some, psnrs)
         for track in {*range(planned.tracks)} - {body.track for body in bodies}:
-            found += _placed(Body(track, share=0.0), frames.start, empty_groups(len(frames)), None)
+            found += _placed(Body(track, share=0.0), first, empty_groups(len(frames)), None)
+        first += len(frames)
         yield sorted(found, key=lambda each: (each.first_frame, each.track))
 
 
