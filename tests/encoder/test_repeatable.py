@@ -24,7 +24,7 @@ from tests.small_options import quick, with_method
 from tests.small_scene import scene
 
 ROOT = Path(__file__).resolve().parents[2]
-TWO = [concatenate([a, Mesh(b.vertices + 4, b.faces)]) for a, b in zip(body(1, 2), body(3, 2), strict=True)]
+TWO = [concatenate([mesh, Mesh(4 - 0.75 * mesh.vertices, mesh.faces[:, ::-1])]) for mesh in body(1, 2)]
 SEQUENCES = {
     "body": (body(1, 5), "best"),
     "noisy body": (body(2, 2), "best"),

@@ -290,7 +290,8 @@ def describe(row: dict[str, Any]) -> str:
     """Describe a row in one line: frames, bytes, rate and forms."""
     forms = [group["form"] for group in row["groups"]]
     counted = ", ".join(_count_groups(forms.count(form), form) for form in sorted(set(forms)))
-    scene = "" if row["scene"] is None else _describe_scene(row["scene"])
+    tracks = 1 + max(group["track"] for group in row["groups"])
+    scene = ("" if tracks == 1 else f"{tracks} tracks, ") if row["scene"] is None else _describe_scene(row["scene"])
     before = f", {row['continued']} intervals from before" if row["continued"] else ""
     return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}{counted}{before}"
 
