@@ -176,9 +176,13 @@ def test_preset_paper_has_one_track(tmp_path):
 
 
 def test_the_order_in_which_bodies_are_coded_does_not_matter(two, tmp_path):
+    done: dict[str, int] = {}
     with ThreadPoolExecutor(2) as executor:
-        encoded(TWO, tmp_path / "a.reel", executor=executor)
+        encoded(
+            TWO, tmp_path / "a.reel", executor=executor, progress=lambda stage, count, _: done.update({stage: count})
+        )
     assert (tmp_path / "a.reel").read_bytes() == two[0].read_bytes()
+    assert done["survey"] == done["code"] == done["fit"] == 3  # bodies share a frame
 
 
 @pytest.mark.usefixtures("plainly")

@@ -7,6 +7,7 @@ import pytest
 from meshreel_bench.datasets import SHAPES, Store
 from meshreel_bench.datasets.shapes import MODULE, TEETH, gears, prism
 
+from meshreel.analysis.pieces import bodies_of, pieces_of
 from meshreel.geometry.closest_points import distances
 from meshreel.geometry.inside import winding_inside
 from meshreel.geometry.topology import border_edges, components, face_normals
@@ -46,6 +47,11 @@ def test_gears_touch_at_every_angle_and_never_cut_each_other(frame):
     assert distances(one.vertices, other).min() < 0.01 * MODULE
     assert not winding_inside(other, one.vertices).any() and not winding_inside(one, other.vertices).any()
     assert sum(len(piece.vertices) for piece in (one, other)) == sum(TEETH) * 512
+
+
+def test_each_gear_is_a_body_that_is_coded_apart():
+    found = bodies_of([pieces_of(mesh) for mesh in gears(3)])
+    assert found is not None and [body.tolist() for body in found] == [[0, 1]] * 3
 
 
 def test_shapes_are_sequences_by_name_without_data(tmp_path):

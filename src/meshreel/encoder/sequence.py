@@ -76,8 +76,9 @@ def encode(
 
     `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`, which also takes a frame rate); vertices
     at equal positions are welded. `options` replace quality and preset; make them with `preset_options`. Most of a
-    scene stands still: it becomes a background and bodies. With an executor, intervals are encoded side by side, to
-    the same bytes; memory then holds an interval for each worker and one more. Warns of surface that the file lacks.
+    scene stands still: it becomes a background and bodies. Bodies that never touch are coded apart in any sequence.
+    With an executor, intervals are encoded side by side, to the same bytes; memory then holds an interval for each
+    worker and one more. Warns of surface that the file lacks.
     Raises InputError for frames that cannot be used, before anything is encoded.
 
     The intervals that are done are kept in `NAME.part` beside the output until it is complete. After an encode that was

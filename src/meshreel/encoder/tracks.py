@@ -17,7 +17,7 @@ from jaxtyping import Float64, Int64
 
 from ..analysis.pieces import Piece, around, bodies_of, unlike
 from ..analysis.survey import Survey
-from ..geometry.strict import norm
+from ..geometry.strict import norm, rounded
 from ..metrics.distance import PSNR_CEILING, psnr
 from .forms import EncodedGroup, empty_groups
 from .interval import BodyFrames, Interval, NormalisedFrames
@@ -123,7 +123,7 @@ def _psnrs(
     """Return the d2_psnr_paper of frames from those of their bodies, dB, each relative to its own diagonal."""
     squares = np.zeros(len(frames))  # mean over the vertices, m^2
     for body, some in zip(bodies, groups, strict=True):
-        of_peak = [10 ** (-group.fidelity.psnr / 10) for group in some for _ in range(group.frame_count)]
+        of_peak = [rounded(10 ** (-group.fidelity.psnr / 10)) for group in some for _ in range(group.frame_count)]
         squares += body.share * np.array(of_peak) * np.square(body.diagonals)
     peaks = seen.diagonals[frames.start : frames.stop]
     return np.array([min(psnr(*both), PSNR_CEILING) for both in zip(squares.tolist(), peaks, strict=True)])
