@@ -23,9 +23,10 @@ def quick(
     group_size: int | None = None,
     centers: int | None = None,
     key_interval: float | None = None,
+    effort: str = "normal",
 ) -> EncoderOptions:
     """The preset's options made small; takes what `preset_options` takes."""
-    options = preset_options(preset, quality, basis_size, group_size, centers, key_interval)
+    options = preset_options(preset, quality, basis_size, group_size, centers, key_interval, effort)
     method = options.method
     method = _quick_layers(method) if isinstance(method, LayersOptions) else _quick_paper(method)
     return replace(options, method=method, scene=SceneOptions(SegmentOptions(views=VIEWS)))

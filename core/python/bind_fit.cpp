@@ -53,7 +53,9 @@ public:
                        double anchor, double tolerance, int iterations, bool turn) {
         expect(are_vectors(rest, vertices_) && are_vectors(place, vertices_) && are_vectors(start, vertices_));
         expect(gates.shape(0) == smoothing.shape(0) && gates.shape(0) == strides.shape(0));
-        const mr_fit_rounds rounds{gates.shape(0), gates.data(), smoothing.data(), strides.data(), agreement, anchor, tolerance, iterations, turn};
+        const mr_fit_rounds rounds{gates.shape(0), gates.data(), smoothing.data(),
+                                   strides.data(), agreement,    anchor,
+                                   tolerance,      iterations,   turn};
         Buffer<double> positions(start.data(), 3 * vertices_);
         check(mr_fit(fitted_.get(), &target.view(), &rounds, rest.data(), place.data(), positions.data()));
         return positions.shaped(vertices_, 3);
@@ -85,8 +87,8 @@ void bind_fit(nb::module_& m) {
              "tree"_a, "positions"_a, "faces"_a, "normals"_a, "inside"_a, "points"_a, "point_normals"_a, "outward"_a);
     nb::class_<FitTemplate>(m, "FitTemplate", "Connectivity of a mesh that is fitted to frames.")
         .def(nb::init<In<int32_t, 2>, size_t>(), "faces"_a, "vertices"_a)
-        .def("fit", &FitTemplate::fit, "target"_a, "rest"_a, "place"_a, "start"_a, "gates"_a, "smoothing"_a, "strides"_a,
-             "agreement"_a, "anchor"_a, "tolerance"_a, "iterations"_a, "turn"_a,
+        .def("fit", &FitTemplate::fit, "target"_a, "rest"_a, "place"_a, "start"_a, "gates"_a, "smoothing"_a,
+             "strides"_a, "agreement"_a, "anchor"_a, "tolerance"_a, "iterations"_a, "turn"_a,
              "The positions of a fit that begins at `start`, keeps the shape of `rest` and stays near `place`.")
         .def("turned_laplacian", &FitTemplate::turned_laplacian, "rest"_a, "now"_a,
              "Laplacian coordinates of `rest`, turned as each neighbourhood turns from `rest` to `now`.");

@@ -107,8 +107,8 @@ private:
         for (size_t f = 0; f < fitted_.faces.size(); f += stride) {
             const auto& face = fitted_.faces[f];
             const Vec middle = (1.0 / 3.0) * (at(face[0]) + at(face[1]) + at(face[2]));
-            towards(middle, face_normals_[f], static_cast<int32_t>(f), {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}, 0.5 * share, gate,
-                    sees_[fitted_.count + f]);
+            towards(middle, face_normals_[f], static_cast<int32_t>(f), {1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0}, 0.5 * share,
+                    gate, sees_[fitted_.count + f]);
         }
     }
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
-from meshreel.analysis.groups import GroupOptions, cut_at, leading
+from meshreel.analysis.groups import GroupOptions, cut_at
 from meshreel.analysis.survey import survey
 from meshreel.types import Mesh, MeshList
 
@@ -55,19 +54,3 @@ def test_a_group_is_cut_where_its_frames_stop_being_followed():
 
 def test_small_residuals_never_cut_however_uneven():
     assert cut_at(np.array([0.01, 0.01, 0.9]), GroupOptions()) is None
-
-
-MIDDLING = np.array([0.9] * 4 + [1.4] * 3 + [0.9] * 3)  # none is lost; three leave 1.15 squared targets more
-
-
-@pytest.mark.parametrize(("worth", "cut"), [(0.34, 4), (0.35, None), (np.inf, None)])
-def test_a_cut_must_be_worth_a_group_more(worth, cut):
-    assert cut_at(MIDDLING, GroupOptions(worth=worth)) == cut
-
-
-def test_a_template_is_kept_until_a_frame_is_lost_or_a_new_one_is_worth_a_group():
-    assert leading(MIDDLING, 0.9, GroupOptions()) == 10
-    assert leading(MIDDLING, 0.9, GroupOptions(worth=0.2)) == 5  # 1.15 squared targets a frame from the fifth on
-    assert leading(np.array([0.9, 0.9, 2.1, 0.9]), 0.9, GroupOptions()) == 2
-    assert leading(np.array([2.1, 0.9]), 0.9, GroupOptions()) == 0
-    assert leading(np.array([2.1, 2.3]), 1.2, GroupOptions()) == 2  # usual is more than the target here

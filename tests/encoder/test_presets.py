@@ -6,8 +6,9 @@ from itertools import pairwise
 
 import pytest
 
+from meshreel.analysis.plan import PlanOptions
 from meshreel.encoder.options import EncoderOptions, LayersOptions, PaperOptions
-from meshreel.encoder.presets import PRESETS, displacement_step, preset_options, reference_vertices
+from meshreel.encoder.presets import EFFORTS, PRESETS, displacement_step, preset_options, reference_vertices
 from meshreel.errors import InputError
 
 
@@ -59,10 +60,24 @@ def test_a_key_interval_out_of_range_is_refused(seconds):
         preset_options(key_interval=seconds)
 
 
-@pytest.mark.parametrize("keys", [0, -1, 6])
-def test_a_number_of_keys_outside_1_to_5_is_refused(keys):
-    with pytest.raises(InputError, match=f"{keys} keys: give 1 to 5"):
-        LayersOptions(keys=keys)
+@pytest.mark.parametrize("wrong", [{"limit": 0.9}, {"worth": 0.0}, {"alone": -1.0}, {"keys": 0}, {"misses": 0}])
+def test_plans_that_make_no_sense_are_refused(wrong):
+    with pytest.raises(InputError, match="give >= 1"):
+        PlanOptions(**wrong)
+
+
+def test_less_effort_tries_fewer_keys_with_fewer_samples_and_the_default_is_normal():
+    fast, normal, thorough = (preset_options(effort=effort).method for effort in EFFORTS)
+    assert fast.plan.keys < normal.plan.keys < thorough.plan.keys
+    assert fast.embedded.samples < normal.embedded.samples and fast.tails is None
+    assert preset_options().method == normal and fast.layers == normal.layers == thorough.layers
+
+
+def test_an_effort_that_is_unknown_or_not_of_the_preset_is_refused():
+    with pytest.raises(InputError, match="no effort is called 'lazy'; known: fast, normal, thorough"):
+        preset_options(effort="lazy")
+    with pytest.raises(InputError, match="effort fast: preset `paper` has one effort"):
+        preset_options("paper", effort="fast")
 
 
 def test_many_centers_bring_the_samples_they_need():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import meshreel
+from meshreel.analysis.fit import closeness
 from meshreel.analysis.follow.embedded import EmbeddedOptions
 from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.coding.layers.patches import decode_patches
@@ -160,8 +161,8 @@ def meshes(positions: np.ndarray, faces: np.ndarray) -> list[Mesh]:
 def options(**changes: object) -> EncoderOptions:
     """`best`, all frames in one group."""
     best = preset_options("best", 40.0, group_size=4)
-    groups = replace(best.method.groups, limit=1e6, tolerance=1e6, worth=1e6)
-    return with_method(best, groups=groups, target=Fidelity(0.01, 90.0, 0.01), **changes)
+    plan = replace(best.method.plan, limit=1e6, worth=1e6)
+    return with_method(best, plan=plan, target=Fidelity(0.01, 90.0, 0.01), **changes)
 
 
 @pytest.fixture(scope="module")
@@ -171,8 +172,9 @@ def sequence() -> MeshList:
     return MeshList((both(frames[0], knob()), *frames[1:]))
 
 
-def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path) -> None:
+def test_a_file_has_the_layer_where_it_pays_and_plays_without_it(sequence: MeshList, tmp_path, monkeypatch) -> None:
     patient = EmbeddedOptions(lost=1.0)  # else the frame with the knob is a group of its own
+    monkeypatch.setattr(closeness, "WRONG", 1.0)
     encode(sequence, tmp_path / "with.reel", options=options(embedded=patient))
     patched = meshreel.open(tmp_path / "with.reel")
     assert payload_bytes_by_purpose(patched.reader.read_chunk(0))["patches"] > 0

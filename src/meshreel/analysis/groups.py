@@ -5,7 +5,6 @@ In -> out: the symmetric residual of each frame's fit -> the frame before which 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,19 +15,16 @@ from ..errors import InputError
 
 @dataclass(frozen=True, slots=True)
 class GroupOptions:
-    """Conditions under which a group is cut in two; the defaults are guesses, `best` sets those of decision 15."""
+    """Conditions under which a group of the paper's recipe is cut in two; the defaults are guesses."""
 
     limit: float = 2.0  # a frame is lost if its residual is larger than this many times the target
     tolerance: float = 2.0  # or larger than the target and than this many times the group's median
     depth: int = 1  # largest number of nested cuts; frames that are lost after them are coded one by one
-    worth: float = math.inf  # mean squared residual over a group, in squared targets, that is worth another group
 
     def __post_init__(self) -> None:
-        if self.limit < 1 or self.tolerance < 1 or self.depth < 0 or not self.worth > 0:
-            raise InputError(
-                f"group limit {self.limit:g}, tolerance {self.tolerance:g}, depth {self.depth}, worth {self.worth:g}: "
-                "give >= 1, >= 1, >= 0, > 0"
-            )
+        if self.limit < 1 or self.tolerance < 1 or self.depth < 0:
+            text = f"group limit {self.limit:g}, tolerance {self.tolerance:g}, depth {self.depth}"
+            raise InputError(f"{text}: give >= 1, >= 1, >= 0")
 
 
 def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int | None:
@@ -38,29 +34,11 @@ def cut_at(residuals: Float64[np.ndarray, " T"], options: GroupOptions) -> int |
     alike (least squares on their logarithms), which separates frames that are followed well from those that are not.
     """
     limit = min(options.limit, max(1.0, options.tolerance * float(np.median(residuals))))
-    if len(residuals) < 2 or (residuals.max() <= limit and _excess(residuals).mean() <= options.worth):
+    if len(residuals) < 2 or residuals.max() <= limit:
         return None
     logs = np.log(np.clip(residuals, 1e-6, 1e6))
     spread = [_scatter(logs[:cut]) + _scatter(logs[cut:]) for cut in range(1, len(logs))]
     return 1 + int(np.argmin(spread))
-
-
-def leading(residuals: Float64[np.ndarray, " T"], usual: float, options: GroupOptions) -> int:
-    """Return how many of the first frames a template still follows.
-
-    It stops at the first lost frame, or when the squared residuals beyond `usual`, which it left so far, are worth a
-    new group. Residuals are in units of the distance to reach.
-    """
-    lost = residuals > options.limit * max(usual, 1.0)
-    spent = np.cumsum(np.maximum(residuals**2 - usual**2, 0.0)) > options.worth * len(residuals)
-    stop = np.flatnonzero(lost | spent)
-    return int(stop[0]) if len(stop) else len(residuals)
-
-
-def _excess(residuals: Float64[np.ndarray, " T"]) -> Float64[np.ndarray, " T"]:
-    """Return squared residuals beyond those of the better half of the frames, which any template would leave, too."""
-    usual = np.median(np.sort(residuals)[: (len(residuals) + 1) // 2])
-    return np.maximum(residuals**2 - usual**2, 0.0)
 
 
 def _scatter(values: Float64[np.ndarray, " n"]) -> float:

@@ -40,6 +40,9 @@ class Coding:
 
     preset: Literal["best", "paper"] = "best"
     """`best` needs the fewest bits for its quality; `paper` is section 3 of the TSMC paper."""
+    effort: Literal["fast", "normal", "thorough"] = "normal"
+    """`fast` encodes in half the time, at a rate within a few per cent; `thorough` tries more templates. Preset `best`
+    only."""
     quality: float | None = None
     """0 (small) to 100 (fine); 50 if neither it nor a target is given."""
     target_psnr: float | None = None
@@ -71,7 +74,13 @@ class Coding:
     def options(self, quality: float) -> EncoderOptions:
         """Return the options at a quality. Raises InputError if a value is out of range or not of the preset."""
         return preset_options(
-            self.preset, quality, self.basis_size, self.group_size, self.centers, key_interval=self.key_interval
+            self.preset,
+            quality,
+            self.basis_size,
+            self.group_size,
+            self.centers,
+            key_interval=self.key_interval,
+            effort=self.effort,
         )
 
 

@@ -7,7 +7,7 @@ group. What is known of a candidate stays with it, so that no frame is tracked o
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64
@@ -67,8 +67,18 @@ class Followed:
 class Candidate:
     """A template that is followed outward from its key, the frame on which it lies, for as long as it fits."""
 
-    def __init__(self, window: Window, key: int, options: LayersOptions, before: Followed | None = None) -> None:
-        """Take the template of a key frame in the window, or that of the group `before` the window."""
+    def __init__(
+        self,
+        window: Window,
+        key: int,
+        options: LayersOptions,
+        before: Followed | None = None,
+        tracker: Tracker | None = None,
+    ) -> None:
+        """Take the template of a key frame in the window, or that of the group `before` the window.
+
+        `tracker` is that of another template of the same key.
+        """
         self.key, self.before, self._options, self._noise = key, before, options, window.noise
         self._fits, self._residuals = dict[int, Float64[np.ndarray, "V 3"]](), dict[int, float]()
         self._ends = dict[int, int]()  # by side, the frame where the template is lost
@@ -78,12 +88,25 @@ class Candidate:
             self._take(before.reference, before.positions, before.closeness)
             self._rest, self._usual = before.positions, before.residual
             return
-        self._tracker = Tracker(window.at(key).mesh, key, options.embedded, window.noise)
+        self._tracker = tracker or Tracker(window.at(key).mesh, key, options.embedded, window.noise)
         if window.noise == 0 or not self._lay_fused(window):
             self._lay(window)
 
+    def others(self, window: Window) -> list[Candidate]:
+        """Return templates of the same key with other errors, followed through the window, where these are tried."""
+        if self.before is not None:
+            return []
+        o, found = self._options, list[Candidate]()
+        for error in o.errors:
+            options = replace(o, template=replace(o.template, error=error * o.template.error), errors=())
+            found.append(Candidate(window, self.key, options, tracker=self._tracker))
+            found[-1].follow(window)
+        return found
+
     def follow(self, window: Window) -> None:
         """Track and fit the frames of the window on both sides of the key, up to one that is lost."""
+        if self._usual == np.inf:
+            return  # nothing is left of the key's surface as it would be coded
         for side in (LATER, EARLIER):
             for number in self._tracked(window, side):
                 if number not in self._residuals:
@@ -96,6 +119,12 @@ class Candidate:
         """Return the residuals on the window's frames, in units of the distance to reach; infinite where it is lost."""
         found = np.array([self._residuals.get(number, np.inf) for number in window.numbers])
         return np.where(found <= self._limit(window), found / window.target.distance, np.inf)
+
+    def follows(self, window: Window, numbers: range) -> bool:
+        """Return whether none of these frames is lost."""
+        return bool(
+            np.isfinite(self.residuals(window)[numbers.start - window.first : numbers.stop - window.first]).all()
+        )
 
     def fit(self, window: Window, numbers: range) -> Float64[np.ndarray, "T V 3"]:
         """Return the final fits to successive frames that it follows: near what one shape explains."""

@@ -27,7 +27,9 @@ from .target import target_of
 
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
 NOISY_KEYS = 2  # keys tried at most under noise: the fused template completes them (decision 16)
-EXCHANGE = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 0013)
+BY_RATE = 1.33  # the squared error falls with this power of the rate: 4 dB a doubling (decision 0013)
+ANGLE_BY_RATE = 0.36  # the normal error falls with this power of the rate (measured on four bodies: decision 0024)
+LEAST = 1e-30  # error: its logarithm is finite
 Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that the next may begin with
 
 
@@ -131,9 +133,15 @@ class _Planner:
     def _piece(self, window: Window, piece: Piece, candidate: Candidate | None) -> Coded:
         """Code a piece of a plan, or the first of its frames."""
         coder = self._coder(window, slice(piece.first, piece.stop))
-        if candidate is None or candidate.reference is None:
+        if candidate is None:
             return coder.alone(), None
         numbers = window.numbers[piece.first : piece.stop]
+        tried = [candidate, *(one for one in candidate.others(window) if one.follows(window, numbers))]
+        coded = [self._with(window, numbers, coder, one) for one in tried]
+        return min(coded, key=lambda one: _cost([one], len(numbers)))
+
+    def _with(self, window: Window, numbers: range, coder: GroupCoder, candidate: Candidate) -> Coded:
+        """Code successive frames with a template."""
         positions = candidate.fit(window, numbers)
         note(window.digests, "fit", positions)
         previous = candidate.before.state if candidate.before else None
@@ -155,9 +163,14 @@ def _known(window: Window, candidates: Sequence[Candidate]) -> tuple[Float64[np.
 
 
 def _cost(coded: Sequence[Coded], frames: int) -> float:
-    """Return the logarithm of error and rate, exchanged; infinite where groups hold not all of the frames."""
+    """Return the logarithm of the rate at equal errors; infinite where groups hold not all of the frames.
+
+    Distances and normals count half each: both fall when the rate rises.
+    """
     groups = [group for group, _ in coded]
     if sum(group.frame_count for group in groups) < frames:
         return math.inf
     squared = sum(group.frame_count * group.fidelity.distance**2 for group in groups) / frames
-    return math.log(max(squared, 1e-30)) + EXCHANGE * math.log(sum(len(group.payload) for group in groups))
+    angle = sum(group.frame_count * group.fidelity.angle for group in groups) / frames
+    errors = math.log(max(squared, LEAST)) / BY_RATE + math.log(max(angle, LEAST)) / ANGLE_BY_RATE
+    return math.log(sum(len(group.payload) for group in groups)) + errors / 2

@@ -63,6 +63,7 @@ class LayersOptions:
     fused: FusedOptions = field(default_factory=FusedOptions)
     fit: FitOptions = FitOptions(strides=(4, 3, 2, 1), restart=False, pull=0.3, second_smoothing=0.7)
     plan: PlanOptions = PlanOptions()
+    errors: tuple[float, ...] = ()  # of a key's further templates, which are tried: times `template.error`
     layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
     tails: TailOptions | None = field(default_factory=TailOptions)  # None: no patches
     displacements: DisplacementOptions = field(default_factory=DisplacementOptions)  # where layers miss the target

@@ -52,7 +52,11 @@ def preset_options(
         raise InputError(f"effort {effort}: preset `{preset}` has one effort; use preset `best`")
     if preset != "best" and key_interval is not None:
         raise InputError(f"key interval {key_interval:g}: groups of preset `{preset}` all decode on their own")
-    method = layers_options(float(quality), effort) if preset == "best" else paper_options(float(quality), centers, basis_size)
+    method = (
+        layers_options(float(quality), effort)
+        if preset == "best"
+        else paper_options(float(quality), centers, basis_size)
+    )
     if group_size is not None:
         method = replace(method, group_size=group_size)
     options = EncoderOptions(method, quality=float(quality))
@@ -101,8 +105,8 @@ def _fast(options: LayersOptions) -> LayersOptions:
 
 
 def _thorough(options: LayersOptions) -> LayersOptions:
-    """Return options with more keys, tried also where a plan is good already (decision 24)."""
-    return replace(options, plan=replace(options.plan, keys=8, misses=3, settled=0.25, gain=0.05))
+    """Return options with more keys, tried also where a plan is good already, and more templates (decision 24)."""
+    return replace(options, plan=replace(options.plan, keys=8, misses=3, settled=0.25, gain=0.05), errors=(0.8, 1.25))
 
 
 def motion_step(quality: float) -> float:

@@ -56,7 +56,7 @@ from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_apart, plan, plan_intervals
 
-QUALITY, PRESET = 50.0, "best"  # the default operating point (decision 0009)
+QUALITY, PRESET, EFFORT = 50.0, "best", "normal"  # the default operating point (decision 0009)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
 
@@ -67,6 +67,7 @@ def encode(
     quality: float = QUALITY,
     preset: str = PRESET,
     *,
+    effort: str = EFFORT,
     options: EncoderOptions | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -75,10 +76,10 @@ def encode(
     """Encode meshes as a .reel file at `path`, also a URL (extra `remote`); it appears only when it is complete.
 
     `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`, which also takes a frame rate); vertices
-    at equal positions are welded. `options` replace quality and preset; make them with `preset_options`. Most of a
-    scene stands still: it becomes a background and bodies. Bodies that never touch are coded apart in any sequence.
-    With an executor, intervals are encoded side by side, to the same bytes; memory then holds an interval for each
-    worker and one more. Warns of surface that the file lacks.
+    at equal positions are welded. `effort` is `fast`, `normal` or `thorough`. `options` replace quality, preset and
+    effort; make them with `preset_options`. Most of a scene stands still: it becomes a background and bodies. Bodies
+    that never touch are coded apart in any sequence. With an executor, intervals are encoded side by side, to the same
+    bytes; memory then holds an interval for each worker and one more. Warns of surface that the file lacks.
     Raises InputError for frames that cannot be used, before anything is encoded.
 
     The intervals that are done are kept in `NAME.part` beside the output until it is complete. After an encode that was
@@ -86,10 +87,10 @@ def encode(
     InputError where there is something to continue.
     """
     if options is None:
-        options = preset_options(preset, quality)
-    elif (quality, preset) != (QUALITY, PRESET):
-        text = f"options and quality {quality:g}, preset {preset!r}: options already have both"
-        raise InputError(f"{text}; leave quality and preset out, or give preset_options(preset, quality) as options")
+        options = preset_options(preset, quality, effort=effort)
+    elif (quality, preset, effort) != (QUALITY, PRESET, EFFORT):
+        text = f"options and quality {quality:g}, preset {preset!r}, effort {effort!r}: options already have them"
+        raise InputError(f"{text}; leave these out, or give preset_options(preset, quality, effort=effort) as options")
     summary = Encoder(Welded(as_sequence(sequence)), executor, progress).encode(path, options, resume)
     for text in summary.warnings:
         warnings.warn(text, stacklevel=2)

@@ -29,7 +29,9 @@ def in_the_core(
     template = _core.FitTemplate(mesh.faces, len(mesh.vertices))
     gates, smoothing = np.full(rounds, GATE), np.full(rounds, SMOOTHING)
     target = FrameSurface(frame).target
-    return template.fit(target, rest, place, mesh.vertices, gates, smoothing, all_points(len(gates)), LEAST, ANCHOR, 1e-7, 400, turn)
+    return template.fit(
+        target, rest, place, mesh.vertices, gates, smoothing, all_points(len(gates)), LEAST, ANCHOR, 1e-7, 400, turn
+    )
 
 
 @pytest.mark.parametrize(

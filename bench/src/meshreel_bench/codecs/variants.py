@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from meshreel.encoder.options import EncoderOptions, LayersOptions, SceneOptions
+from meshreel.encoder.presets import preset_options
 from meshreel.errors import InputError
 
 Change = Callable[[EncoderOptions], EncoderOptions]
@@ -31,6 +32,7 @@ def _background_from_meshes(options: EncoderOptions) -> EncoderOptions:
 
 
 VARIANTS: dict[str, Change] = {
+    "fast": lambda options: preset_options(options.preset, options.quality, effort="fast"),
     "no shared detail": _layers(lambda o: replace(o, fit=replace(o.fit, components=0))),
     "middle key, no cuts": _layers(lambda o: replace(o, plan=replace(o.plan, keys=1, limit=1e9, worth=1e9))),
     "flat midpoints": _layers(lambda o: replace(o, layers=replace(o.layers, curvatures=(0,)))),

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from . import apart, backgrounds, correspondence, fused, procedural, tails, templates, views
+from . import backgrounds, correspondence, fused, procedural, tails, templates, views
 from .rows import Row, Sources, replace_rows
 from .tables import write_tables
 
@@ -22,7 +22,6 @@ MEASURE: dict[str, Callable[[Sources], Iterable[Row]]] = procedural.MEASURE | {
     "fused": fused.measure,
     "views": views.measure,
     "backgrounds": backgrounds.measure,
-    "apart": apart.measure,
 }
 
 

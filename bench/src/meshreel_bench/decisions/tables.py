@@ -128,16 +128,6 @@ COLUMNS: dict[str, Columns] = {
         "> normals, degrees": "{normal_error_deg:.1f}",
         "> CPU s": "{cpu_s:.0f}",
     },
-    "apart": {
-        "frames": "{sequence}",
-        "way": "{way}",
-        "> Mbps": "{mbps:.4f}",
-        "> d2 (paper), dB": "{d2_psnr_paper:.2f}",
-        "> symmetric, dB": "{symmetric_psnr:.2f}",
-        "> normals, degrees": "{normal_error_deg:.2f}",
-        "> CPU s a frame": "{cpu_s_per_frame:.2f}",
-        "> finding pieces, ms a frame": "{pieces_ms:.1f}",
-    },
 }
 
 

@@ -8,22 +8,13 @@ from __future__ import annotations
 from math import log2
 
 from ..names import BEST, DECIMATED
-from .study import D2, NORMALS, Bound, NoMore, Promise, Reaches, Study, Sweep, Which, at_most
+from .study import D2, NORMALS, Bound, Gains, NoMore, Promise, Reaches, Study, Sweep, Values, Which, at_most
 
 DEFAULT = 50.0  # quality
 # CPU s a frame of an encode at the default quality: at most, and the aim.
 BODY, HARD = (1.3, "1"), (2.5, "1.5")
-LIMITS = {
-    "dancer": BODY,
-    "prism": (0.2, ""),
-    "gears": (1.5, ""),
-    "basketball_player": HARD,
-    "crane": BODY,
-    "living_room": HARD,
-    "mitch": BODY,
-    "room2": HARD,
-    "dancer160k": (6.0, ""),
-}
+LIMITS = {"dancer": BODY, "prism": (0.2, ""), "gears": (1.5, ""), "basketball_player": HARD, "crane": BODY}
+LIMITS |= {"living_room": HARD, "mitch": BODY, "room2": HARD, "dancer160k": (6.0, "")}
 EFFICIENCY = {8: 0.97, 32: 0.9, 100: 0.9}  # of an encode of an hour of frames, at least, by workers
 DRACO = {"fraction": 0.1, "qp": 10}  # a little worse than the default quality in D2
 TOGETHER, OF_FOUR = "synthetic4", {35.0: (5.0, "4"), 60.0: (6.0, "5"), 85.0: (7.0, "6")}  # by quality
@@ -31,6 +22,9 @@ LEAST = min(OF_FOUR)
 # Diagonals of the boxes of ten frames, m: a quality is a step in these, and 25 of quality halve the step.
 DIAGONALS = {"dancer": 2.197, "basketball_player": 2.131, "mitch": 2.284, "crane": 2.164}
 DIAGONAL_OF_FOUR = 4.559
+AROUND = (40.0, DEFAULT, 60.0)  # qualities, for a curve
+OTHERS: dict[str, Values] = {TOGETHER: {"quality": tuple(OF_FOUR)}, "dancer": {"quality": AROUND}}
+FAST = Which("dancer", f"{BEST}, fast", {"quality": DEFAULT})
 # Qualities at which each body alone has the step, in metres, that it has among the four at the least quality.
 ALONE = {body: round(LEAST - 25 * log2(DIAGONAL_OF_FOUR / own), 1) for body, own in DIAGONALS.items()}
 
@@ -64,6 +58,8 @@ PROMISES: tuple[Promise, ...] = (
         )
         for frames in (60, 120)
     ),
+    Reaches("dancer, fast: encode", FAST, (at_most("encode_s_at_rest", 0.5, "CPU s/frame"),), "0.25"),
+    Gains("dancer", FAST.curve, (BEST,), (D2, NORMALS), 3.0),
     Reaches("dancer: decode", _which("dancer"), (at_most("decode_ms_at_rest", 0.35, "ms"),), "0.2"),
     NoMore(
         "dancer: decode against decimated Draco that is no better in D2",
@@ -77,7 +73,8 @@ STUDY = Study(
     title="Speed",
     sequences=(*LIMITS, TOGETHER),
     sweeps=(
-        Sweep("meshreel", {"quality": (DEFAULT,)}, {"preset": "best"}, {TOGETHER: {"quality": tuple(OF_FOUR)}}),
+        Sweep("meshreel", {"quality": (DEFAULT,)}, {"preset": "best"}, OTHERS),
+        Sweep("meshreel", {"quality": AROUND}, {"preset": "best", "variant": "fast"}, only=("dancer",)),
         *(
             Sweep("meshreel", {}, {"preset": "best", "quality": q}, only=(body,), small={"quality": DEFAULT}, frames=10)
             for body, q in ALONE.items()

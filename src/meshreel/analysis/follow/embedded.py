@@ -60,10 +60,7 @@ class EmbeddedOptions:
     agreement: float = 0.3  # smallest cosine between the normals of a pair
     torn: tuple[float, float] = (0.5, 0.15)  # an edge off by this share of its length counts a quarter; try, retry
     doubt: float = 0.0005  # a frame with a larger, unusual residual is retried: other starts, edges that tear sooner
-    rekeyed: float = 0.0015  # another key is tried if a residual is larger
     lost: float = 0.004  # a frame with a larger residual is lost: no surface fit would recover it
-    settled: float = 0.0005  # smaller median residuals count as this much, about the effect of noise
-    uneven: float = 1.8  # another key is tried if a residual is larger than this many times the median
     damping: float = 0.01  # squared row weight of a node's step relative to its data
     iterations: int = 60  # largest number of conjugate-gradient iterations per round
     tolerance: float = 1e-2  # relative residual at which they stop
@@ -81,18 +78,12 @@ class EmbeddedOptions:
             raise InputError(f"agreement {self.agreement} is a cosine: give at least -1 and less than 1")
         if not (self.damping > 0 and 0 <= self.tolerance < 1):
             raise InputError(f"damping {self.damping}, tolerance {self.tolerance}: give > 0, and 0 to 1")
-        if not (min(self.torn) > 0 and min(self.doubt, self.rekeyed, self.lost, self.settled, self.uneven) >= 0):
-            raise InputError(
-                f"torn {self.torn}, doubt {self.doubt}, rekeyed {self.rekeyed}, lost {self.lost}, "
-                f"settled {self.settled}, uneven {self.uneven}: give > 0, and >= 0 for the others"
-            )
+        if not (min(self.torn) > 0 and min(self.doubt, self.lost) >= 0):
+            raise InputError(f"torn {self.torn}, doubt {self.doubt}, lost {self.lost}: give > 0, >= 0, >= 0")
 
     def limits(self, noise: float) -> ResidualLimits:
-        """Return the limits for frames at this RMS distance from the truth; with noise no key is in doubt."""
-        if noise == 0:
-            return ResidualLimits(self.doubt, self.rekeyed, self.lost, self.settled, self.uneven)
-        lost = math.hypot(self.lost, LOST * noise)
-        return ResidualLimits(math.hypot(self.doubt, noise), lost, lost, math.hypot(self.settled, noise), math.inf)
+        """Return the limits for frames at this RMS distance from the truth."""
+        return ResidualLimits(math.hypot(self.doubt, noise), math.hypot(self.lost, LOST * noise))
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,10 +91,7 @@ class ResidualLimits:
     """Residuals at which tracking is repeated or given up, as in EmbeddedOptions, for frames of known noise."""
 
     doubt: float
-    rekeyed: float
     lost: float
-    settled: float
-    uneven: float
 
 
 class Tracker:

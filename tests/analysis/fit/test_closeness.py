@@ -1,0 +1,67 @@
+"""Closeness: distances of samples of both surfaces, and templates that are wrong though they are near."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from meshreel.analysis.fit.closeness import Closeness
+from meshreel.analysis.fit.frame import FrameSurface
+from meshreel.capture.procedural import sliding_sphere
+from meshreel.types import Mesh
+
+BALL = Mesh.of(sliding_sphere(1)[0].vertices / 12**0.5, sliding_sphere(1)[0].faces)  # diagonal 1
+RADIUS = float(np.linalg.norm(BALL.vertices[0]))
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    begins = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + begin for mesh, begin in zip(meshes, begins[:-1], strict=True)]
+    return Mesh.of(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def closeness(template: Mesh, frame: Mesh, noise: float = 0.0) -> float:
+    """Of a template that lies well on another frame before."""
+    measure = Closeness(template.faces, template.vertices, noise)
+    assert measure.of(template.vertices, FrameSurface(template)) < 1e-6
+    return measure.of(template.vertices, FrameSurface(frame))
+
+
+def test_the_distance_is_that_of_parallel_surfaces():
+    larger = Mesh.of(BALL.vertices * (1 + 0.001 / RADIUS), BALL.faces)
+    assert closeness(BALL, larger) == pytest.approx(0.001, rel=0.02)
+    assert closeness(larger, BALL) == pytest.approx(0.001, rel=0.02)
+
+
+def test_a_template_that_lacks_surface_is_wrong_and_so_is_one_with_more():
+    speck = Mesh.of(0.25 * BALL.vertices + [0.5, 0, 0], BALL.faces)  # a sixteenth of the area
+    assert closeness(BALL, joined(BALL, speck)) == np.inf
+    assert closeness(joined(BALL, speck), BALL) == np.inf
+
+
+def test_a_template_turned_inside_out_is_wrong_though_it_is_near():
+    thin = BALL.vertices * [1, 1, 0.004]  # a disc, 2 mm thick for a diagonal of 1 m
+    swapped = thin * [1, 1, -1]  # its upper side below
+    disc = Mesh.of(thin, BALL.faces)
+    measure = Closeness(BALL.faces, thin, 0.0)
+    assert measure.of(thin, FrameSurface(disc)) < 1e-6
+    assert np.abs(swapped - thin).max() < 0.003 and measure.of(swapped, FrameSurface(disc)) == np.inf
+
+
+def test_surfaces_that_face_each_other_in_every_frame_are_not_wrong():
+    inner = Mesh.of(0.999 * BALL.vertices, BALL.faces[:, ::-1])  # a shell: each side is nearest to the other
+    shell = joined(BALL, inner)
+    moved = joined(BALL, Mesh.of(0.9985 * BALL.vertices, BALL.faces[:, ::-1]))
+    measure = Closeness(shell.faces, moved.vertices, 0.0)
+    first = measure.of(moved.vertices, FrameSurface(shell))
+    assert first < 0.001 and measure.of(moved.vertices * 1.0001, FrameSurface(shell)) < 0.001
+
+
+def test_holes_and_strays_of_noisy_frames_do_not_count():
+    half = Mesh.of(BALL.vertices, BALL.faces[: len(BALL.faces) // 2])
+    assert closeness(BALL, half, noise=0.001) < 1e-3 < 0.05 < np.sqrt(np.mean(np.square(gaps(BALL, half))))
+
+
+def gaps(mesh: Mesh, other: Mesh) -> np.ndarray:
+    surface = FrameSurface(other).surface
+    return np.linalg.norm(surface.closest(mesh.vertices).points - mesh.vertices, axis=1)
