@@ -148,7 +148,7 @@ def test_flags_default_to_the_defaults_of_the_options():
     code = preset_options()
     assert replace(defaults["reading"].options(), weld=None) == SequenceOptions()
     coding = asdict(defaults["coding"])
-    assert coding.pop("preset") == code.preset == "best"
+    assert coding.pop("preset") == code.preset == "best" and coding.pop("effort") == "normal"
     assert set(coding.values()) == {None}  # chosen by the preset
     assert defaults["coding"].options(code.quality) == code
 

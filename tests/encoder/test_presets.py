@@ -66,6 +66,12 @@ def test_plans_that_make_no_sense_are_refused(wrong):
         PlanOptions(**wrong)
 
 
+@pytest.mark.parametrize("wrong", [{"measured": 0}, {"measured": -1}, {"errors": (0.0,)}, {"errors": (0.8, -1.0)}])
+def test_searches_that_make_no_sense_are_refused(wrong):
+    with pytest.raises(InputError, match="give frames >= 1, and factors > 0"):
+        LayersOptions(**wrong)
+
+
 def test_less_effort_tries_fewer_keys_with_fewer_samples_and_the_default_is_normal():
     fast, normal, thorough = (preset_options(effort=effort).method for effort in EFFORTS)
     assert fast.plan.keys < normal.plan.keys < thorough.plan.keys

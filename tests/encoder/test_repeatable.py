@@ -108,7 +108,7 @@ def test_lines_of_digests_name_each_stage_in_the_order_of_the_file(tmp_path: Pat
     rows = [json.loads(line) for line in "".join(lines).splitlines()]
     assert [row.get("frame") for row in rows if row["stage"] == "payload"] == [0, 1]
     stages = [row["stage"] for row in rows if row.get("frame") == 1]
-    wanted = {"frames", "key and motion", "template, coded", "fit", "fields and symbols"}
+    wanted = {"frames", "template, coded", "first fit", "plans", "fit", "fields and symbols"}
     wanted |= {"patches", "fidelity", "payload"}
     assert set(stages) == wanted
     assert (stages[0], stages[-1]) == ("frames", "payload")

@@ -235,8 +235,8 @@ def test_a_bad_file_is_named_with_its_frame_before_anything_is_coded(tmp_path):
 
 
 def test_options_and_a_quality_or_preset_are_one_too_many(tmp_path):
-    for given in ({"quality": 60}, {"preset": "paper"}):
-        with pytest.raises(InputError, match="leave quality and preset out"):
+    for given in ({"quality": 60}, {"preset": "paper"}, {"effort": "fast"}):
+        with pytest.raises(InputError, match="leave these out"):
             encode(MeshList((BALL,)), tmp_path / "a.reel", options=paper(), **given)
 
 

@@ -56,6 +56,11 @@ class Piece:
     first: int
     stop: int
 
+    @property
+    def is_alone(self) -> bool:
+        """True where its frames are coded one by one."""
+        return self.template == NOBODY
+
 
 @dataclass(frozen=True, slots=True)
 class Plan:
@@ -104,15 +109,15 @@ def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], opt
     return Plan(tuple(pieces), float(best[last]), squares[path, np.arange(frames)])
 
 
-def rivals(
+def rival(
     plan: Plan, residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions
-) -> list[Plan]:
-    """Return another plan, if one would be the best were templates a little dearer or cheaper."""
+) -> Plan | None:
+    """Return another plan that would be the best were templates dearer or cheaper, None where there is none close."""
     for price in (options.worth * CLOSE, options.worth / CLOSE):
         other = best_plan(residuals, onward, replace(options, worth=price))
         if other.pieces != plan.pieces:
-            return [other]
-    return []
+            return other
+    return None
 
 
 def next_key(plan: Plan, tried: Collection[int]) -> int | None:

@@ -41,8 +41,8 @@ class Coding:
     preset: Literal["best", "paper"] = "best"
     """`best` needs the fewest bits for its quality; `paper` is section 3 of the TSMC paper."""
     effort: Literal["fast", "normal", "thorough"] = "normal"
-    """`fast` encodes in half the time, at a rate within a few per cent; `thorough` tries more templates. Preset `best`
-    only."""
+    """`fast` encodes in half the time, at a rate within a few per cent; `thorough` tries more templates, for the
+    least rate at equal errors. Preset `best` only."""
     quality: float | None = None
     """0 (small) to 100 (fine); 50 if neither it nor a target is given."""
     target_psnr: float | None = None

@@ -80,6 +80,7 @@ class Candidate:
         `tracker` is that of another template of the same key.
         """
         self.key, self.before, self._options, self._noise = key, before, options, window.noise
+        self._target = window.target.distance
         self._fits, self._residuals = dict[int, Float64[np.ndarray, "V 3"]](), dict[int, float]()
         self._ends = dict[int, int]()  # by side, the frame where the template is lost
         if before is not None:
@@ -199,10 +200,10 @@ class Candidate:
         faces = reference.base.faces
         self.reference, self._points, self._binding = reference, points, self._tracker.bound(Mesh(points, faces))
         self._fitting = Fitting(faces, len(points), self._options.fit, self._noise)
-        self._closeness = closeness or Closeness(faces, points, self._noise)
+        self._closeness = closeness or Closeness(faces, points, self._target, self._noise)
 
     def _fit(self, window: Window, number: int) -> None:
         prediction = self._tracker.placed(number, self._points, self._binding)
         positions = self._fitting.first(window.at(number), self._rest, prediction)
         self._fits[number], self._residuals[number] = positions, self._closeness.of(positions, window.at(number))
-        note(window.digests, f"first fit, key {self.key}, frame {number}", positions)
+        note(window.digests, "first fit", self.key, number, positions)

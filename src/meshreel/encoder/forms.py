@@ -68,6 +68,11 @@ def displacement_field(
     return np.ascontiguousarray(np.moveaxis(positions, 0, 1) - reference.base.vertices[:, None])
 
 
+def most_for(group: EncodedGroup) -> float:
+    """Return the bytes a frame up to which `cheaper` takes Draco in place of a group."""
+    return MOST_FOR_HALF * len(group.payload) / group.frame_count
+
+
 def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: IntraOptions) -> EncodedGroup:
     """Return the group, or its `draco` form where that is the better bargain.
 
@@ -75,7 +80,7 @@ def cheaper(frames: Sequence[Mesh], group: EncodedGroup, options: IntraOptions) 
     as on bodies of few, large faces.
     """
     size = len(group.payload)
-    found = cheapest_intra(frames, group.fidelity, MOST_FOR_HALF * size, options)
+    found = cheapest_intra(frames, group.fidelity, most_for(group) * len(frames), options)
     if found is None:
         return group
     payload, fidelity = found

@@ -15,16 +15,18 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..analysis.fit.frame import FrameSurface
-from ..analysis.plan import NOBODY, Piece, Plan, best_plan, next_key, rivals
+from ..analysis.plan import Piece, Plan, best_plan, next_key, rival
+from ..format.layout import Form
 from .candidates import Candidate, Followed, Window
 from .digests import note
-from .forms import EncodedGroup, empty_groups
+from .forms import EncodedGroup, empty_groups, most_for
 from .interval import Interval
 from .layers_group import GroupCoder
 from .options import LayersOptions
 from .progress import Stages
 from .target import target_of
 
+GOOD = 1.4  # targets: what leaves more is planned anew, though it stands still (guess)
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
 NOISY_KEYS = 2  # keys tried at most under noise: the fused template completes them (decision 16)
 BY_RATE = 1.33  # the squared error falls with this power of the rate: 4 dB a doubling (decision 0013)
@@ -51,6 +53,7 @@ class _Planner:
         self._surfaces = dict[int, FrameSurface]()
         self._candidates, self._tried = list[Candidate](), set[int]()  # of key frames; their numbers
         self._before: Followed | None = None
+        self._dearer = 0.0  # bytes a frame for which Draco was no bargain
 
     def groups(self) -> Iterator[EncodedGroup]:
         """Yield the groups of the interval."""
@@ -59,6 +62,8 @@ class _Planner:
             for group, after in self._standing(window) or self._moving(window):
                 self._at += group.frame_count
                 self._before = after
+                if not group.predicted:
+                    self._dearer = most_for(group) if group.form == Form.LAYERS else 0.0
                 yield group
 
     def _window(self) -> Window:
@@ -74,7 +79,7 @@ class _Planner:
     def _standing(self, window: Window) -> list[Coded]:
         """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""
         before = self._before
-        if before is None or not self._options.predict:
+        if before is None or not self._options.predict or before.residual > GOOD * window.target.distance:
             return []
         for surface in reversed(window.surfaces):  # most bodies have moved by the last frame
             if before.closeness.of(before.positions, surface) > STILL * before.residual:
@@ -84,23 +89,25 @@ class _Planner:
         return [(group, None if state is None else replace(before, state=state))]
 
     def _moving(self, window: Window) -> list[Coded]:
-        """Code the window by its plan, or by one with other cuts where that costs hardly more and turns out better."""
+        """Code the window by its plan, or by one with other cuts where that costs hardly more and turns out better.
+
+        The last piece may go on beyond the window: it is planned again, with its template, unless it is the only one.
+        """
         plan, candidates = self._planned(window)
-        others = rivals(plan, *_known(window, candidates), self._options.plan)
-        note(window.digests, "plans", *(one.pieces for one in (plan, *others)))
-        used = {piece.template for one in (plan, *others) for piece in one.pieces}
-        self._candidates = [one for k, one in enumerate(candidates) if k in used and one.before is None]
-        is_last = window.numbers.stop == len(self._interval.frames)
-        if others:
-            tried = [self._pieces(window, one.pieces, candidates) for one in (plan, *others)]
-            coded = min(tried, key=lambda groups: _cost(groups, len(window)))
-            return coded if is_last else coded[:-1] or coded
-        some = plan.pieces if is_last else plan.pieces[:-1] or plan.pieces  # the last may go on: it is planned again
-        return self._pieces(window, some, candidates)
+        is_last, done = window.numbers.stop == len(self._interval.frames), dict[Piece, Coded]()
+        other = rival(plan, *_known(window, candidates), self._options.plan)
+        note(window.digests, "plans", plan.pieces, other and other.pieces)
+        if other is not None:
+            tried = [(self._pieces(window, one.pieces, candidates, done), one) for one in (plan, other)]
+            noisy = window.noise > 0
+            plan = min(tried, key=lambda pair: _cost(pair[0], len(window), noisy))[1]
+        goes_on = not is_last and len(plan.pieces) > 1
+        self._candidates = [candidates[piece.template] for piece in plan.pieces[-1:] if goes_on and not piece.is_alone]
+        return self._pieces(window, plan.pieces[:-1] if goes_on else plan.pieces, candidates, done)
 
     def _planned(self, window: Window) -> tuple[Plan, list[Candidate]]:
         """Return the plan of a window, and the candidates that its pieces name; keys are tried while they may pay."""
-        o, candidates = self._options.plan, [one for one in self._candidates if one.key >= window.first]
+        o, candidates = self._options.plan, list(self._candidates)
         if self._before is not None and self._options.predict:
             candidates.append(Candidate(window, window.first - 1, self._options, self._before))
         for one in candidates:
@@ -118,15 +125,22 @@ class _Planner:
             plan = better
         return plan, candidates
 
-    def _pieces(self, window: Window, pieces: Sequence[Piece], candidates: Sequence[Candidate]) -> list[Coded]:
-        """Code pieces of a plan; the last group is shorter than its piece where a group may not hold more frames."""
+    def _pieces(
+        self,
+        window: Window,
+        pieces: Sequence[Piece],
+        candidates: Sequence[Candidate],
+        done: dict[Piece, Coded],
+    ) -> list[Coded]:
+        """Code pieces of a plan that are not done; the last group is shorter where a group may not hold more frames."""
         found = list[Coded]()
         for piece in pieces:
-            one = None if piece.template == NOBODY else candidates[piece.template]
-            group, after = self._piece(window, piece, one)
-            is_over = piece.stop == len(window) or group.frame_count < piece.stop - piece.first
-            found.append((group, after if is_over else None))  # else another template is better
-            if group.frame_count < piece.stop - piece.first:
+            if piece not in done:
+                done[piece] = self._piece(window, piece, None if piece.is_alone else candidates[piece.template])
+            group, after = done[piece]
+            is_short = group.frame_count < piece.stop - piece.first
+            found.append((group, after if is_short or piece.stop == len(window) else None))  # else another is better
+            if is_short:
                 break
         return found
 
@@ -138,7 +152,7 @@ class _Planner:
         numbers = window.numbers[piece.first : piece.stop]
         tried = [candidate, *(one for one in candidate.others(window) if one.follows(window, numbers))]
         coded = [self._with(window, numbers, coder, one) for one in tried]
-        return min(coded, key=lambda one: _cost([one], len(numbers)))
+        return min(coded, key=lambda one: _cost([one], len(numbers), window.noise > 0))
 
     def _with(self, window: Window, numbers: range, coder: GroupCoder, candidate: Candidate) -> Coded:
         """Code successive frames with a template."""
@@ -153,7 +167,8 @@ class _Planner:
         return replace(group, key=key), candidate.followed(state, positions[len(numbers) - 1], numbers)
 
     def _coder(self, window: Window, some: slice) -> GroupCoder:
-        return GroupCoder(window.surfaces[some], window.target, window.noise, self._options, digests=window.digests)
+        chosen, digests = window.surfaces[some], window.digests
+        return GroupCoder(chosen, window.target, window.noise, self._options, self._dearer, digests=digests)
 
 
 def _known(window: Window, candidates: Sequence[Candidate]) -> tuple[Float64[np.ndarray, "C T"], list[bool]]:
@@ -162,15 +177,16 @@ def _known(window: Window, candidates: Sequence[Candidate]) -> tuple[Float64[np.
     return residuals, [one.before is not None for one in candidates]
 
 
-def _cost(coded: Sequence[Coded], frames: int) -> float:
+def _cost(coded: Sequence[Coded], frames: int, noisy: bool) -> float:
     """Return the logarithm of the rate at equal errors; infinite where groups hold not all of the frames.
 
-    Distances and normals count half each: both fall when the rate rises.
+    Distances and normals count half each: both fall when the rate rises. Under noise, normals say nothing.
     """
     groups = [group for group, _ in coded]
     if sum(group.frame_count for group in groups) < frames:
         return math.inf
     squared = sum(group.frame_count * group.fidelity.distance**2 for group in groups) / frames
     angle = sum(group.frame_count * group.fidelity.angle for group in groups) / frames
-    errors = math.log(max(squared, LEAST)) / BY_RATE + math.log(max(angle, LEAST)) / ANGLE_BY_RATE
-    return math.log(sum(len(group.payload) for group in groups)) + errors / 2
+    by_distance = math.log(max(squared, LEAST)) / BY_RATE
+    by_angle = by_distance if noisy else math.log(max(angle, LEAST)) / ANGLE_BY_RATE
+    return math.log(sum(len(group.payload) for group in groups)) + (by_distance + by_angle) / 2

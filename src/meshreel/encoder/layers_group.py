@@ -21,7 +21,7 @@ from ..format.records import pack
 from ..types import Mesh
 from .digests import Digests, note
 from .draco import cheapest_intra
-from .forms import EncodedGroup, cheaper, intra_only, laplacian
+from .forms import EncodedGroup, cheaper, intra_only, laplacian, most_for
 from .options import LayersOptions
 from .tails import find_tails
 from .target import Fidelity, measure
@@ -39,6 +39,7 @@ class GroupCoder:
     target: Fidelity  # that the frames should reach, normalised
     noise: float  # RMS distance of the frames from the truth, normalised
     options: LayersOptions
+    dearer: float = 0.0  # bytes a frame, for which Draco was tried and was no bargain
     digests: Digests | None = field(default=None, kw_only=True)
 
     @property
@@ -80,10 +81,12 @@ class GroupCoder:
                 other = laplacian(self.frames, reference, positions, self.options.displacements)
                 if other.fidelity.reaches(fidelity) and len(other.payload) < len(chosen.payload):
                     chosen = other
-        if not np.isfinite(chosen.fidelity.distance):
+        if not np.isfinite(chosen.fidelity.distance) or any(mesh.is_empty for mesh in shown.frames):
             return self.alone(), None  # the template has collapsed: nothing is comparable
-        sharp = self._sharp(chosen)
-        chosen = sharp or (cheaper(self.frames, chosen, self.options.intra) if self.options.floor else chosen)
+        if (sharp := self._sharp(chosen)) is not None:
+            return sharp, None
+        if self.options.floor and most_for(chosen) > self.dearer:
+            chosen = cheaper(self.frames, chosen, self.options.intra)
         return chosen, encoded.state if chosen.form == Form.LAYERS else None
 
     def _sharp(self, group: EncodedGroup) -> EncodedGroup | None:

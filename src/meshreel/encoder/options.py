@@ -73,6 +73,8 @@ class LayersOptions:
 
     def __post_init__(self) -> None:
         _check_group_size(self.group_size)
+        if (self.measured is not None and self.measured < 1) or min(self.errors, default=1.0) <= 0:
+            raise InputError(f"measured {self.measured}, errors {self.errors}: give frames >= 1, and factors > 0")
 
 
 MethodOptions = PaperOptions | LayersOptions  # the class names the recipe

@@ -17,17 +17,24 @@ from .frame import ON_BORDER, FrameSurface
 
 SAMPLES = 4000  # of each surface: as many as tracking matches
 STRAY = 0.01  # share of a noisy frame's area that may be stray surface: a guess
-FAR = 0.006  # diagonals: samples farther than that have no counterpart (1 cm on a body; decision 24)
+FAR = 0.006  # diagonals: samples farther than that have no counterpart (1 cm on a body; decision 24), or than
+FAR_OFF = 4.0  # distances to reach (guess)
 WRONG = 0.03  # share of samples beyond the usual one, a sum of folds that show; good fits have up to .012 (decision 24)
 
 
 class Closeness:
     """A template prepared for measuring how near its positions are to frames."""
 
-    def __init__(self, faces: Int32[np.ndarray, "F 3"], rest: Float64[np.ndarray, "V 3"], noise: float) -> None:
-        """`noise` is the RMS distance of the frames from the truth; with noise, their holes do not count."""
+    def __init__(
+        self, faces: Int32[np.ndarray, "F 3"], rest: Float64[np.ndarray, "V 3"], target: float, noise: float = 0.0
+    ) -> None:
+        """`target` is the distance to reach, `noise` the RMS distance of the frames from the truth.
+
+        With noise, holes of the frames do not count.
+        """
         mesh = Mesh(rest, faces)
         self._surface, self._samples, self._noise = Surface(mesh), area_samples(mesh, SAMPLES), noise
+        self._far = max(FAR, FAR_OFF * target)
         self._usual = 1.0  # share without counterpart where it fits best: wheels in mesh face each other
 
     def of(self, positions: Float64[np.ndarray, "V 3"], frame: FrameSurface) -> float:
@@ -43,8 +50,8 @@ class Closeness:
             back = np.where(frame.inside_at(to_frame) > ON_BORDER, back, 0.0)
             ahead = np.sort(ahead)[: len(ahead) - int(STRAY * len(ahead))]
             return float(np.sqrt(max(back.mean(), ahead.sum() / len(theirs))))
-        wrong = (np.einsum("nd,nd->n", normals, there) < 0) | (back > FAR**2)
-        lacking = (np.einsum("nd,nd->n", frame.normals[chosen], here) < 0) | (ahead > FAR**2)
+        wrong = (np.einsum("nd,nd->n", normals, there) < 0) | (back > self._far**2)
+        lacking = (np.einsum("nd,nd->n", frame.normals[chosen], here) < 0) | (ahead > self._far**2)
         share = float(max(wrong.mean(), lacking.mean()))
         self._usual = min(self._usual, share)
         if share > self._usual + WRONG:

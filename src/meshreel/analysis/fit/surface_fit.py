@@ -26,6 +26,7 @@ from .shape import strongest_components
 FOLLOWED = 6e-4  # RMS noise from which the second fit trusts the coherent positions more than the frames (decision 16)
 NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit it (decision 16)
 GATE = 6.0  # RMS distances of the noise that a pair may be apart at least: three standard deviations (guess)
+MANY = 5000  # vertices of a template from which strides count: fewer cost little and tell less (guess)
 Coherence = Callable[[Float64[np.ndarray, "T V 3"]], Float64[np.ndarray, "T V 3"]]
 
 
@@ -197,10 +198,12 @@ class Fitting:
     def __init__(self, faces: Int32[np.ndarray, "F 3"], vertices: int, options: FitOptions, noise: float = 0.0) -> None:
         """`noise` is the RMS distance of the frames from the truth; 0: a clean capture."""
         self._template, self._options = _core.FitTemplate(faces, vertices), options
-        rounds, gates = options.rounds(noise), options.rounds(noise).gates[-2:]
-        self._first = _Schedule(rounds.gates, rounds.smoothing, rounds.strides, options.anchor, turn=True)
+        rounds = options.rounds(noise)
+        gates = rounds.gates[-2:]
+        strides = rounds.strides if vertices >= MANY else (1,) * len(rounds.gates)
+        self._first = _Schedule(rounds.gates, rounds.smoothing, strides, options.anchor, turn=True)
         last = (rounds.second_smoothing,) * len(gates)
-        self._second = _Schedule(gates, last, rounds.strides[-2:], rounds.pull, turn=False)
+        self._second = _Schedule(gates, last, strides[-2:], rounds.pull, turn=False)
 
     def first(
         self,
