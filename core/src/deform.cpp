@@ -201,7 +201,9 @@ private:
     std::optional<PointTree> tree_;
 };
 
-bool is_valid(const mr_deformation& graph, const mr_seen& frame) {
+bool is_valid(const mr_deformation& graph, const mr_seen& frame, const double* gates, size_t rounds) {
+    for (size_t k = 0; k < rounds; ++k)
+        if (!(gates[k] > 0.0)) return false;
     return graph.node_count > 0 && in_range(graph.edges, 2 * graph.edge_count, graph.node_count) &&
            in_range(graph.bound, graph.bonds * graph.sample_count, graph.node_count) &&
            tree_of(frame.tree).face_count() == frame.mesh.face_count &&
@@ -216,7 +218,7 @@ using namespace meshreel;
 int mr_deform(const mr_deformation* graph, const mr_seen* frame, const mr_deform_rounds* rounds, double* rotations,
               double* positions) {
     return guarded(MR_NO_MEMORY, [&]() -> int {
-        if (!is_valid(*graph, *frame)) return MR_BAD_INPUT;
+        if (!is_valid(*graph, *frame, rounds->gates, rounds->count)) return MR_BAD_INPUT;
         Rounds state(*graph, *frame, rotations, positions);
         for (size_t k = 0; k < rounds->count; ++k)
             if (!state.round(rounds->gates[k], rounds->rigidity[k], *rounds)) break;
@@ -227,7 +229,7 @@ int mr_deform(const mr_deformation* graph, const mr_seen* frame, const mr_deform
 int mr_deform_matched(const mr_deformation* graph, const mr_seen* frame, double gate, double agreement,
                       const double* rotations, const double* positions, double* sum) {
     return guarded(MR_NO_MEMORY, [&]() -> int {
-        if (!is_valid(*graph, *frame)) return MR_BAD_INPUT;
+        if (!is_valid(*graph, *frame, &gate, 1)) return MR_BAD_INPUT;
         std::vector<double> turns(rotations, rotations + 9 * graph->node_count);
         std::vector<double> places(positions, positions + 3 * graph->node_count);
         Rounds state(*graph, *frame, turns.data(), places.data());

@@ -1,5 +1,6 @@
 #include "field_record.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "escape.h"
@@ -91,7 +92,7 @@ int decode_basis(const CodedField& record, size_t width, bool has_mean, FieldStr
         if (values[0] < 0 || values[0] > kMostMeanBits) return MR_BAD_MEAN;
         for (size_t t = 0; t < width; ++t) out.means[t] = std::ldexp(static_cast<double>(values[1 + t]), -values[0]);
     }
-    out.vectors.resize(columns * width);
+    out.vectors.resize(std::max(columns, size_t{1}) * width);  // room for one, so that pointers can be counted from it
     return mr_orthonormal_inverse(values.data() + head, columns, width, out.vectors.data());
 }
 

@@ -183,9 +183,11 @@ public:
         }
         const mr_graph graph{level.edge_count, level.starts, level.near, weights_.data()};
         const int status = decode_streams(record.scalars, graph, level.frames, false, streams_);
+        if (status != MR_OK) return status;
+        if (record.follows && !level.previous) return MR_NO_PREVIOUS;
         field_ = streams_.over(graph, first);
         field_.before = record.follows ? level.previous : nullptr;
-        return status == MR_OK && record.follows && !level.previous ? int{MR_NO_PREVIOUS} : status;
+        return MR_OK;
     }
 
     // Calls visit(first edge, count, rows of scalars); `last` gets the scalars of the last frame.

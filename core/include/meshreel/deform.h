@@ -54,7 +54,7 @@ struct mr_deform_rounds {
 int mr_deform(const struct mr_deformation* graph, const struct mr_seen* frame, const struct mr_deform_rounds* rounds,
               double* rotations, double* positions);
 
-// The sum of the weights of all pairs at a pose, with one gate.
+// The sum of the weights of all pairs at a pose, with one gate > 0.
 int mr_deform_matched(const struct mr_deformation* graph, const struct mr_seen* frame, double gate, double agreement,
                       const double* rotations, const double* positions, double* sum);
 

@@ -1,0 +1,103 @@
+#include "meshreel/tree.h"
+
+#include <algorithm>
+
+#include "../src/rigid3.h"
+#include "check.h"
+#include "shapes.h"
+
+using namespace meshreel;
+
+namespace {
+
+constexpr double kEnough = 1e-5;  // single precision chooses the face, of triangles of a size of 1
+
+// Random triangles, of which every seventh is a line, every eleventh a point, and the last half repeats the first.
+Shape triangles(uint32_t seed, size_t count) {
+    Noise noise(seed);
+    Shape shape;
+    for (size_t k = 0; k < 9 * count; ++k) shape.positions.push_back(0.001 * noise.within(1000));
+    for (int32_t f = 0; f < static_cast<int32_t>(count); ++f) {
+        const int32_t second = f % 11 == 0 ? 3 * f : 3 * f + 1, third = f % 11 == 0 || f % 7 == 0 ? second : 3 * f + 2;
+        shape.faces.insert(shape.faces.end(), {3 * f, second, third});
+    }
+    const std::vector<int32_t> once = shape.faces;
+    shape.faces.insert(shape.faces.end(), once.begin(), once.end());
+    return shape;
+}
+
+double to_segment(Vec p, Vec a, Vec b) {
+    const double size = dot(b - a, b - a), t = size > 0 ? std::clamp(dot(p - a, b - a) / size, 0.0, 1.0) : 0.0;
+    const Vec gap = p - a - t * (b - a);
+    return std::sqrt(dot(gap, gap));
+}
+
+double to_triangle(Vec p, Vec a, Vec b, Vec c) {
+    const Vec n = cross(b - a, c - a);
+    const double edges = std::min({to_segment(p, a, b), to_segment(p, b, c), to_segment(p, c, a)});
+    const bool over = dot(cross(b - a, p - a), n) >= 0 && dot(cross(c - b, p - b), n) >= 0 &&
+                      dot(cross(a - c, p - c), n) >= 0 && dot(n, n) > 0;
+    return over ? std::fabs(dot(p - a, n)) / std::sqrt(dot(n, n)) : edges;
+}
+
+// Checks the tree's answers against all faces; returns them.
+std::vector<int32_t> checked(const mr_tree* tree, const Shape& shape, std::vector<int32_t> guesses) {
+    Noise noise(7);
+    const size_t count = guesses.size();
+    std::vector<double> queries, weights(3 * count);
+    for (size_t k = 0; k < 3 * count; ++k) queries.push_back(0.0015 * noise.within(1000));
+    std::vector<int32_t> found = guesses;
+    CHECK(mr_tree_closest(tree, queries.data(), count, HUGE_VAL, found.data(), weights.data()) == MR_OK);
+    const auto corner = [&](size_t f, size_t k) {
+        return load(&shape.positions[3 * static_cast<size_t>(shape.faces[3 * f + k])]);
+    };
+    for (size_t q = 0; q < count; ++q) {
+        const Vec query = load(&queries[3 * q]);
+        double least = HUGE_VAL;
+        for (size_t f = 0; f < shape.face_count(); ++f)
+            least = std::min(least, to_triangle(query, corner(f, 0), corner(f, 1), corner(f, 2)));
+        Vec gap = query;
+        for (size_t k = 0; k < 3; ++k) {
+            CHECK(weights[3 * q + k] >= 0);
+            gap = gap - weights[3 * q + k] * corner(static_cast<size_t>(found[q]), k);
+        }
+        CHECK(std::fabs(weights[3 * q] + weights[3 * q + 1] + weights[3 * q + 2] - 1) < 1e-12);
+        CHECK(std::fabs(std::sqrt(dot(gap, gap)) - least) < kEnough);
+        CHECK(static_cast<size_t>(found[q]) < shape.face_count() / 2);  // of equal faces the first
+        int32_t face = guesses[q];                                      // just out of reach
+        double unused[3];
+        CHECK(mr_tree_closest(tree, &queries[3 * q], 1, least - kEnough, &face, unused) == MR_OK && face == -1);
+    }
+    return found;
+}
+
+}  // namespace
+
+TEST(closest_points_are_those_of_all_faces_whatever_the_guess_and_after_moves) {
+    Shape shape = triangles(1, 200);
+    const mr_mesh mesh = shape.view();
+    mr_tree* tree = nullptr;
+    CHECK(mr_tree_create(&mesh, &tree) == MR_OK);
+    Noise noise(3);
+    std::vector<int32_t> guesses(100);
+    for (int32_t& guess : guesses) guess = static_cast<int32_t>(noise.next() % shape.face_count());
+    CHECK(checked(tree, shape, guesses) == checked(tree, shape, std::vector<int32_t>(100, -1)));
+    shape.positions = triangles(2, 200).positions;
+    CHECK(mr_tree_move(tree, shape.positions.data()) == MR_OK);
+    CHECK(checked(tree, shape, guesses) == checked(tree, shape, std::vector<int32_t>(100, -1)));
+    mr_tree_destroy(tree);
+}
+
+TEST(trees_refuse_meshes_without_faces_and_faces_out_of_range) {
+    Shape shape = tetrahedron();
+    mr_tree* tree = nullptr;
+    const mr_mesh good = shape.view(), empty{shape.positions.data(), 4, nullptr, 0};
+    CHECK(mr_tree_create(&empty, &tree) == MR_BAD_INPUT && mr_tree_create(nullptr, &tree) == MR_BAD_INPUT);
+    CHECK(mr_tree_create(&good, &tree) == MR_OK);
+    int32_t guess = 4;
+    double weights[3];
+    CHECK(mr_tree_closest(tree, shape.positions.data(), 1, HUGE_VAL, &guess, weights) == MR_BAD_INPUT);
+    mr_tree_destroy(tree);
+    shape.faces[5] = 4;
+    CHECK(mr_tree_create(&good, &tree) == MR_BAD_INPUT);
+}
