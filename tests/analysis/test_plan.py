@@ -15,47 +15,47 @@ OPTIONS = PlanOptions()
 GOOD, BAD = 0.6, 1.9
 
 
-def pieces(*rows: list[float], onward: tuple[int, ...] = (), **changes: float) -> list[tuple[int, int, int]]:
+def groups(*rows: list[float], onward: tuple[int, ...] = (), **changes: float) -> list[tuple[int, int, int]]:
     known = [k in onward for k in range(len(rows))]
     plan = best_plan(np.array(rows), known, PlanOptions(**changes))
-    return [(piece.template, piece.first, piece.stop) for piece in plan.pieces]
+    return [(group.template, group.first, group.stop) for group in plan.groups]
 
 
 def test_one_template_that_follows_all_frames_is_enough():
-    assert pieces([GOOD] * 10, [0.5] * 4 + [np.inf] * 6) == [(0, 0, 10)]
+    assert groups([GOOD] * 10, [0.5] * 4 + [np.inf] * 6) == [(0, 0, 10)]
 
 
 def test_a_cut_is_where_one_template_is_lost_and_another_begins():
-    assert pieces([GOOD] * 6 + [np.inf] * 4, [np.inf] * 3 + [GOOD] * 7) == [(0, 0, 6), (1, 6, 10)]
+    assert groups([GOOD] * 6 + [np.inf] * 4, [np.inf] * 3 + [GOOD] * 7) == [(0, 0, 6), (1, 6, 10)]
 
 
 def test_a_good_key_beats_every_cut():
     thirds = [GOOD] * 6 + [np.inf] * 4, [np.inf] * 3 + [GOOD] * 7, [1.2] * 10
-    assert pieces(*thirds) == [(2, 0, 10)]
+    assert groups(*thirds) == [(2, 0, 10)]
 
 
 def test_a_cut_must_be_worth_a_template_more():
     rows = [GOOD] * 8 + [BAD] * 8, [BAD] * 8 + [GOOD] * 8
     saved = 8 * (BAD**2 - GOOD**2)
-    assert len(pieces(*rows, worth=0.9 * saved, pop=100.0)) == 2
-    assert len(pieces(*rows, worth=1.1 * saved, pop=100.0)) == 1
+    assert len(groups(*rows, worth=0.9 * saved, pop=100.0)) == 2
+    assert len(groups(*rows, worth=1.1 * saved, pop=100.0)) == 1
 
 
 def test_frames_that_no_template_follows_are_coded_one_by_one():
-    assert pieces([np.inf] * 3 + [GOOD] * 5) == [(NOBODY, 0, 3), (0, 3, 8)]
-    assert [piece.template for piece in best_plan(np.zeros((0, 4)), [], OPTIONS).pieces] == [NOBODY]
+    assert groups([np.inf] * 3 + [GOOD] * 5) == [(NOBODY, 0, 3), (0, 3, 8)]
+    assert [group.template for group in best_plan(np.zeros((0, 4)), [], OPTIONS).groups] == [NOBODY]
 
 
 def test_the_template_of_the_group_before_costs_nothing_but_can_only_begin():
-    assert pieces([0.9] * 10, [GOOD] * 10, onward=(0,)) == [(0, 0, 10)]
-    assert pieces([np.inf] + [0.9] * 9, [GOOD] * 10, onward=(0,)) == [(1, 0, 10)]
+    assert groups([0.9] * 10, [GOOD] * 10, onward=(0,)) == [(0, 0, 10)]
+    assert groups([np.inf] + [0.9] * 9, [GOOD] * 10, onward=(0,)) == [(1, 0, 10)]
 
 
 def test_a_step_of_the_quality_at_a_cut_has_a_price():
     early, late = [GOOD] * 5 + [1.8] * 3 + [np.inf] * 2, [np.inf] * 2 + [1.7] * 5 + [GOOD] * 3
-    [first, _] = pieces(early, late, pop=100.0)
+    [first, _] = groups(early, late, pop=100.0)
     assert first == (0, 0, 5)  # where the sum is least: from .6 to 1.7
-    [first, _] = pieces(early, late, pop=0.5)
+    [first, _] = groups(early, late, pop=0.5)
     assert first[2] in (6, 7)  # from 1.8 to 1.7
 
 
@@ -67,7 +67,7 @@ def test_no_other_way_is_cheaper(count, frames, random):
     plan = best_plan(residuals, onward, OPTIONS)
     costs = [cost_of(path, residuals, onward) for path in product(range(-1, count), repeat=frames)]
     assert plan.cost == pytest.approx(min(costs))
-    path = [piece.template for piece in plan.pieces for _ in range(piece.stop - piece.first)]
+    path = [group.template for group in plan.groups for _ in range(group.stop - group.first)]
     assert cost_of(tuple(path), residuals, onward) == pytest.approx(plan.cost)
 
 

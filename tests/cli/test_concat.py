@@ -94,6 +94,8 @@ def test_files_that_no_survey_unites_are_refused(run, slide, surveyed, tmp_path)
     finer = part(run, slide, surveyed, "d.reel", "--frames", "2:4", "--quality", "60")
     assert failed(run("concat", first, finer, *out), "d.reel: differs from", "quality 50.0, now 60.0", "same options")
     assert failed(run("concat", SCENE, *out), "scene.reel: is a scene")
+    quicker = part(run, slide, surveyed, "f.reel", "--frames", "2:4", "--effort", "fast")
+    assert failed(run("concat", first, quicker, *out), "f.reel: differs from", "options", "same options")
     damaged = first.read_bytes()[:-1] + b"?"
     (tmp_path / "e.reel").write_bytes(damaged)
     assert failed(run("concat", first, tmp_path / "e.reel", *out), "e.reel: chunk", "damaged")
@@ -102,7 +104,7 @@ def test_files_that_no_survey_unites_are_refused(run, slide, surveyed, tmp_path)
     assert not out[1].exists()
 
 
-@pytest.mark.parametrize("metadata", ["{}", '{"key_frames": [1]}', '{"key_frames": [], "part": [1]}'])
+@pytest.mark.parametrize("metadata", ["{}", '{"key_frames": [1]}', '{"key_frames": [], "part": [1]}', '{"part": 1}'])
 def test_metadata_that_no_encoder_wrote_are_refused(run, tmp_path, metadata):
     with FileSource(FILE) as source:
         reader = ReelReader(source)

@@ -274,3 +274,14 @@ def test_a_size_that_no_header_holds_is_reported_before_anything_is_coded(run, t
     monkeypatch.setattr("meshreel.encoder.recipe.encode_interval", lambda *_: pytest.fail("coded"))
     obj(tmp_path, "f0.obj", TRIANGLE.replace("1", "1e12") + "f 1 2 3\n")
     assert failed(run("encode", tmp_path, "-o", tmp_path / "a.reel", "--scale", "1e9"), "Header.scale")
+
+
+def test_more_effort_is_more_work_on_the_same_frames(run, balls, tmp_path):
+    work = list[float]()
+    for effort in ("fast", "normal", "thorough"):
+        path = tmp_path / f"{effort}.reel"
+        said = run("encode", balls, "-o", path, "--dynamic-only", "--effort", effort, "--json")
+        assert said.code == 0 and len(meshreel.open(path)) == 3 and said.row["d2_psnr_paper"] > 50
+        work.append(said.row["work"]["closest points"])
+    assert work == sorted(set(work))
+    assert failed(run("encode", balls, "-o", tmp_path / "c.reel", "--effort", "lazy"), "lazy", "fast")

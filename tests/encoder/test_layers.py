@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
+from meshreel.analysis.plan import Plan
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.coding.group import continue_group
 from meshreel.encoder import layers as layered
 from meshreel.encoder.forms import EncodedGroup
 from meshreel.encoder.interval import Interval
 from meshreel.encoder.layers import encode_interval
+from meshreel.encoder.layers_group import GroupCoder
 from meshreel.encoder.target import measure
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
@@ -100,6 +102,28 @@ def test_a_frame_is_prepared_once_for_all_that_is_tried_with_it(monkeypatch: pyt
     other = Mesh.of(BALL.vertices * [1.6, 0.3, 0.8] + [0, 0.3, 0], BALL.faces)
     first = next(encode_interval(Interval([BALL, BALL, BALL, other, other]), quick(group_size=5).method))
     assert first.frame_count < 5 and len(prepared) == 5  # though it is cut, and tried anew
+
+
+def test_of_two_close_plans_the_one_whose_groups_turn_out_cheaper_is_taken(monkeypatch: pytest.MonkeyPatch):
+    """The rival cuts in two; every group of both is coded once."""
+    frames, sizes = [moved(FINE, 0.01 * t, 0, 0) for t in range(4)], list[int]()
+    encode = GroupCoder.layers
+
+    def counted(self: GroupCoder, *rest):
+        sizes.append(len(self.surfaces))
+        return encode(self, *rest)
+
+    def cut(plan: Plan, *_: object) -> Plan:
+        (group,) = plan.groups
+        return replace(plan, groups=(replace(group, stop=2), replace(group, first=2)))
+
+    monkeypatch.setattr(GroupCoder, "layers", counted)
+    monkeypatch.setattr(layered, "rival", cut)
+    for sign, count in ((1, 4), (-1, 2)):  # as if fewer groups were cheaper, or more
+        monkeypatch.setattr(layered, "_cost", lambda groups, *_, sign=sign: sign * len(groups))
+        sizes.clear()
+        first = next(encode_interval(Interval(frames), OPTIONS))
+        assert first.frame_count == count and sorted(sizes) == [2, 2, 4]
 
 
 def test_a_body_that_jumps_is_followed_or_cut_but_never_lost():

@@ -14,7 +14,7 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.encoder import recipe
 from meshreel.encoder.forms import EncodedGroup
-from meshreel.encoder.interval import Interval, NormalisedFrames
+from meshreel.encoder.interval import BodyFrames, Interval, NormalisedFrames
 from meshreel.encoder.sequence import Encoder
 from meshreel.encoder.target import NO_ERROR, Fidelity, target_of
 from meshreel.errors import InputError
@@ -217,3 +217,10 @@ def test_a_stopped_encode_continues_with_the_bodies_that_are_missing(tmp_path, m
     assert Encoder(sequence).encode(tmp_path / "a.reel", OPTIONS, resume=True).continued == 1
     assert calls == [(0, 0), (0, 1), (0, 1), (3, 0), (3, 1)]
     assert (tmp_path / "a.reel").read_bytes() == (tmp_path / "whole.reel").read_bytes()
+
+
+def test_a_survey_that_has_other_pieces_of_a_frame_is_refused():
+    seen = replace(survey(TWO), pieces=tuple((*pieces, pieces[-1]) for pieces in survey(TWO).pieces))
+    frames = BodyFrames(DerivedSequence(TWO), seen, range(3), 0, ((0, 1, 1),) * 3)
+    with pytest.raises(InputError, match="frame 1: has 2 large pieces, in its survey 3; write it again"):
+        frames[1]

@@ -1,6 +1,6 @@
 """Plan groups: cut the next frames where another template pays, and nowhere else (decision 24).
 
-In -> out: the residuals that each template leaves on each frame -> pieces of successive frames, each with its template
+In -> out: the residuals that each template leaves on each frame -> groups of successive frames, each with its template
 or with none. Residuals are in units of the distance to reach; a cost is a sum of their squares.
 """
 
@@ -49,7 +49,7 @@ class PlanOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class PlannedGroup:
     """Successive frames with one template."""
 
     template: int  # its number, or `NOBODY`
@@ -64,9 +64,9 @@ class Piece:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Pieces that cover some frames, and what they cost."""
+    """Groups that cover some frames, and what they cost."""
 
-    pieces: tuple[Piece, ...]
+    groups: tuple[PlannedGroup, ...]
     cost: float
     squares: Float64[np.ndarray, " T"]  # squared residual of each frame, or the price of one without a template
 
@@ -80,7 +80,7 @@ class Plan:
 def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], options: PlanOptions) -> Plan:
     """Return the plan of least cost (dynamic programming); residuals of frames that a template does not follow are inf.
 
-    The cost is the sum of the squared residuals, the price of each piece's template, and that of steps of the quality
+    The cost is the sum of the squared residuals, the price of each group's template, and that of steps of the quality
     at cuts. A template that is `onward`, known from the frames before, costs nothing, but can only begin.
     """
     (count, frames), price = residuals.shape, options.worth
@@ -101,12 +101,12 @@ def best_plan(residuals: Float64[np.ndarray, "C T"], onward: Sequence[bool], opt
     for t in range(frames - 1, 0, -1):
         path.append(int(before[t, path[-1]]))
     path.reverse()
-    pieces, at = list[Piece](), 0
+    groups, at = list[PlannedGroup](), 0
     for template, same in groupby(path):
         stop = at + len(list(same))
-        pieces.append(Piece(NOBODY if template == count else template, at, stop))
+        groups.append(PlannedGroup(NOBODY if template == count else template, at, stop))
         at = stop
-    return Plan(tuple(pieces), float(best[last]), squares[path, np.arange(frames)])
+    return Plan(tuple(groups), float(best[last]), squares[path, np.arange(frames)])
 
 
 def rival(
@@ -115,7 +115,7 @@ def rival(
     """Return another plan that would be the best were templates dearer or cheaper, None where there is none close."""
     for price in (options.worth * CLOSE, options.worth / CLOSE):
         other = best_plan(residuals, onward, replace(options, worth=price))
-        if other.pieces != plan.pieces:
+        if other.groups != plan.groups:
             return other
     return None
 

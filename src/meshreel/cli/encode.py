@@ -114,7 +114,7 @@ class Parting:
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True)
-class Parts:
+class Part:
     """Flags for a file of some frames, which `concat` joins with the others."""
 
     survey: str | None = None
@@ -159,7 +159,7 @@ def command(
     reading: Reading = Reading(),
     parting: Parting = Parting(),
     masking: Masking = Masking(),
-    parts: Parts = Parts(),
+    part: Part = Part(),
     jobs: int = 1,
     cluster: str | None = None,
     resume: bool | None = None,
@@ -197,8 +197,8 @@ def command(
     parting.check(masking)
     if debug_digests is not None and (resume or coding.goal() is not None):
         raise InputError("--debug-digests describes one whole encode: leave out --resume and targets")
-    parts.check(coding, masking)
-    source = open_source(inputs, reading if parts.survey is None else replace(reading, frames=":"))
+    part.check(coding, masking)
+    source = open_source(inputs, reading if part.survey is None else replace(reading, frames=":"))
     scene = parting.scene(preset_options().scene or SceneOptions(), masking)
 
     def options_at(quality: float) -> EncoderOptions:
@@ -207,7 +207,7 @@ def command(
     goal, quality = coding.goal(), DEFAULT_QUALITY if coding.quality is None else coding.quality
     options = options_at(quality)
     sequence, masker = masking.upright(source), masking.masker(len(source.sequence))
-    excerpt = parts.excerpt(sequence, reading.frames, options)
+    excerpt = part.excerpt(sequence, reading.frames, options)
     with (
         common.stages(len(sequence if excerpt is None else excerpt.frames)) as progress,
         workers(jobs, cluster) as executor,

@@ -1,6 +1,6 @@
 """Templates that may follow the next frames: of a key frame or of the group before, followed outward until lost.
 
-In: a window of frames. Out: for each candidate its residual on each frame that it follows, and its fit to those of a
+In: the next frames. Out: for each candidate its residual on each frame that it follows, and its fit to those of a
 group. What is known of a candidate stays with it, so that no frame is tracked or fitted twice with one template.
 """
 
@@ -31,7 +31,7 @@ LATER, EARLIER = 1, -1  # sides of a key
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class Ahead:
     """The frames that the next group may have, prepared for matching."""
 
     first: int  # number of the first of them in its interval
@@ -68,129 +68,127 @@ class Candidate:
     """A template that is followed outward from its key, the frame on which it lies, for as long as it fits."""
 
     def __init__(
-        self,
-        window: Window,
-        key: int,
-        options: LayersOptions,
-        before: Followed | None = None,
-        tracker: Tracker | None = None,
+        self, ahead: Ahead, key: int, options: LayersOptions, tracker: Tracker, before: Followed | None = None
     ) -> None:
-        """Take the template of a key frame in the window, or that of the group `before` the window.
-
-        `tracker` is that of another template of the same key.
-        """
-        self.key, self.before, self._options, self._noise = key, before, options, window.noise
-        self._target = window.target.distance
+        """Follow the surface of a tracker that begins at the key; `of_key` and `of_group` also give it a template."""
+        self.key, self.before, self._options, self._noise = key, before, options, ahead.noise
+        self._target, self._tracker = ahead.target.distance, tracker
         self._fits, self._residuals = dict[int, Float64[np.ndarray, "V 3"]](), dict[int, float]()
         self._ends = dict[int, int]()  # by side, the frame where the template is lost
-        if before is not None:
-            surface = Mesh(before.positions, before.reference.base.faces)
-            self._tracker = Tracker(surface, key, options.embedded, window.noise)
-            self._take(before.reference, before.positions, before.closeness)
-            self._rest, self._usual = before.positions, before.residual
-            return
-        self._tracker = tracker or Tracker(window.at(key).mesh, key, options.embedded, window.noise)
-        if window.noise == 0 or not self._lay_fused(window):
-            self._lay(window)
 
-    def others(self, window: Window) -> list[Candidate]:
-        """Return templates of the same key with other errors, followed through the window, where these are tried."""
+    @classmethod
+    def of_key(cls, ahead: Ahead, key: int, options: LayersOptions, tracker: Tracker | None = None) -> Candidate:
+        """Return the template of a key frame ahead; `tracker` is that of another template of the same key."""
+        found = cls(ahead, key, options, tracker or Tracker(ahead.at(key).mesh, key, options.embedded, ahead.noise))
+        if ahead.noise == 0 or not found._lay_fused(ahead):
+            found._lay(ahead)
+        return found
+
+    @classmethod
+    def of_group(cls, ahead: Ahead, before: Followed, options: LayersOptions) -> Candidate:
+        """Return the template at the end of the group before, whose last frame is its key."""
+        surface, key = Mesh(before.positions, before.reference.base.faces), ahead.first - 1
+        found = cls(ahead, key, options, Tracker(surface, key, options.embedded, ahead.noise), before)
+        found._take(before.reference, before.positions, before.closeness)
+        found._rest, found._usual = before.positions, before.residual
+        return found
+
+    def others(self, ahead: Ahead) -> list[Candidate]:
+        """Return templates of the same key with other errors, already followed, where these are tried."""
         if self.before is not None:
             return []
         o, found = self._options, list[Candidate]()
         for error in o.errors:
             options = replace(o, template=replace(o.template, error=error * o.template.error), errors=())
-            found.append(Candidate(window, self.key, options, tracker=self._tracker))
-            found[-1].follow(window)
+            found.append(Candidate.of_key(ahead, self.key, options, self._tracker))
+            found[-1].follow(ahead)
         return found
 
-    def follow(self, window: Window) -> None:
-        """Track and fit the frames of the window on both sides of the key, up to one that is lost."""
+    def follow(self, ahead: Ahead) -> None:
+        """Track and fit the frames ahead on both sides of the key, up to one that is lost."""
         if self._usual == np.inf:
             return  # nothing is left of the key's surface as it would be coded
         for side in (LATER, EARLIER):
-            for number in self._tracked(window, side):
+            for number in self._tracked(ahead, side):
                 if number not in self._residuals:
-                    self._fit(window, number)
-                if self._residuals[number] > self._limit(window):
+                    self._fit(ahead, number)
+                if self._residuals[number] > self._limit(ahead):
                     self._ends[side] = number
                     break
 
-    def residuals(self, window: Window) -> Float64[np.ndarray, " T"]:
-        """Return the residuals on the window's frames, in units of the distance to reach; infinite where it is lost."""
-        found = np.array([self._residuals.get(number, np.inf) for number in window.numbers])
-        return np.where(found <= self._limit(window), found / window.target.distance, np.inf)
+    def residuals(self, ahead: Ahead) -> Float64[np.ndarray, " T"]:
+        """Return the residuals on the frames ahead, in units of the distance to reach; infinite where it is lost."""
+        found = np.array([self._residuals.get(number, np.inf) for number in ahead.numbers])
+        return np.where(found <= self._limit(ahead), found / ahead.target.distance, np.inf)
 
-    def follows(self, window: Window, numbers: range) -> bool:
+    def follows(self, ahead: Ahead, numbers: range) -> bool:
         """Return whether none of these frames is lost."""
-        return bool(
-            np.isfinite(self.residuals(window)[numbers.start - window.first : numbers.stop - window.first]).all()
-        )
+        return bool(np.isfinite(self.residuals(ahead)[numbers.start - ahead.first : numbers.stop - ahead.first]).all())
 
-    def fit(self, window: Window, numbers: range) -> Float64[np.ndarray, "T V 3"]:
+    def fit(self, ahead: Ahead, numbers: range) -> Float64[np.ndarray, "T V 3"]:
         """Return the final fits to successive frames that it follows: near what one shape explains."""
         first = np.stack([self._fits[number] for number in numbers])
         if not self._options.fit.components or len(numbers) == 1:
             return first
         detail = shared_detail(self.reference.mesh.faces, len(self.reference.mesh.vertices), self.reference.levels)
         triples = zip(numbers, detail(first), first, strict=True)
-        return np.stack([self._fitting.second(window.at(number), *both) for number, *both in triples])
+        return np.stack([self._fitting.second(ahead.at(number), *both) for number, *both in triples])
 
     def followed(self, state: LayersState, positions: Float64[np.ndarray, "V 3"], numbers: range) -> Followed:
         """Return the template at the end of a group of these frames, for the group after it."""
         usual = self._usual if self.before else float(np.median([self._residuals[number] for number in numbers]))
         return Followed(self.reference, state, positions, self._closeness, usual)
 
-    def _limit(self, window: Window) -> float:
+    def _limit(self, ahead: Ahead) -> float:
         """Return the residual beyond which a frame is lost: there is none below a key that is lost itself."""
-        limit, target = self._options.plan.limit, window.target.distance
+        limit, target = self._options.plan.limit, ahead.target.distance
         return 0.0 if self._usual > limit * target and self.before is None else limit * max(target, self._usual)
 
-    def _tracked(self, window: Window, side: int) -> Iterator[int]:
+    def _tracked(self, ahead: Ahead, side: int) -> Iterator[int]:
         """Yield frames outward from the key for as long as the key's surface is tracked."""
-        numbers = window.numbers
+        numbers = ahead.numbers
         later, earlier = range(self.key + 1, numbers.stop), range(self.key - 1, numbers.start - 1, -1)
         for number in later if side == LATER else earlier:
             if number == self._ends.get(side):
                 return
             residual = self._tracker.residual(number)
             if residual is None:
-                residual = self._tracker.step(number, window.at(number))
+                residual = self._tracker.step(number, ahead.at(number))
             if residual > self._tracker.limits.lost:
                 self._ends[side] = number
                 return
             yield number
 
-    def _lay_fused(self, window: Window) -> bool:
+    def _lay_fused(self, ahead: Ahead) -> bool:
         """Make the template of what all tracked frames have in common; return False where nothing is left of it."""
-        tracked = sorted([self.key, *(number for side in (LATER, EARLIER) for number in self._tracked(window, side))])
-        surfaces = [window.at(number) for number in tracked]
+        tracked = sorted([self.key, *(number for side in (LATER, EARLIER) for number in self._tracked(ahead, side))])
+        surfaces = [ahead.at(number) for number in tracked]
         fused = fused_mesh(self._tracker.motion(tracked), surfaces, self._noise, self._options.fused)
-        if fused.is_empty or (reference := self._coded(window, fused)) is None:
+        if fused.is_empty or (reference := self._coded(ahead, fused)) is None:
             return False
         placed = reference.base.vertices
         fitting = Fitting(reference.base.faces, len(placed), self._options.fit, self._noise)
         self._rest = fitting.first(FrameSurface(fused), placed, placed)
         self._take(reference, self._rest)
-        self._fit(window, self.key)
+        self._fit(ahead, self.key)
         self._usual = self._residuals[self.key]
         return True
 
-    def _lay(self, window: Window) -> None:
+    def _lay(self, ahead: Ahead) -> None:
         """Make the template of the key frame's surface."""
         self._usual = np.inf
-        if (reference := self._coded(window, window.at(self.key).mesh)) is not None:
+        if (reference := self._coded(ahead, ahead.at(self.key).mesh)) is not None:
             self._rest = reference.base.vertices
             self._take(reference, self._rest)
-            self._fit(window, self.key)
+            self._fit(ahead, self.key)
             self._rest, self._usual = self._fits[self.key], self._residuals[self.key]
 
-    def _coded(self, window: Window, surface: Mesh) -> CodedReference | None:
+    def _coded(self, ahead: Ahead, surface: Mesh) -> CodedReference | None:
         """Return a base mesh of a surface as decoded; None where nothing is left of it."""
         o = self._options
-        lattice = o.layers.step_above(self._noise) * (LATTICE if len(window) > 1 else LATTICE_ALONE)
+        lattice = o.layers.step_above(self._noise) * (LATTICE if len(ahead) > 1 else LATTICE_ALONE)
         reference = code_on_lattice(base_mesh(surface, o.template, self._noise), lattice, o.template.levels)
-        note(window.digests, "template, coded", reference.base.vertices, reference.base.faces)
+        note(ahead.digests, "template, coded", reference.base.vertices, reference.base.faces)
         return None if reference.mesh.is_empty else reference
 
     def _take(
@@ -202,8 +200,8 @@ class Candidate:
         self._fitting = Fitting(faces, len(points), self._options.fit, self._noise)
         self._closeness = closeness or Closeness(faces, points, self._target, self._noise)
 
-    def _fit(self, window: Window, number: int) -> None:
+    def _fit(self, ahead: Ahead, number: int) -> None:
         prediction = self._tracker.placed(number, self._points, self._binding)
-        positions = self._fitting.first(window.at(number), self._rest, prediction)
-        self._fits[number], self._residuals[number] = positions, self._closeness.of(positions, window.at(number))
-        note(window.digests, "first fit", self.key, number, positions)
+        positions = self._fitting.first(ahead.at(number), self._rest, prediction)
+        self._fits[number], self._residuals[number] = positions, self._closeness.of(positions, ahead.at(number))
+        note(ahead.digests, "first fit", self.key, number, positions)

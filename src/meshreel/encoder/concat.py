@@ -67,13 +67,15 @@ def _joined_header(inputs: Sequence[Place]) -> Header:
         if len(reader.tracks) != tracks:
             text = f"{path}: {len(reader.tracks)} tracks, and {inputs[0]} has {tracks}"
             raise InputError(f"{text}; encode both with --survey FILE, which meshreel survey writes")
-        _check_alike(path, reader, header, parts[0][0] if parts else reader.metadata, inputs[0])
-        parts.append((reader.metadata, reader.frame_count))
+        try:
+            _check_alike(path, reader, header, parts[0][0] if parts else reader.metadata, inputs[0])
+            parts.append((reader.metadata, reader.frame_count))
+            joined_metadata(parts[-1:])
+        except (KeyError, TypeError, ValueError) as error:
+            text = f"{path}: its metadata are not those of meshreel encode ({error!r})"
+            raise InputError(f"{text}; encode it again") from None
     assert header is not None
-    try:
-        metadata = joined_metadata(parts)
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(f"{inputs[0]} ...: the metadata are not those of meshreel encode ({error!r})") from None
+    metadata = joined_metadata(parts)
     return replace(header, metadata=json.dumps(metadata, separators=(",", ":")))
 
 

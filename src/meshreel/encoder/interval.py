@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.pieces import piece_of_faces
 from ..analysis.survey import Survey
+from ..errors import InputError
 from ..geometry.derived_sequences import DerivedSequence
 from ..geometry.topology import clean, part_of
 from ..types import Frames, Mesh
@@ -90,5 +91,10 @@ class BodyFrames(NormalisedFrames):
         self._body, self._bodies = body, bodies
 
     def __getitem__(self, index: int) -> Mesh:
-        mesh = clean(self._sequence[self._numbers[index]])
-        return self._seen.normalise(part_of(mesh, np.array(self._bodies[index])[piece_of_faces(mesh)] == self._body))
+        """Return the body in a frame. Raises InputError for a survey that has other pieces of the frame."""
+        mesh, bodies = clean(self._sequence[self._numbers[index]]), self._bodies[index]
+        pieces = piece_of_faces(mesh)
+        if (count := 1 + int(pieces.max(initial=0))) != len(bodies):
+            text = f"{self._sequence.name(self._numbers[index])}: has {count} large pieces, in its survey {len(bodies)}"
+            raise InputError(f"{text}; write it again with meshreel survey")
+        return self._seen.normalise(part_of(mesh, np.array(bodies)[pieces] == self._body))

@@ -1,7 +1,7 @@
 """The recipe of layers: base meshes of key frames follow the frames around them for as long as they fit.
 
-In -> out: an interval, whose frames are read in order -> groups with their fidelity. A window of the next frames is
-planned: which templates, of key frames or of the group before, follow which of its frames (`analysis.plan`). Frames
+In -> out: an interval, whose frames are read in order -> groups with their fidelity. The next frames are
+planned together: which templates, of key frames or of the group before, follow which of them (`analysis.plan`). Frames
 that no template follows are coded one by one.
 """
 
@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..analysis.fit.frame import FrameSurface
-from ..analysis.plan import Piece, Plan, best_plan, next_key, rival
+from ..analysis.plan import Plan, PlannedGroup, best_plan, next_key, rival
 from ..format.layout import Form
-from .candidates import Candidate, Followed, Window
+from .candidates import Ahead, Candidate, Followed
 from .digests import note
 from .forms import EncodedGroup, empty_groups, most_for
 from .interval import Interval
@@ -36,7 +36,7 @@ Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that t
 
 
 def encode_interval(interval: Interval, options: LayersOptions, stages: Stages | None = None) -> Iterator[EncodedGroup]:
-    """Yield the groups of an interval; only the frames of one window are in memory at a time."""
+    """Yield the groups of an interval; only the frames of one plan are in memory at a time."""
     frames = interval.frames
     stages = stages or Stages(None, len(frames))
     groups = empty_groups(len(frames)) if frames[0].is_empty else _Planner(interval, options).groups()
@@ -46,7 +46,7 @@ def encode_interval(interval: Interval, options: LayersOptions, stages: Stages |
 
 
 class _Planner:
-    """Plans and codes one window of an interval after the other."""
+    """Plans the next frames of an interval and codes them, until none is left."""
 
     def __init__(self, interval: Interval, options: LayersOptions) -> None:
         self._interval, self._options, self._at = interval, options, 0
@@ -58,15 +58,15 @@ class _Planner:
     def groups(self) -> Iterator[EncodedGroup]:
         """Yield the groups of the interval."""
         while self._at < len(self._interval.frames):
-            window = self._window()
-            for group, after in self._standing(window) or self._moving(window):
+            ahead = self._next_frames()
+            for group, after in self._standing(ahead) or self._moving(ahead):
                 self._at += group.frame_count
                 self._before = after
                 if not group.predicted:
                     self._dearer = most_for(group) if group.form == Form.LAYERS else 0.0
                 yield group
 
-    def _window(self) -> Window:
+    def _next_frames(self) -> Ahead:
         """Return the next frames."""
         numbers = range(self._at, min(self._at + self._options.group_size, len(self._interval.frames)))
         known, digests, noise = self._surfaces, self._interval.digests, self._interval.noise
@@ -74,90 +74,90 @@ class _Planner:
         meshes = [surface.mesh for surface in self._surfaces.values()]
         note(digests, "frames", *(array for mesh in meshes for array in (mesh.vertices, mesh.faces)))
         target = target_of(meshes, self._options.target, noise)
-        return Window(self._at, list(self._surfaces.values()), noise, target, digests)
+        return Ahead(self._at, list(self._surfaces.values()), noise, target, digests)
 
-    def _standing(self, window: Window) -> list[Coded]:
+    def _standing(self, ahead: Ahead) -> list[Coded]:
         """Code the template where it was, if its residual there is hardly larger than usual: a fit would only slide."""
         before = self._before
-        if before is None or not self._options.predict or before.residual > GOOD * window.target.distance:
+        if before is None or not self._options.predict or before.residual > GOOD * ahead.target.distance:
             return []
-        for surface in reversed(window.surfaces):  # most bodies have moved by the last frame
+        for surface in reversed(ahead.surfaces):  # most bodies have moved by the last frame
             if before.closeness.of(before.positions, surface) > STILL * before.residual:
                 return []
-        positions = np.repeat(before.positions[None], len(window), axis=0)
-        group, state = self._coder(window, slice(None)).layers(before.reference, positions, before.state)
+        positions = np.repeat(before.positions[None], len(ahead), axis=0)
+        group, state = self._coder(ahead, slice(None)).layers(before.reference, positions, before.state)
         return [(group, None if state is None else replace(before, state=state))]
 
-    def _moving(self, window: Window) -> list[Coded]:
-        """Code the window by its plan, or by one with other cuts where that costs hardly more and turns out better.
+    def _moving(self, ahead: Ahead) -> list[Coded]:
+        """Code the frames ahead by their plan, or by another one that costs hardly more and turns out better.
 
-        The last piece may go on beyond the window: it is planned again, with its template, unless it is the only one.
+        The last group may go on beyond these frames: it is planned again, with its template, unless it is the only one.
         """
-        plan, candidates = self._planned(window)
-        is_last, done = window.numbers.stop == len(self._interval.frames), dict[Piece, Coded]()
-        other = rival(plan, *_known(window, candidates), self._options.plan)
-        note(window.digests, "plans", plan.pieces, other and other.pieces)
+        plan, candidates = self._planned(ahead)
+        is_last, done = ahead.numbers.stop == len(self._interval.frames), dict[PlannedGroup, Coded]()
+        other = rival(plan, *_known(ahead, candidates), self._options.plan)
+        note(ahead.digests, "plans", plan.groups, other and other.groups)
         if other is not None:
-            tried = [(self._pieces(window, one.pieces, candidates, done), one) for one in (plan, other)]
-            noisy = window.noise > 0
-            plan = min(tried, key=lambda pair: _cost(pair[0], len(window), noisy))[1]
-        goes_on = not is_last and len(plan.pieces) > 1
-        self._candidates = [candidates[piece.template] for piece in plan.pieces[-1:] if goes_on and not piece.is_alone]
-        return self._pieces(window, plan.pieces[:-1] if goes_on else plan.pieces, candidates, done)
+            tried = [(self._all(ahead, one.groups, candidates, done), one) for one in (plan, other)]
+            noisy = ahead.noise > 0
+            plan = min(tried, key=lambda pair: _cost(pair[0], len(ahead), noisy))[1]
+        goes_on = not is_last and len(plan.groups) > 1
+        self._candidates = [candidates[each.template] for each in plan.groups[-1:] if goes_on and not each.is_alone]
+        return self._all(ahead, plan.groups[:-1] if goes_on else plan.groups, candidates, done)
 
-    def _planned(self, window: Window) -> tuple[Plan, list[Candidate]]:
-        """Return the plan of a window, and the candidates that its pieces name; keys are tried while they may pay."""
+    def _planned(self, ahead: Ahead) -> tuple[Plan, list[Candidate]]:
+        """Return the plan of the frames ahead and the candidates that it names; keys are tried while they may pay."""
         o, candidates = self._options.plan, list(self._candidates)
         if self._before is not None and self._options.predict:
-            candidates.append(Candidate(window, window.first - 1, self._options, self._before))
+            candidates.append(Candidate.of_group(ahead, self._before, self._options))
         for one in candidates:
-            one.follow(window)
-        plan, misses = best_plan(*_known(window, candidates), o), 0
-        for _ in range(min(o.keys, NOISY_KEYS) if window.noise else o.keys):
-            tried = {number - window.first for number in self._tried}
+            one.follow(ahead)
+        plan, misses = best_plan(*_known(ahead, candidates), o), 0
+        for _ in range(min(o.keys, NOISY_KEYS) if ahead.noise else o.keys):
+            tried = {number - ahead.first for number in self._tried}
             if plan.excess.sum() <= o.settled * o.worth or misses == o.misses or (key := next_key(plan, tried)) is None:
                 break
-            self._tried.add(window.first + key)
-            candidates.append(Candidate(window, window.first + key, self._options))
-            candidates[-1].follow(window)
-            better = best_plan(*_known(window, candidates), o)
+            self._tried.add(ahead.first + key)
+            candidates.append(Candidate.of_key(ahead, ahead.first + key, self._options))
+            candidates[-1].follow(ahead)
+            better = best_plan(*_known(ahead, candidates), o)
             misses = 0 if plan.cost - better.cost > o.gain * o.worth else misses + 1
             plan = better
         return plan, candidates
 
-    def _pieces(
+    def _all(
         self,
-        window: Window,
-        pieces: Sequence[Piece],
+        ahead: Ahead,
+        planned: Sequence[PlannedGroup],
         candidates: Sequence[Candidate],
-        done: dict[Piece, Coded],
+        done: dict[PlannedGroup, Coded],
     ) -> list[Coded]:
-        """Code pieces of a plan that are not done; the last group is shorter where a group may not hold more frames."""
+        """Code groups of a plan that are not done; the last group is shorter where a group may not hold more frames."""
         found = list[Coded]()
-        for piece in pieces:
-            if piece not in done:
-                done[piece] = self._piece(window, piece, None if piece.is_alone else candidates[piece.template])
-            group, after = done[piece]
-            is_short = group.frame_count < piece.stop - piece.first
-            found.append((group, after if is_short or piece.stop == len(window) else None))  # else another is better
+        for each in planned:
+            if each not in done:
+                done[each] = self._one(ahead, each, None if each.is_alone else candidates[each.template])
+            group, after = done[each]
+            is_short = group.frame_count < each.stop - each.first
+            found.append((group, after if is_short or each.stop == len(ahead) else None))  # else another is better
             if is_short:
                 break
         return found
 
-    def _piece(self, window: Window, piece: Piece, candidate: Candidate | None) -> Coded:
-        """Code a piece of a plan, or the first of its frames."""
-        coder = self._coder(window, slice(piece.first, piece.stop))
+    def _one(self, ahead: Ahead, each: PlannedGroup, candidate: Candidate | None) -> Coded:
+        """Code a group of a plan, or the first of its frames."""
+        coder = self._coder(ahead, slice(each.first, each.stop))
         if candidate is None:
             return coder.alone(), None
-        numbers = window.numbers[piece.first : piece.stop]
-        tried = [candidate, *(one for one in candidate.others(window) if one.follows(window, numbers))]
-        coded = [self._with(window, numbers, coder, one) for one in tried]
-        return min(coded, key=lambda one: _cost([one], len(numbers), window.noise > 0))
+        numbers = ahead.numbers[each.first : each.stop]
+        tried = [candidate, *(one for one in candidate.others(ahead) if one.follows(ahead, numbers))]
+        coded = [self._with(ahead, numbers, coder, one) for one in tried]
+        return min(coded, key=lambda one: _cost([one], len(numbers), ahead.noise > 0))
 
-    def _with(self, window: Window, numbers: range, coder: GroupCoder, candidate: Candidate) -> Coded:
+    def _with(self, ahead: Ahead, numbers: range, coder: GroupCoder, candidate: Candidate) -> Coded:
         """Code successive frames with a template."""
-        positions = candidate.fit(window, numbers)
-        note(window.digests, "fit", positions)
+        positions = candidate.fit(ahead, numbers)
+        note(ahead.digests, "fit", positions)
         previous = candidate.before.state if candidate.before else None
         group, state = coder.layers(candidate.reference, positions, previous)
         if state is None:
@@ -166,14 +166,14 @@ class _Planner:
         key = numbers.index(candidate.key) if candidate.key in numbers else None
         return replace(group, key=key), candidate.followed(state, positions[len(numbers) - 1], numbers)
 
-    def _coder(self, window: Window, some: slice) -> GroupCoder:
-        chosen, digests = window.surfaces[some], window.digests
-        return GroupCoder(chosen, window.target, window.noise, self._options, self._dearer, digests=digests)
+    def _coder(self, ahead: Ahead, some: slice) -> GroupCoder:
+        chosen, digests = ahead.surfaces[some], ahead.digests
+        return GroupCoder(chosen, ahead.target, ahead.noise, self._options, self._dearer, digests=digests)
 
 
-def _known(window: Window, candidates: Sequence[Candidate]) -> tuple[Float64[np.ndarray, "C T"], list[bool]]:
-    """Return the candidates' residuals on the window's frames, and which of them come from the group before."""
-    residuals = np.array([one.residuals(window) for one in candidates]).reshape(-1, len(window))
+def _known(ahead: Ahead, candidates: Sequence[Candidate]) -> tuple[Float64[np.ndarray, "C T"], list[bool]]:
+    """Return the candidates' residuals on the frames ahead, and which of them come from the group before."""
+    residuals = np.array([one.residuals(ahead) for one in candidates]).reshape(-1, len(ahead))
     return residuals, [one.before is not None for one in candidates]
 
 

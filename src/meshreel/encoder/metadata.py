@@ -6,16 +6,17 @@ them, but the rate includes them.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, astuple, dataclass
 from typing import Any
 
 from ..types import Up
 from .options import EncoderOptions
 from .summary import GroupSummary
 
-PART = "part"  # the exact totals, in a file that is a part
+PART = "part"  # of a file that is a part: its exact totals, and a digest of its options
 _KEYS, _MEANS = "key_frames", ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
 
 
@@ -58,7 +59,7 @@ class Totals:
         Raises TypeError or ValueError for metadata that no encoder wrote.
         """
         if PART in metadata:
-            return Totals(frames, *map(_number, metadata[PART]))
+            return Totals(frames, *map(_number, metadata[PART]["totals"]))
         rms, worst, psnr, angle = (_number(metadata[name]) for name in _MEANS)
         return Totals(frames, frames * rms**2, worst, frames * psnr, frames * angle)
 
@@ -79,7 +80,8 @@ def metadata_of(options: EncoderOptions, groups: Sequence[GroupSummary], up: Up,
     """Return the metadata of a file that is no scene."""
     totals, keys = Totals.of(groups), sorted({group.key for group in groups if group.key is not None})
     found = {"preset": options.preset, "quality": rounded(options.quality), _KEYS: keys, **totals.means}
-    return found | upright(up) | ({PART: totals.exact} if is_part else {})
+    part = {"totals": totals.exact, "options": hashlib.sha256(repr(asdict(options)).encode()).hexdigest()[:16]}
+    return found | upright(up) | ({PART: part} if is_part else {})
 
 
 def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
@@ -97,8 +99,12 @@ def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, An
 
 
 def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
-    """Return the metadata that all parts of a sequence have in common."""
-    return {name: value for name, value in metadata.items() if name not in (PART, _KEYS, *_MEANS)}
+    """Return the metadata that all parts of a sequence have in common, the digest of their options among them.
+
+    Raises KeyError or TypeError for metadata that no encoder wrote.
+    """
+    found = {name: value for name, value in metadata.items() if name not in (PART, _KEYS, *_MEANS)}
+    return found | ({"options": metadata[PART]["options"]} if PART in metadata else {})
 
 
 def upright(up: Up) -> dict[str, Any]:

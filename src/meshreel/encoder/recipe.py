@@ -66,7 +66,7 @@ def _side_by_side(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
                 ready[number] = known, ""
                 continue
             sent[number] = interval, stages
-            yield number, encode_apart, (interval.to_send(), job.options.method, number)
+            yield number, encode_sent, (interval.to_send(), job.options.method, number)
 
     def look() -> None:
         for number, stage, done in told() if told is not None else ():
@@ -128,7 +128,7 @@ def encode_interval(
         yield group if interval.digests is None else replace(group, digests=interval.digests.take())
 
 
-def encode_apart(interval: Interval, options: MethodOptions, number: int) -> tuple[list[EncodedGroup], Any]:
+def encode_sent(interval: Interval, options: MethodOptions, number: int) -> tuple[list[EncodedGroup], Any]:
     """Encode an interval in a worker process, which ends with its parent; the result can be pickled.
 
     Return the groups, and what reading the frames has shown.

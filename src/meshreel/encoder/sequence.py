@@ -54,7 +54,7 @@ from .scene import (
 )
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
-from .tracks import TrackGroup, encode_apart, plan, plan_intervals
+from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
 
 QUALITY, PRESET, EFFORT = 50.0, "best", "normal"  # the default operating point (decision 0009)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
@@ -166,7 +166,7 @@ class Encoder:
         seen = parts.seen if parts is not None else surveyed(job) if excerpt is None else excerpt.surveyed.seen
         made = made_of(self.sequence, options, self._masker)
         journal.begin(made if excerpt is None else made | {"part": str(excerpt.frames)})
-        summary = _encode_bodies(job, file, seen) if parts is None else _encode_scene(job, file, parts)
+        summary = _encode_tracked(job, file, seen) if parts is None else _encode_scene(job, file, parts)
         return replace(summary, work=since(before))
 
     def survey(self, path: Path) -> Survey:
@@ -196,13 +196,13 @@ class Encoder:
         return self._scene[2]
 
 
-def _encode_bodies(job: Job, file: BinaryIO, seen: Survey) -> Summary:
+def _encode_tracked(job: Job, file: BinaryIO, seen: Survey) -> Summary:
     """Encode a sequence in which everything may move."""
     sequence, options = job.sequence, job.options
     groups: list[GroupSummary] = []
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped, seen.pieces)
     with _writer(job, file, seen) as writer:
-        for encoded in encode_apart(job, seen):
+        for encoded in encode_tracked(job, seen):
             groups += [_added(writer, each, [], seen.diagonal) for each in encoded]
         metadata = metadata_of(options, groups, sequence.up, is_part=job.excerpt is not None)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
@@ -333,5 +333,5 @@ def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
     """Yield the intervals of a sequence, of a scene where there are parts."""
     if parts is None:
         seen = surveyed(job)
-        return plan_intervals(job, seen, plan(job, seen))
+        return intervals_of(job, seen, tracked_bodies(job, seen))
     return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))

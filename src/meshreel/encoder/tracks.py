@@ -48,14 +48,14 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class TrackedBodies:
     """The key intervals of a sequence, each with its bodies."""
 
     intervals: list[tuple[range, list[Body]]]
-    tracks: int  # of the whole sequence, also where the intervals are those of an excerpt
+    count: int  # of the whole sequence, also where the intervals are those of an excerpt
 
 
-def plan(job: Job, seen: Survey) -> Plan:
+def tracked_bodies(job: Job, seen: Survey) -> TrackedBodies:
     """Return the key intervals and their bodies: one, in track 0, where the recipe codes none apart.
 
     Of an excerpt, these are the key intervals of the whole sequence as far as its frames go.
@@ -67,12 +67,14 @@ def plan(job: Job, seen: Survey) -> Plan:
         whole = [(frames, [Body(0)]) for frames in numbered]
     tracks = 1 + max(body.track for _, bodies in whole for body in bodies)
     if job.excerpt is None:
-        return Plan(whole, tracks)
+        return TrackedBodies(whole, tracks)
     cut = [(frames, some, bodies) for frames, bodies in whole for some in job.excerpt.of([frames])]
-    return Plan([(some, [_only(body, frames, some) for body in bodies]) for frames, some, bodies in cut], tracks)
+    return TrackedBodies(
+        [(some, [_only(body, frames, some) for body in bodies]) for frames, some, bodies in cut], tracks
+    )
 
 
-def plan_intervals(job: Job, seen: Survey, planned: Plan) -> Iterator[Interval]:
+def intervals_of(job: Job, seen: Survey, planned: TrackedBodies) -> Iterator[Interval]:
     """Yield an interval for each body of each key interval, whose frames are read where it is encoded."""
     for frames, bodies in planned.intervals:
         for body in bodies:
@@ -85,20 +87,20 @@ def plan_intervals(job: Job, seen: Survey, planned: Plan) -> Iterator[Interval]:
             yield Interval(some, first_frame=frames.start, track=body.track, weight=weight, larger=larger)
 
 
-def encode_apart(job: Job, seen: Survey) -> Iterator[list[TrackGroup]]:
+def encode_tracked(job: Job, seen: Survey) -> Iterator[list[TrackGroup]]:
     """Yield the groups of each key interval in the order of the file, whose first frame has number 0.
 
     All tracks have all frames, some of them empty. The PSNR of a group is that of its whole frames; its other measures
     are its body's own.
     """
-    planned, first = plan(job, seen), 0
-    coded = encode_intervals(job, plan_intervals(job, seen, planned))
+    planned, first = tracked_bodies(job, seen), 0
+    coded = encode_intervals(job, intervals_of(job, seen, planned))
     for frames, bodies in planned.intervals:
         found, groups = list[TrackGroup](), [next(coded) for _ in bodies]
         psnrs = _psnrs(seen, frames, bodies, groups) if len(bodies) > 1 else None
         for body, some in zip(bodies, groups, strict=True):
             found += _placed(body, first, some, psnrs)
-        for track in {*range(planned.tracks)} - {body.track for body in bodies}:
+        for track in {*range(planned.count)} - {body.track for body in bodies}:
             found += _placed(Body(track, share=0.0), first, empty_groups(len(frames)), None)
         first += len(frames)
         yield sorted(found, key=lambda each: (each.first_frame, each.track))
