@@ -22,16 +22,16 @@ SHEET = noisy(sheet(), NOISE, 0)
 
 def test_without_noise_limits_rounds_and_steps_are_those_of_the_options() -> None:
     assert BEST.embedded.limits(0.0).lost == BEST.embedded.lost
-    rounds = BEST.fit.rounds(0.0)
-    assert (rounds.gates, rounds.smoothing, rounds.pull) == (BEST.fit.gates, BEST.fit.smoothing, BEST.fit.pull)
+    first, second = BEST.fit.rounds(0.0)
+    assert (first.gates, first.smoothing, second.anchor) == (BEST.fit.gates, BEST.fit.smoothing, BEST.fit.pull)
     assert BEST.layers.step_above(0.0) == BEST.layers.step
 
 
 def test_noise_makes_nothing_finer() -> None:
     assert BEST.layers.step_above(NOISE) > BEST.layers.step
     assert BEST.embedded.limits(NOISE).lost > BEST.embedded.lost
-    rounds = BEST.fit.rounds(NOISE)
-    assert rounds.pull > BEST.fit.pull and min(rounds.gates) > min(BEST.fit.gates)
+    first, second = BEST.fit.rounds(NOISE)
+    assert second.anchor > BEST.fit.pull and min(first.gates) > min(BEST.fit.gates)
     assert len(base_mesh(SHEET, BEST.template, NOISE).vertices) <= len(base_mesh(SHEET, BEST.template).vertices)
 
 

@@ -25,8 +25,8 @@ from .digests import Digests, note
 from .options import LayersOptions
 from .target import Fidelity
 
-LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 0014)
-LATTICE_ALONE = 0.8  # the same for a single frame, whose base need not move (decision 0014)
+LATTICE = 0.33  # spacing of the base's lattice, in steps: the motion codes what it rounds away (decision 14)
+LATTICE_ALONE = 0.8  # the same for a single frame, whose base need not move (decision 14)
 LATER, EARLIER = 1, -1  # sides of a key
 
 

@@ -25,7 +25,7 @@ from ..types import Mesh
 from .draco import IntraOptions, cheapest_intra, finest_intra
 from .target import NO_ERROR, Fidelity, measure
 
-# Times the bytes that half the distance (6 dB) may cost: a finer template gains 4 dB for that (decision 0007).
+# Times the bytes that half the distance (6 dB) may cost: a finer template gains 4 dB for that (decision 7).
 MOST_FOR_HALF = 2
 MOST_EMPTY = 65_535  # frames of a group without surface: what its field in the index holds
 

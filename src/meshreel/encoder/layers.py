@@ -29,8 +29,8 @@ from .target import target_of
 GOOD = 1.4  # targets: what leaves more is planned anew, though it stands still (guess)
 STILL = 1.1  # times its usual residual that a template may leave without a new fit (guess)
 NOISY_KEYS = 2  # keys tried at most under noise: the fused template completes them (decision 16)
-BY_RATE = 1.33  # the squared error falls with this power of the rate: 4 dB a doubling (decision 0013)
-ANGLE_BY_RATE = 0.36  # the normal error falls with this power of the rate (measured on four bodies: decision 0024)
+BY_RATE = 1.33  # the squared error falls with this power of the rate: 4 dB a doubling (decision 13)
+ANGLE_BY_RATE = 0.36  # the normal error falls with this power of the rate (measured on four bodies: decision 24)
 LEAST = 1e-30  # error: its logarithm is finite
 Coded = tuple[EncodedGroup, Followed | None]  # a group, and the template that the next may begin with
 

@@ -1,7 +1,7 @@
 """Presets: one name and one quality from 0 to 100 set every option of the encoder.
 
 In -> out: what a user chooses -> EncoderOptions. The curves were fitted to rate-distortion points of a captured dancer
-(decision 0009); docs/results.md has the rates they lead to.
+(decision 9); docs/results.md has the rates they lead to.
 """
 
 from __future__ import annotations

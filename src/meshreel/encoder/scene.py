@@ -37,7 +37,7 @@ from .parts import Change, Parts
 from .recipe import encode_intervals, longest_interval
 from .tracks import TrackGroup
 
-# Of the background's vertices, tried in order (decision 0019).
+# Of the background's vertices, tried in order (decision 19).
 FRACTIONS = (0.02, 0.03, 0.045, 0.07, 0.1, 0.15, 0.22, 0.35, 0.5, 0.75)
 HALFWAY = 0.3  # of the vertices; smaller meshes are decimated from this one, in a third of the time (guess)
 LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)

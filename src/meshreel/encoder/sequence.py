@@ -56,7 +56,7 @@ from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
 
-QUALITY, PRESET, EFFORT = 50.0, "best", "normal"  # the default operating point (decision 0009)
+QUALITY, PRESET, EFFORT = 50.0, "best", "normal"  # the default operating point (decision 9)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
 

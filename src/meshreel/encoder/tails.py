@@ -26,7 +26,7 @@ from ..geometry.strict import dot
 from ..geometry.topology import clean, components, concatenate, drop_unreferenced, face_normals
 from ..types import Mesh
 
-BODY = 0.98  # share of the surface; the rest is the tails (decision 0013)
+BODY = 0.98  # share of the surface; the rest is the tails (decision 13)
 LEAST_BYTES = 4  # bytes of a region or a patch at least (guess)
 DRACO_HEAD = 36  # bytes of a Draco mesh that all patches share
 EXACT = 1e-7  # RMS distance of the rest, of the diagonal, below which no byte is worth spending (guess)
@@ -42,7 +42,7 @@ class TailOptions:
     thresholds: tuple[float, ...] = (4.0, 6.0, 9.0)  # distances of the tails, in RMS distances of the rest
     shares: tuple[float, ...] = (0.1, 0.25, 0.5)  # of a patch's vertices that are kept
     lattice: float = 2.0  # spacing of the patches' lattice, in RMS distances of the rest
-    exchange: float = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 0013)
+    exchange: float = 1.33  # relative fall of the squared error for a rise of the rate: 4 dB a doubling (decision 13)
 
     def __post_init__(self) -> None:
         if not self.thresholds or min(self.thresholds) <= 1:

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.fit.frame import FrameSurface
-from meshreel.analysis.fit.residual import residual_of
 from meshreel.analysis.follow.embedded import Motion
 from meshreel.analysis.follow.embedded_graph import build_graph, farthest_first
 from meshreel.analysis.follow.fused_template import FusedOptions, fused_mesh
 from meshreel.errors import InputError
 from meshreel.geometry.closest_points import Surface, area_samples
-from meshreel.geometry.topology import clean, concatenate
+from meshreel.geometry.topology import clean
 from meshreel.types import Mesh
 
 SIDE, CELLS = 0.5, 40  # of the sheet
@@ -125,23 +124,6 @@ def test_frames_without_surface_in_common_give_the_empty_mesh() -> None:
     frames = [Mesh(sheet().vertices + (3.0 * n, 0, 0), sheet().faces) for n in range(3)]
     motion = moving(sheet(), 3, 0.0)
     assert fused_mesh(motion, carried(frames, motion), 0.001).is_empty
-
-
-def test_the_common_residual_ignores_holes_of_the_frame_but_not_of_the_template() -> None:
-    whole, holed = sheet(), with_hole(sheet(), 0.0, 0.0)
-    over = residual_of(whole, FrameSurface(holed))
-    assert over.by_area > 0.001
-    assert over.common < 1e-6
-    lacking = residual_of(holed, FrameSurface(whole))
-    assert 0.001 < lacking.common <= lacking.by_area
-
-
-def test_the_common_residual_ignores_stray_surface() -> None:
-    whole = sheet()
-    flown = Mesh(whole.vertices[whole.faces[0]] + (0, 0, 0.3), np.array([[0, 1, 2]], np.int32))
-    residual = residual_of(whole, FrameSurface(concatenate([whole, flown])))
-    assert residual.by_area > 0.003
-    assert residual.common < 1e-6
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ class FitOptions:
 
     gates: tuple[float, ...] = (0.024, 0.018, 0.012, 0.012)  # largest distances of pairs, in diagonals
     smoothing: tuple[float, ...] = (4.0, 2.0, 0.7, 0.4)  # row weights of the difference from the rotated Laplacian
-    strides: tuple[int, ...] | None = None  # every so manieth point is matched in a round of a clean fit; None: all
+    strides: tuple[int, ...] | None = None  # of n points one is matched, in a round of a clean fit; None: all
     agreement: float = 0.3  # smallest cosine between the normals of a pair
     anchor: float = 0.02  # row weight of the offset from the prediction
     components: int = 15  # of the trajectories, in the second fit (decision 10); 0: no second fit
@@ -69,26 +69,30 @@ class FitOptions:
         if self.iterations < 1 or not 0 <= self.tolerance < 1:
             raise InputError(f"{self.iterations} iterations, tolerance {self.tolerance}: give at least 1, and 0 to 1")
 
-    def rounds(self, noise: float) -> Rounds:
-        """Return the rounds for frames at this RMS distance from the truth: wider and stiffer where there is noise."""
-        last = self.smoothing[-1] if self.second_smoothing is None else self.second_smoothing
-        if noise == 0:
-            return Rounds(self.gates, self.smoothing, self.strides or (1,) * len(self.gates), self.pull, last)
-        chosen = NOISY_ROUNDS if len(self.gates) >= NOISY_ROUNDS.stop else slice(None)
-        gates = tuple(max(gate, GATE * noise) for gate in self.gates[chosen])
-        stiffer = math.hypot(1.0, noise / FOLLOWED)
-        return Rounds(gates, self.smoothing[chosen], (1,) * len(gates), stiffer * self.pull, stiffer * last)
+    def rounds(self, noise: float) -> tuple[Rounds, Rounds]:
+        """Return the rounds of both fits to frames at this RMS distance from the truth: noise makes them stiffer."""
+        gates, smoothing, strides, stiffer = self.gates, self.smoothing, self.strides or (1,) * len(self.gates), 1.0
+        last = smoothing[-1] if self.second_smoothing is None else self.second_smoothing
+        if noise > 0:
+            chosen = NOISY_ROUNDS if len(gates) >= NOISY_ROUNDS.stop else slice(None)
+            gates, smoothing = tuple(max(gate, GATE * noise) for gate in gates[chosen]), smoothing[chosen]
+            strides, stiffer = (1,) * len(gates), math.hypot(1.0, noise / FOLLOWED)
+        again = (stiffer * last,) * len(gates[-2:])
+        return (
+            Rounds(gates, smoothing, strides, self.anchor, turn=True),
+            Rounds(gates[-2:], again, strides[-2:], stiffer * self.pull, turn=False),
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Rounds:
-    """Gates and weights of both fits, as in FitOptions, for frames of known noise."""
+    """Rounds of the fit of one frame, as in FitOptions."""
 
     gates: tuple[float, ...]
     smoothing: tuple[float, ...]
     strides: tuple[int, ...]
-    pull: float
-    second_smoothing: float
+    anchor: float  # row weight of the offset from the place
+    turn: bool  # whether the shape turns with each vertex's neighbourhood
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,20 +124,6 @@ class Fit:
         return Fit(
             positions, tuple(NOTHING if surface is None else residual_of(mesh, surface) for mesh, surface in pairs)
         )
-
-    @property
-    def by_area(self) -> Float64[np.ndarray, " T"]:
-        """Symmetric RMS over the area of each frame."""
-        return np.array([residual.by_area for residual in self.residuals])
-
-    @property
-    def common(self) -> Float64[np.ndarray, " T"]:
-        """Symmetric RMS over the area that both the template and each frame have."""
-        return np.array([residual.common for residual in self.residuals])
-
-    def first(self, count: int) -> Fit:
-        """Return the fit of the first `count` frames."""
-        return Fit(self.positions[:count], self.residuals[:count])
 
 
 def fit_frames(
@@ -198,12 +188,8 @@ class Fitting:
     def __init__(self, faces: Int32[np.ndarray, "F 3"], vertices: int, options: FitOptions, noise: float = 0.0) -> None:
         """`noise` is the RMS distance of the frames from the truth; 0: a clean capture."""
         self._template, self._options = _core.FitTemplate(faces, vertices), options
-        rounds = options.rounds(noise)
-        gates = rounds.gates[-2:]
-        strides = rounds.strides if vertices >= MANY else (1,) * len(rounds.gates)
-        self._first = _Schedule(rounds.gates, rounds.smoothing, strides, options.anchor, turn=True)
-        last = (rounds.second_smoothing,) * len(gates)
-        self._second = _Schedule(gates, last, strides[-2:], rounds.pull, turn=False)
+        self._few = vertices < MANY  # all points are matched
+        self._first, self._second = options.rounds(noise)
 
     def first(
         self,
@@ -231,7 +217,7 @@ class Fitting:
         rest: Float64[np.ndarray, "V 3"],
         place: Float64[np.ndarray, "V 3"],
         start: Float64[np.ndarray, "V 3"],
-        schedule: _Schedule,
+        rounds: Rounds,
     ) -> Float64[np.ndarray, "V 3"]:
         """Fit a frame in the core; an empty one keeps where it starts."""
         o = self._options
@@ -242,23 +228,12 @@ class Fitting:
             rest,
             place,
             start,
-            np.array(schedule.gates),
-            np.array(schedule.smoothing),
-            np.array(schedule.strides, np.int32),
+            np.array(rounds.gates),
+            np.array(rounds.smoothing),
+            np.ones(len(rounds.gates), np.int32) if self._few else np.array(rounds.strides, np.int32),
             o.agreement,
-            schedule.anchor,
+            rounds.anchor,
             o.tolerance,
             o.iterations,
-            schedule.turn,
+            rounds.turn,
         )
-
-
-@dataclass(frozen=True, slots=True)
-class _Schedule:
-    """Rounds of the fit of one frame."""
-
-    gates: tuple[float, ...]
-    smoothing: tuple[float, ...]
-    strides: tuple[int, ...]
-    anchor: float  # row weight
-    turn: bool  # whether the shape turns with each vertex's neighbourhood

@@ -28,7 +28,7 @@ from .fields import Rate
 from .graph import Connectivity, connectivity
 from .trajectories import decode_last_places, decode_trajectories, encode_trajectories
 
-NOISY_STEP = 0.8  # RMS distances of the noise that a step is wide in addition (decision 0016)
+NOISY_STEP = 0.8  # RMS distances of the noise that a step is wide in addition (decision 16)
 MOST_FRAMES = 255  # of a group: a byte in the head
 MOST_NUMBERS = 1 << 29  # of decoded places: 4 GiB
 
