@@ -91,12 +91,13 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
 
 def _fast(options: LayersOptions) -> LayersOptions:
     """Return options with fewer keys, rounds, nodes and samples, and without patches (decision 24)."""
-    coarse = Stage(150, (0.1, 0.06, 0.045, 0.024), (10.0, 3.0, 0.5, 0.1))
-    fine = Stage(600, (0.024, 0.012, 0.012), (0.3, 0.1, 0.05))
+    coarse = Stage(150, (0.1, 0.045, 0.024), (10.0, 1.0, 0.1))
+    fine = Stage(600, (0.024, 0.012), (0.3, 0.05))
+    rounds = replace(options.fit, gates=(0.018, 0.012), smoothing=(2.0, 0.4), strides=(4, 1))
     return replace(
         options,
-        embedded=replace(options.embedded, coarse=coarse, fine=fine, samples=2000),
-        fit=replace(options.fit, gates=(0.024, 0.012, 0.012), smoothing=(4.0, 0.7, 0.4), strides=(6, 3, 1)),
+        embedded=replace(options.embedded, coarse=coarse, fine=fine, samples=3000),
+        fit=replace(rounds, iterations=20, tolerance=3e-3),
         plan=replace(options.plan, keys=2, misses=1),
         tails=None,
         measured=4,
