@@ -48,6 +48,12 @@ def test_decoding_loads_no_heavy_package_and_nothing_of_the_encoder():
     assert answer.stdout.split("\n")[:2] == ["[]", "[]"]
 
 
+def test_importing_the_package_loads_no_numpy_and_none_of_its_parts():
+    code = "import sys, meshreel; print([name for name in sys.modules if name.startswith(('numpy', 'meshreel.'))])"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout == "['meshreel.errors']\n"
+
+
 def test_opening_loads_nothing_that_only_some_files_need():
     opened = f"import sys, meshreel; meshreel.open({str(GOLDEN / 'layers.reel')!r})"
     command = [sys.executable, "-c", f"{opened}; print([name for name in {LATER!r} if name in sys.modules])"]

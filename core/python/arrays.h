@@ -5,9 +5,9 @@
 #include <nanobind/ndarray.h>
 
 #include <cstring>
-#include <memory>
 #include <new>
 
+#include "../src/scratch.h"
 #include "meshreel/status.h"
 
 namespace meshreel {
@@ -25,7 +25,7 @@ using Out = nb::ndarray<nb::numpy, T, nb::ndim<N>>;
 template <class T>
 class Buffer {
 public:
-    explicit Buffer(size_t count) : owned_(new T[count]) {}
+    explicit Buffer(size_t count) : owned_(scratch<T>(count)) {}
     Buffer(const T* from, size_t count) : Buffer(count) {
         if (count > 0) std::memcpy(data(), from, count * sizeof(T));
     }
@@ -34,12 +34,12 @@ public:
     template <class... Sizes>
     Out<T, sizeof...(Sizes)> shaped(Sizes... sizes) {
         T* p = data();
-        nb::capsule owner(owned_.release(), [](void* memory) noexcept { delete[] static_cast<T*>(memory); });
+        nb::capsule owner(owned_.release(), [](void* memory) noexcept { give_block(memory); });
         return Out<T, sizeof...(Sizes)>(p, {static_cast<size_t>(sizes)...}, owner);
     }
 
 private:
-    std::unique_ptr<T[]> owned_;
+    Scratch<T> owned_;
 };
 
 // Raises ValueError for arguments that the core refuses.

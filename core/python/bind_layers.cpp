@@ -277,6 +277,9 @@ void frames_of_rows(In<double, 3> rows, Place place, InOut<Number, 3> positions)
     check_decoded(mr_frames_of_rows(rows.data(), frames, vertices, Target(positions.data(), place).get()));
 }
 
+// Numbers that are not set to anything, in memory that arrays of the core had before.
+Out<double, 1> empty(size_t count) { return Buffer<double>(count).shaped(count); }
+
 // Copies the faces of which `dropped` is 0 to the beginning of `room`. Returns their number.
 size_t keep_faces(In<int32_t, 2> faces, In<uint8_t, 1> dropped, InOut<int32_t, 2> room) {
     const size_t count = faces.shape(0);
@@ -316,6 +319,7 @@ void bind_layers(nb::module_& m) {
           "previous"_a.none());
     m.def("frames_of_rows", &frames_of_rows<double>, "rows"_a, "place"_a.none(), "positions"_a.noconvert());
     m.def("frames_of_rows", &frames_of_rows<float>, "rows"_a, "place"_a.none(), "positions"_a.noconvert());
+    m.def("empty", &empty, "count"_a);
     m.def("keep_faces", &keep_faces, "faces"_a, "dropped"_a, "room"_a.noconvert());
 }
 

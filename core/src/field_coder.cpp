@@ -8,6 +8,7 @@
 #include "guarded.h"
 #include "magnitude_classes.h"
 #include "range_coder.h"
+#include "scratch.h"
 #include "wide.h"
 
 namespace meshreel {
@@ -100,13 +101,13 @@ private:
     }
 
     size_t count_;
-    std::vector<uint32_t> sums_;    // of the magnitudes at the neighbours of each place, as far as they are known
-    std::vector<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16
-    std::vector<uint32_t> past_;
-    std::vector<uint32_t> bases_;  // three fifths of what the past predicts
-    std::vector<uint8_t> now_, classes_;
-    std::vector<size_t> starts_;  // of the places that have each place as a neighbour
-    std::vector<int32_t> followers_;
+    Array<uint32_t> sums_;    // of the magnitudes at the neighbours of each place, as far as they are known
+    Array<uint32_t> shares_;  // 16 / number of neighbours, in units of 2^-16
+    Array<uint32_t> past_;
+    Array<uint32_t> bases_;  // three fifths of what the past predicts
+    Array<uint8_t> now_, classes_;
+    Array<size_t> starts_;  // of the places that have each place as a neighbour
+    Array<int32_t> followers_;
     uint32_t trust_ = 5;  // fifths: the weight of the neighbours, all of it in a first column, then two
     uint64_t seen_ = 0, expected_ = 0, ratio_ = kFirstRatio;
 };
@@ -131,13 +132,30 @@ int64_t code_nonzero(Coder& coder, FieldModels& models, int context, int64_t val
     return negative ? -static_cast<int64_t>(read) : static_cast<int64_t>(read);
 }
 
+// Where the encoder's symbols come from.
+struct Given {
+    const int32_t* symbols;
+    size_t count;
+    int64_t at(size_t c, size_t v) const { return symbols[c * count + v]; }
+    void set(size_t, size_t, int64_t) const {}
+};
+
+// Where the decoder's go.
+struct Found {
+    FieldTable table;
+    double step;
+    int64_t at(size_t, size_t) const { return 0; }
+    void set(size_t c, size_t v, int64_t value) const {
+        table.numbers[v * table.stride + c] = step * static_cast<double>(value);
+    }
+};
+
 // All columns through a coder, either way; false where the bytes are bad.
-template <class Coder>
-bool code_field(Coder coder, const mr_weights& weights, size_t* ends) {
+template <class Coder, class Symbols>
+bool code_field(Coder coder, const mr_weights& weights, const Symbols symbols, size_t* ends) {
     Magnitudes magnitudes(weights);
     FieldModels models;
     for (size_t c = 0; c < weights.columns; ++c) {
-        int32_t* symbols = weights.symbols + c * weights.count;
         for (size_t first = 0; first < weights.count; first += kBlock) {
             const size_t places = std::min(kBlock, weights.count - first);
             magnitudes.begin_block(first, places);
@@ -145,10 +163,11 @@ bool code_field(Coder coder, const mr_weights& weights, size_t* ends) {
             bool good = true;
             for (size_t v = first; v < first + places; ++v) {
                 const int context = classes[v];
-                if (!coder.bit(models.zero[context], symbols[v] != 0)) continue;
-                const int64_t value = code_nonzero(coder, models, context, symbols[v]);
+                const int64_t given = symbols.at(c, v);
+                if (!coder.bit(models.zero[context], given != 0)) continue;
+                const int64_t value = code_nonzero(coder, models, context, given);
                 good = good && fits(value);
-                symbols[v] = static_cast<int32_t>(value);
+                symbols.set(c, v, value);
                 magnitudes.learn(v, value);
             }
             if (coder.failed() || !good) return false;
@@ -162,9 +181,9 @@ bool code_field(Coder coder, const mr_weights& weights, size_t* ends) {
 
 }  // namespace
 
-bool decode_symbols(const mr_weights& weights, const mr_bytes& stream) {
-    if (weights.count == 0 || weights.columns == 0) return stream.size == 0;
-    return code_field(RangeDecoder(stream.data, stream.size), weights, nullptr);
+bool decode_symbols(const mr_weights& shape, const mr_bytes& stream, double step, const FieldTable& table) {
+    if (shape.count == 0 || shape.columns == 0) return stream.size == 0;
+    return code_field(RangeDecoder(stream.data, stream.size), shape, Found{table, step}, nullptr);
 }
 
 }  // namespace meshreel
@@ -176,7 +195,8 @@ int mr_encode_field(const mr_weights* weights, uint8_t* out, size_t capacity, si
     return guarded(MR_NO_MEMORY, [&]() -> int {
         std::vector<uint8_t> bytes;
         RangeEncoder coder(bytes);
-        if (weights->count * weights->columns > 0) code_field(coder, *weights, ends);
+        if (weights->count * weights->columns > 0)
+            code_field(coder, *weights, Given{weights->symbols, weights->count}, ends);
         *size = bytes.size();
         return copy_out(bytes, out, capacity);
     });

@@ -125,10 +125,10 @@ bool parse(const mr_bytes& bytes, LayersLevel& record) {
     return fields.is_done();
 }
 
-Field FieldStreams::over(const mr_graph& graph, size_t first) const {
+Field FieldStreams::over(const mr_graph& graph, size_t first) {
     const size_t width = means.size();
-    return {graph,          columns, width - first, width, vectors.data() + first, means.data() + first,
-            symbols.data(), step,    nullptr};
+    return {graph,  columns, width - first, width, vectors.data() + first, means.data() + first, differences.data(),
+            nullptr};
 }
 
 int decode_streams(const CodedField& record, const mr_graph& graph, size_t width, bool has_mean, FieldStreams& out) {
@@ -136,14 +136,14 @@ int decode_streams(const CodedField& record, const mr_graph& graph, size_t width
     const int status = decode_basis(record, width, has_mean, out);
     if (status != MR_OK) return status;
     out.columns = static_cast<size_t>(record.columns);
-    out.step = step_of(record.step_level);
     const uint64_t count = uint64_t{out.columns} * graph.count;
     if ((count > 0) != (record.symbols.size > 0) || !is_plausible(count, record.symbols.size)) return MR_BAD_SYMBOLS;
-    if (count > SIZE_MAX / sizeof(double)) return MR_NO_MEMORY;
-    out.symbols.resize(static_cast<size_t>(count));
-    return decode_symbols({out.symbols.data(), graph.count, out.columns, graph.starts, graph.near, 0}, record.symbols)
-               ? MR_OK
-               : MR_BAD_SYMBOLS;
+    const size_t stride = stride_of(out.columns);
+    if (uint64_t{stride} * (graph.count + 1) > SIZE_MAX / sizeof(double)) return MR_NO_MEMORY;
+    out.differences.assign(stride * (graph.count + 1), 0.0);
+    const mr_weights shape{nullptr, graph.count, out.columns, graph.starts, graph.near, 0};
+    const FieldTable table{out.differences.data(), stride};
+    return decode_symbols(shape, record.symbols, step_of(record.step_level), table) ? MR_OK : MR_BAD_SYMBOLS;
 }
 
 }  // namespace meshreel

@@ -7,6 +7,7 @@
 
 #include "field_rows.h"
 #include "meshreel/layers.h"
+#include "scratch.h"
 
 namespace meshreel {
 
@@ -36,12 +37,11 @@ bool parse(const mr_bytes& bytes, LayersLevel& record);
 // What the streams of a CodedField hold.
 struct FieldStreams {
     std::vector<double> vectors, means;
-    std::vector<int32_t> symbols;
+    Array<double> differences;  // of values and what predicts them, as FieldRows takes them
     size_t columns;
-    double step;
 
     // The numbers of each row from the first-th on.
-    Field over(const mr_graph& graph, size_t first = 0) const;
+    Field over(const mr_graph& graph, size_t first = 0);
 };
 
 // Returns a status. The graph must be causal. May throw std::bad_alloc.

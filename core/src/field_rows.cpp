@@ -15,7 +15,6 @@ typedef double Register __attribute__((vector_size(32)));
 typedef double Register;
 #endif
 constexpr size_t kRegister = sizeof(Register) / sizeof(double);
-constexpr size_t kLanes = 2;  // columns side by side, each summed as if it were alone
 
 void add(const double* __restrict more, double weight, size_t count, double* __restrict sums) {
     for (size_t c = 0; c < count; ++c) sums[c] += weight * more[c];
@@ -86,10 +85,7 @@ void add_prediction(const mr_graph& graph, size_t v, size_t stride, const double
 
 }  // namespace
 
-FieldRows::FieldRows(const Field& field)
-    : field_(field),
-      stride_((field.columns + kLanes - 1) / kLanes * kLanes),
-      decoded_(new double[(field.graph.count + 1) * stride_]) {}
+FieldRows::FieldRows(const Field& field) : field_(field), stride_(stride_of(field.columns)) {}
 
 void FieldRows::next(size_t count, double* rows) {
     wide([&] { follow(count, rows); });
@@ -100,7 +96,7 @@ void FieldRows::follow(size_t count, double* rows) {
         const size_t end = std::min(at_ + kRowBlock, last);
         predict(at_, end);
         for (; at_ < end; ++at_, rows += field_.width) {
-            transform(decoded_.get() + at_ * stride_, field_, rows);
+            transform(field_.differences + at_ * stride_, field_, rows);
             if (!field_.before) continue;
             const double from = field_.before[at_];
             for (size_t t = 0; t < field_.width; ++t) rows[t] += from;
@@ -110,13 +106,9 @@ void FieldRows::follow(size_t count, double* rows) {
 
 void FieldRows::predict(size_t begin, size_t end) {
     const mr_graph& graph = field_.graph;
-    double* decoded = decoded_.get();
-    for (size_t c = 0; c < stride_; ++c)
-        for (size_t v = begin; v < end; ++v)
-            decoded[v * stride_ + c] =
-                c < field_.columns ? field_.step * static_cast<double>(field_.symbols[c * graph.count + v]) : 0.0;
-    double* sums = decoded + graph.count * stride_;  // a row of its own behind the others
-    for (size_t v = begin; v < end; ++v) add_prediction(graph, v, stride_, decoded, sums, decoded + v * stride_);
+    double* rows = field_.differences;
+    double* sums = rows + graph.count * stride_;  // a row of its own behind the others
+    for (size_t v = begin; v < end; ++v) add_prediction(graph, v, stride_, rows, sums, rows + v * stride_);
 }
 
 }  // namespace meshreel

@@ -6,6 +6,7 @@
 #include "arrays.h"
 #include "guarded.h"
 #include "meshreel/layers.h"
+#include "scratch.h"
 
 struct mr_hierarchy {
     std::vector<int32_t> order;
@@ -33,13 +34,13 @@ struct Link {
 
 // Both directions of each edge, sorted by `from`, then by `to`, none twice.
 struct Adjacency {
-    std::vector<Link> links;
-    std::vector<size_t> starts;  // where each vertex's begin
+    Array<Link> links;
+    Array<size_t> starts;  // where each vertex's begin
 
     // Sorts links that are in any order: by counting, so that no mesh takes more than linear time.
     void sort(size_t vertices) {
         spare_.resize(links.size());
-        const auto place = [&](const std::vector<Link>& in, std::vector<Link>& out, int32_t Link::* key) {
+        const auto place = [&](const Array<Link>& in, Array<Link>& out, int32_t Link::* key) {
             starts.assign(vertices + 1, 0);
             for (const Link& link : in) ++starts[static_cast<size_t>(link.*key)];
             size_t sum = 0;
@@ -64,7 +65,7 @@ struct Adjacency {
     }
 
 private:
-    std::vector<Link> spare_;
+    Array<Link> spare_;
 };
 
 double squared_distance(const double* a, const double* b) {
@@ -111,9 +112,9 @@ void regression(const double* positions, int32_t v, const int32_t* ring, size_t 
 }
 
 // Rounds in which vertices that no neighbour's removal forbids leave, each merged into its nearest neighbour.
-void remove_vertices(const double* positions, size_t vertices, Adjacency& mesh, std::vector<Removal>& removals,
-                     std::vector<int32_t>& rings) {
-    std::vector<int32_t> heir(vertices);
+void remove_vertices(const double* positions, size_t vertices, Adjacency& mesh, Array<Removal>& removals,
+                     Array<int32_t>& rings) {
+    Array<int32_t> heir(vertices);
     for (size_t v = 0; v < vertices; ++v) heir[v] = static_cast<int32_t>(v);
     for (;;) {
         size_t linked = 0, removed = 0;
@@ -158,10 +159,10 @@ void build(const double* positions, size_t vertices, const int32_t* faces, size_
             if (a != b) mesh.links.push_back({a, b}), mesh.links.push_back({b, a});
         }
     mesh.sort(vertices);
-    std::vector<Removal> removals;
-    std::vector<int32_t> rings;
+    Array<Removal> removals;
+    Array<int32_t> rings;
     remove_vertices(positions, vertices, mesh, removals, rings);
-    std::vector<int32_t> place(vertices, 0);
+    Array<int32_t> place(vertices, 0);
     for (const Removal& removal : removals) place[static_cast<size_t>(removal.vertex)] = -1;
     for (size_t v = 0; v < vertices; ++v) {
         if (place[v] < 0) continue;  // a root: the one before it predicts it

@@ -6,6 +6,7 @@
 #include "field_record.h"
 #include "guarded.h"
 #include "meshreel/layers.h"
+#include "scratch.h"
 #include "wide.h"
 
 namespace meshreel {
@@ -45,9 +46,10 @@ void normalize(size_t frames, double* __restrict n) {
     }
 }
 
-std::vector<double> normals_of(const Rows& p, size_t vertices, const int32_t* faces, size_t face_count) {
+Array<double> normals_of(const Rows& p, size_t vertices, const int32_t* faces, size_t face_count) {
     const size_t width = 3 * p.frames;
-    std::vector<double> n(width * vertices, 0.0), one(width);
+    Array<double> n(width * vertices, 0.0);
+    std::vector<double> one(width);
     for (size_t f = 0; f < face_count; ++f) {
         face_normal(p, faces + 3 * f, one.data());
         for (size_t k = 0; k < 3; ++k) add(one.data(), width, n.data() + width * static_cast<size_t>(faces[3 * f + k]));
@@ -83,7 +85,7 @@ void edge_frame(const Rows& p, const Rows& normals, const int32_t* edge, double 
 // Places new vertices by the rows of the coarser level's.
 struct Refinement {
     Rows places;
-    std::vector<double> normals;
+    Array<double> normals;
     double share;
 
     Refinement(const mr_level& level, int curvature, const double* rows)
@@ -205,7 +207,7 @@ public:
     }
 
 private:
-    std::vector<double> weights_;
+    Array<double> weights_;
     FieldStreams streams_;
     Field field_{};
 };

@@ -3,11 +3,11 @@
 #include <cstring>
 #include <functional>
 #include <utility>
-#include <vector>
 
 #include "arrays.h"
 #include "guarded.h"
 #include "meshreel/layers.h"
+#include "scratch.h"
 
 namespace meshreel {
 namespace {
@@ -31,15 +31,15 @@ struct HalfEdge {
 };
 
 size_t number_edges(const int32_t* faces, size_t face_count, size_t vertices, int32_t* edges, int32_t* numbers) {
-    std::vector<size_t> starts(vertices + 1, 0);
+    Array<size_t> starts(vertices + 1, 0);
     const auto ends = [&](size_t slot) {
         const int32_t a = faces[slot], b = faces[slot % 3 == 2 ? slot - 2 : slot + 1];
         return std::pair<int32_t, int32_t>(std::min(a, b), std::max(a, b));
     };
     for (size_t slot = 0; slot < 3 * face_count; ++slot) ++starts[static_cast<size_t>(ends(slot).first) + 1];
     for (size_t v = 0; v < vertices; ++v) starts[v + 1] += starts[v];
-    std::vector<HalfEdge> halves(3 * face_count);
-    std::vector<size_t> next(starts.begin(), starts.end() - 1);
+    Array<HalfEdge> halves(3 * face_count);
+    Array<size_t> next(starts.begin(), starts.end() - 1);
     for (size_t slot = 0; slot < 3 * face_count; ++slot) {
         const auto [low, high] = ends(slot);
         halves[next[static_cast<size_t>(low)]++] = {high, static_cast<int32_t>(slot)};
@@ -71,7 +71,7 @@ int mr_subdivide(const int32_t* faces, size_t face_count, size_t vertices, int32
     if (vertices > INT32_MAX || vertices + 3 * face_count > INT32_MAX) return MR_BAD_INPUT;
     if (!in_range(faces, 3 * face_count, vertices)) return MR_BAD_INPUT;
     return guarded(MR_NO_MEMORY, [&] {
-        std::vector<int32_t> numbers(3 * face_count);
+        Array<int32_t> numbers(3 * face_count);
         *edge_count = number_edges(faces, face_count, vertices, edges, numbers.data());
         const int32_t first = static_cast<int32_t>(vertices);
         for (size_t f = 0; f < face_count; ++f, finer += 12) {
@@ -93,7 +93,7 @@ int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t
         for (int k = 0; k < 3; ++k)
             if (in_face(f, k) < 0 || in_face(f, k) >= static_cast<int64_t>(edge_count)) return MR_BAD_INPUT;
     return guarded(MR_NO_MEMORY, [&] {
-        std::vector<int64_t> bounds(edge_count + 1, 0);
+        Array<int64_t> bounds(edge_count + 1, 0);
         const auto each_pair = [&](auto&& visit) {
             for (size_t f = 0; f < face_count; ++f)
                 for (int k = 0; k < 3; ++k)
@@ -102,8 +102,8 @@ int mr_siblings(const int32_t* finer, size_t face_count, size_t vertices, size_t
         };
         each_pair([&](int64_t late, int64_t) { ++bounds[static_cast<size_t>(late) + 1]; });
         for (size_t e = 0; e < edge_count; ++e) bounds[e + 1] += bounds[e];
-        std::vector<int32_t> all(static_cast<size_t>(bounds[edge_count]));
-        std::vector<int64_t> next(bounds.begin(), bounds.end() - 1);
+        Array<int32_t> all(static_cast<size_t>(bounds[edge_count]));
+        Array<int64_t> next(bounds.begin(), bounds.end() - 1);
         each_pair([&](int64_t late, int64_t early) {
             all[static_cast<size_t>(next[static_cast<size_t>(late)]++)] = static_cast<int32_t>(early);
         });

@@ -44,14 +44,14 @@ class Number:
 
     @property
     def least(self) -> int:
-        return struct.calcsize("<" + self.code)
+        return _SIZES[self.code]
 
     def pack(self, value: Any) -> bytes:
         return self.pack_many([value])
 
     def unpack(self, data: bytes, offset: int) -> tuple[Any, int]:
-        values, offset = self.unpack_many(data, offset, 1)
-        return values[0], offset
+        (value,), offset = self.unpack_many(data, offset, 1)
+        return value, offset
 
     def pack_many(self, values: Sequence[Any]) -> bytes:
         if not self._finite(values):
@@ -62,15 +62,18 @@ class Number:
             raise ValueError(str(error)) from error
 
     def unpack_many(self, data: bytes, offset: int, count: int) -> tuple[tuple[Any, ...], int]:
-        _, end = _take(data, offset, count * self.least)
+        size = count * self.least
+        _check_room(data, offset, size)
         values = struct.unpack_from(f"<{count}{self.code}", data, offset)
         if not self._finite(values):
             raise FormatError("a number that is not finite")
-        return values, end
+        return values, offset + size
 
     def _finite(self, values: Sequence[Any]) -> bool:
         return self.code not in "fd" or all(map(math.isfinite, values))
 
+
+_SIZES = {code: struct.calcsize("<" + code) for code in "BHIQhiqfd"}
 
 U8 = Number("u8", "B")
 U16 = Number("u16", "H")
@@ -102,6 +105,8 @@ class Varint:
         return bytes(data)
 
     def unpack(self, data: bytes, offset: int) -> tuple[int, int]:
+        if offset < len(data) and data[offset] < 0x80:  # as nearly always
+            return data[offset], offset + 1
         value = 0
         for shift in range(0, 70, 7):
             chunk, offset = _take(data, offset, 1)
@@ -290,6 +295,10 @@ def _unpack_items(item: Kind, data: bytes, offset: int, count: int) -> tuple[tup
 
 
 def _take(data: bytes, offset: int, size: int) -> tuple[bytes, int]:
+    _check_room(data, offset, size)
+    return bytes(data[offset : offset + size]), offset + size
+
+
+def _check_room(data: bytes, offset: int, size: int) -> None:
     if size > len(data) - offset:
         raise FormatError(f"{size} bytes needed at byte {offset}, {max(len(data) - offset, 0)} left")
-    return bytes(data[offset : offset + size]), offset + size

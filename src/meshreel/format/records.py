@@ -48,6 +48,7 @@ def unpack_all(record_type: type[R], data: bytes) -> R:
     return record
 
 
+@cache
 def least_size(record_type: type) -> int:
     """Return the fewest bytes that a record can take, which is its size if all fields are of fixed size."""
     return sum(field.kind.least for field in record_fields(record_type))

@@ -13,6 +13,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
+from ... import _core
 from ...errors import FormatError, InputError
 from ...format.budget import Size, check_cost, layers_cost
 from ...format.layout import Form, LayersGroup, LayersLevel, LayersPatches, Origin, Presence
@@ -257,7 +258,7 @@ class _Room:
                 raise InputError(f"{frames} frames of {vertices} vertices: give an array for them, not {out.shape}")
             return _Room(out, np.empty((frames * faces, 3), np.int32))
         size = 3 * frames * vertices
-        block = np.empty(size + (3 * frames * faces + 1) // 2)
+        block = _core.empty(size + (3 * frames * faces + 1) // 2)
         rows = block[size:].view(np.int32)[: 3 * frames * faces]
         return _Room(block[:size].reshape(frames, vertices, 3), rows.reshape(-1, 3))
 
