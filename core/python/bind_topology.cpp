@@ -38,6 +38,17 @@ Out<double, 2> vertex_normals(In<double, 2> positions, In<int32_t, 2> faces) {
     return normals.shaped(mesh.vertices, 3);
 }
 
+nb::tuple spread(In<double, 2> positions, In<int32_t, 2> faces, double spacing, int32_t most) {
+    const mr_mesh mesh = mesh_of(positions, faces);
+    Buffer<int32_t> parts(mesh.face_count);
+    size_t count = 0;
+    check(mr_spread_parts(&mesh, spacing, most, parts.data(), &count));
+    Buffer<double> points(3 * count);
+    Buffer<int64_t> of(count);
+    check(mr_spread(&mesh, parts.data(), points.data(), of.data()));
+    return nb::make_tuple(points.shaped(count, 3), of.shaped(count));
+}
+
 }  // namespace
 
 void bind_topology(nb::module_& m) {
@@ -47,6 +58,7 @@ void bind_topology(nb::module_& m) {
     m.def("components", &components);
     m.def("face_normals", &face_normals);
     m.def("vertex_normals", &vertex_normals);
+    m.def("spread", &spread);
 }
 
 }  // namespace meshreel

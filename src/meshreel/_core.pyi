@@ -99,6 +99,9 @@ def face_normals(
 def vertex_normals(
     vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
 ) -> Float64[np.ndarray, "V 3"]: ...
+def spread(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], spacing: float, most: int
+) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]: ...
 
 # bind_tracking.cpp
 
