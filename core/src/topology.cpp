@@ -206,6 +206,45 @@ void normals_of_vertices(const mr_mesh& mesh, double* normals) {
     }
 }
 
+double longest_side(const mr_mesh& mesh, const Row<int32_t>& face) {
+    double most = 0;
+    for (size_t k = 0; k < 3; ++k) {
+        const double *a = mesh.positions + 3 * face[k], *b = mesh.positions + 3 * face[(k + 1) % 3];
+        const double x = b[0] - a[0], y = b[1] - a[1], z = b[2] - a[2];
+        most = std::max(most, (x * x + y * y) + z * z);
+    }
+    return std::sqrt(most);
+}
+
+// Barycentric middles of the count^2 equal parts of a face: those that point as it does, then the others.
+std::vector<Row<double>> middles_of_parts(int32_t count) {
+    std::vector<Row<double>> middles;
+    for (const int32_t turned : {0, 1})
+        for (int32_t row = 0; row < count - turned; ++row)
+            for (int32_t column = 0; row + column < count - turned; ++column) {
+                const double aside = turned == 0 ? 1.0 / 3 : 2.0 / 3;
+                const double first = (row + aside) / count, second = (column + aside) / count;
+                middles.push_back({1 - first - second, first, second});
+            }
+    return middles;
+}
+
+void spread(const mr_mesh& mesh, const int32_t* parts, double* points, int64_t* faces) {
+    std::vector<std::vector<Row<double>>> known;
+    for (size_t f = 0; f < mesh.face_count; ++f) {
+        const size_t count = static_cast<size_t>(parts[f]);
+        if (known.size() <= count) known.resize(count + 1);
+        if (known[count].empty()) known[count] = middles_of_parts(parts[f]);
+        const Row<int32_t> face = face_of(mesh, f);
+        const double *a = mesh.positions + 3 * face[0], *b = mesh.positions + 3 * face[1],
+                     *c = mesh.positions + 3 * face[2];
+        for (const Row<double>& weights : known[count]) {
+            for (size_t k = 0; k < 3; ++k) *points++ = (weights[0] * a[k] + weights[1] * b[k]) + weights[2] * c[k];
+            *faces++ = static_cast<int64_t>(f);
+        }
+    }
+}
+
 template <class Body>
 int checked(const mr_mesh& mesh, Body body) {
     if (!sound(mesh)) return MR_BAD_INPUT;
@@ -253,4 +292,20 @@ int mr_face_normals(const mr_mesh* mesh, double* normals, double* areas) {
 
 int mr_vertex_normals(const mr_mesh* mesh, double* normals) {
     return checked(*mesh, [&] { normals_of_vertices(*mesh, normals); });
+}
+
+int mr_spread_parts(const mr_mesh* mesh, double spacing, int32_t most, int32_t* parts, size_t* count) {
+    if (!(spacing > 0) || most < 1) return MR_BAD_INPUT;
+    return checked(*mesh, [&] {
+        *count = 0;
+        for (size_t f = 0; f < mesh->face_count; ++f) {
+            const double wanted = std::ceil(longest_side(*mesh, face_of(*mesh, f)) / spacing);
+            parts[f] = wanted < most ? static_cast<int32_t>(std::max(wanted, 1.0)) : most;
+            *count += static_cast<size_t>(parts[f]) * static_cast<size_t>(parts[f]);
+        }
+    });
+}
+
+int mr_spread(const mr_mesh* mesh, const int32_t* parts, double* points, int64_t* faces) {
+    return checked(*mesh, [&] { spread(*mesh, parts, points, faces); });
 }

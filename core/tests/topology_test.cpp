@@ -77,6 +77,24 @@ TEST(normals_have_unit_length_or_none) {
     CHECK(own == Reals({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 0}));
 }
 
+TEST(points_spread_over_a_face_are_the_middles_of_its_equal_parts) {
+    const Case pair{{0, 0, 0, 6, 0, 0, 0, 6, 0, 1, 0, 0}, {0, 0, 3, 0, 1, 2}};
+    const mr_mesh mesh = pair.mesh();
+    Ints parts(2);
+    size_t count = 0;
+    CHECK(mr_spread_parts(&mesh, 6, 8, parts.data(), &count) == MR_OK);
+    CHECK(parts == Ints({1, 2}) && count == 5);
+    Reals points(15);
+    std::vector<int64_t> faces(5);
+    CHECK(mr_spread(&mesh, parts.data(), points.data(), faces.data()) == MR_OK);
+    CHECK(faces == std::vector<int64_t>({0, 1, 1, 1, 1}));
+    const Reals wanted{1.0 / 3, 0, 0, 1, 1, 0, 1, 4, 0, 4, 1, 0, 2, 2, 0};
+    for (size_t k = 0; k < wanted.size(); ++k) CHECK(std::abs(points[k] - wanted[k]) < 1e-12);
+    CHECK(mr_spread_parts(&mesh, 1e-9, 8, parts.data(), &count) == MR_OK && parts == Ints({8, 8}));
+    for (const double none : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()})
+        CHECK(mr_spread_parts(&mesh, none, 8, parts.data(), &count) == MR_BAD_INPUT);
+}
+
 TEST(faces_of_missing_vertices_are_refused) {
     for (const int32_t wrong : {-1, 3, INT32_MAX}) {
         Case bad{{0, 0, 0, 1, 0, 0, 0, 1, 0}, {0, 1, wrong}};
@@ -85,6 +103,8 @@ TEST(faces_of_missing_vertices_are_refused) {
         CHECK(mr_components(mesh.faces, 1, 3, nullptr) == MR_BAD_INPUT);
         CHECK(mr_face_normals(&mesh, nullptr, nullptr) == MR_BAD_INPUT);
         CHECK(mr_vertex_normals(&mesh, nullptr) == MR_BAD_INPUT);
+        CHECK(mr_spread_parts(&mesh, 1, 8, nullptr, nullptr) == MR_BAD_INPUT);
+        CHECK(mr_spread(&mesh, nullptr, nullptr, nullptr) == MR_BAD_INPUT);
     }
     const mr_mesh endless{nullptr, size_t{1} << 31, nullptr, 0};
     CHECK(mr_vertex_normals(&endless, nullptr) == MR_BAD_INPUT);

@@ -92,6 +92,9 @@ def clean(
 def drop_unreferenced(
     vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
 ) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "F 3"]]: ...
+def decimate(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], wanted: int, border: float
+) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"]]: ...
 def components(faces: Int32[np.ndarray, "F 3"], vertices: int) -> Int32[np.ndarray, " V"]: ...
 def face_normals(
     vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
@@ -99,6 +102,9 @@ def face_normals(
 def vertex_normals(
     vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
 ) -> Float64[np.ndarray, "V 3"]: ...
+def spread(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], spacing: float, most: int
+) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]: ...
 
 # bind_tracking.cpp
 

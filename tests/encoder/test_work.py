@@ -10,6 +10,7 @@ from meshreel.encoder.sequence import encode
 from meshreel.format.layout import Form
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.types import Mesh, MeshList
+from tests.scenes import ball, quick_scene, with_room
 from tests.shared_data import performer
 from tests.small_options import quick
 
@@ -36,6 +37,12 @@ def test_a_body_that_is_followed_is_tracked_and_fitted_once(tmp_path):
     frames = [Mesh.of(BALL.vertices * [0.28, 0.2, 0.15] + [0.01 * t, 0, 0], BALL.faces) for t in range(24)]
     work = encode(MeshList(tuple(frames)), tmp_path / "a.reel", options=quick(group_size=8)).work
     assert work["frames tracked"] <= 23 and work["frames fitted"] <= 24 and work["frames read"] == 24
+
+
+def test_frames_of_a_room_are_read_once_and_tracked_and_fitted_once(tmp_path):
+    frames = with_room([ball(0.5 + 0.35 * t) for t in range(4)])
+    work = encode(MeshList(tuple(frames)), tmp_path / "a.reel", options=quick_scene(group_size=4)).work
+    assert work["frames read"] == 4 and work["frames fitted"] <= 4 and work["frames tracked"] <= 4
 
 
 def test_a_hard_body_is_fitted_at_most_two_and_a_half_times_a_frame(tmp_path):

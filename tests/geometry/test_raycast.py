@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from meshreel.geometry.cameras import PinholeCamera
-from meshreel.geometry.raycast import Rays
+from meshreel.geometry.raycast import Rays, pixels_near
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere
 
 INTRINSIC = np.array([[60.0, 0, 40], [0, 60.0, 30], [0, 0, 1]])
+BALL = moved(sphere(0.5, 3), (0, 0, 3))
 WALL = moved(plane(8.0, 8), (-4, -4, 3))  # z = 3, faces the other way
 
 
@@ -30,6 +31,16 @@ def test_a_wall_has_one_depth_and_every_pixel_sees_the_face_that_it_should():
     pixels = np.stack([columns + 0.5, rows + 0.5], axis=-1)
     low, high = images.min(axis=1)[seen.faces], images.max(axis=1)[seen.faces]
     assert (pixels >= low - 1e-3).all() and (pixels <= high + 1e-3).all()
+
+
+@pytest.mark.parametrize("eye", [(0, 0, 0), (0.3, 0.2, 1.5), (0, 0, 2.8), (0, 0, 9)])
+def test_faces_are_seen_in_no_pixels_but_those_near_them(eye):
+    some = np.arange(len(BALL.faces)) % 7 == 0
+    near, rays = pixels_near(camera(eye), Mesh(BALL.vertices, BALL.faces[some])), Rays(BALL)
+    seen = rays.look(camera(eye)).faces
+    assert np.array_equal(rays.faces_in(camera(eye), near), seen[near])
+    assert not np.append(some, False)[seen[~near]].any()
+    assert near.all() == (eye[2] == 2.8) and near.any() == (eye[2] != 9)  # inside the ball, and behind it
 
 
 def test_a_ray_that_meets_no_face_is_a_miss():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 import time
 
 import pytest
@@ -43,6 +44,19 @@ def test_the_loop_runs_meanwhile_and_is_not_charged(monkeypatch):
         whole = time.process_time() - start
     assert whole > 0.3 and timer.seconds < whole - 0.25
     assert cost_of([timer], 1).reference_s == pytest.approx(0.1)
+
+
+def test_what_is_imported_where_it_is_needed_is_not_charged(tmp_path, monkeypatch):
+    text = "import time\nend = time.process_time() + 0.2\nwhile time.process_time() < end:\n    pass\n"
+    (tmp_path / "slow_to_import.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(clock, "LATE", ("slow_to_import",))
+    before = builtins.__import__
+    with StageTimer() as timer:
+        start = time.process_time()
+        __import__("slow_to_import")
+        whole = time.process_time() - start
+    assert whole >= 0.2 and timer.seconds < whole - 0.15 and builtins.__import__ is before
 
 
 def test_the_loop_takes_a_time_that_can_be_measured():

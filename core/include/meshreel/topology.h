@@ -1,6 +1,6 @@
-// Connectivity and normals of triangle meshes: what is asked of each frame that is read, and of each surface that is
-// fitted. Encoder only. One thread; sums in the order of the faces; time and memory in proportion to the mesh, but for
-// sorting what a hostile mesh repeats. MR_BAD_INPUT for a face that refers to a missing vertex.
+// Connectivity, normals and points of triangle meshes: what is asked of each frame that is read, and of each surface
+// that is fitted. Encoder only. One thread; sums in the order of the faces; time and memory in proportion to the mesh,
+// but for sorting what a hostile mesh repeats. MR_BAD_INPUT for a face that refers to a missing vertex.
 #pragma once
 
 #include <stddef.h>
@@ -40,6 +40,11 @@ int mr_face_normals(const struct mr_mesh* mesh, double* normals, double* areas);
 // Unit normals of the vertices, weighted by the areas of their faces; zero where no face has an area. For each vertex
 // the faces are summed that have it as their first corner, then as their second, then as their third.
 int mr_vertex_normals(const struct mr_mesh* mesh, double* normals);
+
+// Cuts each face into parts^2 equal parts, 1 to `most`^2, whose sides are at most `spacing` long where `most` allows
+// it. Sets the number of all parts; then the middles of those of each face, and the face of each.
+int mr_spread_parts(const struct mr_mesh* mesh, double spacing, int32_t most, int32_t* parts, size_t* count);
+int mr_spread(const struct mr_mesh* mesh, const int32_t* parts, double* points, int64_t* faces);
 
 #ifdef __cplusplus
 }

@@ -111,7 +111,9 @@ def survey_of(sequence: MeshSequence, numbers: range, stages: Counter | None = N
         flattened += [number] if had_faces and mesh.is_empty else []
         pieces += [pieces_of(mesh)] if cleaned else []
         if not mesh.is_empty:
-            low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
+            axes = mesh.vertices.T  # one by one: NumPy takes ten times as long for rows of 3
+            low = np.minimum(low, [axis.min() for axis in axes])
+            high = np.maximum(high, [axis.max() for axis in axes])
         if stages is not None:
             stages.add("survey", 1)
     return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped, pieces=tuple(pieces))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Bool
@@ -21,10 +21,9 @@ from ..analysis.scene.masks import Masker
 from ..analysis.scene.segmentation import segment, segment_by
 from ..analysis.survey import Survey, check_one_unit
 from ..errors import InputError
-from ..geometry.closest_points import Outline, distances
-from ..geometry.connected import connected
+from ..geometry.closest_points import Outline, Surface
 from ..geometry.derived_sequences import CapturedSequence, ChosenParts
-from ..geometry.topology import concatenate, face_normals, part_of
+from ..geometry.topology import components, concatenate, face_normals, part_of
 from ..types import Mesh, MeshSequence, evenly
 from .options import SceneOptions
 from .progress import Stages
@@ -147,6 +146,12 @@ def _measured(
     """Measure noise and bodies in some frames; still surface that is far from the background is no noise."""
     far = OUTLIER * segmentation.noise
     squares, deviations, sizes, lost, whole = [], [], list[float](), 0.0, 0.0
+
+    @lru_cache(maxsize=1)
+    def room_after(count: int) -> Surface | None:
+        there = concatenate([background, *(change.came for change in changes[:count])])
+        return None if there.is_empty else Surface(there)
+
     for number in evenly(len(sequence), PROBES):
         mesh = sequence[number]
         moves = segmentation.moving(number, mesh)
@@ -155,11 +160,11 @@ def _measured(
         still = part_of(mesh, ~moves)
         areas = face_normals(still)[1]
         whole += float(face_normals(mesh)[1].sum())
-        there = concatenate([background, *(change.came for change in changes if change.frame <= number)])
-        if there.is_empty:
+        room = room_after(sum(change.frame <= number for change in changes))
+        if room is None:
             lost += float(areas.sum())
         elif not still.is_empty:
-            gaps = distances(still.vertices, there)
+            gaps = room.distances(still.vertices)
             deviations.append(float(np.median(gaps)) / NORMAL_MEDIAN)
             squares.append(float((gaps[gaps < far] ** 2).mean()) if (gaps < far).any() else 0.0)
             lost += float(areas[(gaps[still.faces] >= far).all(axis=1)].sum())
@@ -171,5 +176,5 @@ def _measured(
 
 def _largest(mesh: Mesh) -> float:
     """The diagonal of the connected piece with most vertices, m."""
-    label = connected(mesh.faces, len(mesh.vertices))
+    label = components(mesh.faces, len(mesh.vertices))
     return Mesh(mesh.vertices[label == np.bincount(label).argmax()], mesh.faces[:0]).diagonal

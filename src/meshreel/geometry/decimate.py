@@ -1,7 +1,6 @@
 """Decimation of meshes by quadric error metrics (paper, section 3.3.2; needs the extra `encode`).
 
-Closed meshes are decimated by fast-simplification, open ones by Open3D, which can hold a border in place.
-Both libraries stop at absolute errors, so the mesh is brought to one scale first.
+Closed meshes are decimated by fast-simplification, open ones by the core, which holds borders in place.
 """
 
 from __future__ import annotations
@@ -10,14 +9,15 @@ import threading
 
 import numpy as np
 
+from .. import _core
 from ..errors import InputError
 from ..types import Mesh
 from . import work
 from .topology import border_edges, clean
 
-# Size of the bounding box's diagonal for each library, in its own unit; found by trial, without recorded rows.
-CLOSED_DIAGONAL = 10.0  # here AGGRESSION 4 reaches the target and loses nothing; at 1 and at 1000 it may not (guess)
-OPEN_DIAGONAL = 100.0  # below it Open3D takes whole regions for flat (guess)
+# Size of the bounding box's diagonal for fast-simplification, which stops at absolute errors: at 10, AGGRESSION 4
+# reaches the target and loses nothing; at 1 and at 1000 it may not (guess).
+CLOSED_DIAGONAL = 10.0
 AGGRESSION = 4.0  # of fast-simplification; see CLOSED_DIAGONAL (guess)
 BOUNDARY_WEIGHT = 10.0  # of planes on open borders against planes of faces (guess)
 ROUGHLY = 5  # times the wanted vertices that a first, quick pass leaves: errors are those of one pass (decision 14)
@@ -90,11 +90,6 @@ def _collapse_closed(mesh: Mesh, faces: int) -> Mesh:
 
 
 def _collapse_open(mesh: Mesh, faces: int, border: float) -> Mesh:
-    import open3d as o3d
-
-    scale, middle = OPEN_DIAGONAL / mesh.diagonal, mesh.vertices.mean(axis=0)
-    solid = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector((mesh.vertices - middle) * scale), o3d.utility.Vector3iVector(mesh.faces)
-    )
-    small = solid.simplify_quadric_decimation(faces, boundary_weight=border)
-    return Mesh.of(np.asarray(small.vertices) / scale + middle, np.asarray(small.triangles))
+    middle = mesh.vertices.mean(axis=0)
+    vertices, triangles = _core.decimate(mesh.vertices - middle, mesh.faces, faces, border)
+    return Mesh(vertices + middle, triangles)

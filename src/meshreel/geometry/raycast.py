@@ -67,6 +67,14 @@ class Rays:
         answer = self._scene.cast_rays(self._tensor(rays))
         return Seen(_faces(answer), answer["t_hit"].numpy())
 
+    def faces_in(self, camera: PinholeCamera, pixels: Bool[np.ndarray, "H W"]) -> Int32[np.ndarray, " N"]:
+        """Find the face that a camera sees in each of some pixels, row by row; -1: none."""
+        rays = np.empty((np.count_nonzero(pixels), 6), np.float32)
+        rays[:, :3] = camera.eye - self._origin
+        for axis, ways in enumerate(_ways(camera)):
+            rays[:, 3 + axis] = ways[pixels]
+        return _faces(self._scene.cast_rays(self._tensor(rays)))
+
     def backs(self, camera: PinholeCamera, seen: Seen) -> Bool[np.ndarray, "H W"]:
         """Return where a camera sees the back of a face; `seen` is the result of `look`."""
         if self._mesh.is_empty:
@@ -82,6 +90,25 @@ class Rays:
     def _cast(self, origins: np.ndarray, directions: np.ndarray) -> dict:
         rays = np.concatenate([origins - self._origin, directions], axis=1).astype(np.float32)
         return self._scene.cast_rays(self._tensor(rays))
+
+
+def pixels_near(camera: PinholeCamera, mesh: Mesh) -> Bool[np.ndarray, "H W"]:
+    """Return the pixels in the boxes of the projected faces, a pixel wider: a camera sees the faces in no others.
+
+    These are all pixels where the plane of the camera cuts a face.
+    """
+    local = products(mesh.vertices, camera.extrinsic[:3, :3].T) + camera.extrinsic[:3, 3]
+    ahead = (local[:, 2] > 0)[mesh.faces]
+    if (ahead.any(axis=1) & ~ahead.all(axis=1)).any():
+        return np.ones((camera.height, camera.width), bool)
+    size = np.array([camera.width, camera.height])
+    corners = camera.project(local)[mesh.faces[ahead.all(axis=1)]]
+    low = np.clip(np.floor(corners.min(axis=1)) - 1, 0, size).astype(np.int64)
+    high = np.clip(np.floor(corners.max(axis=1)) + 2, 0, size).astype(np.int64)
+    steps = np.zeros((camera.height + 1, camera.width + 1), np.int64)  # of the number of boxes, along both axes
+    for x, y, step in ((low, low, 1), (high, high, 1), (low, high, -1), (high, low, -1)):
+        np.add.at(steps, (y[:, 1], x[:, 0]), step)
+    return steps.cumsum(axis=0).cumsum(axis=1)[:-1, :-1] > 0
 
 
 def _ways(camera: PinholeCamera) -> Iterator[Float64[np.ndarray, "H W"]]:

@@ -105,7 +105,8 @@ def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " 
     """Return the chosen faces and all faces that share a vertex with one of them."""
     touched = np.zeros(int(faces.max(initial=-1)) + 1, bool)
     touched[faces[chosen]] = True
-    return touched[faces].any(axis=1)
+    a, b, c = touched[faces].T
+    return a | b | c
 
 
 def concatenate(meshes: Sequence[Mesh]) -> Mesh:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
+from .. import _core
 from ..types import Mesh
 
 _SIDE = 1 << 20  # cells along an axis, half of them on either side of the origin: three axes fit into a 64-bit key
@@ -85,26 +86,8 @@ def neighbours(keys: Int64[np.ndarray, " P"]) -> Int32[np.ndarray, "P 26"]:
 
 def spread(mesh: Mesh, spacing: float) -> tuple[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]]:
     """Return points on a mesh about `spacing` apart at most, and the face of each, ascending; every face has one."""
-    corners = mesh.vertices[mesh.faces]
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    longest = np.sqrt(np.max([(x * x + y * y) + z * z for x, y, z in ((b - a).T, (c - b).T, (a - c).T)], axis=0))
-    parts = np.clip(np.ceil(longest / spacing), 1, _MOST_PARTS).astype(np.int64)
-    start = np.cumsum(parts * parts) - parts * parts
-    points = np.empty((int((parts * parts).sum()), 3))
-    for count in np.flatnonzero(np.bincount(parts)):
-        faces = np.flatnonzero(parts == count)
-        weights = _middles(int(count))
-        points[start[faces][:, None] + np.arange(len(weights))] = np.einsum("mk,nkd->nmd", weights, corners[faces])
-    return points, np.repeat(np.arange(len(parts)), parts * parts)
-
-
-def _middles(count: int) -> Float64[np.ndarray, "M 3"]:
-    """Return the barycentric middles of the count^2 equal parts of a triangle."""
-    row, column = np.meshgrid(np.arange(count), np.arange(count), indexing="ij")
-    up, down = row + column < count, row + column < count - 1
-    first = np.concatenate([row[up] + 1 / 3, row[down] + 2 / 3]) / count
-    second = np.concatenate([column[up] + 1 / 3, column[down] + 2 / 3]) / count
-    return np.column_stack([1 - first - second, first, second])
+    points, faces = _core.spread(mesh.vertices, mesh.faces, spacing, _MOST_PARTS)
+    return points, faces.view(np.int64)  # of the same size, by its usual name
 
 
 def _key(cells: Int64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:

@@ -68,8 +68,9 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
 def checked(polygons: Polygons) -> Loaded:
     """Return the mesh of polygons after checking every number. Raises Unreadable for the first illegal one."""
     vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
-    bad = np.flatnonzero(~(np.abs(vertices) <= FARTHEST).all(axis=1))  # NaN is not <= anything
-    if len(bad):
+    near = np.abs(vertices) <= FARTHEST  # NaN is not <= anything
+    if not near.all():
+        bad = np.flatnonzero(~near.all(axis=1))
         x, y, z = vertices[bad[0]]
         raise Unreadable(f"vertex {bad[0]} is at ({x:g}, {y:g}, {z:g}), and {len(bad)} in all are not within 1e12")
     if (sizes < 3).any():

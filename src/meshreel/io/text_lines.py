@@ -56,6 +56,8 @@ class Lines:
 
 def whole(values: np.ndarray, what: str) -> Int64[np.ndarray, "..."]:
     """Return the values as integers. Raises Unreadable for fractions, NaN, and magnitudes of 2^53 or more."""
+    if np.can_cast(values.dtype, np.int64):
+        return values.astype(np.int64)
     with np.errstate(invalid="ignore"):
         bad = np.flatnonzero(~((np.abs(values) < 2**53) & (values == np.floor(values))))
     if len(bad):

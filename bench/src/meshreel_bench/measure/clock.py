@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import builtins
 import signal
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..rows import Encoding
 NUMBERS, STEPS = 200_000, 200_000  # of the fixed loop
 SAMPLES, PAUSE = 5, 1.0  # of the loop before and after what is measured, and s between two meanwhile (guess)
 ON_TIME = hasattr(signal, "setitimer")  # not on Windows
-LATE = ("open3d", "scipy.spatial", "scipy.sparse.csgraph", "fast_simplification", "igl")  # imported where first needed
+LATE = ("open3d", "scipy.spatial", "scipy.sparse.csgraph", "fast_simplification", "igl")  # imported where needed
 
 
 def reference_s() -> float:
@@ -36,13 +36,14 @@ class StageTimer:
     """Progress callback that charges processor time to the stage that reports.
 
     As a context manager it also counts work, and runs the fixed loop before, after and, where the system has timers,
-    meanwhile: a machine that others use is slower at one time than at another. The loop's time is not charged.
+    meanwhile: a machine that others use is slower at one time than at another. The loop and imports are not charged.
     """
 
     def __enter__(self) -> StageTimer:
         self.stages: dict[str, float] = {}
         self.references = [reference_s() for _ in range(SAMPLES)]
         self._work, self._apart = so_far(), 0.0
+        self._import, builtins.__import__ = builtins.__import__, self._late  # type: ignore[assignment]
         self._start = self._last = time.process_time()
         if ON_TIME:
             signal.signal(signal.SIGALRM, self._sample)  # on this thread, so that nothing runs beside the loop
@@ -59,8 +60,16 @@ class StageTimer:
         if ON_TIME:
             signal.signal(signal.SIGALRM, signal.SIG_IGN)  # first: a sample that is due would start the timer again
             signal.setitimer(signal.ITIMER_REAL, 0)
+        builtins.__import__ = self._import
         self.seconds, self.work = time.process_time() - self._apart - self._start, since(self._work)
         self.references += [reference_s() for _ in range(SAMPLES)]
+
+    def _late(self, name: str, *rest: Any) -> Any:
+        """Import a module; what is imported where it is first needed is not charged."""
+        is_late = name in LATE and name not in sys.modules
+        start, module = time.process_time(), self._import(name, *rest)
+        self._apart += is_late * (time.process_time() - start)
+        return module
 
     def _sample(self, *_signal: object) -> None:
         start = time.process_time()
@@ -84,13 +93,6 @@ def cost_of(timers: Sequence[StageTimer], frames: int) -> Encoding:
         reference_s=float(np.mean(references)),
         work=a_frame([timer.work for timer in timers]),
     )
-
-
-def import_late() -> None:
-    """Import what codecs import when they first need it, so that no frame pays for it."""
-    for name in LATE:
-        with suppress(ImportError):  # the codec reports what it lacks
-            import_module(name)
 
 
 def peak_rss_mb() -> float | None:

@@ -28,7 +28,7 @@ from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, SceneFrames
 from ..rows import Encoding, Group, Point, Row, Stream
-from .clock import StageTimer, cost_of, import_late
+from .clock import StageTimer, cost_of
 from .decode import decoded_apart
 from .maker import maker
 from .metrics import Measured, measure_frames
@@ -117,7 +117,6 @@ _LAST = _Analysed()
 
 def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, Encoding]:
     """Return the bytes and what they cost; a shared analysis counts in each of its points."""
-    import_late()
     before = list[StageTimer]()
     if isinstance(codec, TwoStepCodec):
         key = (what, codec.analysis_key)

@@ -19,6 +19,7 @@ from ...types import Mesh
 
 TURN = 0.01  # diagonals, weight of a difference of unit normals, so that both sides of a thin part get nodes: a guess
 SEEDED = 0.25  # largest share of the nodes that are the first of their component: a guess
+TOGETHER = 2048  # points that are bound together: bounds memory (guess)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +41,13 @@ class DeformationGraph:
 
     def bind(self, points: Float64[np.ndarray, "P 3"], cells: Int64[np.ndarray, " P"], count: int) -> Binding:
         """Bind each point to the `count` nearest nodes of its cell's hood; weights fall to 0 at the next nearest."""
+        some = (slice(at, at + TOGETHER) for at in range(0, max(len(points), 1), TOGETHER))
+        found = [self._bound(points[rows], cells[rows], count) for rows in some]
+        return Binding(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+    def _bound(
+        self, points: Float64[np.ndarray, "P 3"], cells: Int64[np.ndarray, " P"], count: int
+    ) -> tuple[Int64[np.ndarray, "P k"], Float64[np.ndarray, "P k"]]:
         hood = self.hood[cells]
         away = np.linalg.norm(self.nodes[hood] - points[:, None], axis=2)
         away[hood < 0] = np.inf
@@ -51,7 +59,7 @@ class DeformationGraph:
         reach = np.maximum(reach, np.finfo(float).tiny)
         weights = np.square(np.maximum(1 - away[:, :count] / reach[:, None], 0))
         weights[:, 0] = np.maximum(weights[:, 0], 1e-12)
-        return Binding(np.maximum(indices[:, :count], 0), weights / weights.sum(axis=1, keepdims=True))
+        return np.maximum(indices[:, :count], 0), weights / weights.sum(axis=1, keepdims=True)
 
 
 def farthest_first(mesh: Mesh, candidates: Int64[np.ndarray, " S"], count: int) -> Int64[np.ndarray, " N"]:

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float32
 
 from ...geometry.connected import without_fragments
 from ...geometry.depth import DepthPicture
-from ...geometry.raycast import Rays
+from ...geometry.raycast import Rays, pixels_near
 from ...geometry.topology import face_normals, part_of
 from ...geometry.tsdf import SEEN, TRUNCATION, extract, integrate
 from ...types import Mesh
@@ -51,7 +51,7 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
         for number, picture in enumerate(moment.pictures):
             if picture is not None:
                 cameras[number] = picture
-                stacks.setdefault(number, []).append(_still(picture, rays, moment.still))
+                stacks.setdefault(number, []).append(_still(picture, rays, moment))
     found = list[DepthPicture]()
     for number, stack in sorted(stacks.items()):
         depth = _medians(np.stack(stack), options.least(len(stack)))
@@ -60,13 +60,13 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
     return found
 
 
-def _still(picture: DepthPicture, rays: Rays, still: Bool[np.ndarray, " F"]) -> np.ndarray:
+def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
     """Return the depths of a picture with 0 for pixels that see moving faces or lie within `BESIDE` pixels of those."""
     from scipy.ndimage import binary_dilation
 
-    faces = rays.look(picture.camera).faces
-    moves = faces >= 0
-    moves[moves] = ~still[faces[moves]]
+    moves = pixels_near(picture.camera, Mesh(moment.mesh.vertices, moment.mesh.faces[~moment.still]))
+    faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: what stands still may hide what moves
+    moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]
     return np.where(binary_dilation(moves, iterations=BESIDE), 0, picture.depth).astype(picture.depth.dtype)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
@@ -90,6 +90,7 @@ class ByPlace:
     rest: Rest  # the frames in which surface at a moving place belongs to the room nevertheless
     island: float  # m^2
     _cache: _LabelCache = field(default_factory=lambda: _LabelCache(_REMEMBERED), init=False, repr=False, compare=False)
+    _trees: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)  # of the places, once needed
 
     @property
     def noise(self) -> float:
@@ -135,15 +136,21 @@ class ByPlace:
 
     def _place(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
         """Return the number of the place of each point, or of the nearest place; P if none is near."""
-        from scipy.spatial import cKDTree
-
         asked = self.lattice.keys(points)
         number = np.searchsorted(self.keys, asked)
         unknown = np.flatnonzero(np.append(self.keys, -1)[number] != asked)
         if len(unknown):
-            tree, reach = cKDTree(self.lattice.centers(self.keys)), _ELSEWHERE * self.lattice.size
-            number[unknown] = tree.query(points[unknown], distance_upper_bound=reach)[1]
+            reach = _ELSEWHERE * self.lattice.size
+            number[unknown] = self._tree().query(points[unknown], distance_upper_bound=reach)[1]
         return number
+
+    def _tree(self) -> Any:
+        """Return the middles of the places as a tree, which takes a tenth of a second to make."""
+        from scipy.spatial import cKDTree
+
+        if not self._trees:
+            self._trees.append(cKDTree(self.lattice.centers(self.keys)))
+        return self._trees[0]
 
 
 @dataclass(frozen=True, slots=True)

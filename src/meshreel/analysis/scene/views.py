@@ -148,14 +148,15 @@ def _pixels(
     focal = options.width / 2 / across
     found = []
     for part, free in zip(samples, sees, strict=True):
-        ahead = part.points - eye
+        ahead = part.points[free] - eye
         distance = np.maximum(np.linalg.norm(ahead, axis=1), 1e-12)
-        facing = np.abs((part.normals * ahead).sum(axis=1)) / distance
-        whole = np.where(free, focal**2 * facing * part.areas / distance**2, 0).astype(np.float32)  # on the axis
+        facing = np.abs((part.normals[free] * ahead).sum(axis=1)) / distance
+        whole = (focal**2 * facing * part.areas[free] / distance**2).astype(np.float32)  # on the axis
         x, y, z = np.moveaxis(np.einsum("nd,wed->wne", ahead / distance[:, None], turns), 2, 0)
         within = (np.abs(x) < across * z) & (np.abs(y) < high * z)
-        found.append(np.where(within, np.minimum(whole / np.maximum(z, 1e-3) ** 3, 1), 0))
-    return np.concatenate(found, axis=1).astype(np.float32)
+        found.append(np.zeros((len(turns), len(free)), np.float32))
+        found[-1][:, free] = np.where(within, np.minimum(whole / np.maximum(z, 1e-3) ** 3, 1), 0)
+    return np.concatenate(found, axis=1)
 
 
 def _greedy(
