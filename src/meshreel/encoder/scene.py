@@ -39,6 +39,7 @@ from .recipe import encode_intervals, longest_interval
 from .tracks import TrackGroup
 
 FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
+HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
 LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
 
 
@@ -108,12 +109,28 @@ def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
     steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
     for fraction in FRACTIONS:
         steps.append(decimate_faces(steps[-1], max(4, round(2 * fraction * len(mesh.vertices)))))
-    for small in reversed(steps):
-        payload = encode_background(small, step)
-        decoded = decode_background(payload)
-        if not decoded.is_empty and _apart(mesh, decoded) <= most:
+    failed, best = 0, steps[0]
+    for best in reversed(steps):
+        if (found := _reaching(mesh, best, most, step)) is not None:
             break
-    return payload, decoded
+        failed = len(best.faces)
+    else:
+        payload = encode_background(best, step)
+        return payload, decode_background(payload)
+    for _ in range(HALVINGS if failed else 0):
+        small = decimate_faces(best, round((failed * len(best.faces)) ** 0.5))
+        if (smaller := _reaching(mesh, small, most, step)) is None:
+            failed = len(small.faces)
+        else:
+            best, found = small, smaller
+    return found
+
+
+def _reaching(mesh: Mesh, small: Mesh, most: float, step: float) -> tuple[bytes, Mesh] | None:
+    """Return payload and decoded mesh of a decimated mesh that is within an RMS distance as decoded; else None."""
+    payload = encode_background(small, step)
+    decoded = decode_background(payload)
+    return (payload, decoded) if not decoded.is_empty and _apart(mesh, decoded) <= most else None
 
 
 def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
