@@ -23,9 +23,6 @@ from .datasets import Store
 from .experiments import EXPERIMENTS, find_experiment
 from .experiments.study import Sweep as Points
 from .measure.runner import Sweep, run_points
-from .report import write_report
-from .report.pages import parts_of
-from .report.tables import change_table
 from .report.values import value
 from .report.verdicts import Verdict, verdicts
 from .rows import Options, Point, Row, failed_rows, join_rows, measured_rows, read_rows
@@ -171,6 +168,8 @@ def report(
     output
         The folder to write into.
     """
+    from .report.pages import parts_of, write_report  # pandas: workers, which read this module, do without
+
     joined = join_rows(_some_rows(path) for path in rows)
     check_one_source(joined)
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
@@ -182,6 +181,8 @@ def report(
 @command.command
 def compare(before: Path, after: Path, /, *, common: Common = Common()) -> None:
     """Print what points cost before and after a change, from two files of rows that `run` wrote."""
+    from .report.tables import change_table
+
     lines = change_table(*(measured_rows(_some_rows(path)) for path in (before, after)))
     common.result({"table": lines}, *(lines or [f"{before} and {after} have no point in common"]))
 

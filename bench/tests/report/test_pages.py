@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from meshreel_bench.experiments.study import D2, MASKED
 from meshreel_bench.names import BEST
-from meshreel_bench.report import pages, write_report
+from meshreel_bench.report import pages
 from meshreel_bench.report.looks import direction, looks_of
+from meshreel_bench.report.pages import write_report
 from meshreel_bench.report.plots import curves_figure
 from meshreel_bench.rows import join_rows, read_rows
 
