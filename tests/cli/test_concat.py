@@ -46,6 +46,11 @@ def part(run, slide, survey, name, *flags):
     return path
 
 
+def test_a_survey_is_of_all_frames(run, slide, tmp_path):
+    said = run("survey", slide, "-o", tmp_path / "s.json", "--frames", ":3")
+    assert failed(said, "--frames :3", "give --frames to encode --survey") and not (tmp_path / "s.json").exists()
+
+
 @pytest.mark.parametrize("count", [1, 3])
 def test_parts_join_to_the_bytes_of_the_whole(run, slide, surveyed, tmp_path, count):
     whole, joined = tmp_path / "whole.reel", tmp_path / "joined.reel"
@@ -124,7 +129,7 @@ def test_metadata_that_no_encoder_wrote_are_refused(run, tmp_path, metadata):
         (["--survey", "S", "--part", "0/2"], ["part 0/2: give 1/2 to 2/2"]),
         (["--survey", "S", "--part", "2"], ["--part 2: give K/N"]),
         (["--survey", "S", "--part", "1/2", "--frames", ":3"], ["leave --frames out"]),
-        (["--survey", "S", "--part", "1/99"], ["there are 5 intervals"]),
+        (["--survey", "S", "--part", "1/99"], ["has 5 key intervals", "a shorter --key-interval"]),
         (["--survey", "S", "--target-mbps", "1"], ["--quality in place of a target"]),
         (["--survey", "S", "--fps", "20"], ["frame_rate 10.0, and here 20.0"]),
         (["--survey", "S", "--up", "z"], ["up y, and here z"]),

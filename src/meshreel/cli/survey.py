@@ -47,6 +47,8 @@ def command(
     place = located(output)
     if place.suffix != ".json":
         raise InputError(f"{output}: the output must end in .json")
+    if reading.frames != ":":
+        raise InputError(f"--frames {reading.frames}: a survey is of all frames; give --frames to encode --survey")
     source = open_source(inputs, reading)
     sequence = Masking(up=up).upright(source)
     with uploaded(place) as path, common.stages(len(sequence)) as progress, workers(jobs, cluster) as executor:

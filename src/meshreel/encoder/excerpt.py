@@ -63,7 +63,8 @@ def part_of(intervals: list[range], number: int, count: int) -> range:
     if not 1 <= number <= count:
         raise InputError(f"part {number}/{count}: give 1/{count} to {count}/{count}")
     if count > len(intervals):
-        raise InputError(f"part {number}/{count}: there are {len(intervals)} intervals; give at most as many parts")
+        text = f"part {number}/{count}: the sequence has {len(intervals)} key intervals"
+        raise InputError(f"{text}; give at most as many parts, or a shorter --key-interval")
     ends = [len(intervals) * k // count for k in (number - 1, number)]
     return range(intervals[ends[0]].start, intervals[ends[1] - 1].stop)
 

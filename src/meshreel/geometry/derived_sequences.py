@@ -209,8 +209,8 @@ class Unchanging(DerivedSequence):
 
     def _check(self, index: int, now: str) -> None:
         if self._digests.setdefault(index, now) != now:
-            text = f"{self.name(index)}: has changed while it was encoded"
-            raise InputError(f"{text}; encode again when nothing writes to it any more")
+            text = f"{self.name(index)}: has changed while it was encoded, or since its survey"
+            raise InputError(f"{text}; encode again when nothing writes to it any more, with the survey's flags")
 
     @property
     def digests(self) -> list[str]:
