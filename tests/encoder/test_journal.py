@@ -282,7 +282,7 @@ def test_a_frame_that_changes_after_the_survey_is_refused(fake, tmp_path, monkey
     Moving.__slots__ = ()
     monkeypatch.setattr(derived_sequences, "MOST_KEPT", 0)  # so that frames are read again
     fake()
-    with pytest.raises(InputError, match=r"frame \d: has changed while it was encoded, or since its survey; encode again"):
+    with pytest.raises(InputError, match=r"frame \d: has changed while it was encoded, or .*; encode again"):
         encode(tmp_path / "a.reel", sequence=Moving(BALLS.meshes, 10.0))
 
 
