@@ -101,12 +101,20 @@ def test_files_that_no_survey_unites_are_refused(run, slide, surveyed, tmp_path)
     assert failed(run("concat", SCENE, *out), "scene.reel: is a scene")
     quicker = part(run, slide, surveyed, "f.reel", "--frames", "2:4", "--effort", "fast")
     assert failed(run("concat", first, quicker, *out), "f.reel: differs from", "options", "same options")
-    damaged = first.read_bytes()[:-1] + b"?"
+    damaged = part(run, slide, surveyed, "g.reel", "--frames", "2:4").read_bytes()[:-1] + b"?"
     (tmp_path / "e.reel").write_bytes(damaged)
     assert failed(run("concat", first, tmp_path / "e.reel", *out), "e.reel: chunk", "damaged")
     assert failed(run("concat", tmp_path / "no.reel", *out), "no.reel: cannot be opened")
     assert failed(run("concat", first, "-o", first), "is the input")
     assert not out[1].exists()
+
+
+@pytest.mark.parametrize("order", [(1, 3), (2, 1, 3), (1, 1, 2)])
+def test_parts_that_do_not_follow_one_another_are_refused(run, slide, surveyed, tmp_path, order):
+    parts = {k: part(run, slide, surveyed, f"{k}.reel", "--part", f"{k}/3") for k in sorted(set(order))}
+    said = run("concat", *(parts[k] for k in order), "-o", tmp_path / "joined.reel")
+    assert failed(said, f"{order[1]}.reel: begins at frame", "the next in turn is", "each part once")
+    assert not (tmp_path / "joined.reel").exists()
 
 
 @pytest.mark.parametrize("metadata", ["{}", '{"key_frames": [1]}', '{"key_frames": [], "part": [1]}', '{"part": 1}'])
@@ -150,7 +158,19 @@ def test_a_frame_that_has_changed_since_the_survey_is_refused(run, slide, survey
 
 
 @pytest.mark.parametrize(
-    "change", [{"kind": "x"}, {"low": [0, 1]}, {"low": [9, 9, 9]}, {"digests": []}, {"up": None}, {"pieces": []}, None]
+    "change",
+    [
+        {"kind": "x"},
+        {"low": [0, 1]},
+        {"low": [9, 9, 9]},
+        {"low": [-(10**400), 0, 0]},
+        {"high": [1e308, 9, 9]},
+        {"dropped": float("inf")},
+        {"digests": []},
+        {"up": None},
+        {"pieces": []},
+        None,
+    ],
 )
 def test_a_file_that_is_no_survey_is_refused(run, slide, surveyed, tmp_path, change):
     record = json.loads(surveyed.read_bytes())

@@ -62,7 +62,12 @@ def _cluster(address: str) -> Iterator[Executor]:
         from distributed import Client
     except ModuleNotFoundError as error:
         raise InputError("--cluster needs the extra `cluster`: pip install 'meshreel[cluster]'") from error
-    with Client(address, timeout=CONNECTS) as client:
+    try:
+        connected = Client(address, timeout=CONNECTS)
+    except (ValueError, OSError) as error:
+        text = f"--cluster {address}: no scheduler answers ({error})"
+        raise InputError(f"{text}; start one, or give its address, as tcp://10.0.0.7:8786") from error
+    with connected as client:
         own = installed()
         for worker, theirs in client.run(installed).items():
             if theirs != own:

@@ -23,7 +23,7 @@ from ..io.differences import first_difference
 from ..io.read import read_file
 from ..io.remote import Place, uploaded
 from ..io.write import check_apart
-from .metadata import joined_metadata, of_all_parts
+from .metadata import first_frame_of, joined_metadata, of_all_parts
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +70,7 @@ def _joined_header(inputs: Sequence[Place]) -> Header:
         try:
             _check_alike(path, reader, header, parts[0][0] if parts else reader.metadata, inputs[0])
             parts.append((reader.metadata, reader.frame_count))
+            _check_order(path, parts)
             joined_metadata(parts[-1:])
         except (KeyError, TypeError, ValueError) as error:
             text = f"{path}: its metadata are not those of meshreel encode ({error!r})"
@@ -90,6 +91,17 @@ def _check_alike(path: Place, reader: ReelReader, header: Header, metadata: dict
     if ours != theirs:
         text = f"{path}: differs from {first}: {first_difference(ours, theirs)}"
         raise InputError(f"{text}; encode both with the same options")
+
+
+def _check_order(path: Place, parts: Sequence[tuple[dict[str, object], int]]) -> None:
+    """Raise InputError where the last part does not begin where those before it end."""
+    first, ours = first_frame_of(parts[0][0]), first_frame_of(parts[-1][0])
+    if first is None or ours is None:
+        return
+    end = first + sum(frames for _, frames in parts[:-1])
+    if ours != end:
+        text = f"{path}: begins at frame {ours} of the sequence, and the next in turn is {end}"
+        raise InputError(f"{text}; give each part once, in the order of the frames")
 
 
 def _add(writer: ReelWriter, path: Place) -> None:

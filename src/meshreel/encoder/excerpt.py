@@ -16,6 +16,7 @@ import numpy as np
 from ..analysis.pieces import Piece
 from ..analysis.survey import Survey
 from ..errors import InputError
+from ..format.checks import LARGEST
 from ..geometry.derived_sequences import Unchanging
 from ..io.read import read_file
 from ..io.remote import Place
@@ -92,7 +93,7 @@ def read_survey(path: Place) -> Surveyed:
         record = None
     try:
         return _surveyed(str(path), record)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         text = f"{path}: is no survey that this version of meshreel wrote ({type(error).__name__}: {error})"
         raise InputError(f"{text}; write it again with meshreel survey") from None
 
@@ -110,7 +111,7 @@ def _surveyed(name: str, record: Any) -> Surveyed:
     sizes = np.array([*low, *high, *diagonals])
     if not (len(low) == len(high) == 3 and len(diagonals) == len(digests) == len(pieces) == facts["frames"]):
         raise ValueError("its parts are of different lengths")
-    if not np.isfinite(sizes).all() or (low > high).any() or min(diagonals, default=-1.0) < 0:
+    if not (np.abs(sizes) <= LARGEST).all() or (low > high).any() or min(diagonals, default=-1.0) < 0:
         raise ValueError("its numbers are impossible")
     seen = Survey(low, high, diagonals, flattened, scale, int(record["dropped"]), pieces)
     return Surveyed(name, seen, facts, digests)
@@ -118,7 +119,7 @@ def _surveyed(name: str, record: Any) -> Surveyed:
 
 def _piece(record: Any) -> Piece:
     boxes, vertices = np.array([record["box"], record["around"]], np.float64), int(record["vertices"])
-    if boxes.shape != (2, 6) or not np.isfinite(boxes).all() or vertices < 1:
+    if boxes.shape != (2, 6) or not (np.abs(boxes) <= LARGEST).all() or vertices < 1:
         raise ValueError(f"a piece {record}")
     if (boxes[:, :3] >= boxes[:, 3:]).all(axis=1).any():
         raise ValueError(f"a piece without extent {record}")

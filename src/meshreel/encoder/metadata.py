@@ -16,7 +16,7 @@ from ..types import Up
 from .options import EncoderOptions
 from .summary import GroupSummary
 
-PART = "part"  # of a file that is a part: its exact totals, and a digest of its options
+PART = "part"  # of a file that is a part: its first frame, its exact totals, and a digest of its options
 _KEYS, _MEANS = "key_frames", ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
 
 
@@ -76,12 +76,16 @@ class Totals:
         return {name: rounded(value) for name, value in zip(_MEANS, values, strict=True)}
 
 
-def metadata_of(options: EncoderOptions, groups: Sequence[GroupSummary], up: Up, is_part: bool) -> dict[str, Any]:
-    """Return the metadata of a file that is no scene."""
+def metadata_of(
+    options: EncoderOptions, groups: Sequence[GroupSummary], up: Up, first: int | None = None
+) -> dict[str, Any]:
+    """Return the metadata of a file that is no scene; `first` is the first frame of a part."""
     totals, keys = Totals.of(groups), sorted({group.key for group in groups if group.key is not None})
     found = {"preset": options.preset, "quality": rounded(options.quality), _KEYS: keys, **totals.means}
-    part = {"totals": totals.exact, "options": hashlib.sha256(repr(asdict(options)).encode()).hexdigest()[:16]}
-    return found | upright(up) | ({PART: part} if is_part else {})
+    if first is None:
+        return found | upright(up)
+    digest = hashlib.sha256(repr(asdict(options)).encode()).hexdigest()[:16]
+    return found | upright(up) | {PART: {"first_frame": first, "totals": totals.exact, "options": digest}}
 
 
 def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
@@ -105,6 +109,15 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
     """
     found = {name: value for name, value in metadata.items() if name not in (PART, _KEYS, *_MEANS)}
     return found | ({"options": metadata[PART]["options"]} if PART in metadata else {})
+
+
+def first_frame_of(metadata: dict[str, Any]) -> int | None:
+    """Return where in its sequence a part begins; None where its metadata do not say.
+
+    Raises TypeError or ValueError for metadata that no encoder wrote.
+    """
+    first = metadata.get(PART, {}).get("first_frame")
+    return None if first is None else int(first)
 
 
 def upright(up: Up) -> dict[str, Any]:
