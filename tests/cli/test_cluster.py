@@ -65,7 +65,7 @@ def test_workers_of_other_versions_are_refused(cluster, monkeypatch):
 def test_a_cluster_that_does_not_answer_is_an_error(monkeypatch):
     monkeypatch.setattr(module, "CONNECTS", 0.3)
     with (
-        pytest.raises(InputError, match="--cluster tcp://127.0.0.1:9: no scheduler .*; start one"),
+        pytest.raises(InputError, match=r"--cluster tcp://127.0.0.1:9: no scheduler .*; start one"),
         workers(1, "tcp://127.0.0.1:9"),
     ):
         pass
