@@ -117,6 +117,14 @@ def test_parts_that_do_not_follow_one_another_are_refused(run, slide, surveyed, 
     assert not (tmp_path / "joined.reel").exists()
 
 
+def test_frames_that_no_part_has_are_said(run, slide, surveyed, tmp_path):
+    parts = [part(run, slide, surveyed, f"{k}.reel", "--part", f"{k}/3") for k in (2, 3)]
+    said = run("concat", *parts, "-o", tmp_path / "joined.reel", "--json")
+    missing = 7 - said.row["frames"]
+    assert said.code == 0 and missing > 0 and f"{missing} of the sequence's 7 frames are in none" in said.err
+    assert "none of the files" not in run("concat", part(run, slide, surveyed, "w.reel"), "-o", tmp_path / "x.reel").err
+
+
 @pytest.mark.parametrize("metadata", ["{}", '{"key_frames": [1]}', '{"key_frames": [], "part": [1]}', '{"part": 1}'])
 def test_metadata_that_no_encoder_wrote_are_refused(run, tmp_path, metadata):
     with FileSource(FILE) as source:

@@ -33,5 +33,8 @@ def command(
     if place.suffix != ".reel":
         raise InputError(f"{output}: the output must end in .reel")
     joined = concat([located(path) for path in inputs], place)
+    if joined.missing:
+        whole = joined.frames + joined.missing
+        common.warn((f"{place}: {joined.missing} of the sequence's {whole} frames are in none of the files",))
     row = {"output": str(place), "frames": joined.frames, "bytes": joined.size, "files": len(inputs)}
     common.result(row, f"{place}: {joined.frames} frames of {len(inputs)} files, {joined.size} bytes")

@@ -23,7 +23,7 @@ from ..io.differences import first_difference
 from ..io.read import read_file
 from ..io.remote import Place, uploaded
 from ..io.write import check_apart
-from .metadata import first_frame_of, joined_metadata, of_all_parts
+from .metadata import first_frame_of, joined_metadata, of_all_parts, whole_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +32,7 @@ class Joined:
 
     frames: int
     size: int  # bytes
+    missing: int  # frames of the sequence that no file has, where the files say of what they are parts
 
 
 def concat(inputs: Sequence[Place], output: Place) -> Joined:
@@ -46,14 +47,15 @@ def concat(inputs: Sequence[Place], output: Place) -> Joined:
         raise InputError(f"{output}: is the input, which it would replace; choose another name")
     with uploaded(output) as place:
         check_apart(place, [path for path in inputs if isinstance(path, Path)])
-        with ReelWriter(place, _joined_header(inputs)) as writer:
+        header, whole = _joined_header(inputs)
+        with ReelWriter(place, header) as writer:
             for path in inputs:
                 _add(writer, path)
-    return Joined(writer.frame_count, writer.size)
+    return Joined(writer.frame_count, writer.size, max(whole - writer.frame_count, 0))
 
 
-def _joined_header(inputs: Sequence[Place]) -> Header:
-    """Return the header of the whole, after a look at that of each file."""
+def _joined_header(inputs: Sequence[Place]) -> tuple[Header, int]:
+    """Return the header of the whole, and how many frames that should have, after a look at each file."""
     header, parts, tracks = None, list[tuple[dict[str, object], int]](), 0
     for path in inputs:
         with closing(_source(path)) as source:
@@ -77,7 +79,7 @@ def _joined_header(inputs: Sequence[Place]) -> Header:
             raise InputError(f"{text}; encode it again") from None
     assert header is not None
     metadata = joined_metadata(parts)
-    return replace(header, metadata=json.dumps(metadata, separators=(",", ":")))
+    return replace(header, metadata=json.dumps(metadata, separators=(",", ":"))), whole_of(parts[0][0])
 
 
 def _check_alike(path: Place, reader: ReelReader, header: Header, metadata: dict[str, object], first: Place) -> None:

@@ -16,7 +16,7 @@ from ..types import Up
 from .options import EncoderOptions
 from .summary import GroupSummary
 
-PART = "part"  # of a file that is a part: its first frame, its exact totals, and a digest of its options
+PART = "part"  # of a file that is a part: its place, its exact totals, and a digest of its options
 _KEYS, _MEANS = "key_frames", ("rms_m", "worst_rms_m", "d2_psnr_paper", "normal_error_deg")
 
 
@@ -77,15 +77,16 @@ class Totals:
 
 
 def metadata_of(
-    options: EncoderOptions, groups: Sequence[GroupSummary], up: Up, first: int | None = None
+    options: EncoderOptions, groups: Sequence[GroupSummary], up: Up, part: tuple[int, int] | None = None
 ) -> dict[str, Any]:
-    """Return the metadata of a file that is no scene; `first` is the first frame of a part."""
+    """Return the metadata of a file that is no scene; a `part` is its first frame, and the frames of the whole."""
     totals, keys = Totals.of(groups), sorted({group.key for group in groups if group.key is not None})
     found = {"preset": options.preset, "quality": rounded(options.quality), _KEYS: keys, **totals.means}
-    if first is None:
+    if part is None:
         return found | upright(up)
     digest = hashlib.sha256(repr(asdict(options)).encode()).hexdigest()[:16]
-    return found | upright(up) | {PART: {"first_frame": first, "totals": totals.exact, "options": digest}}
+    place = {"first_frame": part[0], "of": part[1]}
+    return found | upright(up) | {PART: place | {"totals": totals.exact, "options": digest}}
 
 
 def joined_metadata(parts: Sequence[tuple[dict[str, Any], int]]) -> dict[str, Any]:
@@ -108,7 +109,7 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
     Raises KeyError or TypeError for metadata that no encoder wrote.
     """
     found = {name: value for name, value in metadata.items() if name not in (PART, _KEYS, *_MEANS)}
-    return found | ({"options": metadata[PART]["options"]} if PART in metadata else {})
+    return found | ({"options": metadata[PART]["options"], "frames": whole_of(metadata)} if PART in metadata else {})
 
 
 def first_frame_of(metadata: dict[str, Any]) -> int | None:
@@ -118,6 +119,11 @@ def first_frame_of(metadata: dict[str, Any]) -> int | None:
     """
     first = metadata.get(PART, {}).get("first_frame")
     return None if first is None else int(first)
+
+
+def whole_of(metadata: dict[str, Any]) -> int:
+    """Return how many frames the sequence of a part has; 0 for a file that is none. Raises as `first_frame_of`."""
+    return int(metadata.get(PART, {}).get("of", 0))
 
 
 def upright(up: Up) -> dict[str, Any]:

@@ -204,8 +204,9 @@ def _encode_tracked(job: Job, file: BinaryIO, seen: Survey) -> Summary:
     with _writer(job, file, seen) as writer:
         for encoded in encode_tracked(job, seen):
             groups += [_added(writer, each, [], seen.diagonal) for each in encoded]
-        first = None if job.excerpt is None else job.excerpt.frames.start
-        metadata = metadata_of(options, groups, sequence.up, first)
+        excerpt = job.excerpt
+        part = None if excerpt is None else (excerpt.frames.start, len(excerpt.surveyed.digests))
+        metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
     return Summary(writer.size, tuple(groups), texts, continued=_continued(job))
