@@ -115,3 +115,11 @@ def test_open3d_missing_names_the_extra(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "open3d", None)
     with pytest.raises(ImportError, match=r"meshreel\[encode\]"):
         TRIANGLE.to_open3d()
+
+
+def test_the_box_of_a_mesh_has_its_diagonal_and_middle():
+    mesh = Mesh.of([[-1, 0, 2], [1, 4, 2], [0, 1, 6]], [[0, 1, 2]])
+    low, high = mesh.box
+    assert low.tolist() == [-1, 0, 2] and high.tolist() == [1, 4, 6]
+    assert mesh.diagonal == 6 and mesh.middle.tolist() == [0, 2, 4]
+    assert Mesh.empty().diagonal == 0 and Mesh.empty().middle.tolist() == [0, 0, 0]

@@ -1,7 +1,6 @@
 // Edges wait in a queue with the versions of their ends; an entry whose end has changed since then is out of date. The
 // corners of the faces at a vertex are a list through `next_`, so that two vertices are merged by joining their lists.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <queue>
 #include <utility>
@@ -10,51 +9,44 @@
 #include "arrays.h"
 #include "guarded.h"
 #include "meshreel/decimate.h"
+#include "rigid3.h"
 
 namespace meshreel {
 namespace {
 
-using Vec3 = std::array<double, 3>;
-
 constexpr double kFlat = 1e-3;  // of the cubed mean of the diagonal: determinants below leave a direction open (guess)
-
-Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-double dot(const Vec3& a, const Vec3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
 
 // The sum of squared distances from weighted planes: p A p + 2 b p + c.
 struct Quadric {
     double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
-    Vec3 b{};
+    Vec b{};
     double c = 0;
 
-    void add_plane(const Vec3& unit, const Vec3& through, double weight) {
+    void add_plane(Vec unit, Vec through, double weight) {
         const double d = -dot(unit, through);
-        xx += weight * unit[0] * unit[0], xy += weight * unit[0] * unit[1], xz += weight * unit[0] * unit[2];
-        yy += weight * unit[1] * unit[1], yz += weight * unit[1] * unit[2], zz += weight * unit[2] * unit[2];
-        for (size_t k = 0; k < 3; ++k) b[k] += weight * d * unit[k];
+        xx += weight * unit.x * unit.x, xy += weight * unit.x * unit.y, xz += weight * unit.x * unit.z;
+        yy += weight * unit.y * unit.y, yz += weight * unit.y * unit.z, zz += weight * unit.z * unit.z;
+        b = b + (weight * d) * unit;
         c += weight * d * d;
     }
     void add(const Quadric& other) {
         xx += other.xx, xy += other.xy, xz += other.xz, yy += other.yy, yz += other.yz, zz += other.zz;
-        for (size_t k = 0; k < 3; ++k) b[k] += other.b[k];
+        b = b + other.b;
         c += other.c;
     }
-    double at(const Vec3& p) const {
-        const double x = xx * p[0] + xy * p[1] + xz * p[2], y = xy * p[0] + yy * p[1] + yz * p[2],
-                     z = xz * p[0] + yz * p[1] + zz * p[2];
-        return std::max((x + 2 * b[0]) * p[0] + (y + 2 * b[1]) * p[1] + (z + 2 * b[2]) * p[2] + c, 0.0);
+    double at(Vec p) const {
+        const Vec square{xx * p.x + xy * p.y + xz * p.z, xy * p.x + yy * p.y + yz * p.z,
+                         xz * p.x + yz * p.y + zz * p.z};
+        return std::max(dot(square + 2 * b, p) + c, 0.0);
     }
     // Sets the point with the least sum; false where no single point has it.
-    bool least(Vec3& p) const {
+    bool least(Vec& p) const {
         const double x = yy * zz - yz * yz, y = xz * yz - xy * zz, z = xy * yz - xz * yy;
         const double determinant = xx * x + xy * y + xz * z, mean = (xx + yy + zz) / 3;
         if (!(determinant > kFlat * mean * mean * mean)) return false;
         const double ww = xx * zz - xz * xz, wz = xy * xz - xx * yz, vv = xx * yy - xy * xy;
-        p = {-(x * b[0] + y * b[1] + z * b[2]) / determinant, -(y * b[0] + ww * b[1] + wz * b[2]) / determinant,
-             -(z * b[0] + wz * b[1] + vv * b[2]) / determinant};
+        p = {-(x * b.x + y * b.y + z * b.z) / determinant, -(y * b.x + ww * b.y + wz * b.z) / determinant,
+             -(z * b.x + wz * b.y + vv * b.z) / determinant};
         return true;
     }
 };
@@ -70,7 +62,7 @@ public:
           versions_(mesh.vertices, 0),
           quadrics_(mesh.vertices) {
         positions_.resize(mesh.vertices);
-        for (size_t v = 0; v < mesh.vertices; ++v) std::copy_n(mesh.positions + 3 * v, 3, positions_[v].data());
+        for (size_t v = 0; v < mesh.vertices; ++v) positions_[v] = load(mesh.positions + 3 * v);
         for (size_t slot = 0; slot < faces_.size(); ++slot) append(faces_[slot], static_cast<int32_t>(slot));
         for (size_t f = 0; f < left_; ++f) add_planes(f, border);
         for (int32_t v = 0; v < static_cast<int32_t>(mesh.vertices); ++v) {
@@ -97,7 +89,7 @@ public:
         }
         for (size_t v = 0; v < numbers.size(); ++v) {
             if (numbers[v] < 0) continue;
-            std::copy_n(positions_[v].data(), 3, rest.positions + 3 * rest.vertices);
+            store(rest.positions + 3 * rest.vertices, positions_[v]);
             numbers[v] = static_cast<int32_t>(rest.vertices++);
         }
         for (size_t f = 0; 3 * f < faces_.size(); ++f) {
@@ -120,7 +112,7 @@ private:
     };
 
     static size_t at(int32_t number) { return static_cast<size_t>(number); }
-    const Vec3& corner(size_t f, size_t k) const { return positions_[at(faces_[3 * f + k % 3])]; }
+    Vec corner(size_t f, size_t k) const { return positions_[at(faces_[3 * f + k % 3])]; }
 
     void append(int32_t v, int32_t slot) {
         if (first_[at(v)] < 0) first_[at(v)] = slot;
@@ -151,33 +143,33 @@ private:
     }
 
     void add_planes(size_t f, double border) {
-        const Vec3 normal = cross(corner(f, 1) - corner(f, 0), corner(f, 2) - corner(f, 0));
+        const Vec normal = cross(corner(f, 1) - corner(f, 0), corner(f, 2) - corner(f, 0));
         const double length = std::sqrt(dot(normal, normal));
         if (!(length > 0)) return;
-        const Vec3 unit{normal[0] / length, normal[1] / length, normal[2] / length};
+        const Vec unit{normal.x / length, normal.y / length, normal.z / length};
         for (size_t k = 0; k < 3; ++k) {
             const int32_t a = faces_[3 * f + k], b = faces_[3 * f + (k + 1) % 3];
             quadrics_[at(a)].add_plane(unit, corner(f, 0), length / 2);
             if (!is_border(a, b)) continue;
-            const Vec3 along = positions_[at(b)] - positions_[at(a)], out = cross(along, unit);
+            const Vec along = positions_[at(b)] - positions_[at(a)], out = cross(along, unit);
             const double side = std::sqrt(dot(out, out));
             if (!(side > 0)) continue;
-            const Vec3 upright{out[0] / side, out[1] / side, out[2] / side};
+            const Vec upright{out.x / side, out.y / side, out.z / side};
             for (const int32_t end : {a, b})
                 quadrics_[at(end)].add_plane(upright, positions_[at(a)], border * length / 2);
         }
     }
 
     // The place of what two vertices become, and what that costs.
-    std::pair<double, Vec3> merged(int32_t a, int32_t b) const {
+    std::pair<double, Vec> merged(int32_t a, int32_t b) const {
         Quadric sum = quadrics_[at(a)];
         sum.add(quadrics_[at(b)]);
-        const Vec3 &p = positions_[at(a)], &q = positions_[at(b)];
-        Vec3 best{(p[0] + q[0]) / 2, (p[1] + q[1]) / 2, (p[2] + q[2]) / 2};
+        const Vec p = positions_[at(a)], q = positions_[at(b)];
+        Vec best = 0.5 * (p + q);
         if (sum.least(best)) return {sum.at(best), best};
         double least = sum.at(best);
-        for (const Vec3* end : {&p, &q})
-            if (const double cost = sum.at(*end); cost < least) least = cost, best = *end;
+        for (const Vec end : {p, q})
+            if (const double cost = sum.at(end); cost < least) least = cost, best = end;
         return {least, best};
     }
 
@@ -187,19 +179,19 @@ private:
     }
 
     // Whether a face of `v` that `other` has not would turn over if `v` were at a place.
-    bool turns_over(int32_t v, int32_t other, const Vec3& place) const {
+    bool turns_over(int32_t v, int32_t other, Vec place) const {
         for (int32_t slot = first_[at(v)]; slot >= 0; slot = next_[at(slot)]) {
             const size_t f = at(slot) / 3, k = at(slot) % 3;
             const int32_t* face = &faces_[3 * f];
             if (face[0] < 0 || face[0] == other || face[1] == other || face[2] == other) continue;
-            const Vec3 &b = corner(f, k + 1), &c = corner(f, k + 2);
+            const Vec b = corner(f, k + 1), c = corner(f, k + 2);
             if (dot(cross(b - corner(f, k), c - corner(f, k)), cross(b - place, c - place)) <= 0) return true;
         }
         return false;
     }
 
     void collapse(int32_t a, int32_t b) {
-        const Vec3 place = merged(a, b).second;
+        const Vec place = merged(a, b).second;
         if (turns_over(a, b, place) || turns_over(b, a, place)) return;
         for (int32_t slot = first_[at(b)]; slot >= 0; slot = next_[at(slot)]) {
             int32_t* face = &faces_[at(slot) / 3 * 3];
@@ -221,7 +213,7 @@ private:
     std::vector<int32_t> next_, first_, last_;  // corners of faces: after each; of each vertex
     std::vector<uint32_t> versions_;
     std::vector<Quadric> quadrics_;
-    std::vector<Vec3> positions_;
+    std::vector<Vec> positions_;
     std::vector<int32_t> around_;
     std::priority_queue<Entry> queue_;
 };

@@ -59,8 +59,22 @@ class Mesh:
         """Length of the diagonal of the bounding box, m; 0 for a mesh without vertices."""
         if len(self.vertices) == 0:
             return 0.0
-        sides = [np.ptp(axis) for axis in self.vertices.T]  # axis by axis: NumPy takes ten times as long for rows of 3
-        return float(np.sqrt(np.square(sides).sum()))  # not BLAS, whose bits vary
+        low, high = self.box
+        return float(np.sqrt(np.square(high - low).sum()))  # not BLAS, whose bits vary
+
+    @property
+    def box(self) -> tuple[Float64[np.ndarray, "3"], Float64[np.ndarray, "3"]]:
+        """Lower and upper corner of the bounding box, m, of a mesh with vertices."""
+        axes = self.vertices.T  # one by one: NumPy takes ten times as long for rows of 3
+        return np.array([axis.min() for axis in axes]), np.array([axis.max() for axis in axes])
+
+    @property
+    def middle(self) -> Float64[np.ndarray, "3"]:
+        """Middle of the bounding box, m; 0 for a mesh without vertices."""
+        if len(self.vertices) == 0:
+            return np.zeros(3)
+        low, high = self.box
+        return (low + high) / 2
 
     def copy(self) -> Mesh:
         """Return the same mesh in new arrays, which may be written to."""

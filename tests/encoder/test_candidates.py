@@ -21,12 +21,12 @@ def sliding(count: int) -> list[Mesh]:
     return [Mesh.of(BALL.vertices + [0.01 * t, 0, 0], BALL.faces) for t in range(count)]
 
 
-def window(meshes: list[Mesh], first: int = 0) -> Ahead:
+def ahead(meshes: list[Mesh], first: int = 0) -> Ahead:
     return Ahead(first, [FrameSurface(mesh) for mesh in meshes], 0.0, target_of(meshes, OPTIONS.target, 0.0))
 
 
 def test_a_key_is_followed_on_both_sides():
-    frames = window(sliding(5))
+    frames = ahead(sliding(5))
     one = Candidate.of_key(frames, 2, OPTIONS)
     one.follow(frames)
     assert (one.residuals(frames) < 1).all() and one.follows(frames, frames.numbers)
@@ -36,7 +36,7 @@ def test_a_key_is_followed_on_both_sides():
 
 
 def test_a_key_is_followed_up_to_the_first_frame_that_is_lost_and_no_farther():
-    frames = window([OTHER, OTHER, *sliding(3), OTHER, *sliding(2)])
+    frames = ahead([OTHER, OTHER, *sliding(3), OTHER, *sliding(2)])
     one, before = Candidate.of_key(frames, 3, OPTIONS), so_far()
     one.follow(frames)
     assert np.isfinite(one.residuals(frames)).tolist() == [False, False, True, True, True, False, False, False]
@@ -46,7 +46,7 @@ def test_a_key_is_followed_up_to_the_first_frame_that_is_lost_and_no_farther():
 
 def test_what_is_known_of_a_candidate_stays_when_frames_are_left_behind():
     meshes = sliding(6)
-    frames = window(meshes[:4])
+    frames = ahead(meshes[:4])
     one = Candidate.of_key(frames, 2, OPTIONS)
     one.follow(frames)
     before = so_far()
@@ -60,7 +60,7 @@ def test_what_is_known_of_a_candidate_stays_when_frames_are_left_behind():
 
 def test_a_key_of_which_nothing_is_left_is_lost():
     speck = Mesh.of(1e-5 * np.eye(3), [[0, 1, 2]])
-    frames = window([speck, BALL])
+    frames = ahead([speck, BALL])
     one = Candidate.of_key(frames, 0, OPTIONS)
     one.follow(frames)
     assert np.isinf(one.residuals(frames)[1])
@@ -69,7 +69,7 @@ def test_a_key_of_which_nothing_is_left_is_lost():
 def test_other_templates_of_a_key_are_finer_or_coarser_and_track_nothing_again():
     fine = sliding_sphere(1)[0]
     frames, before = (
-        window([Mesh.of(fine.vertices / 12**0.5 + [0.01 * t, 0, 0], fine.faces) for t in range(3)]),
+        ahead([Mesh.of(fine.vertices / 12**0.5 + [0.01 * t, 0, 0], fine.faces) for t in range(3)]),
         so_far(),
     )
     one = Candidate.of_key(frames, 1, quick(quality=0, effort="thorough").method)

@@ -147,7 +147,7 @@ class Part:
             raise InputError("--survey is for a part: give --quality in place of a target, and no masks or views")
 
 
-_PART = re.compile(r"(\d{1,9})/(\d{1,9})")
+_PART = re.compile(r"(\d{1,9})/([1-9]\d{0,8})")
 
 
 def command(

@@ -23,7 +23,7 @@ from ..io.differences import first_difference
 from ..io.read import read_file
 from ..io.remote import Place, uploaded
 from ..io.write import check_apart
-from .metadata import first_frame_of, joined_metadata, of_all_parts, whole_of
+from .metadata import joined_metadata, of_all_parts, place_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +78,8 @@ def _joined_header(inputs: Sequence[Place]) -> tuple[Header, int]:
             text = f"{path}: its metadata are not those of meshreel encode ({error!r})"
             raise InputError(f"{text}; encode it again") from None
     assert header is not None
-    metadata = joined_metadata(parts)
-    return replace(header, metadata=json.dumps(metadata, separators=(",", ":"))), whole_of(parts[0][0])
+    metadata, place = joined_metadata(parts), place_of(parts[0][0])
+    return replace(header, metadata=json.dumps(metadata, separators=(",", ":"))), place[1] if place else 0
 
 
 def _check_alike(path: Place, reader: ReelReader, header: Header, metadata: dict[str, object], first: Place) -> None:
@@ -97,12 +97,12 @@ def _check_alike(path: Place, reader: ReelReader, header: Header, metadata: dict
 
 def _check_order(path: Place, parts: Sequence[tuple[dict[str, object], int]]) -> None:
     """Raise InputError where the last part does not begin where those before it end."""
-    first, ours = first_frame_of(parts[0][0]), first_frame_of(parts[-1][0])
+    first, ours = place_of(parts[0][0]), place_of(parts[-1][0])
     if first is None or ours is None:
         return
-    end = first + sum(frames for _, frames in parts[:-1])
-    if ours != end:
-        text = f"{path}: begins at frame {ours} of the sequence, and the next in turn is {end}"
+    end = first[0] + sum(frames for _, frames in parts[:-1])
+    if ours[0] != end:
+        text = f"{path}: begins at frame {ours[0]} of the sequence, and the next in turn is {end}"
         raise InputError(f"{text}; give each part once, in the order of the frames")
 
 

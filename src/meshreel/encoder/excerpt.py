@@ -62,7 +62,7 @@ def part_of(intervals: list[range], number: int, count: int) -> range:
     Raises InputError where there is no such part.
     """
     if not 1 <= number <= count:
-        raise InputError(f"part {number}/{count}: give 1/{max(count, 1)} to {max(count, 1)}/{max(count, 1)}")
+        raise InputError(f"part {number}/{count}: give 1/{count} to {count}/{count}")
     if count > len(intervals):
         text = f"part {number}/{count}: the sequence has {len(intervals)} key intervals"
         raise InputError(f"{text}; give at most as many parts, or a shorter --key-interval")

@@ -109,21 +109,16 @@ def of_all_parts(metadata: dict[str, Any]) -> dict[str, Any]:
     Raises KeyError or TypeError for metadata that no encoder wrote.
     """
     found = {name: value for name, value in metadata.items() if name not in (PART, _KEYS, *_MEANS)}
-    return found | ({"options": metadata[PART]["options"], "frames": whole_of(metadata)} if PART in metadata else {})
+    return found | ({"options": metadata[PART]["options"], "frames": metadata[PART]["of"]} if PART in metadata else {})
 
 
-def first_frame_of(metadata: dict[str, Any]) -> int | None:
-    """Return where in its sequence a part begins; None where its metadata do not say.
+def place_of(metadata: dict[str, Any]) -> tuple[int, int] | None:
+    """Return the first frame of a part, and how many frames its sequence has; None for a file that is no part.
 
-    Raises TypeError or ValueError for metadata that no encoder wrote.
+    Raises KeyError, TypeError or ValueError for metadata that no encoder wrote.
     """
-    first = metadata.get(PART, {}).get("first_frame")
-    return None if first is None else int(first)
-
-
-def whole_of(metadata: dict[str, Any]) -> int:
-    """Return how many frames the sequence of a part has; 0 for a file that is none. Raises as `first_frame_of`."""
-    return int(metadata.get(PART, {}).get("of", 0))
+    part = metadata.get(PART)
+    return None if part is None else (int(part["first_frame"]), int(part["of"]))
 
 
 def upright(up: Up) -> dict[str, Any]:

@@ -109,28 +109,20 @@ def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
     steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
     for fraction in FRACTIONS:
         steps.append(decimate_faces(steps[-1], max(4, round(2 * fraction * len(mesh.vertices)))))
-    failed, best = 0, steps[0]
+    failed, best, found = 0, mesh, (b"", mesh)
     for best in reversed(steps):
-        if (found := _reaching(mesh, best, most, step)) is not None:
+        found = _stored(best, step)
+        if is_near := _is_near(mesh, found[1], most):
             break
         failed = len(best.faces)
-    else:
-        payload = encode_background(best, step)
-        return payload, decode_background(payload)
-    for _ in range(HALVINGS if failed else 0):
+    for _ in range(HALVINGS if failed and is_near else 0):
         small = decimate_faces(best, round((failed * len(best.faces)) ** 0.5))
-        if (smaller := _reaching(mesh, small, most, step)) is None:
-            failed = len(small.faces)
+        stored = _stored(small, step)
+        if _is_near(mesh, stored[1], most):
+            best, found = small, stored
         else:
-            best, found = small, smaller
+            failed = len(small.faces)
     return found
-
-
-def _reaching(mesh: Mesh, small: Mesh, most: float, step: float) -> tuple[bytes, Mesh] | None:
-    """Return payload and decoded mesh of a decimated mesh that is within an RMS distance as decoded; else None."""
-    payload = encode_background(small, step)
-    decoded = decode_background(payload)
-    return (payload, decoded) if not decoded.is_empty and _apart(mesh, decoded) <= most else None
 
 
 def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
@@ -247,6 +239,12 @@ def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
     return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell, parts.outline)
 
 
-def _apart(mesh: Mesh, small: Mesh) -> float:
-    """Return the RMS distance from the vertices of a mesh to a simplified mesh."""
-    return float(np.sqrt((distances(mesh.vertices, small) ** 2).mean()))
+def _stored(mesh: Mesh, step: float) -> tuple[bytes, Mesh]:
+    """Return the payload of a background, and what it decodes to."""
+    payload = encode_background(mesh, step)
+    return payload, decode_background(payload)
+
+
+def _is_near(mesh: Mesh, small: Mesh, most: float) -> bool:
+    """Return whether a simplified mesh is within an RMS distance of the vertices of a mesh."""
+    return not small.is_empty and float(np.sqrt((distances(mesh.vertices, small) ** 2).mean())) <= most

@@ -45,7 +45,7 @@ class Rays:
 
         self._tensor = o3d.core.Tensor.from_numpy
         self._scene = o3d.t.geometry.RaycastingScene()
-        self._origin = _middle(mesh) if origin is None else origin
+        self._origin = mesh.middle if origin is None else origin
         self._mesh = mesh
         if not mesh.is_empty:
             vertices = (mesh.vertices - self._origin).astype(np.float32)
@@ -121,9 +121,3 @@ def _ways(camera: PinholeCamera) -> Iterator[Float64[np.ndarray, "H W"]]:
 def _faces(answer: dict) -> Int32[np.ndarray, "..."]:
     """Return the faces that rays hit; a miss, 2^32 - 1 in Open3D, becomes -1."""
     return answer["primitive_ids"].numpy().view(np.int32)
-
-
-def _middle(mesh: Mesh) -> Float64[np.ndarray, " 3"]:
-    if len(mesh.vertices) == 0:
-        return np.zeros(3)
-    return (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2

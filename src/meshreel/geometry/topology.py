@@ -75,7 +75,7 @@ def vertex_normals(mesh: Mesh) -> Float64[np.ndarray, "V 3"]:
 def vertex_areas(mesh: Mesh) -> Float64[np.ndarray, " V"]:
     """Return a third of the area of each vertex's faces, in squared units of the vertices."""
     thirds = np.repeat(face_normals(mesh)[1] / 3, 3)
-    return np.bincount(mesh.faces.reshape(-1), thirds, len(mesh.vertices))
+    return np.bincount(mesh.faces.reshape(-1), thirds, len(mesh.vertices)).astype(np.float64)  # int if empty
 
 
 def weld(mesh: Mesh) -> Mesh:

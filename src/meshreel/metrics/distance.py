@@ -17,7 +17,7 @@ from jaxtyping import Float64
 from ..geometry.strict import dot
 from ..types import Mesh
 from .normals import WORST_ANGLE, angles
-from .surface_samples import RESOLUTION, Matches, Samples, box_center, match, sample, used_surface
+from .surface_samples import RESOLUTION, Matches, Samples, match, sample, used_surface
 
 _LEAST, _MOST = 1e-3, 1e6  # m, extents of meshes that are measured in metres; others are scaled (guess)
 PSNR_CEILING = -20 * math.log10(RESOLUTION)  # dB, about 132; stands for an infinite PSNR in a mean over frames
@@ -112,7 +112,7 @@ class Original:
     @cached_property
     def samples(self) -> Samples:
         """The mesh's samples, around the middle of its box."""
-        return sample(self.mesh, box_center(self.mesh))
+        return sample(self.mesh, self.mesh.middle)
 
 
 def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
@@ -125,7 +125,7 @@ def surface_errors(original: Mesh | Original, decoded: Mesh) -> SurfaceErrors:
     if original.is_empty or decoded.is_empty:
         both = _PERFECT if original.is_empty and decoded.is_empty else _WORST
         return SurfaceErrors(original.diagonal, both, both)
-    a, b = prepared.samples, sample(decoded, box_center(original))
+    a, b = prepared.samples, sample(decoded, original.middle)
     if (unit := _unit(a.mesh, b.mesh)) != 1:  # in metres, squares of the queries' float32 would be inf or 0
         smaller = surface_errors(_scaled(original, 1 / unit), _scaled(decoded, 1 / unit))
         return SurfaceErrors(original.diagonal, smaller.forward.times(unit), smaller.backward.times(unit))

@@ -22,7 +22,7 @@ from ..io.write import replacing
 from ..types import UP_AXES, Mesh, check_up
 from .distance import surface_errors
 from .render import Crop, View, look
-from .surface_samples import box_center, used_surface
+from .surface_samples import used_surface
 from .viewpoints import Box, ViewOptions, views_around
 
 _COLUMNS = ("original", "decoded", "error (magenta: only decoded)")
@@ -91,7 +91,7 @@ def error_at_pixels(view: View, decoded: Mesh) -> Float64[np.ndarray, " N"]:
     decoded = used_surface(decoded)
     if decoded.is_empty:
         return np.full(len(view.points), np.inf)
-    center = box_center(decoded)
+    center = decoded.middle
     points = view.points - center
     if len(points) == 0:
         return np.zeros(0)

@@ -35,7 +35,6 @@ from .even_points import Scatter, scatter
 from .normals import WORST_ANGLE, angles, interpolate, welded_normals
 from .render import BACKGROUND
 from .ssim import BORDER, ssim_map
-from .surface_samples import box_center
 
 Row = dict[str, Any]
 PARTS = ("all", "people", "background")
@@ -93,7 +92,7 @@ class Scene:
     ) -> None:
         if dynamic.shape != (len(mesh.faces),):
             raise InputError(f"{len(dynamic)} labels for {len(mesh.faces)} faces: give one a face")
-        self.origin = box_center(mesh)  # closest points are found in float32
+        self.origin = mesh.middle  # closest points are found in float32
         self.mesh, self.dynamic = Mesh.of(mesh.vertices - self.origin, mesh.faces), dynamic
         self.sights, self.options, self.complete = tuple(sights), options, complete
 

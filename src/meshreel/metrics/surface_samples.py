@@ -70,13 +70,6 @@ def used_surface(mesh: Mesh) -> Mesh:
     return drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[areas > 0]))
 
 
-def box_center(mesh: Mesh) -> Float64[np.ndarray, " 3"]:
-    """Return the middle of the bounding box, or 0 for a mesh without vertices."""
-    if len(mesh.vertices) == 0:
-        return np.zeros(3)
-    return (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
-
-
 def _moved(mesh: Mesh, offset: Float64[np.ndarray, " 3"]) -> Mesh:
     return Mesh.of(mesh.vertices + offset, mesh.faces)
 

@@ -112,7 +112,8 @@ class Box:
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for mesh in sequence:
             if len(mesh.vertices):
-                low, high = np.minimum(low, mesh.vertices.min(axis=0)), np.maximum(high, mesh.vertices.max(axis=0))
+                lower, upper = mesh.box
+                low, high = np.minimum(low, lower), np.maximum(high, upper)
         if not np.isfinite(low).all():
             return Box(np.full(3, -0.5), np.full(3, 0.5))
         return Box(low, high)

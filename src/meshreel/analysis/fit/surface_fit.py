@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, Int32
@@ -188,8 +188,8 @@ class Fitting:
     def __init__(self, faces: Int32[np.ndarray, "F 3"], vertices: int, options: FitOptions, noise: float = 0.0) -> None:
         """`noise` is the RMS distance of the frames from the truth; 0: a clean capture."""
         self._template, self._options = _core.FitTemplate(faces, vertices), options
-        self._few = vertices < MANY  # all points are matched
-        self._first, self._second = options.rounds(noise)
+        chosen = options if vertices >= MANY else replace(options, strides=None)  # all points of few are matched
+        self._first, self._second = chosen.rounds(noise)
 
     def first(
         self,
@@ -230,7 +230,7 @@ class Fitting:
             start,
             np.array(rounds.gates),
             np.array(rounds.smoothing),
-            np.ones(len(rounds.gates), np.int32) if self._few else np.array(rounds.strides, np.int32),
+            np.array(rounds.strides, np.int32),
             o.agreement,
             rounds.anchor,
             o.tolerance,

@@ -18,7 +18,14 @@ from ...errors import InputError
 from ...geometry.decimate import decimate
 from ...geometry.holes import close_holes
 from ...geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
-from ...geometry.topology import clean, components, face_normals, subdivide_midpoint, unique_edges, vertex_normals
+from ...geometry.topology import (
+    clean,
+    components,
+    subdivide_midpoint,
+    unique_edges,
+    vertex_areas,
+    vertex_normals,
+)
 from ...types import Mesh
 from .centers import center_spacing
 from .deform import Binding, DeformOptions, Neighbours, bind, center_motions, move, move_normals
@@ -95,7 +102,7 @@ class Group:
         for t in sorted(range(len(self.frames)), key=lambda t: (abs(t - key), t)):
             moved, turned, faces = self._moved(t, pose)
             nearest = self.bindings[t].nearest
-            area = np.bincount(nearest, _vertex_areas(self.frames[t], faces), len(pose))
+            area = np.bincount(nearest, vertex_areas(Mesh(self.frames[t].vertices, faces)), len(pose))
             wanted = self._around(covered) < self.fuse.cover * self._around(area)
             covered += np.where(wanted, area, 0)
             faces = faces[wanted[nearest][faces].any(axis=1)]
@@ -195,11 +202,6 @@ def _dense(
 def _longest_edges(points: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
     corners = points[faces]
     return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-
-
-def _vertex_areas(mesh: Mesh, faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " V"]:
-    areas = face_normals(Mesh.of(mesh.vertices, faces))[1] / 3
-    return np.bincount(faces.reshape(-1), np.repeat(areas, 3), len(mesh.vertices)).astype(np.float64)  # int if empty
 
 
 def _lengths(vertices: Float64[np.ndarray, "V 3"], edges: np.ndarray) -> Float64[np.ndarray, " E"]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -79,7 +80,7 @@ class _LabelCache:
         return np.unpackbits(self._known[key], count=len(mesh.faces)).astype(bool)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ByPlace:
     """Segmentation by place: surface at a moving place moves, and so does surface far from every known place."""
 
@@ -90,7 +91,6 @@ class ByPlace:
     rest: Rest  # the frames in which surface at a moving place belongs to the room nevertheless
     island: float  # m^2
     _cache: _LabelCache = field(default_factory=lambda: _LabelCache(_REMEMBERED), init=False, repr=False, compare=False)
-    _trees: list[Any] = field(default_factory=list, init=False, repr=False, compare=False)  # of the places, once needed
 
     @property
     def noise(self) -> float:
@@ -141,16 +141,15 @@ class ByPlace:
         unknown = np.flatnonzero(np.append(self.keys, -1)[number] != asked)
         if len(unknown):
             reach = _ELSEWHERE * self.lattice.size
-            number[unknown] = self._tree().query(points[unknown], distance_upper_bound=reach)[1]
+            number[unknown] = self._tree.query(points[unknown], distance_upper_bound=reach)[1]
         return number
 
+    @cached_property
     def _tree(self) -> Any:
-        """Return the middles of the places as a tree, which takes a tenth of a second to make."""
+        """The middles of the places as a tree, which takes a tenth of a second to make."""
         from scipy.spatial import cKDTree
 
-        if not self._trees:
-            self._trees.append(cKDTree(self.lattice.centers(self.keys)))
-        return self._trees[0]
+        return cKDTree(self.lattice.centers(self.keys))
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,7 +83,7 @@ def _faces_away(mesh: Mesh) -> bool:
     """Return whether most of the surface faces away from the middle of the mesh; the faces of a room look into it."""
     normals, areas = face_normals(mesh)
     middles = mesh.vertices[mesh.faces].mean(axis=1)
-    away = middles - (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    away = middles - mesh.middle
     return bool((areas * (normals * away).sum(axis=1)).sum() > 0)
 
 
