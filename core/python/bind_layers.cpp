@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "arrays.h"
+#include "meshreel/colors.h"
 #include "meshreel/entropy.h"
 #include "meshreel/layers.h"
 
@@ -287,6 +288,27 @@ size_t keep_faces(In<int32_t, 2> faces, In<uint8_t, 1> dropped, InOut<int32_t, 2
     return mr_keep_faces(faces.data(), dropped.data(), count, room.data());
 }
 
+// Colours frames x vertices x 3, and the values of the last frame.
+nb::tuple decode_colors(nb::bytes records, In<double, 2> positions, In<int32_t, 2> faces, int levels, size_t vertices,
+                        size_t frames, double chroma, std::optional<In<double, 2>> before) {
+    const mr_mesh base = mesh_of(positions, faces);
+    expect(!before || (before->shape(0) == vertices && before->shape(1) == 3));
+    const mr_colored colored{&base, levels, vertices, frames, chroma, before ? before->data() : nullptr};
+    Buffer<uint8_t> colors(3 * frames * vertices);
+    Buffer<double> last(3 * vertices);
+    const mr_bytes bytes = bytes_of(records);
+    check_decoded(mr_decode_colors(&colored, &bytes, colors.data(), last.data()));
+    return nb::make_tuple(colors.shaped(frames, vertices, 3), last.shaped(vertices, 3));
+}
+
+Out<double, 2> color_values(In<uint8_t, 2> colors, double chroma) {
+    const size_t count = colors.shape(0);
+    expect(colors.shape(1) == 3);
+    Buffer<double> values(3 * count);
+    mr_color_values(colors.data(), count, chroma, values.data());
+    return values.shaped(count, 3);
+}
+
 }  // namespace
 
 // Arrays that are written to are bound with .noconvert(): a converted copy would leave the caller's array as it was.
@@ -319,6 +341,9 @@ void bind_layers(nb::module_& m) {
           "previous"_a.none());
     m.def("frames_of_rows", &frames_of_rows<double>, "rows"_a, "place"_a.none(), "positions"_a.noconvert());
     m.def("frames_of_rows", &frames_of_rows<float>, "rows"_a, "place"_a.none(), "positions"_a.noconvert());
+    m.def("decode_colors", &decode_colors, "records"_a, "vertices"_a, "faces"_a, "levels"_a, "count"_a, "frames"_a,
+          "chroma"_a, "before"_a.none());
+    m.def("color_values", &color_values);
     m.def("empty", &empty, "count"_a);
     m.def("keep_faces", &keep_faces, "faces"_a, "dropped"_a, "room"_a.noconvert());
 }

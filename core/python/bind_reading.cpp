@@ -18,7 +18,7 @@ nb::tuple split_lines(In<uint8_t, 1> text, char comment) {
 }
 
 // Numbers, their count in each line, and where the first word is that is none: -1 for no such word.
-nb::tuple read_numbers(In<uint8_t, 1> text, In<int64_t, 1> starts, In<int64_t, 1> ends, char stop) {
+nb::tuple read_numbers(In<uint8_t, 1> text, In<int64_t, 1> starts, In<int64_t, 1> ends, char stop, size_t field) {
     const size_t count = starts.shape(0);
     expect(ends.shape(0) == count);
     size_t room = 0;
@@ -30,7 +30,7 @@ nb::tuple read_numbers(In<uint8_t, 1> text, In<int64_t, 1> starts, In<int64_t, 1
     Buffer<double> values(room);
     Buffer<int32_t> counts(count);
     int64_t bad = -1, found = 0;
-    const mr_lines lines{reinterpret_cast<const char*>(text.data()), starts.data(), ends.data(), count, stop};
+    const mr_lines lines{reinterpret_cast<const char*>(text.data()), starts.data(), ends.data(), count, stop, field};
     const int status = mr_read_numbers(&lines, nearest, values.data(), counts.data(), &bad);
     if (PyErr_Occurred()) throw nb::python_error();
     if (bad < 0) check(status);

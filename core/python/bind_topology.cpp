@@ -5,26 +5,42 @@
 namespace meshreel {
 namespace {
 
-// The vertices and faces that `take` leaves of a mesh.
-template <class Take>
-nb::tuple left_by(const mr_mesh& mesh, Take take) {
-    Buffer<double> left(3 * mesh.vertices);
-    Buffer<int32_t> kept(3 * mesh.face_count);
-    mr_rest rest{left.data(), mesh.vertices, kept.data(), mesh.face_count};
-    check(take(mesh, rest));
-    if (rest.vertices < mesh.vertices) left = Buffer<double>(left.data(), 3 * rest.vertices);
-    if (rest.face_count < mesh.face_count) kept = Buffer<int32_t>(kept.data(), 3 * rest.face_count);
-    return nb::make_tuple(left.shaped(rest.vertices, 3), kept.shaped(rest.face_count, 3));
-}
+// What is left of a mesh.
+struct Rest {
+    const mr_mesh mesh;
+    Buffer<double> positions;
+    Buffer<int32_t> faces;
+    mr_rest rest;
+
+    explicit Rest(const mr_mesh& of)
+        : mesh(of),
+          positions(3 * of.vertices),
+          faces(3 * of.face_count),
+          rest{positions.data(), of.vertices, faces.data(), of.face_count, nullptr, nullptr} {}
+    Out<double, 2> left() {
+        if (rest.vertices < mesh.vertices) positions = Buffer<double>(positions.data(), 3 * rest.vertices);
+        return positions.shaped(rest.vertices, 3);
+    }
+    Out<int32_t, 2> kept() {
+        if (rest.face_count < mesh.face_count) faces = Buffer<int32_t>(faces.data(), 3 * rest.face_count);
+        return faces.shaped(rest.face_count, 3);
+    }
+};
 
 template <int (*take)(const mr_mesh*, mr_rest*)>
 nb::tuple rest_of(In<double, 2> positions, In<int32_t, 2> faces) {
-    return left_by(mesh_of(positions, faces), [](const mr_mesh& mesh, mr_rest& rest) { return take(&mesh, &rest); });
+    Rest left(mesh_of(positions, faces));
+    Buffer<int32_t> vertex_origins(left.mesh.vertices), face_origins(left.mesh.face_count);
+    left.rest.vertex_origins = vertex_origins.data(), left.rest.face_origins = face_origins.data();
+    check(take(&left.mesh, &left.rest));
+    const size_t vertices = left.rest.vertices, faces_left = left.rest.face_count;
+    return nb::make_tuple(left.left(), left.kept(), vertex_origins.shaped(vertices), face_origins.shaped(faces_left));
 }
 
 nb::tuple decimate(In<double, 2> positions, In<int32_t, 2> faces, size_t wanted, double border) {
-    return left_by(mesh_of(positions, faces),
-                   [&](const mr_mesh& mesh, mr_rest& rest) { return mr_decimate(&mesh, wanted, border, &rest); });
+    Rest left(mesh_of(positions, faces));
+    check(mr_decimate(&left.mesh, wanted, border, &left.rest));
+    return nb::make_tuple(left.left(), left.kept());
 }
 
 Out<int32_t, 1> components(In<int32_t, 2> faces, size_t vertices) {

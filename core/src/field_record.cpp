@@ -125,6 +125,16 @@ bool parse(const mr_bytes& bytes, LayersLevel& record) {
     return fields.is_done();
 }
 
+bool parse(const mr_bytes& bytes, CodedField& base, std::vector<ColorsLevel>& levels) {
+    Fields fields(bytes);
+    base = fields.field();
+    for (ColorsLevel& level : levels) {
+        level.sibling_weight = fields.u8();
+        level.values = fields.field();
+    }
+    return fields.is_done();
+}
+
 Field FieldStreams::over(const mr_graph& graph, size_t first) {
     const size_t width = means.size();
     return {graph,  columns, width - first, width, vectors.data() + first, means.data() + first, differences.data(),

@@ -29,10 +29,18 @@ struct LayersLevel {
     CodedField scalars;
 };
 
+// Colours of the vertices that a subdivision adds.
+struct ColorsLevel {
+    int sibling_weight;
+    CodedField values;
+};
+
 // False where the bytes are not exactly one such record.
 bool parse(const mr_bytes& bytes, CodedField& record);
 bool parse(const mr_bytes& bytes, LayersGroup& record);
 bool parse(const mr_bytes& bytes, LayersLevel& record);
+// The same of a CodedField and a ColorsLevel for each of `levels`.
+bool parse(const mr_bytes& bytes, CodedField& base, std::vector<ColorsLevel>& levels);
 
 // What the streams of a CodedField hold.
 struct FieldStreams {

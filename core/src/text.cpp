@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <system_error>
@@ -102,6 +103,12 @@ private:
     bool is_exact_ = false;
 };
 
+// What follows `count` stops in a word; the end of the word where it has fewer.
+const char* behind_stops(const char* at, const char* end, char stop, size_t count) {
+    for (; at != end && !is_blank(*at) && count > 0; ++at) count -= *at == stop;
+    return at;
+}
+
 }  // namespace
 }  // namespace meshreel
 
@@ -129,7 +136,11 @@ int mr_read_numbers(const mr_lines* lines, mr_nearest nearest, double* values, i
             while (true) {
                 at = std::find_if_not(at, end, is_blank);
                 if (at == end) break;
-                if (*at != lines->stop || lines->stop == 0) {
+                if (lines->field > 0) {
+                    at = behind_stops(at, end, lines->stop, lines->field);
+                    if (!Number(at, end, lines->stop).read(nearest, values)) *values = std::nan("");
+                    ++values;
+                } else if (*at != lines->stop || lines->stop == 0) {
                     Number number(at, end, lines->stop);
                     if (!number.read(nearest, values)) {
                         *bad = at - lines->text;

@@ -116,7 +116,17 @@ Row<double> unit(const Span& span) {
     return {span.normal[0] / divisor, span.normal[1] / divisor, span.normal[2] / divisor};
 }
 
-void put(const Row<int32_t>& face, mr_rest& rest) { std::copy_n(face.data(), 3, rest.faces + 3 * rest.face_count++); }
+void put(const Row<int32_t>& face, size_t origin, mr_rest& rest) {
+    if (rest.face_origins) rest.face_origins[rest.face_count] = static_cast<int32_t>(origin);
+    std::copy_n(face.data(), 3, rest.faces + 3 * rest.face_count++);
+}
+
+// Puts a vertex; returns its number.
+int32_t put_vertex(const mr_mesh& mesh, size_t v, mr_rest& rest) {
+    std::copy_n(mesh.positions + 3 * v, 3, rest.positions + 3 * rest.vertices);
+    if (rest.vertex_origins) rest.vertex_origins[rest.vertices] = static_cast<int32_t>(v);
+    return static_cast<int32_t>(rest.vertices++);
+}
 
 void weld(const mr_mesh& mesh, mr_rest& rest) {
     const std::vector<int32_t> first = first_at_position(mesh);
@@ -127,13 +137,12 @@ void weld(const mr_mesh& mesh, mr_rest& rest) {
             numbers[v] = numbers[at];
             continue;
         }
-        std::copy_n(mesh.positions + 3 * v, 3, rest.positions + 3 * rest.vertices);
-        numbers[v] = static_cast<int32_t>(rest.vertices++);
+        numbers[v] = put_vertex(mesh, v, rest);
     }
     for (size_t f = 0; f < mesh.face_count; ++f) {
         Row<int32_t> face = face_of(mesh, f);
         for (int32_t& corner : face) corner = numbers[static_cast<size_t>(corner)];
-        if (!collapsed(face)) put(face, rest);
+        if (!collapsed(face)) put(face, f, rest);
     }
 }
 
@@ -143,24 +152,26 @@ void move_used(const mr_mesh& mesh, mr_rest& rest) {
     for (size_t k = 0; k < 3 * rest.face_count; ++k) numbers[static_cast<size_t>(rest.faces[k])] = 1;
     rest.vertices = 0;
     for (size_t v = 0; v < mesh.vertices; ++v) {
-        if (numbers[v] == 0) continue;
-        std::copy_n(mesh.positions + 3 * v, 3, rest.positions + 3 * rest.vertices);
-        numbers[v] = static_cast<int32_t>(rest.vertices++);
+        if (numbers[v] != 0) numbers[v] = put_vertex(mesh, v, rest);
     }
     for (size_t k = 0; k < 3 * rest.face_count; ++k) rest.faces[k] = numbers[static_cast<size_t>(rest.faces[k])];
 }
 
 void clean(const mr_mesh& mesh, mr_rest& rest) {
     std::vector<Row<int32_t>> faces;
+    std::vector<size_t> origins;
     faces.reserve(mesh.face_count);
+    origins.reserve(mesh.face_count);
     for (size_t f = 0; f < mesh.face_count; ++f) {
         const Row<int32_t> face = face_of(mesh, f);
-        if (!collapsed(face) && span_of(mesh, face).square > 0) faces.push_back(face);
+        if (collapsed(face) || !(span_of(mesh, face).square > 0)) continue;
+        faces.push_back(face);
+        origins.push_back(f);
     }
     const std::vector<int32_t> first = first_with_vertices(faces);
     rest.face_count = 0;
     for (size_t f = 0; f < faces.size(); ++f)
-        if (static_cast<size_t>(first[f]) == f) put(faces[f], rest);
+        if (static_cast<size_t>(first[f]) == f) put(faces[f], origins[f], rest);
     move_used(mesh, rest);
 }
 
@@ -271,6 +282,7 @@ int mr_drop_unreferenced(const mr_mesh* mesh, mr_rest* rest) {
     return checked(*mesh, [&] {
         rest->face_count = mesh->face_count;
         std::copy_n(mesh->faces, 3 * mesh->face_count, rest->faces);
+        if (rest->face_origins) std::iota(rest->face_origins, rest->face_origins + mesh->face_count, 0);
         move_used(*mesh, *rest);
     });
 }

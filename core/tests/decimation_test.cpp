@@ -8,7 +8,7 @@ namespace {
 Shape decimated(const Shape& shape, size_t faces, double border) {
     Shape left{std::vector<double>(shape.positions.size()), std::vector<int32_t>(shape.faces.size())};
     const mr_mesh mesh = shape.view();
-    mr_rest rest{left.positions.data(), 0, left.faces.data(), 0};
+    mr_rest rest{left.positions.data(), 0, left.faces.data(), 0, nullptr, nullptr};
     CHECK(mr_decimate(&mesh, faces, border, &rest) == MR_OK);
     left.positions.resize(3 * rest.vertices);
     left.faces.resize(3 * rest.face_count);

@@ -17,9 +17,9 @@ double nearest(const char* word) {
 }
 
 // The numbers of one line; `bad` is -1 where all of its words are numbers.
-std::vector<double> numbers(const std::string& line, char stop, int64_t& bad) {
+std::vector<double> numbers(const std::string& line, char stop, int64_t& bad, size_t field = 0) {
     const int64_t start = 0, end = static_cast<int64_t>(line.size());
-    const mr_lines lines{line.data(), &start, &end, 1, stop};
+    const mr_lines lines{line.data(), &start, &end, 1, stop, field};
     std::vector<double> values(line.size() / 2 + 1);
     int32_t count = 0;
     bad = -1;

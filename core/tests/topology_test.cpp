@@ -13,17 +13,22 @@ struct Case {
     std::vector<int32_t> faces;
     std::vector<double> left{};
     std::vector<int32_t> kept{};
+    std::vector<int32_t> vertex_origins{}, face_origins{};
 
     mr_mesh mesh() const { return {positions.data(), positions.size() / 3, faces.data(), faces.size() / 3}; }
 
     int take(int (*how)(const mr_mesh*, mr_rest*)) {
         left.assign(positions.size(), -1);
         kept.assign(faces.size(), -1);
+        vertex_origins.assign(positions.size() / 3, -1);
+        face_origins.assign(faces.size() / 3, -1);
         const mr_mesh view = mesh();
-        mr_rest rest{left.data(), 0, kept.data(), 0};
+        mr_rest rest{left.data(), 0, kept.data(), 0, vertex_origins.data(), face_origins.data()};
         const int status = how(&view, &rest);
         left.resize(3 * rest.vertices);
         kept.resize(3 * rest.face_count);
+        vertex_origins.resize(rest.vertices);
+        face_origins.resize(rest.face_count);
         return status;
     }
 };
@@ -38,6 +43,7 @@ TEST(welding_merges_equal_positions_in_the_order_of_their_first) {
     CHECK(square.take(mr_weld) == MR_OK);
     CHECK(square.left == Reals({1, 0, 0, 0, -0.0, 0, 0, 1, 0}) && std::signbit(square.left[4]));
     CHECK(square.kept == Ints({0, 2, 1, 0, 2, 1}));
+    CHECK(square.vertex_origins == Ints({0, 1, 2}) && square.face_origins == Ints({0, 2}));
     const double nan = std::numeric_limits<double>::quiet_NaN();
     Case none{{nan, 0, 0, nan, 0, 0}, {}};
     CHECK(none.take(mr_weld) == MR_OK && none.left.size() == 6);
@@ -47,8 +53,10 @@ TEST(cleaning_leaves_each_face_with_an_area_once_and_no_loose_vertex) {
     Case mesh{{9, 9, 9, 0, 0, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0}, {1, 1, 2, 1, 2, 4, 1, 2, 3, 3, 2, 1, 2, 3, 4}};
     CHECK(mesh.take(mr_clean) == MR_OK);
     CHECK(mesh.kept == Ints({0, 1, 2, 1, 2, 3}) && mesh.left.size() == 12 && mesh.left[0] == 0);
+    CHECK(mesh.vertex_origins == Ints({1, 2, 3, 4}) && mesh.face_origins == Ints({2, 4}));
     Case loose{{9, 9, 9, 0, 0, 0, 1, 0, 0, 0, 1, 0}, {1, 1, 2}};
     CHECK(loose.take(mr_drop_unreferenced) == MR_OK && loose.kept == Ints({0, 0, 1}) && loose.left.size() == 6);
+    CHECK(loose.vertex_origins == Ints({1, 2}) && loose.face_origins == Ints({0}));
 }
 
 TEST(as_many_equal_vertices_and_faces_as_there_are_take_no_square_of_time) {

@@ -75,7 +75,7 @@ def split_lines(
     text: UInt8[np.ndarray, " B"], comment: str
 ) -> tuple[Int64[np.ndarray, " N"], Int64[np.ndarray, " N"]]: ...
 def read_numbers(
-    text: UInt8[np.ndarray, " B"], starts: Int64[np.ndarray, " N"], ends: Int64[np.ndarray, " N"], stop: str
+    text: UInt8[np.ndarray, " B"], starts: Int64[np.ndarray, " N"], ends: Int64[np.ndarray, " N"], stop: str, field: int
 ) -> tuple[Float64[np.ndarray, " M"], Int32[np.ndarray, " N"], int]: ...
 def read_lists(
     data: UInt8[np.ndarray, " B"], fields: Int64[np.ndarray, "P 2"], count: int, wanted: int, big_endian: bool
@@ -83,15 +83,13 @@ def read_lists(
 
 # bind_topology.cpp
 
-def weld(
-    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
-) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"]]: ...
-def clean(
-    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
-) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"]]: ...
-def drop_unreferenced(
-    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]
-) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "F 3"]]: ...
+_Rest: TypeAlias = tuple[
+    Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"], Int32[np.ndarray, " W"], Int32[np.ndarray, " G"]
+]  # vertices and faces that are left, and the number that each had
+
+def weld(vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> _Rest: ...
+def clean(vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> _Rest: ...
+def drop_unreferenced(vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> _Rest: ...
 def decimate(
     vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], wanted: int, border: float
 ) -> tuple[Float64[np.ndarray, "W 3"], Int32[np.ndarray, "G 3"]]: ...
@@ -222,6 +220,17 @@ def decode_last_scalars(
 def frames_of_rows(
     rows: Float64[np.ndarray, "V 3 T"], place: _Place | None, positions: Float[np.ndarray, "T V 3"]
 ) -> None: ...
+def decode_colors(
+    records: bytes,
+    vertices: Float64[np.ndarray, "B 3"],
+    faces: Int32[np.ndarray, "F 3"],
+    levels: int,
+    count: int,
+    frames: int,
+    chroma: float,
+    before: Float64[np.ndarray, "V 3"] | None,
+) -> tuple[UInt8[np.ndarray, "T V 3"], Float64[np.ndarray, "V 3"]]: ...
+def color_values(colors: UInt8[np.ndarray, "N 3"], chroma: float) -> Float64[np.ndarray, "N 3"]: ...
 def empty(count: int) -> Float64[np.ndarray, " N"]: ...
 def keep_faces(
     faces: Int32[np.ndarray, "F 3"], dropped: UInt8[np.ndarray, " F"], room: Int32[np.ndarray, "N 3"]

@@ -5,14 +5,15 @@ Coordinates are float64 in memory, so that geo-referenced captures (around 1e6) 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args, runtime_checkable
 
 import numpy as np
 
 from .errors import InputError
-from .shapes import Float64, Int32
+from .shapes import Bool, Float32, Float64, Int32, UInt8
 
 if TYPE_CHECKING:
     import trimesh
@@ -25,17 +26,39 @@ UP_AXES = {
     "-y": (0.0, -1.0, 0.0),
     "-z": (0.0, 0.0, -1.0),
 }
+GREY = 128  # red, green and blue of a surface without colours beside one with colours
+
+
+@dataclass(frozen=True, slots=True)
+class Texture:
+    """A picture in sRGB that is decoded when its pixels are asked for; InputError where its file cannot be used."""
+
+    read: Callable[[], UInt8[np.ndarray, "H W 3"]]
+
+    @staticmethod
+    def of(pixels: UInt8[np.ndarray, "H W 3"]) -> Texture:
+        """Return the texture of a picture in memory."""
+        return Texture(partial(np.asarray, pixels))
+
+    @property
+    def pixels(self) -> UInt8[np.ndarray, "H W 3"]:
+        """The picture, its uppermost row first."""
+        return self.read()
 
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A triangle mesh, which may have no faces and no vertices (an empty frame).
+    """A triangle mesh, which may have no faces and no vertices (an empty frame), and may have colours.
 
     The arrays of decoded meshes are read-only; those of `copy()` are not.
     """
 
     vertices: Float64[np.ndarray, "V 3"]  # m, right-handed
     faces: Int32[np.ndarray, "F 3"]  # counter-clockwise from outside
+    colors: UInt8[np.ndarray, "V 3"] | None = None  # red, green, blue of the vertices, sRGB
+    # Places of the faces' corners in the texture, whose lower left corner is (0, 0) and upper right one (1, 1).
+    uv: Float32[np.ndarray, "F 3 2"] | None = None
+    texture: Texture | None = None
 
     @staticmethod
     def of(vertices: object, faces: object) -> Mesh:
@@ -48,6 +71,31 @@ class Mesh:
     def empty() -> Mesh:
         """Return a mesh with no vertices and no faces."""
         return Mesh.of(np.zeros((0, 3)), np.zeros((0, 3)))
+
+    @property
+    def is_colored(self) -> bool:
+        """True if the mesh has colours of its vertices or a texture."""
+        return self.colors is not None or (self.uv is not None and self.texture is not None)
+
+    def at(self, vertices: Float64[np.ndarray, "V 3"]) -> Mesh:
+        """Return the same surface, colours and all, with its vertices in other places."""
+        return replace(self, vertices=vertices)
+
+    def left(
+        self,
+        vertices: Float64[np.ndarray, "W 3"],
+        faces: Int32[np.ndarray, "G 3"],
+        vertex_origins: Int32[np.ndarray, " W"],
+        face_origins: Int32[np.ndarray, " G"],
+    ) -> Mesh:
+        """Return what is left of the mesh, with its colours, by the number that each vertex and each face had."""
+        colors = None if self.colors is None else self.colors[vertex_origins]
+        uv = None if self.uv is None else self.uv[face_origins]
+        return Mesh(vertices, faces, colors, uv, self.texture)
+
+    def with_faces(self, chosen: Bool[np.ndarray, " F"]) -> Mesh:
+        """Return the mesh with the chosen faces only, and all its vertices."""
+        return replace(self, faces=self.faces[chosen], uv=None if self.uv is None else self.uv[chosen])
 
     @property
     def is_empty(self) -> bool:
@@ -78,13 +126,16 @@ class Mesh:
 
     def copy(self) -> Mesh:
         """Return the same mesh in new arrays, which may be written to."""
-        return Mesh(self.vertices.copy(), self.faces.copy())
+        colors = None if self.colors is None else self.colors.copy()
+        uv = None if self.uv is None else self.uv.copy()
+        return Mesh(self.vertices.copy(), self.faces.copy(), colors, uv, self.texture)
 
     def to_trimesh(self) -> trimesh.Trimesh:
-        """Return a copy as a `trimesh.Trimesh`, with the same vertices in the same order."""
+        """Return a copy as a `trimesh.Trimesh`, with the same vertices in the same order and their colours."""
         import trimesh
 
-        return trimesh.Trimesh(self.vertices.copy(), self.faces.copy(), process=False)
+        mesh = self.copy()
+        return trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False)
 
     def to_open3d(self) -> Any:
         """Return a copy as an `open3d.geometry.TriangleMesh`. Raises ImportError without the extra `encode`."""
@@ -93,7 +144,10 @@ class Mesh:
         except ImportError as error:
             raise ImportError("Mesh.to_open3d needs the extra `encode`: pip install 'meshreel[encode]'") from error
         mesh, utility = self.copy(), open3d.utility  # it refuses read-only arrays
-        return open3d.geometry.TriangleMesh(utility.Vector3dVector(mesh.vertices), utility.Vector3iVector(mesh.faces))
+        found = open3d.geometry.TriangleMesh(utility.Vector3dVector(mesh.vertices), utility.Vector3iVector(mesh.faces))
+        if mesh.colors is not None:
+            found.vertex_colors = utility.Vector3dVector(mesh.colors / 255.0)
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +159,7 @@ class Placement:
 
     def of(self, mesh: Mesh) -> Mesh:
         """Return a mesh of normalised coordinates in metres."""
-        return Mesh(np.asarray(self.origin) + self.scale * mesh.vertices, mesh.faces)
+        return mesh.at(np.asarray(self.origin) + self.scale * mesh.vertices)
 
     @property
     def numbers(self) -> tuple[float, tuple[float, ...]]:

@@ -21,8 +21,9 @@ from meshreel.encoder.forms import EncodedGroup
 from meshreel.encoder.job import Job
 from meshreel.encoder.parts import Parts, take_apart
 from meshreel.encoder.progress import Stages
-from meshreel.encoder.scene import encode_bodies, encode_static
+from meshreel.encoder.scene import encode_bodies
 from meshreel.encoder.sequence import Encoder, encode
+from meshreel.encoder.static import encode_static
 from meshreel.encoder.target import NO_ERROR, target_of
 from meshreel.encoder.tracks import TrackGroup
 from meshreel.errors import InputError

@@ -84,7 +84,7 @@ MESHES = st.integers(1, 9).flatmap(
 
 def assert_same_bits(found: Mesh | tuple, expected: Mesh | tuple) -> None:
     for one, other in zip(
-        *(astuple(each) if isinstance(each, Mesh) else each for each in (found, expected)), strict=True
+        *(astuple(each)[:2] if isinstance(each, Mesh) else each for each in (found, expected)), strict=True
     ):
         assert one.shape == other.shape and one.dtype == other.dtype and one.tobytes() == other.tobytes()
 

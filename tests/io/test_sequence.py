@@ -173,7 +173,7 @@ def test_what_is_dropped_is_said_once_for_the_sequence(tmp_path: Path) -> None:
     for mesh in sequence:
         assert mesh.faces.shape == (1, 3)
     assert sequence.warnings == (
-        "only geometry is kept; dropped: materials, normals, texture coordinates (first in frame 1)",
+        "not kept: normals, texture coordinates (first in frame 1)",
     )
 
 

@@ -16,13 +16,15 @@ extern "C" {
 size_t mr_split_lines(const char* text, size_t size, char comment, int64_t* starts, int64_t* ends);
 
 // Lines text[starts[k] .. ends[k]) of words between blanks. What follows `stop` in a word is skipped, and so is a word
-// that begins with it; 0 stops nothing.
+// that begins with it; 0 stops nothing. With a `field` above 0, what follows so many stops is read of each word, and is
+// NaN where it is no number.
 struct mr_lines {
     const char* text;
     const int64_t* starts;
     const int64_t* ends;
     size_t count;
     char stop;
+    size_t field;
 };
 
 // The double nearest to a decimal number of any length, ended by 0, in the grammar of C without signs.

@@ -18,6 +18,7 @@ struct mr_rest {
     size_t vertices;
     int32_t* faces;
     size_t face_count;
+    int32_t *vertex_origins, *face_origins;  // the number that each had in the mesh; or null
 };
 
 // Merges vertices at equal positions into the first of them (-0 equals 0, NaN nothing) and drops the faces that

@@ -61,7 +61,7 @@ class Survey:
     def normalise(self, mesh: Mesh) -> Mesh:
         """Return the mesh cleaned and in normalised coordinates: centered, in multiples of `unit`."""
         mesh = clean(mesh)
-        return Mesh.of((mesh.vertices - self.center) / self.unit, mesh.faces)
+        return mesh.at((mesh.vertices - self.center) / self.unit)
 
     def intervals(self, size: int) -> list[range]:
         """Return intervals of at most `size` frames, of even lengths, each all empty or all of about one scale."""

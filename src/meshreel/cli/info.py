@@ -85,7 +85,7 @@ def _describe_group(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, A
     """Describe a group of a file of which the first `there` bytes exist."""
     row: dict[str, Any] = {"chunk": chunk.number, "track": chunk.track}
     row |= {"first_frame": chunk.first_frame, "frames": chunk.frame_count}
-    row |= {"form": chunk.form.name.lower(), "bytes": chunk.size, "layers": len(chunk.layers) - 1}
+    row |= {"form": chunk.form_name, "bytes": chunk.size, "layers": len(chunk.layers) - 1}
     row["predicted"] = reader.group_before(chunk) is not None
     return row | _contents(reader, chunk, there, payload_bytes_by_purpose)
 
@@ -102,7 +102,7 @@ def _shown(reader: ReelReader) -> dict[int, list[tuple[int, int]]]:
 
 def _describe_state(reader: ReelReader, chunk: Chunk, there: int, shown: Iterable[tuple[int, int]]) -> dict[str, Any]:
     """Describe a state of the background: the state that it changes, if any, and the frames that show it."""
-    row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form.name.lower(), "bytes": chunk.size}
+    row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form_name, "bytes": chunk.size}
     row["changes"] = chunk.depends_on[0] if chunk.depends_on else None
     row["ranges"] = _merged(shown)
     return row | _contents(reader, chunk, there, lambda payload: {"background": len(payload)})

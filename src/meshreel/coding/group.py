@@ -9,20 +9,20 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import FormatError
-from ..format.layout import DracoGroup, Form, LayersPatches
+from ..format.layout import DracoGroup, Form
 from ..format.records import unpack_all
 from ..shapes import Float
 from ..types import Mesh, Placement
 from .intra import decode_empty, decode_intra
 from .layers.coder import (
-    LayersRecords,
     LayersState,
+    has_patches,
     layers_bytes_by_purpose,
+    patches_of,
     place_layers,
     read_layers,
     state_after,
 )
-from .layers.patches import Patches, decode_patches
 
 
 def decode_group(data: bytes, frame_count: int, layers: int | None = None) -> list[Mesh]:
@@ -72,7 +72,7 @@ def write_vertices(
     """
     records = read_layers(data, layers)
     decoded = place_layers(records, previous, place, out=out)
-    patches = _patches(data, records, layers, len(decoded.faces))
+    patches = patches_of(data, records, layers, len(decoded.faces))
     if patches is not None and not all(mesh.is_empty for mesh in patches.meshes):
         return None
     return decoded.state
@@ -105,21 +105,11 @@ def _decode_layers(
 ) -> tuple[list[Mesh], LayersState | None]:
     """Decode a `layers` group, with its patches if it has them and `levels` does not exclude them."""
     records = read_layers(data, levels)
-    decoded = place_layers(records, previous, place, spare=_has_patches(data, records, levels))
-    patches = _patches(data, records, levels, len(decoded.faces))
+    decoded = place_layers(records, previous, place, spare=has_patches(data, records, levels))
+    patches = patches_of(data, records, levels, len(decoded.faces))
     if patches is None:
         return [Mesh(frame, decoded.faces) for frame in decoded.positions], decoded.state
     return patches.apply(decoded.positions, decoded.faces, place, decoded.spare), decoded.state
-
-
-def _has_patches(data: bytes, records: LayersRecords, levels: int | None) -> bool:
-    return records.end < len(data) and (levels is None or levels > records.head.levels)
-
-
-def _patches(data: bytes, records: LayersRecords, levels: int | None, faces: int) -> Patches | None:
-    if not _has_patches(data, records, levels):
-        return None
-    return decode_patches(unpack_all(LayersPatches, data[records.end :]), records.head.frames, faces)
 
 
 def payload_bytes_by_purpose(data: bytes) -> dict[str, int]:

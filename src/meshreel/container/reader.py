@@ -26,15 +26,20 @@ class Chunk:
     """Position and contents of a chunk."""
 
     number: int
-    kind: ChunkKind
-    form: Form
+    kind: int  # a ChunkKind, or one that this version does not know
+    form: int
     first_frame: int  # 0 for STATIC
     frame_count: int  # 0 for STATIC
-    depends_on: tuple[int, ...]  # numbers of a STATIC chunk and, where it is predicted, of the group before it
+    depends_on: tuple[int, ...]  # numbers of the chunks that it needs
     offset: int  # bytes from the start of the file
     layers: tuple[Layer, ...]
     track: int = 0  # 0 for STATIC
     is_alone: bool = True  # whether the file has no other track
+
+    @property
+    def form_name(self) -> str:
+        """Name of the form, in small letters; its number where this version does not know it."""
+        return next((form.name.lower() for form in Form if form == self.form), str(self.form))
 
     @property
     def size(self) -> int:
@@ -49,8 +54,11 @@ class Chunk:
     def __str__(self) -> str:
         if self.kind == ChunkKind.STATIC:
             return f"chunk {self.number} (static)"
+        what = "colours, " if self.kind == ChunkKind.COLORS else ""
         track = "" if self.is_alone else f"track {self.track}, "
-        return f"chunk {self.number} ({track}frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"
+        return (
+            f"chunk {self.number} ({what}{track}frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"
+        )
 
 
 class ReelReader:
@@ -70,6 +78,7 @@ class ReelReader:
         check_frames(sum(group.frame_count for group in self.groups), self.size)
         if source.size > self.size:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
+        self.colors = {c.depends_on[0]: c for c in self.chunks if c.kind == ChunkKind.COLORS}  # by the coloured chunk
         self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
 
@@ -170,14 +179,16 @@ def _read_head(source: Source) -> tuple[Header, Index, int]:
 
 def _chunks(index: Index, offset: int) -> tuple[Chunk, ...]:
     chunks: list[Chunk] = []
-    frames = [0] * (1 + max(entry.track for entry in index.chunks))
+    frames = [0] * (1 + max((entry.track for entry in index.chunks if entry.kind == ChunkKind.GROUP), default=0))
     for number, entry in enumerate(index.chunks):
-        first = frames[entry.track] if entry.kind == ChunkKind.GROUP else 0
+        is_group = entry.kind == ChunkKind.GROUP
+        of = chunks[entry.depends_on[0]] if entry.kind == ChunkKind.COLORS else None
+        first = frames[entry.track] if is_group else of.first_frame if of is not None else 0
         place = (number, entry.kind, entry.form, first, entry.frames, entry.depends_on, offset, entry.layers)
         chunk = Chunk(*place, entry.track, len(frames) == 1)
         chunks.append(chunk)
         offset = chunk.end
-        frames[entry.track] += entry.frames
+        frames[entry.track] += entry.frames if is_group else 0
     return tuple(chunks)
 
 
@@ -197,4 +208,4 @@ def _check_payload(chunk: Chunk, payload: bytes, layers: tuple[Layer, ...]) -> N
             raise FormatError(f"{chunk}: layer {number} is damaged, its checksum does not match")
         offset += layer.size
     if payload[0] != chunk.form:
-        raise FormatError(f"{chunk}: its form is {payload[0]}, the index says {chunk.form.value}")
+        raise FormatError(f"{chunk}: its form is {payload[0]}, the index says {chunk.form}")

@@ -71,6 +71,11 @@ class ReelWriter:
         self._checks = IndexChecks()
 
     @property
+    def chunk_count(self) -> int:
+        """Number of chunks added, which is the number of the next."""
+        return len(self._entries)
+
+    @property
     def frame_count(self) -> int:
         """Number of frames added to the first track."""
         return self.frames_of(0)
@@ -135,6 +140,20 @@ class ReelWriter:
         data = payload if isinstance(payload, bytes) else payload.read()
         entry = IndexEntry(ChunkKind.GROUP, _form(data), frame_count, track, tuple(depends_on), _layers(data, layers))
         return self._add(entry, payload)
+
+    def add_colors(self, payload: bytes | Stored, layers: Sequence[int], of: int, before: int | None = None) -> int:
+        """Add the colours of the vertices of a chunk, and return the number of theirs; `layers` as for `add_group`.
+
+        `before` is the number of the colours that they are predicted from: those of the group before.
+        """
+        data, entry = payload if isinstance(payload, bytes) else payload.read(), self._entries[of]
+        depends_on = (of,) if before is None else (of, before)
+        kind, form = ChunkKind.COLORS, _form(data)
+        return self._add(IndexEntry(kind, form, entry.frames, entry.track, depends_on, _layers(data, layers)), payload)
+
+    def colors_of(self, number: int) -> int | None:
+        """Return the number of the chunk that has the colours of a chunk, or None."""
+        return self._checks.colors.get(number)
 
     def _add(self, entry: IndexEntry, payload: bytes | Stored) -> int:
         pack(entry)  # refuses what does not fit its field

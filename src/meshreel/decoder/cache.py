@@ -90,13 +90,15 @@ class Refusals:
 
 def memory_of(meshes: Sequence[Mesh]) -> int:
     """Return the memory of meshes in bytes; arrays that are views of one array count once."""
-    arrays = [array for mesh in meshes for array in (mesh.vertices, mesh.faces)]
+    arrays = [array for mesh in meshes for array in (mesh.vertices, mesh.faces, mesh.colors) if array is not None]
     owners = [array.base if isinstance(array.base, np.ndarray) else array for array in arrays]
     return sum({id(owner): owner.nbytes for owner in owners}.values())
 
 
 def read_only(mesh: Mesh) -> Mesh:
     """Return read-only views of a mesh that is cached and shares its faces with other frames and groups."""
-    vertices, faces = mesh.vertices.view(), mesh.faces.view()
-    vertices.flags.writeable = faces.flags.writeable = False
-    return Mesh(vertices, faces)
+    arrays = [None if array is None else array.view() for array in (mesh.vertices, mesh.faces, mesh.colors)]
+    for array in arrays:
+        if array is not None:
+            array.flags.writeable = False
+    return Mesh(*arrays)  # type: ignore[arg-type]

@@ -7,17 +7,19 @@ background is decoded once and kept until another state of it is shown.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ..coding.background import decode_background, decode_change
+from ..coding.colored import canvas_of, decode_group_colors, paint_background
 from ..coding.group import continue_group, skip_group, write_vertices
 from ..coding.layers.coder import MOST_NUMBERS, LayersState
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError, InputError
 from ..format.budget import Chain, together
 from ..format.layout import Form
-from ..shapes import Float
+from ..shapes import Float, UInt8
 from ..types import Frames, Mesh, Placement
 from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
 
@@ -27,9 +29,10 @@ MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes: the groups of one frame take no more 
 class Track(Frames):
     """One moving body over the whole file: a mesh for each frame, empty in frames without the body."""
 
-    def __init__(self, reader: ReelReader, number: int, layers: int | None = None) -> None:
+    def __init__(self, reader: ReelReader, number: int, layers: int | None = None, colored: bool = True) -> None:
         """Decode track `number` from at most `layers` layers of each group beyond its first; None: from all."""
         self.reader = reader
+        self._colored = colored and bool(reader.colors)
         self.number = number
         self.layers = layers
         self._place = placement(reader)
@@ -76,7 +79,7 @@ class Track(Frames):
                 after = write_vertices(payload, self.layers, state, self._place, out)
             except InputError as error:
                 raise InputError(f"{chunk}: {error}") from error
-        if after is not None:
+        if after is not None and not self._colored:  # else the state lacks what the next colours are predicted from
             self._states = states.add(chunk.number, after, state, self._most)
         return after is not None
 
@@ -89,6 +92,10 @@ class Track(Frames):
         payload = self._read(chunk)
         with self._refusals.of(chunk):
             meshes, after = continue_group(payload, chunk.frame_count, self.layers, state, self._place)
+        counts = [len(mesh.vertices) for mesh in meshes]
+        if (colors := self._colors(chunk, payload, counts, state, after)) is not None:
+            meshes = [replace(mesh, colors=some) for mesh, some in zip(meshes, colors[0], strict=True)]
+            after = colors[1]
         shown = {id(mesh): read_only(mesh) for mesh in meshes}  # the frames of an empty group are one mesh
         meshes = [shown[id(mesh)] for mesh in meshes]
         self._states = states.add(chunk.number, after, state, self._most)
@@ -109,9 +116,29 @@ class Track(Frames):
             payload = self._read(link)
             with self._lost.of(link):
                 after = skip_group(payload, link.frame_count, self.layers, state)
+            if after is not None:
+                colors = self._colors(link, payload, [after.count] * link.frame_count, state, after)
+                after = after if colors is None else colors[1]
             states = states.add(link.number, after, state, self._most)
             state = after
         return state, states
+
+    def _colors(
+        self,
+        chunk: Chunk,
+        payload: bytes,
+        counts: Sequence[int],
+        before: LayersState | None,
+        after: LayersState | None,
+    ) -> tuple[list[UInt8[np.ndarray, "V 3"]], LayersState | None] | None:
+        """Decode the colours of a group whose frames have so many vertices; None where it has none."""
+        of = self.reader.colors.get(chunk.number) if self._colored else None
+        if of is None:
+            return None
+        some = None if self.layers is None or chunk.form != Form.LAYERS else self.layers + 1
+        with self._refusals.of(of):
+            data = self.reader.read_chunk(of.number, some)
+            return decode_group_colors(data, canvas_of(payload, counts, self.layers, before), before, after)
 
     @property
     def _most(self) -> int:
@@ -125,8 +152,9 @@ class Track(Frames):
 class Background:
     """The background of each frame. It has no layers: all of it is read, whatever the layers of the tracks."""
 
-    def __init__(self, reader: ReelReader) -> None:
+    def __init__(self, reader: ReelReader, colored: bool = True) -> None:
         self.reader = reader
+        self._colored = colored
         self._place = placement(reader)
         # Number of a chunk, its mesh, and what led to it; replaced as a whole, as other threads do.
         self._last = (-1, Mesh.empty(), Chain())
@@ -168,8 +196,16 @@ class Background:
         with self._refusals.of(chunk):
             if chunk.form == Form.PATCH:
                 after = decode_change(payload, before, self._place)
-                return after, led.then(before, after, len(payload))
-            return decode_background(payload, self._place), Chain(0, len(payload))
+                return self._painted(chunk, payload, after), led.then(before, after, len(payload))
+            return self._painted(chunk, payload, decode_background(payload, self._place)), Chain(0, len(payload))
+
+    def _painted(self, chunk: Chunk, payload: bytes, mesh: Mesh) -> Mesh:
+        """Return a state with its colours, where it has them: those of what a change adds come behind what is left."""
+        of = self.reader.colors.get(chunk.number) if self._colored else None
+        if of is None:
+            return mesh
+        with self._refusals.of(of):
+            return paint_background(mesh, payload, self.reader.read_chunk(of.number))
 
 
 def copy_vertices(mesh: Mesh, frame: int, out: Float[np.ndarray, "V 3"]) -> None:

@@ -66,24 +66,31 @@ class Video(Sequence[Mesh]):
     parts of one array: `mesh.copy()` gives arrays that can be changed, and kept without the rest of the group.
     """
 
-    def __init__(self, reader: ReelReader, layers: int | None = None, close: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self,
+        reader: ReelReader,
+        layers: int | None = None,
+        close: Callable[[], None] | None = None,
+        colored: bool = True,
+    ) -> None:
         self.reader = reader
         self.layers = layers
-        self.tracks = tuple(Track(reader, number, layers) for number in range(len(reader.tracks)))
-        self._background = Background(reader)
+        self._colored = colored
+        self.tracks = tuple(Track(reader, number, layers, colored) for number in range(len(reader.tracks)))
+        self._background = Background(reader, colored)
         self._close = close
 
-    def at(self, layers: int | None) -> Video:
+    def at(self, layers: int | None = None, colors: bool = True) -> Video:
         """Return the same video decoded from at most `layers` layers of each group beyond its first; None: from all.
 
         Fewer bytes are read, and each frame is a coarser, valid mesh. A layer is one subdivision of a group of form
         LAYERS, or its patches, which come last; of a group of form LAPLACIAN it is one displacement component. The
-        background has no layers and is always whole.
+        background has no layers and is always whole. Without `colors`, they are not read.
         """
         layers = None if layers is None else operator.index(layers)
         if layers is not None and layers < 0:
             raise InputError(f"layers must not be negative, got {layers}: give a number of layers, or None for all")
-        return Video(self.reader, layers, self._close)
+        return Video(self.reader, layers, self._close, colors)
 
     def close(self) -> None:
         """Close the file. Afterwards only frames of the groups that were decoded last can be read."""
@@ -202,6 +209,7 @@ class Video(Sequence[Mesh]):
             "tracks": _counted(len(self.tracks), "track"),
             "background": "with background" if self.reader.has_background else "no background",
         }
+        facts |= {"color": "in colour"} if self.reader.colors and self._colored else {}
         return facts if self.layers is None else facts | {"layers": f"at most {_counted(self.layers, 'layer')}"}
 
     def _frame(self, index: int) -> int:
@@ -218,5 +226,7 @@ def _counted(count: int, what: str) -> str:
 def _joined(meshes: list[Mesh]) -> Mesh:
     """Return all meshes as one, read-only as each of them is."""
     mesh = concatenate(meshes)
-    mesh.vertices.flags.writeable = mesh.faces.flags.writeable = False
+    for array in (mesh.vertices, mesh.faces, mesh.colors):
+        if array is not None:
+            array.flags.writeable = False
     return mesh

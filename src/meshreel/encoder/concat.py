@@ -110,15 +110,19 @@ def _add(writer: ReelWriter, path: Place) -> None:
     """Add all groups of a file."""
     with closing(_source(path)) as source:
         reader, first_frame = _opened(source, path), writer.frame_count
-        base = 1 + max((-1 if (last := writer.last_of(track)) is None else last) for track in range(len(reader.tracks)))
+        base = writer.chunk_count
         for chunk in reader.chunks:
-            assert chunk.kind == ChunkKind.GROUP
+            if chunk.kind not in (ChunkKind.GROUP, ChunkKind.COLORS):
+                raise InputError(f"{path}: {chunk} is of a kind that this version cannot join; update meshreel")
             try:
                 payload = reader.read_chunk(chunk.number)
             except FormatError as error:
                 raise FormatError(f"{path}: {error}") from error
             ends = tuple(accumulate(layer.size for layer in chunk.layers))
             depends_on = [base + number for number in chunk.depends_on]
+            if chunk.kind == ChunkKind.COLORS:
+                writer.add_colors(payload, ends, *depends_on)
+                continue
             first = first_frame + chunk.first_frame
             writer.add_group(first, chunk.frame_count, payload, ends, depends_on, chunk.track)
 

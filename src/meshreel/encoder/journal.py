@@ -13,7 +13,7 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, astuple
+from dataclasses import asdict, astuple, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
@@ -33,7 +33,7 @@ from .interval import Interval
 from .options import EncoderOptions
 from .target import Fidelity
 
-MAGIC = b"meshreel journal 1\n"
+MAGIC = b"meshreel journal 2\n"
 _HEAD, _TEXT = struct.Struct("<QI"), struct.Struct("<I")
 _BLOCK = 1 << 20  # bytes that are read at once to check a record (guess)
 
@@ -116,7 +116,7 @@ class Journal:
     def keep(self, interval: Interval, groups: Sequence[EncodedGroup]) -> list[EncodedGroup]:
         """Store the groups of an interval; return them with payloads that are read when they are needed."""
         head = {"interval": _place(interval), "groups": [_packed(group) for group in groups]}
-        offset = self._append(head, b"".join(group.payload for group in groups))
+        offset = self._append(head, b"".join(group.payload + group.colors for group in groups))
         self._done += 1
         return self._groups(interval, head, offset)
 
@@ -193,11 +193,13 @@ class Journal:
         """Return the groups that a record tells of. Raises InputError where no encoder wrote it."""
         found = []
         try:
-            for form, count, size, layers, predicted, key, fidelity in head["groups"]:
+            for form, count, size, layers, predicted, key, fidelity, color_size, color_layers in head["groups"]:
                 stored = Stored(self._file, offset, int(size))
-                error, ends = Fidelity(*fidelity), tuple(layers)
-                found.append(EncodedGroup(Form(form), count, b"", ends, error, predicted, key, stored))
-                offset += stored.size
+                colors = Stored(self._file, offset + stored.size, int(color_size)) if color_size else None
+                error, ends, more = Fidelity(*fidelity), tuple(layers), tuple(color_layers)
+                group = EncodedGroup(Form(form), count, b"", ends, error, predicted, key, stored)
+                found.append(replace(group, stored_colors=colors, color_layers=more))
+                offset += stored.size + int(color_size)
         except (KeyError, TypeError, ValueError) as error:
             text = f"{self.path}: {_named(interval)} cannot be read ({error})"
             raise InputError(f"{text}; start over with --no-resume (resume=False)") from None
@@ -258,4 +260,5 @@ def _packed(group: EncodedGroup) -> list[Any]:
     """Return a group without its payload, for JSON."""
     layers, key = [int(end) for end in group.layers], None if group.key is None else int(group.key)
     fidelity = [float(value) for value in astuple(group.fidelity)]
-    return [int(group.form), int(group.frame_count), len(group.payload), layers, bool(group.predicted), key, fidelity]
+    of_geometry = [int(group.form), int(group.frame_count), len(group.payload), layers, bool(group.predicted), key]
+    return [*of_geometry, fidelity, len(group.colors), [int(end) for end in group.color_layers]]

@@ -18,6 +18,7 @@ from ..analysis.reference.track import TrackOptions
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.bodies import BodyOptions
 from ..analysis.scene.segmentation import SegmentOptions
+from ..coding.appearance.colors import ColorCodingOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
@@ -90,11 +91,19 @@ class SceneOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class AppearanceOptions:
+    """Options of what surfaces look like; a sequence without colours has none."""
+
+    colors: ColorCodingOptions = ColorCodingOptions()  # of the vertices
+
+
+@dataclass(frozen=True, slots=True)
 class EncoderOptions:
     """Options of the encoder: a recipe, and for scenes how they are taken apart."""
 
     method: MethodOptions = field(default_factory=LayersOptions)
     scene: SceneOptions | None = field(default_factory=SceneOptions)  # None: no background is looked for
+    appearance: AppearanceOptions | None = AppearanceOptions()  # None: colours are left out
     key_interval: float = 4.0  # s, at most, from one random-access point to the next; of a scene in both recipes
     quality: float = 50.0  # 0 to 100, which the other options were made from; a file records it
 

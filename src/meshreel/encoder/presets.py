@@ -13,11 +13,12 @@ from ..analysis.follow.embedded import Stage
 from ..analysis.follow.template import TemplateOptions
 from ..analysis.reference.extraction import ReferenceOptions
 from ..analysis.reference.track import TrackOptions
+from ..coding.appearance.colors import ColorCodingOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
 from ..geometry.strict import rounded
-from .options import EncoderOptions, LayersOptions, PaperOptions
+from .options import AppearanceOptions, EncoderOptions, LayersOptions, PaperOptions
 from .target import Fidelity
 
 PRESETS = ("best", "paper")
@@ -59,7 +60,8 @@ def preset_options(
     )
     if group_size is not None:
         method = replace(method, group_size=group_size)
-    options = EncoderOptions(method, quality=float(quality))
+    appearance = AppearanceOptions(ColorCodingOptions(step=color_step(float(quality))))
+    options = EncoderOptions(method, appearance=appearance, quality=float(quality))
     return options if key_interval is None else replace(options, key_interval=key_interval)
 
 
@@ -113,6 +115,11 @@ def _thorough(options: LayersOptions) -> LayersOptions:
 def motion_step(quality: float) -> float:
     """Quantiser step of the base's motion as a fraction of the diagonal: .0018 at 50, halved every 25 points."""
     return rounded(0.0018 * 2 ** ((50 - quality) / 25))
+
+
+def color_step(quality: float) -> float:
+    """Quantiser step of colours of vertices as a share of their range: 1/11 at 50, halved every 35 points."""
+    return rounded(2 ** ((50 - quality) / 35) / 11)
 
 
 def displacement_step(quality: float) -> float:

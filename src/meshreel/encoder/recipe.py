@@ -15,11 +15,12 @@ from threadpoolctl import threadpool_limits
 
 from ..geometry.work import add, heard, since, so_far
 from . import layers, paper
+from .appearance import colored_groups
 from .digests import Digests, note
 from .forms import EncodedGroup
 from .interval import Interval
 from .job import Job
-from .options import EncoderOptions, LayersOptions, MethodOptions
+from .options import AppearanceOptions, EncoderOptions, LayersOptions, MethodOptions
 from .progress import IntervalStages, Stages
 from .side_by_side import Call, as_done
 from .worker import end_with_parent, tell
@@ -49,7 +50,7 @@ def _one_by_one(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
             yield known, ""
             continue
         with heard(stages.hear):
-            groups = list(encode_interval(interval, job.options.method, stages, job.store.find))
+            groups = list(encode_interval(interval, job.options.method, stages, job.store.find, job.options.appearance))
         yield _kept(job, interval, groups)
 
 
@@ -66,7 +67,7 @@ def _side_by_side(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
                 ready[number] = known, ""
                 continue
             sent[number] = interval, stages
-            yield number, encode_sent, (interval.to_send(), job.options.method, number)
+            yield number, encode_sent, (interval.to_send(), job.options, number)
 
     def look() -> None:
         for number, stage, done in told() if told is not None else ():
@@ -112,9 +113,13 @@ def _kept(job: Job, interval: Interval, groups: list[EncodedGroup]) -> _Done:
 
 
 def encode_interval(
-    interval: Interval, options: MethodOptions, stages: Stages | None = None, find: paper.FindGroups | None = None
+    interval: Interval,
+    options: MethodOptions,
+    stages: Stages | None = None,
+    find: paper.FindGroups | None = None,
+    appearance: AppearanceOptions | None = None,
 ) -> Iterator[EncodedGroup]:
-    """Encode an interval as groups, in order, by the recipe whose options are given.
+    """Encode an interval as groups, in order, by the recipe whose options are given; with colours by `appearance`.
 
     `find` finds the groups of the paper's recipe; pass a store's `find` to reuse an earlier analysis.
     """
@@ -123,22 +128,22 @@ def encode_interval(
         groups = layers.encode_interval(interval, options, stages)
     else:
         groups = iter(paper.encode_interval(interval, options, stages, find))
-    for group in groups:
-        note(interval.digests, "payload", group.form.name, group.payload)
+    for group in colored_groups(groups, interval.frames, appearance):
+        note(interval.digests, "payload", group.form.name, group.payload, group.colors)
         yield group if interval.digests is None else replace(group, digests=interval.digests.take())
 
 
-def encode_sent(interval: Interval, options: MethodOptions, number: int) -> tuple[list[EncodedGroup], Any]:
+def encode_sent(interval: Interval, options: EncoderOptions, number: int) -> tuple[list[EncodedGroup], Any]:
     """Encode an interval in a worker process, which ends with its parent; the result can be pickled.
 
     Return the groups, and what reading the frames has shown.
     """
     end_with_parent()
     count = len(interval.frames)
-    stages = IntervalStages(Stages(partial(tell, number), count), count, options.group_size)
+    stages = IntervalStages(Stages(partial(tell, number), count), count, options.method.group_size)
     with threadpool_limits(1), heard(stages.hear):
         before = so_far()
-        *others, last = encode_interval(interval, options, stages)
+        *others, last = encode_interval(interval, options.method, stages, appearance=options.appearance)
         return [*others, replace(last, work=since(before))], interval.observed
 
 

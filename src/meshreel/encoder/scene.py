@@ -15,41 +15,20 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 
-import numpy as np
-from jaxtyping import Bool
-
-from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.bodies import BodyOptions, at_most, find_bodies, same_bodies, with_ring
 from ..analysis.scene.labelling import Segmentation
 from ..analysis.survey import Survey
-from ..coding.background import changed, decode_background, decode_change, encode_background, encode_change
-from ..format.budget import Chain, CostlyError
 from ..format.checks import MOST_TRACKS
-from ..geometry.closest_points import distances
-from ..geometry.decimate import decimate_faces
 from ..geometry.derived_sequences import digest
-from ..geometry.topology import clean
-from ..types import Mesh, MeshSequence, Placement
+from ..types import Mesh, MeshSequence
 from .forms import empty_groups
 from .interval import Interval
 from .job import Job
 from .options import EncoderOptions
-from .parts import Change, Parts
+from .parts import Parts
 from .recipe import encode_intervals, longest_interval
+from .static import refreshes
 from .tracks import TrackGroup
-
-FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
-HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
-LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
-
-
-@dataclass(frozen=True, slots=True)
-class Static:
-    """A state of the background from a frame on: whole, or a patch of the one before."""
-
-    frame: int
-    payload: bytes
-    is_patch: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,75 +37,6 @@ class CodedBodies:
 
     groups: list[TrackGroup]  # in the order of the file
     dropped: int  # faces of pieces that were there for a moment only, and are in none of the groups
-
-
-def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:
-    """Encode the states of the background: as few faces as stay about as near to it as the noise.
-
-    The first state is whole, as are those of a refresh; each change of the room is a patch of the state before.
-    """
-    noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
-    step, most = options.lattice * noise, options.coarse * noise
-    payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
-    found = [] if state.is_empty else [Static(0, payload, False)]
-    chain, changes = Chain(0, len(payload)), {change.frame: change for change in parts.changes}
-    again = set(refreshes(count, frame_rate, options))
-    for frame in sorted({*changes, *again} - {0}):
-        whole = state.is_empty or frame in again
-        if change := changes.get(frame):
-            came = _coded(_normalised(change.came, parts.seen), most, step)[1]
-            before, gone = state, _gone(parts, state, change)
-            payload = encode_change(before, gone, came, step)
-            try:
-                state = decode_change(payload, before)
-                chain = chain.then(before, state, len(payload))
-            except CostlyError:  # no reader would decode it
-                state, whole = changed(before, gone, came), True
-        if whole and not state.is_empty:
-            payload = encode_background(state, step)
-            state = decode_background(payload)  # the next patch counts faces in the decoded order
-            chain = Chain(0, len(payload))
-        if not (whole and state.is_empty):
-            found.append(Static(frame, payload, not whole))
-    return found
-
-
-def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> range:
-    """Return the frames at which the whole background is sent; the first frame is one of them."""
-    return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
-
-
-def _gone(parts: Parts, state: Mesh, change: Change) -> Bool[np.ndarray, " F"]:
-    """Return a mask of the background's faces, normalised, that a change removes."""
-    place = Placement(parts.seen.unit, tuple(parts.seen.center))
-    return parts.segmentation.gone(change.frame, place.of(state))
-
-
-def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
-    """Encode a mesh with the fewest vertices that stay within an RMS distance; return payload and decoded mesh."""
-    if mesh.is_empty:
-        return b"", mesh
-    steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
-    for fraction in FRACTIONS:
-        steps.append(decimate_faces(steps[-1], max(4, round(2 * fraction * len(mesh.vertices)))))
-    failed, best, found = 0, mesh, (b"", mesh)
-    for best in reversed(steps):
-        found = _stored(best, step)
-        if is_near := _is_near(mesh, found[1], most):
-            break
-        failed = len(best.faces)
-    for _ in range(HALVINGS if failed and is_near else 0):
-        small = decimate_faces(best, round((failed * len(best.faces)) ** 0.5))
-        stored = _stored(small, step)
-        if _is_near(mesh, stored[1], most):
-            best, found = small, stored
-        else:
-            failed = len(small.faces)
-    return found
-
-
-def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
-    return Mesh((mesh.vertices - seen.center) / seen.unit, mesh.faces)
 
 
 def encode_bodies(job: Job, parts: Parts) -> CodedBodies:
@@ -237,14 +147,3 @@ class Tracks:
 
 def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
     return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell, parts.outline)
-
-
-def _stored(mesh: Mesh, step: float) -> tuple[bytes, Mesh]:
-    """Return the payload of a background, and what it decodes to."""
-    payload = encode_background(mesh, step)
-    return payload, decode_background(payload)
-
-
-def _is_near(mesh: Mesh, small: Mesh, most: float) -> bool:
-    """Return whether a simplified mesh is within an RMS distance of the vertices of a mesh."""
-    return not small.is_empty and float(np.sqrt((distances(mesh.vertices, small) ** 2).mean())) <= most

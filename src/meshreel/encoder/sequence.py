@@ -45,13 +45,8 @@ from .options import EncoderOptions, PaperOptions
 from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
-from .scene import (
-    Static,
-    Tracks,
-    encode_bodies,
-    encode_static,
-    scene_intervals,
-)
+from .scene import Tracks, encode_bodies, scene_intervals
+from .static import Static, colored_states, encode_static
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
@@ -218,6 +213,7 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
     job.note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
     states = encode_static(parts, len(sequence), sequence.frame_rate, job.scene.background)
+    states = colored_states(states, sequence, parts, options.appearance)
     job.note("background, coded", *(state.payload for state in states))
     with _writer(job, file, seen) as writer:
         coded = encode_bodies(job, parts)
@@ -226,7 +222,10 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
         writer.header = make_header(sequence.frame_rate, seen, metadata | upright(sequence.up))
     measured = evenly(len(sequence), MEASURED)
     psnr = _measured(sequence, file, seen.diagonal, measured)
-    size, tracks = sum(len(state.payload) for state in states), 1 + max(group.track for group in groups)
+    size, tracks = (
+        sum(len(state.payload) + len(state.colors) for state in states),
+        1 + max(group.track for group in groups),
+    )
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
@@ -253,6 +252,8 @@ def _added_in_order(
         while waiting and waiting[0].frame <= each.first_frame:
             state = waiting.popleft()
             static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
+            if state.colors:
+                writer.add_colors(state.colors, (), static[0])
         with_static = each.track == 0 and not seen.is_bare(each.first_frame)
         groups.append(_added(writer, each, static if with_static else [], seen.unit))
     return groups
@@ -262,11 +263,14 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     """Write a group of a track, with the chunk of the background that its frames are shown with."""
     group, track, last = each.group, each.track, writer.last_of(each.track)
     before, payload = [last] if group.predicted and last is not None else [], group.stored or group.payload
-    writer.add_group(each.first_frame, group.frame_count, payload, group.layers, (*static, *before), track)
+    number = writer.add_group(each.first_frame, group.frame_count, payload, group.layers, (*static, *before), track)
+    colors = group.stored_colors or group.colors
+    if colors:
+        writer.add_colors(colors, group.color_layers, number, writer.colors_of(before[0]) if before else None)
     key = None if group.key is None else each.first_frame + group.key
     fidelity = group.fidelity.scaled(unit)
     size, share = len(payload), each.share
-    return GroupSummary(group.form, group.frame_count, size, fidelity, group.predicted, key, track, share)
+    return GroupSummary(group.form, group.frame_count, size, fidelity, group.predicted, key, track, share, len(colors))
 
 
 def _measured(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:

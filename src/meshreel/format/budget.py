@@ -34,6 +34,9 @@ class Limits:
     column: int = 20  # of an element in each frame and for each component of a LAPLACIAN group
     pair: int = 100  # of two corners at one vertex of a LAPLACIAN group: a row of the least squares squared
     number: int = 40  # of a number in the basis of a LAPLACIAN group
+    colors: int = 96 << 20  # what any chunk of colours may cost, and per_byte more (guess)
+    painted: int = 32  # of a vertex with colours, in each frame
+    painting: int = 256  # of a vertex of the largest mesh with colours
 
 
 LIMITS = Limits()
@@ -124,6 +127,14 @@ def check_frames(frames: int, size: int) -> None:
     most = LIMITS.frames + LIMITS.frames_per_byte * size
     if frames > most:
         raise CostlyError(f"{frames} frames of all tracks in a file of {size} bytes, over {most}")
+
+
+def check_colors(meshes: Sequence[tuple[int, int]], size: int) -> None:
+    """Raise CostlyError if colours of so many vertices in so many frames, of each mesh, cost more than they may."""
+    cost = LIMITS.painted * sum(vertices * frames for vertices, frames in meshes)
+    cost += LIMITS.painting * max((vertices for vertices, _ in meshes), default=0)
+    if cost > LIMITS.colors + LIMITS.per_byte * size:
+        raise CostlyError(f"colours: {size} bytes that cost {cost} to decode")
 
 
 def check_cost(cost: int, size: int, what: str) -> None:

@@ -12,6 +12,7 @@ from .layout import ChunkKind, Form, Header, Index, IndexEntry
 LARGEST = 1e15  # of the numbers in a header: keeps everything computed from them finite (guess)
 SMALLEST = 1e-15  # of a rate or scale (guess)
 MOST_TRACKS = 256  # a frame needs a group of each track (guess)
+GROUP_FORMS = (Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY)
 MOST_CHANGES = 255  # patches on one background: random access decodes all of them (guess)
 
 
@@ -41,21 +42,32 @@ class IndexChecks:
         self.groups: list[int] = []  # number of the newest group of each track
         self._changes: dict[int, int] = {}  # for each STATIC chunk, how many patches lead to it
         self._place = (0, -1)  # first frame and track of the newest group
+        # Of each STATIC and GROUP: its frames, its track, and the group that it is predicted from.
+        self._whole: dict[int, tuple[int, int, int | None]] = {}
+        self.colors: dict[int, int] = {}  # for each chunk with colours, the number of their chunk
         self._count = 0
 
     def add(self, entry: IndexEntry) -> int:
         """Add the next entry and return its number. Raises FormatError, and changes nothing, where it breaks a law."""
         number = self._count
-        if (entry.kind == ChunkKind.STATIC) != (entry.frames == 0):
-            raise FormatError(f"chunk {number}: {entry.kind.name} of {entry.frames} frames")
+        if entry.kind in (ChunkKind.STATIC, ChunkKind.GROUP):
+            if (entry.kind == ChunkKind.STATIC) != (entry.frames == 0):
+                raise FormatError(f"chunk {number}: {ChunkKind(entry.kind).name} of {entry.frames} frames")
+            if entry.form not in (*GROUP_FORMS, Form.PATCH):
+                raise FormatError(f"chunk {number}: {ChunkKind(entry.kind).name} of form {entry.form}")
         if not entry.layers or any(layer.size == 0 for layer in entry.layers):
             raise FormatError(f"chunk {number}: a chunk or a layer without bytes")
         if len(set(entry.depends_on)) != len(entry.depends_on):
             raise FormatError(f"chunk {number}: depends on {entry.depends_on}, on one of them twice")
         if entry.kind == ChunkKind.STATIC:
             self._changes[number] = self._changes_of(entry)
-        else:
+            self._whole[number] = (0, 0, None)
+        elif entry.kind == ChunkKind.GROUP:
             self._add_group(entry)
+            before = next((other for other in entry.depends_on if other not in self._changes), None)
+            self._whole[number] = (entry.frames, entry.track, before)
+        elif entry.kind == ChunkKind.COLORS:
+            self._add_colors(entry)
         self._count += 1
         return number
 
@@ -71,9 +83,11 @@ class IndexChecks:
         """Return how many patches lead to a STATIC chunk: 0 for a mesh, 1 + those of its base for a patch."""
         number = self._count
         if entry.form not in (Form.DRACO, Form.PATCH) or entry.track:
-            raise FormatError(f"chunk {number}: a static chunk of form {entry.form.name} and track {entry.track}")
+            raise FormatError(f"chunk {number}: a static chunk of form {Form(entry.form).name} and track {entry.track}")
         if len(entry.depends_on) != (entry.form == Form.PATCH):
-            raise FormatError(f"chunk {number}: a static chunk of form {entry.form.name} depends on {entry.depends_on}")
+            raise FormatError(
+                f"chunk {number}: a static chunk of form {Form(entry.form).name} depends on {entry.depends_on}"
+            )
         if entry.form == Form.DRACO:
             return 0
         [before] = entry.depends_on
@@ -82,6 +96,18 @@ class IndexChecks:
         if self._changes[before] == MOST_CHANGES:
             raise FormatError(f"chunk {number}: patch {MOST_CHANGES + 1} of one background, at most {MOST_CHANGES}")
         return self._changes[before] + 1
+
+    def _add_colors(self, entry: IndexEntry) -> None:
+        number, of = self._count, next(iter(entry.depends_on), -1)
+        if of not in self._whole or of in self.colors:
+            raise FormatError(f"chunk {number}: colours of {of}, which is no chunk before them, or has others")
+        frames, track, before = self._whole[of]
+        if entry.form != Form.VERTEX_COLORS or (entry.frames, entry.track) != (frames, track):
+            text = f"{entry.frames} frames of form {entry.form} and track {entry.track}"
+            raise FormatError(f"chunk {number}: colours of {text}, which are not those of chunk {of}")
+        if entry.depends_on[1:] and (before is None or entry.depends_on[1:] != (self.colors.get(before),)):
+            raise FormatError(f"chunk {number}: colours that depend on {entry.depends_on[1:]}, not on those before")
+        self.colors[of] = number
 
     def _add_group(self, entry: IndexEntry) -> None:
         number, track = self._count, entry.track

@@ -120,14 +120,16 @@ class Varint:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A value of an enumeration."""
+    """A value of an enumeration; of an open one, also a number that only later versions know."""
 
     number: Number
     values: type[IntEnum]
+    is_open: bool = False
 
     @property
     def label(self) -> str:
-        return f"{self.number.label} ({', '.join(f'{value.value} {value.name}' for value in self.values)})"
+        known = ", ".join(f"{value.value} {value.name}" for value in self.values)
+        return f"{self.number.label} ({known}{' ...' if self.is_open else ''})"
 
     @property
     def least(self) -> int:
@@ -136,11 +138,13 @@ class Choice:
     def pack(self, value: int) -> bytes:
         return self.number.pack(self.values(value))
 
-    def unpack(self, data: bytes, offset: int) -> tuple[IntEnum, int]:
+    def unpack(self, data: bytes, offset: int) -> tuple[int, int]:
         value, offset = self.number.unpack(data, offset)
         try:
             return self.values(value), offset
         except ValueError as error:
+            if self.is_open:
+                return value, offset
             raise FormatError(f"{value} is none of the known values") from error
 
 

@@ -23,6 +23,7 @@ class ChunkKind(IntEnum):
 
     STATIC = 1  # a state of the background; groups refer to it
     GROUP = 2  # a group of consecutive frames of one track
+    COLORS = 3  # the colours of the vertices of another chunk
 
 
 class Form(IntEnum):
@@ -33,6 +34,7 @@ class Form(IntEnum):
     DRACO = 3  # one Draco mesh per frame
     EMPTY = 4  # frames without a surface
     PATCH = 5  # a background: another background without some faces, plus a Draco mesh
+    VERTEX_COLORS = 6  # colours of vertices, as fields over their connectivity
 
 
 class AnchorRule(IntEnum):
@@ -87,16 +89,17 @@ class Layer:
 class IndexEntry:
     """Index entry of a chunk."""
 
-    kind: Annotated[ChunkKind, Choice(U8, ChunkKind), "purpose"]
-    form: Annotated[Form, Choice(U8, Form), "coding; equal to the first byte of the chunk"]
-    frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC"]
+    kind: Annotated[int, Choice(U8, ChunkKind, is_open=True), "purpose"]
+    form: Annotated[int, Choice(U8, Form, is_open=True), "coding; equal to the first byte of the chunk"]
+    frames: Annotated[int, U16, "number of frames; 0 if and only if STATIC, or COLORS of a STATIC"]
     track: Annotated[int, Varint(), "number of the moving body, from 0; 0 if STATIC"]
     depends_on: Annotated[
         tuple[int, ...],
         List(U8, Varint()),
         "numbers of the earlier chunks that it needs: "
         "for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; "
-        "for a STATIC of form PATCH, the STATIC chunk that it changes",
+        "for a STATIC of form PATCH, the STATIC chunk that it changes; "
+        "for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before",
     ]
     layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]
 
@@ -232,6 +235,23 @@ class StaticPatch:
 
 
 @dataclass(frozen=True, slots=True)
+class VertexColors:
+    """First bytes of a chunk of form VERTEX_COLORS; for each mesh, a CodedField and a ColorsLevel a level follow."""
+
+    form: Annotated[Form, Choice(U8, Form), "VERTEX_COLORS"]
+    origin: Annotated[Origin, Choice(U8, Origin), "prediction of the values"]
+    chroma: Annotated[int, U8, "what colour differences were multiplied by, 64ths, above 0"]
+
+
+@dataclass(frozen=True, slots=True)
+class ColorsLevel:
+    """Colours of the vertices that a level of subdivision adds."""
+
+    sibling_weight: Annotated[int, U8, "weight of the siblings' mean in a prediction, 64ths"]
+    values: Annotated[CodedField, Nested(CodedField), "differences from the means of the ends of their edges"]
+
+
+@dataclass(frozen=True, slots=True)
 class EmptyGroup:
     """The payload of a group of form EMPTY."""
 
@@ -250,4 +270,6 @@ PAYLOADS = (
     DracoGroup,
     EmptyGroup,
     StaticPatch,
+    VertexColors,
+    ColorsLevel,
 )

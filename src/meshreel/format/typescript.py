@@ -88,7 +88,7 @@ def _reader(kind: Kind) -> str:
     if isinstance(kind, Number):
         return kind.label
     if isinstance(kind, Choice):
-        return f"choice({kind.number.label}, {kind.values.__name__})"
+        return kind.number.label if kind.is_open else f"choice({kind.number.label}, {kind.values.__name__})"
     if isinstance(kind, Array):
         return f"array({kind.count}, {_reader(kind.item)})"
     if isinstance(kind, List):

@@ -10,7 +10,7 @@ import copy
 import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -164,7 +164,8 @@ class Recent:
 
 
 def _nbytes(mesh: Mesh) -> int:
-    return int(mesh.vertices.nbytes + mesh.faces.nbytes)
+    arrays = (mesh.vertices, mesh.faces, mesh.colors, mesh.uv)
+    return sum(array.nbytes for array in arrays if array is not None)
 
 
 class Unchanging(DerivedSequence):
@@ -222,9 +223,12 @@ def digest(meshes: Iterable[Mesh]) -> str:
     """Return a text of 16 characters that differs where meshes do."""
     found = hashlib.sha256()
     for mesh in meshes:
-        for array in (mesh.vertices, mesh.faces):
-            found.update(f"{array.shape}".encode())
-            found.update(np.ascontiguousarray(array).data)
+        for array in (mesh.vertices, mesh.faces, mesh.colors, mesh.uv):
+            if array is not None:
+                found.update(f"{array.shape}".encode())
+                found.update(np.ascontiguousarray(array).data)
+        if mesh.texture is not None:
+            found.update(mesh.texture.pixels.data)
     return found.hexdigest()[:16]
 
 
@@ -257,7 +261,8 @@ class TurnedOver(DerivedSequence):
 
     def __getitem__(self, index: int) -> Mesh:
         mesh = self._source[index]
-        return Mesh(mesh.vertices, np.ascontiguousarray(mesh.faces[:, ::-1]))
+        uv = None if mesh.uv is None else np.ascontiguousarray(mesh.uv[:, ::-1])
+        return replace(mesh, faces=np.ascontiguousarray(mesh.faces[:, ::-1]), uv=uv)
 
 
 class Chosen(DerivedSequence):

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import _core
 from ..shapes import Bool, Float64, Int32, Int64
-from ..types import Mesh
+from ..types import GREY, Mesh
 
 
 def unique_edges(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]:
@@ -83,22 +83,22 @@ def weld(mesh: Mesh) -> Mesh:
 
     UV seams duplicate positions; codecs and normals need them to be one vertex.
     """
-    return Mesh(*_core.weld(mesh.vertices, mesh.faces))
+    return mesh.left(*_core.weld(mesh.vertices, mesh.faces))
 
 
 def clean(mesh: Mesh) -> Mesh:
     """Remove collapsed, zero-area and repeated faces, then vertices that no face uses."""
-    return Mesh(*_core.clean(mesh.vertices, mesh.faces))
+    return mesh.left(*_core.clean(mesh.vertices, mesh.faces))
 
 
 def drop_unreferenced(mesh: Mesh) -> Mesh:
     """Remove vertices that no face uses; the others keep their order."""
-    return Mesh(*_core.drop_unreferenced(mesh.vertices, mesh.faces))
+    return mesh.left(*_core.drop_unreferenced(mesh.vertices, mesh.faces))
 
 
 def part_of(mesh: Mesh, chosen: Bool[np.ndarray, " F"]) -> Mesh:
     """Return the mesh of the chosen faces and the vertices that they use."""
-    return drop_unreferenced(Mesh(mesh.vertices, mesh.faces[chosen]))
+    return drop_unreferenced(mesh.with_faces(chosen))
 
 
 def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " F"]) -> Bool[np.ndarray, " F"]:
@@ -110,7 +110,10 @@ def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " 
 
 
 def concatenate(meshes: Sequence[Mesh]) -> Mesh:
-    """Join meshes into one, vertices and faces in order; if only one has vertices, it is returned itself."""
+    """Join meshes into one, vertices and faces in order; if only one has vertices, it is returned itself.
+
+    Where one has colours of its vertices, those of others are grey. A texture is kept where all have the same one.
+    """
     meshes = [mesh for mesh in meshes if len(mesh.vertices)] or list(meshes[:1])
     if len(meshes) <= 1:
         return meshes[0] if meshes else Mesh.empty()
@@ -121,7 +124,16 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
         vertices[v : v + len(mesh.vertices)] = mesh.vertices
         np.add(mesh.faces, np.int32(v), out=faces[f : f + len(mesh.faces)])
         v, f = v + len(mesh.vertices), f + len(mesh.faces)
-    return Mesh(vertices, faces)
+    colors = [np.full(mesh.vertices.shape, GREY, np.uint8) if mesh.colors is None else mesh.colors for mesh in meshes]
+    uv = [mesh.uv for mesh in meshes if mesh.uv is not None]
+    same = len(uv) == len(meshes) and len({mesh.texture for mesh in meshes}) == 1
+    return Mesh(
+        vertices,
+        faces,
+        None if all(mesh.colors is None for mesh in meshes) else np.concatenate(colors),
+        np.concatenate(uv) if same else None,
+        meshes[0].texture if same else None,
+    )
 
 
 def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:

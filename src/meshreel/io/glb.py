@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import io
 import json
+from functools import partial
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float32, UInt8
 
+from ..types import GREY, Texture
+from .color import from_linear
+from .pictures import parse_picture
 from .polygons import Dropped, Polygons, Unreadable
 
-_DROPS = {"NORMAL": "normals", "TEXCOORD": "texture coordinates", "COLOR": "colors", "JOINTS": "skinning"}
+_DROPS = {"NORMAL": "normals", "JOINTS": "skinning"}
+# Of trimesh: what begins with _ it hands on as it is; colours of 16 bits it would read by their lower byte.
+_COLORS, _HIDDEN = b'"COLOR_0"', b'"_OLOR_0"'
 _DRACO = "KHR_draco_mesh_compression"
 _DENSEST = 64  # values per byte (guess): no mesh compression comes near
 
@@ -19,19 +26,28 @@ def parse_glb(data: bytes) -> Polygons:
     """Return the surface of a GLB scene at rest in world coordinates, without nodes that are hidden at rest."""
     tree = _json_chunk(data)
     if not tree.get("meshes"):
-        return _joined([], _dropped(tree))
+        return _joined([], _dropped(tree), None)
     if f'"{_DRACO}":' in json.dumps(tree["meshes"]):  # a few bytes could claim any size, and Draco believes them
         raise Unreadable(f"GLB is compressed with Draco ({_DRACO}); write it without, with `gltf-transform copy` or so")
     import trimesh
 
     try:
-        scene = trimesh.load_scene(io.BytesIO(data), file_type="glb", process=False)
+        hidden = data[: _text_end(data)].replace(_COLORS, _HIDDEN) + data[_text_end(data) :]
+        scene = trimesh.load_scene(io.BytesIO(hidden), file_type="glb", process=False)
         placed = [(scene.graph[node][0], scene.geometry[scene.graph[node][1]]) for node in scene.graph.nodes_geometry]
         # A scale of 0 hides a node until an animation shows it.
         parts = [part for part in placed if isinstance(part[1], trimesh.Trimesh) and part[0][:3, :3].any()]
-        return _joined(parts, _dropped(tree))
+        pictures = _pictures(tree)
+        lost = frozenset({"several materials"} if len(pictures) > 1 else ())
+        picture = _picture(data, tree, pictures.pop()) if len(pictures) == 1 else None
+        return _joined(parts, _dropped(tree) | lost, picture)
     except Exception as error:  # a foreign parser may raise anything for a damaged file
         raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
+
+
+def _text_end(data: bytes) -> int:
+    """Return where the JSON chunk ends."""
+    return 20 + int.from_bytes(data[12:16], "little")
 
 
 def _json_chunk(data: bytes) -> dict[str, Any]:
@@ -61,11 +77,38 @@ def _json_chunk(data: bytes) -> dict[str, Any]:
 def _dropped(tree: dict[str, Any]) -> Dropped:
     text = json.dumps([mesh.get("primitives", []) for mesh in tree.get("meshes", []) if isinstance(mesh, dict)])
     dropped = {words for mark, words in _DROPS.items() if f'"{mark}' in text}
-    dropped |= {key for key in ("materials", "animations", "textures") if tree.get(key)}
+    dropped |= {"animations"} if tree.get("animations") else set()
+    materials = json.dumps(tree.get("materials") or [])
+    dropped |= {"normal maps"} if '"normalTexture"' in materials else set()
+    dropped |= {"transparency"} if '"alphaMode"' in materials and '"OPAQUE"' not in materials else set()
     return frozenset(dropped)
 
 
-def _joined(parts: list[tuple[np.ndarray, Any]], dropped: Dropped) -> Polygons:
+def _pictures(tree: dict[str, Any]) -> set[int]:
+    """Return the numbers of the images that are base colours of triangles."""
+    found = set[int]()
+    for primitive in (one for mesh in tree["meshes"] for one in mesh.get("primitives", [])):
+        if "material" in primitive:
+            shine = tree["materials"][primitive["material"]].get("pbrMetallicRoughness", {})
+            if "baseColorTexture" in shine:
+                texture = tree["textures"][shine["baseColorTexture"]["index"]]
+                found.add(
+                    texture.get("source", texture.get("extensions", {}).get("EXT_texture_webp", {}).get("source"))
+                )
+    return found
+
+
+def _picture(data: bytes, tree: dict[str, Any], image: int) -> Texture | None:
+    """Return the texture of an image that is in the file."""
+    view = tree["images"][image].get("bufferView")
+    if view is None:
+        return None
+    where = tree["bufferViews"][view]
+    begin = _text_end(data) + 8 + where.get("byteOffset", 0)
+    return Texture(partial(parse_picture, data[begin : begin + where["byteLength"]], "the texture of a GLB"))
+
+
+def _joined(parts: list[tuple[np.ndarray, Any]], dropped: Dropped, texture: Texture | None) -> Polygons:
     """Return all parts as one surface; nodes without rotation or scale are added without a matrix product."""
     vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
     for matrix, part in parts:
@@ -76,5 +119,27 @@ def _joined(parts: list[tuple[np.ndarray, Any]], dropped: Dropped) -> Polygons:
         mirrored = np.linalg.det(matrix[:3, :3]) < 0
         faces.append((triangles[:, ::-1] if mirrored else triangles) + count)
         count += len(local)
-    corners = np.concatenate(faces).reshape(-1)
-    return Polygons(np.concatenate(vertices), corners, np.full(len(corners) // 3, 3, np.int64), dropped)
+    corners, shown = np.concatenate(faces).reshape(-1), [part for _, part in parts]
+    sizes = np.full(len(corners) // 3, 3, np.int64)
+    uv = None if texture is None else np.concatenate([_places(part) for part in shown])[corners]
+    return Polygons(np.concatenate(vertices), corners, sizes, dropped, _colors(shown), uv, texture)
+
+
+def _places(part: Any) -> Float32[np.ndarray, "V 2"]:
+    """Return the places of a part's vertices in its texture, NaN where it has none."""
+    uv = getattr(part.visual, "uv", None)
+    if uv is None or len(uv) != len(part.vertices):
+        return np.full((len(part.vertices), 2), np.nan, np.float32)
+    return np.asarray(uv, np.float32)[:, :2]
+
+
+def _colors(parts: list[Any]) -> UInt8[np.ndarray, "V 3"] | None:
+    """Return the colours of all vertices, grey for parts without; None where no part has any."""
+    found = [part.vertex_attributes.get(_HIDDEN.decode().strip('"')) for part in parts]
+    if all(values is None for values in found):
+        return None
+    colors = [
+        np.full((len(part.vertices), 3), GREY, np.uint8) if values is None else from_linear(np.asarray(values)[:, :3])
+        for part, values in zip(parts, found, strict=True)
+    ]
+    return np.concatenate(colors)

@@ -7,7 +7,7 @@ that cannot be used.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ..types import Mesh
 from .glb import parse_glb
 from .obj import parse_obj
 from .off import parse_off
+from .pictures import texture_of_materials
 from .ply import parse_ply
 from .polygons import Dropped, Polygons, Unreadable, triangulate
 from .read import read_file
@@ -59,7 +60,11 @@ def read_mesh(path: Place, where: str | None = None) -> Loaded:
     if not data:
         raise InputError(f"{where}: the file has 0 bytes; write it again, or leave it out with --frames")
     try:
-        return checked(parse(data))
+        polygons = parse(data)
+        if polygons.uv is not None and polygons.texture is None:
+            texture, dropped = texture_of_materials(path, polygons.materials, polygons.used)
+            polygons = replace(polygons, texture=texture, dropped=polygons.dropped | dropped)
+        return checked(polygons)
     except Unreadable as error:
         kind = path.suffix[1:].upper()
         raise InputError(f"{where}: {error}; re-export the {kind} file, or leave it out with --frames") from None
@@ -82,4 +87,10 @@ def checked(polygons: Polygons) -> Loaded:
     if len(sizes) == 0:
         loose = frozenset({"vertices without faces"} if len(vertices) else ())
         return Loaded(Mesh.empty(), polygons.dropped | loose)
-    return Loaded(Mesh.of(vertices, triangulate(polygons)), polygons.dropped)
+    triangles = triangulate(polygons)
+    mesh = Mesh.of(vertices, corners[triangles])
+    if polygons.uv is None or polygons.texture is None:
+        lost = frozenset() if polygons.uv is None else frozenset({"texture coordinates"})
+        return Loaded(replace(mesh, colors=polygons.colors), polygons.dropped | lost)
+    uv = np.where(np.isfinite(polygons.uv), polygons.uv, np.float32(np.nan))[triangles]
+    return Loaded(replace(mesh, colors=polygons.colors, uv=uv, texture=polygons.texture), polygons.dropped)

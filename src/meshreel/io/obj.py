@@ -8,9 +8,9 @@ from __future__ import annotations
 import re
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float32, Float64, Int64, UInt8
 
-from .polygons import Dropped, Polygons, Unreadable
+from .polygons import Dropped, Polygons, Unreadable, eight_bits
 from .text_lines import Lines
 
 _KNOWN = (
@@ -18,7 +18,7 @@ _KNOWN = (
     *("cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con"),
     *("c_interp", "d_interp", "shadow_obj", "trace_obj", "ctech", "stech", "call", "csh"),
 )
-_DROPS = {"vt": "texture coordinates", "vn": "normals", "usemtl": "materials", "l": "lines", "p": "points"}
+_DROPS = {"vn": "normals", "l": "lines", "p": "points"}
 
 
 def parse_obj(data: bytes) -> Polygons:
@@ -30,20 +30,29 @@ def parse_obj(data: bytes) -> Polygons:
     second = lines.text[np.minimum(lines.starts + 1, lines.ends)]
     bare = (second == ord(" ")) | (second == ord("\t")) | (lines.ends == lines.starts + 1)
     is_vertex, is_face = bare & (first == ord("v")), bare & (first == ord("f"))
-    vertices, dropped = _vertices(lines, np.flatnonzero(is_vertex))
-    corners, sizes = _faces(lines, np.flatnonzero(is_face), np.cumsum(is_vertex)[is_face], len(vertices))
-    known = is_vertex | is_face | (lines.starts == lines.ends)
-    return Polygons(vertices, corners, sizes, dropped | _others(lines, first, second, ~known))
+    is_place = (first == ord("v")) & (second == ord("t"))
+    vertices, colors = _vertices(lines, np.flatnonzero(is_vertex))
+    faces = np.flatnonzero(is_face)
+    corners, sizes = _faces(lines, faces, np.cumsum(is_vertex)[is_face], len(vertices))
+    uv = _places(lines, np.flatnonzero(is_place), faces, np.repeat(np.cumsum(is_place)[is_face], sizes))
+    others = np.flatnonzero(~(is_vertex | is_face | is_place | (lines.starts == lines.ends)))
+    dropped, materials, used = _others(lines, others)
+    return Polygons(vertices, corners, sizes, dropped, colors, uv, None, materials, used)
 
 
-def _vertices(lines: Lines, chosen: Int64[np.ndarray, " V"]) -> tuple[Float64[np.ndarray, "V 3"], Dropped]:
+def _vertices(
+    lines: Lines, chosen: Int64[np.ndarray, " V"]
+) -> tuple[Float64[np.ndarray, "V 3"], UInt8[np.ndarray, "V 3"] | None]:
+    """Return the places of vertices and, where all have them, their colours: three numbers behind the place."""
     values, counts = lines.values(chosen, skip=1)
     short = np.flatnonzero(counts < 3)
     if len(short):
         where = chosen[short[0]]
         raise Unreadable(f"line {where + 1} ({lines.line(where)!r}) has {counts[short[0]]} coordinates instead of 3")
     begins = np.cumsum(counts) - counts
-    return values[begins[:, None] + np.arange(3)], frozenset({"vertex colors"} if (counts >= 6).any() else ())
+    colored = len(counts) > 0 and (counts >= 6).all()
+    colors = eight_bits(values[begins[:, None] + np.arange(3, 6)]) if colored else None
+    return values[begins[:, None] + np.arange(3)], colors
 
 
 def _faces(
@@ -66,16 +75,37 @@ def _faces(
     return np.where(corners > 0, corners - 1, corners + np.repeat(defined, sizes)), sizes
 
 
-def _others(lines: Lines, first: np.ndarray, second: np.ndarray, other: np.ndarray) -> Dropped:
-    """Return the data in the other lines that is dropped. Raises Unreadable for unknown statements."""
-    dropped = set()
-    for mark in ("t", "n"):  # no Python loop: there may be one for each vertex
-        found = other & (first == ord("v")) & (second == ord(mark))
-        dropped |= {_DROPS["v" + mark]} if found.any() else set()
-        other = other & ~found
-    for number in np.flatnonzero(other):
-        keyword = next(iter(lines.line(number).split(maxsplit=1)), "")
+def _places(
+    lines: Lines, chosen: Int64[np.ndarray, " W"], faces: Int64[np.ndarray, " P"], defined: Int64[np.ndarray, " C"]
+) -> Float32[np.ndarray, "C 2"] | None:
+    """Return the place in the texture of each corner, NaN where it has none; `defined` places precede each corner."""
+    if not len(chosen):
+        return None
+    values, counts = lines.values(chosen, skip=2)
+    begins, (wanted, _) = np.cumsum(counts) - counts, lines.values(faces, skip=1, stop="/", field=1)
+    values = np.concatenate([values, [np.nan, np.nan]])  # behind a line without numbers
+    known = np.where((counts >= 2)[:, None], values[begins[:, None] + np.arange(2)], np.nan)
+    numbers = np.where(wanted > 0, wanted - 1, wanted + defined)
+    good = (numbers >= 0) & (numbers < len(known)) & (numbers == np.floor(numbers)) & (wanted != 0)
+    found = np.full((len(numbers), 2), np.nan, np.float32)
+    with np.errstate(over="ignore"):
+        found[good] = known[numbers[good].astype(np.int64)]
+    return found
+
+
+def _others(lines: Lines, chosen: Int64[np.ndarray, " N"]) -> tuple[Dropped, tuple[str, ...], tuple[str, ...]]:
+    """Return what is dropped of the other lines, the files of materials, and the materials that faces have."""
+    text, starts = lines.text, lines.starts
+    is_normal = (text[starts[chosen]] == ord("v")) & (text[np.minimum(starts[chosen] + 1, len(text) - 1)] == ord("n"))
+    dropped, materials, used = {_DROPS["vn"]} if is_normal.any() else set(), list[str](), dict[str, None]()
+    for number in chosen[~is_normal]:  # no Python loop over normals: there may be one for each vertex
+        words = lines.whole(number).split(maxsplit=1)
+        keyword, rest = words[0] if words else "", words[1].strip() if len(words) > 1 else ""
         if keyword and keyword not in _KNOWN:
             raise Unreadable(f"line {number + 1} ({lines.line(number)!r}) begins with no OBJ keyword")
         dropped |= {_DROPS[keyword]} if keyword in _DROPS else set()
-    return frozenset(dropped)
+        if keyword == "mtllib":
+            materials.append(rest)
+        elif keyword == "usemtl":
+            used[rest] = None
+    return frozenset(dropped), tuple(materials), tuple(used)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import _core
-from .polygons import Dropped, Polygons, Unreadable
+from .polygons import Dropped, Polygons, Unreadable, eight_bits
 from .text_lines import Lines, whole
 
 _TYPES = {
@@ -23,9 +23,10 @@ _TYPES = {
 }
 _DIGITS = 18  # of a number of rows; longer ones do not fit 64-bit integers
 _INDICES = ("vertex_indices", "vertex_index")
+_COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _DROPS = {
     "normals": {"nx", "ny", "nz"},
-    "colors": {"red", "green", "blue", "alpha", "diffuse_red", "r", "g", "b"},
+    "transparency": {"alpha"},
     "texture coordinates": {"s", "t", "u", "v", "texture_u", "texture_v", "texcoord"},
 }
 
@@ -55,13 +56,16 @@ def parse_ply(data: bytes) -> Polygons:
         raise Unreadable("PLY header does not run from 'ply' to 'end_header' (truncated?)")
     encoding, elements = _header(data[: found.start()].decode("utf-8", "replace").splitlines()[1:])
     body = _Text(data[found.end() :]) if encoding == "ascii" else _Binary(data[found.end() :])
-    vertices, corners, sizes = np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64)
+    vertices, corners, sizes, colors = np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64), None
     for element in elements:
         if element.name == "vertex":
             columns, _, _ = body.read(element, None)
             if not {"x", "y", "z"} <= columns.keys():
                 raise Unreadable("PLY vertices have no x, y, z")
             vertices = np.stack([columns[axis] for axis in "xyz"], axis=1).astype(np.float64)
+            names = next((some for some in _COLORS if {*some} <= columns.keys()), None)
+            if names is not None:
+                colors = eight_bits(_of_kind(element, np.stack([columns[name] for name in names], axis=1), names[0]))
         elif element.name == "face":
             name = next((p.name for p in element.properties if p.name in _INDICES and p.count), None)
             if name is None and element.rows:
@@ -69,7 +73,16 @@ def parse_ply(data: bytes) -> Polygons:
             _, corners, sizes = body.read(element, name)
         else:
             body.read(element, None)
-    return Polygons(vertices, corners, sizes, _dropped(elements))
+    return Polygons(vertices, corners, sizes, _dropped(elements), colors)
+
+
+def _of_kind(element: _Element, values: np.ndarray, name: str) -> np.ndarray:
+    """Return the values of a property in the kind that the header names: text is read as float64."""
+    dtype = next(field.dtype for field in element.properties if field.name == name)
+    if dtype.kind not in "iu" or values.dtype == dtype:
+        return values
+    limits = np.iinfo(dtype)
+    return np.clip(np.nan_to_num(values), limits.min, limits.max).astype(dtype)
 
 
 def _header(lines: list[str]) -> tuple[str, list[_Element]]:
@@ -103,7 +116,9 @@ def _dtype(kind: str, encoding: str) -> np.dtype:
 
 def _dropped(elements: list[_Element]) -> Dropped:
     names = {p.name for e in elements if e.rows for p in e.properties}
+    faces = {p.name for e in elements if e.rows and e.name == "face" for p in e.properties}
     others = {f"element {e.name!r}" for e in elements if e.rows and e.name not in ("vertex", "face")}
+    others |= {"colors of faces"} if faces & {name for some in _COLORS for name in some} else set()
     return frozenset({words for words, fields in _DROPS.items() if fields & names} | others)
 
 

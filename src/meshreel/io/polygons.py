@@ -1,6 +1,6 @@
 """Polygons of a mesh file, and their triangulation.
 
-In: vertices and the corners of all polygons. Out: faces F x 3 in the order of the file, with their orientation.
+In: vertices and the corners of all polygons. Out: triangles in the order of the file, with their orientation.
 """
 
 from __future__ import annotations
@@ -8,7 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float32, Float64, Int64, UInt8
+
+from ..types import Texture
 
 Dropped = frozenset[str]  # names of data in a file other than geometry
 
@@ -25,16 +27,32 @@ class Polygons:
     corners: Int64[np.ndarray, " C"]  # vertex of each corner of each polygon, from 0
     sizes: Int64[np.ndarray, " P"]  # corners of each polygon
     dropped: Dropped = frozenset()
+    colors: UInt8[np.ndarray, "V 3"] | None = None  # of the vertices, sRGB
+    uv: Float32[np.ndarray, "C 2"] | None = None  # of the corners, as `Mesh.uv`; NaN where a corner has none
+    texture: Texture | None = None
+    materials: tuple[str, ...] = ()  # what OBJ says of its texture: names of files of materials,
+    used: tuple[str, ...] = ()  # and the materials in them that faces have
+
+
+def eight_bits(values: np.ndarray) -> UInt8[np.ndarray, "..."]:
+    """Return colours in 8 bits: of larger integers all bits are a 1, of fractions 1 is; others have 8 bits already."""
+    if values.dtype.kind in "iu":
+        most = float(np.iinfo(values.dtype).max) if values.dtype.itemsize > 1 else 255.0
+    else:
+        most = 1.0 if np.nanmax(values, initial=0.0) <= 1.0 else 255.0  # some write 0 to 255 as text
+    shares = np.nan_to_num(values.astype(np.float64) / most, nan=0.0, posinf=1.0, neginf=0.0)
+    return (np.clip(shares, 0.0, 1.0) * 255.0).round().astype(np.uint8)
 
 
 def triangulate(polygons: Polygons) -> Int64[np.ndarray, "F 3"]:
     """Cut polygons into triangles: quads along a diagonal that does not fold, others as fans or by ear clipping.
 
-    The caller must have checked indices and sizes.
+    Return the numbers of the triangles' corners among all corners. The caller must have checked indices and sizes.
     """
-    vertices, corners, sizes = polygons.vertices, polygons.corners, polygons.sizes
+    sizes, corners = polygons.sizes, np.arange(len(polygons.corners))
     if (sizes == 3).all():
         return corners.reshape(-1, 3)
+    vertices = polygons.vertices[polygons.corners]
     first_corner = np.cumsum(sizes) - sizes
     first_face = np.cumsum(sizes - 2) - (sizes - 2)
     faces = np.empty((int((sizes - 2).sum()), 3), dtype=np.int64)

@@ -155,7 +155,7 @@ class FileSequence(MeshSequence):
         loaded = self._frames.load(number, self.name(index))
         mesh = loaded.mesh
         if self._options.scale != 1:
-            mesh = Mesh.of(mesh.vertices * self._options.scale, mesh.faces)
+            mesh = mesh.at(mesh.vertices * self._options.scale)
         if self._options.weld is not None:
             whole, mesh = mesh, self._options.weld(mesh)
             merged = len(whole.vertices) - len(mesh.vertices)
@@ -213,7 +213,7 @@ def _warnings(seen: _Seen, remarks: tuple[str, ...]) -> Iterator[str]:
         yield f"frame {seen.dropped[loose]} has vertices but no faces: it counts as empty (a point cloud is no surface)"
     extras = {what: first for what, first in seen.dropped.items() if what != loose}
     if extras:
-        yield f"only geometry is kept; dropped: {', '.join(sorted(extras))} (first in frame {min(extras.values())})"
+        yield f"not kept: {', '.join(sorted(extras))} (first in frame {min(extras.values())})"
     merged, positions, faces = np.array([*seen.merged.values()], dtype=np.int64).reshape(-1, 3).sum(axis=0).tolist()
     if merged:
         lost = f", and {faces} faces that collapsed with them" if faces else ""

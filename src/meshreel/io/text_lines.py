@@ -33,19 +33,25 @@ class Lines:
     def __len__(self) -> int:
         return len(self.starts)
 
+    def whole(self, number: int | np.integer) -> str:
+        """Return one line."""
+        return self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
+
     def line(self, number: int | np.integer) -> str:
         """Return one line, shortened for an error message."""
-        shown = self.text[self.starts[number] : self.ends[number]].tobytes().decode("utf-8", "replace").strip()
+        shown = self.whole(number)
         return shown if len(shown) <= 60 else shown[:57] + "..."
 
     def values(
-        self, chosen: Int64[np.ndarray, " N"], skip: int = 0, stop: str = ""
+        self, chosen: Int64[np.ndarray, " N"], skip: int = 0, stop: str = "", field: int = 0
     ) -> tuple[Float64[np.ndarray, " M"], Int64[np.ndarray, " N"]]:
         """Return all numbers of the chosen lines, without their first `skip` bytes, and the count in each line.
 
-        What follows the letter `stop` in a word is no part of the number.
+        What follows the letter `stop` in a word is no part of the number. A `field` above 0 is what follows so many of
+        these letters, NaN where that is no number.
         """
-        values, counts, bad = _core.read_numbers(self.text, self.starts[chosen] + skip, self.ends[chosen], stop or "\0")
+        starts, ends = self.starts[chosen] + skip, self.ends[chosen]
+        values, counts, bad = _core.read_numbers(self.text, starts, ends, stop or "\0", field)
         if bad >= 0:
             number = int(np.searchsorted(self.starts, bad, side="right")) - 1
             word = self.text[bad : self.ends[number]].tobytes().split()[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,6 +17,7 @@ from jaxtyping import UInt8
 
 from ..errors import InputError
 from ..types import Mesh
+from .color import to_linear
 from .unfinished import cannot_be_written, unfinished
 
 _WAIT = 10.0  # s, for another process that writes the same file: a mesh takes less (guess)
@@ -69,9 +71,7 @@ def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> N
     corners = np.stack([mesh.faces.reshape(-1), np.repeat(code, 3)], axis=1)
     split, number = np.unique(corners, axis=0, return_inverse=True)
     shown = np.stack([split[:, 1] >> 16, split[:, 1] >> 8 & 255, split[:, 1] & 255], axis=1).astype(np.uint8)
-    whole = Mesh.of(mesh.vertices[split[:, 0]], number.reshape(-1, 3))
-    with replacing(path) as file:
-        file.write(_pack_ply(whole, shown))
+    write_mesh(replace(Mesh.of(mesh.vertices[split[:, 0]], number.reshape(-1, 3)), colors=shown), path)
 
 
 @contextmanager
@@ -84,7 +84,8 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         yield file
 
 
-def _pack_ply(mesh: Mesh, colors: UInt8[np.ndarray, "V 3"] | None = None) -> bytes:
+def _pack_ply(mesh: Mesh) -> bytes:
+    colors = mesh.colors
     kind, dtype = ("float", "<f4") if _fits_float32(mesh) else ("double", "<f8")
     colored = "" if colors is None else "property uchar red\nproperty uchar green\nproperty uchar blue\n"
     header = (
@@ -102,7 +103,9 @@ def _pack_ply(mesh: Mesh, colors: UInt8[np.ndarray, "V 3"] | None = None) -> byt
 
 def _pack_obj(mesh: Mesh) -> bytes:
     vertex = "v %.9g %.9g %.9g\n" if _fits_float32(mesh) else "v %.17g %.17g %.17g\n"
-    vertices = "".join(vertex % tuple(row) for row in mesh.vertices.tolist())
+    rows = mesh.vertices if mesh.colors is None else np.concatenate([mesh.vertices, mesh.colors / 255], axis=1)
+    vertex = vertex if mesh.colors is None else vertex.replace("\n", " %.4f %.4f %.4f\n")
+    vertices = "".join(vertex % tuple(row) for row in rows.tolist())
     faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + 1).tolist())
     return ("# meshreel\n" + vertices + faces).encode()  # a comment, because readers take an empty file for damage
 
@@ -115,23 +118,31 @@ def _pack_glb(mesh: Mesh) -> bytes:
     local = (mesh.vertices - origin).astype("<f4")
     points, corners = local.tobytes(), mesh.faces.astype("<u4").tobytes()
     low, high = local.min(axis=0).tolist(), local.max(axis=0).tolist()
+    attributes, accessors, views, colors = {"POSITION": 0}, list[dict[str, object]](), list[dict[str, object]](), b""
+    if mesh.colors is not None:  # rows of four bytes' multiples: a fourth number beside red, green and blue
+        light = np.pad(to_linear(mesh.colors), ((0, 0), (0, 1)), constant_values=65535)
+        colors, attributes["COLOR_0"] = light.astype("<u2").tobytes(), 2
+        accessors = [{"bufferView": 2, "componentType": 5123, "normalized": True, "count": len(local), "type": "VEC4"}]
+        views = [{"buffer": 0, "byteOffset": len(points) + len(corners), "byteLength": len(colors), "target": 34962}]
     tree = {
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0, "translation": origin.tolist()}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "mode": 4}]}],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": 1, "mode": 4}]}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": len(local), "type": "VEC3", "min": low, "max": high},
             {"bufferView": 1, "componentType": 5125, "count": mesh.faces.size, "type": "SCALAR"},
+            *accessors,
         ],
         "bufferViews": [
             {"buffer": 0, "byteOffset": 0, "byteLength": len(points), "target": 34962},
             {"buffer": 0, "byteOffset": len(points), "byteLength": len(corners), "target": 34963},
+            *views,
         ],
-        "buffers": [{"byteLength": len(points) + len(corners)}],
+        "buffers": [{"byteLength": len(points) + len(corners) + len(colors)}],
     }
-    return _glb(tree, points + corners)
+    return _glb(tree, points + corners + colors)
 
 
 def _glb(tree: dict[str, object], binary: bytes) -> bytes:

@@ -15,7 +15,7 @@ from meshreel.analysis.survey import survey
 from meshreel.encoder.options import SceneOptions
 from meshreel.encoder.parts import take_apart
 from meshreel.encoder.progress import Stages
-from meshreel.encoder.scene import Static, encode_static
+from meshreel.encoder.static import Static, encode_static
 from meshreel.geometry.derived_sequences import captured
 from meshreel.geometry.topology import part_of
 from meshreel.types import Mesh, MeshSequence

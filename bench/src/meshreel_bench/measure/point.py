@@ -144,7 +144,7 @@ def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
     groups = list[Group]()
     for chunk in reader.groups:
         own = keys & set(range(chunk.first_frame, chunk.first_frame + chunk.frame_count))
-        form = chunk.form.name.lower()
+        form = chunk.form_name
         groups.append(Group(chunk.first_frame, chunk.frame_count, form, chunk.size, min(own, default=None)))
     once = sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
     if isinstance(codec, BackgroundDracoCodec):

@@ -27,6 +27,7 @@ from ..steps import RUNGS, rung_of, step_of
 from .details import Shown, decode_last, decode_last_scalars, decode_level, encode_level
 from .fields import Rate
 from .graph import Connectivity, connectivity
+from .patches import Patches, decode_patches
 from .trajectories import decode_last_places, decode_trajectories, encode_trajectories
 
 NOISY_STEP = 0.8  # RMS distances of the noise that a step is wide in addition (decision 16)
@@ -80,12 +81,21 @@ class LayersState:
     base: Float64[np.ndarray, "V 3"]  # the base's vertices in the last frame
     scalars: tuple[Float64[np.ndarray, " _"], ...]  # of the last frame, for each decoded level
     finer: tuple[Connectivity, ...] = ()  # of the decoded levels, kept because it follows from the faces alone
+    colors: Float64[np.ndarray, "W 3"] | None = (
+        None  # values of the colours of all decoded vertices (appearance.colors)
+    )
+
+    @property
+    def count(self) -> int:
+        """Number of vertices of the decoded levels."""
+        return len(self.base) + sum(map(len, self.scalars))
 
     def nbytes_beyond(self, previous: LayersState | None) -> int:
         """Return the memory, bytes, that this state does not share with the state from which it was predicted."""
         shared = () if previous is None else previous.finer
         own = [near.nbytes for near in self.finer if not any(near is other for other in shared)]
-        return self.faces.nbytes + self.base.nbytes + sum(level.nbytes for level in self.scalars) + sum(own)
+        colors = 0 if self.colors is None else self.colors.nbytes
+        return self.faces.nbytes + self.base.nbytes + sum(level.nbytes for level in self.scalars) + sum(own) + colors
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,6 +285,23 @@ def layers_bytes_by_purpose(data: bytes) -> dict[str, int]:
         patches = unpack_all(LayersPatches, data[offset:])
         sizes |= {"dropped faces": len(patches.dropped), "patches": len(patches.mesh)}
     return sizes
+
+
+def base_of(records: LayersRecords, previous: LayersState | None) -> Mesh:
+    """Return the base mesh of a group. Raises FormatError as `place_layers` does."""
+    return _start(records, previous)[0]
+
+
+def has_patches(data: bytes, records: LayersRecords, levels: int | None) -> bool:
+    """Return whether a payload has patches that are decoded, of which `records` are the records before them."""
+    return records.end < len(data) and (levels is None or levels > records.head.levels)
+
+
+def patches_of(data: bytes, records: LayersRecords, levels: int | None, faces: int) -> Patches | None:
+    """Decode the patches of a payload whose finest level has `faces` faces; None where it has none, or not these."""
+    if not has_patches(data, records, levels):
+        return None
+    return decode_patches(unpack_all(LayersPatches, data[records.end :]), records.head.frames, faces)
 
 
 def _start(records: LayersRecords, previous: LayersState | None) -> tuple[Mesh, LayersState | None]:

@@ -24,11 +24,15 @@ export const LIMITS = {
   column: 20,
   pair: 100,
   number: 40,
+  colors: 100663296,
+  painted: 32,
+  painting: 256,
 } as const;
 
 export const ChunkKind = {
   STATIC: 1,
   GROUP: 2,
+  COLORS: 3,
 } as const;
 
 export const Form = {
@@ -37,6 +41,7 @@ export const Form = {
   DRACO: 3,
   EMPTY: 4,
   PATCH: 5,
+  VERTEX_COLORS: 6,
 } as const;
 
 export const AnchorRule = {
@@ -104,14 +109,14 @@ export const Layer: Kind<Layer> = record("Layer", {
 export interface IndexEntry {
   readonly kind: number; // purpose
   readonly form: number; // coding; equal to the first byte of the chunk
-  readonly frames: number; // number of frames; 0 if and only if STATIC
+  readonly frames: number; // number of frames; 0 if and only if STATIC, or COLORS of a STATIC
   readonly track: number; // number of the moving body, from 0; 0 if STATIC
-  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes
+  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before
   readonly layers: readonly Layer[]; // at least one
 }
 export const IndexEntry: Kind<IndexEntry> = record("IndexEntry", {
-  kind: choice(u8, ChunkKind),
-  form: choice(u8, Form),
+  kind: u8,
+  form: u8,
   frames: u16,
   track: varint,
   dependsOn: list(u8, varint),
@@ -286,4 +291,26 @@ export const StaticPatch: Kind<StaticPatch> = record("StaticPatch", {
   runs: varint,
   dropped: blob(varint),
   mesh: blob(varint),
+});
+
+/** First bytes of a chunk of form VERTEX_COLORS; for each mesh, a CodedField and a ColorsLevel a level follow. */
+export interface VertexColors {
+  readonly form: number; // VERTEX_COLORS
+  readonly origin: number; // prediction of the values
+  readonly chroma: number; // what colour differences were multiplied by, 64ths, above 0
+}
+export const VertexColors: Kind<VertexColors> = record("VertexColors", {
+  form: choice(u8, Form),
+  origin: choice(u8, Origin),
+  chroma: u8,
+});
+
+/** Colours of the vertices that a level of subdivision adds. */
+export interface ColorsLevel {
+  readonly siblingWeight: number; // weight of the siblings' mean in a prediction, 64ths
+  readonly values: CodedField; // differences from the means of the ends of their edges
+}
+export const ColorsLevel: Kind<ColorsLevel> = record("ColorsLevel", {
+  siblingWeight: u8,
+  values: nested(() => CodedField),
 });

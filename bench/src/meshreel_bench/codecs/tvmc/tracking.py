@@ -17,8 +17,8 @@ from meshreel.encoder.forms import displacement_field, intra_only
 from meshreel.encoder.interval import Interval
 from meshreel.encoder.options import EncoderOptions, PaperOptions
 from meshreel.encoder.paper import FoundGroup
-from meshreel.encoder.scene import Static, encode_static
 from meshreel.encoder.sequence import Encoder
+from meshreel.encoder.static import Static, encode_static
 from meshreel.encoder.target import target_of
 
 

@@ -1,0 +1,59 @@
+"""Colours of places on and near a surface: of its texture, or blended from its vertices.
+
+In: a mesh with colours, and places. Out: red, green and blue, 0 to 255, at the closest point of the mesh to each.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float32, Float64, Int32, UInt8
+
+from ...geometry.closest_points import Surface
+from ...geometry.topology import blend
+from ...types import GREY, Mesh
+
+
+class Painted:
+    """A mesh with faces and colours, prepared for repeated queries."""
+
+    def __init__(self, mesh: Mesh, surface: Surface | None = None) -> None:
+        """Take the mesh, and the surface of its places where one is at hand already."""
+        self._mesh, self._surface = mesh, surface or Surface(mesh)
+        self._pixels = None if mesh.uv is None or mesh.texture is None else mesh.texture.pixels
+
+    def at(
+        self, points: Float64[np.ndarray, "N 3"], guesses: Int32[np.ndarray, " N"] | None = None
+    ) -> Float64[np.ndarray, "N 3"]:
+        """Return the colours at the closest points; `guesses` are faces that may be near: they save time."""
+        hits = self._surface.closest(points, guesses)
+        return self.on(hits.faces, hits.barycentric)
+
+    def on(self, faces: Int32[np.ndarray, " N"], barycentric: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+        """Return the colours at places inside faces."""
+        mesh = self._mesh
+        if mesh.colors is None:
+            found = np.full((len(faces), 3), float(GREY))
+        else:
+            found = blend(mesh.colors.astype(np.float64), mesh.faces[faces], barycentric)
+        if self._pixels is not None and mesh.uv is not None:
+            places = np.einsum("nkc,nk->nc", mesh.uv[faces].astype(np.float64), barycentric)
+            known = np.isfinite(places).all(axis=1)
+            found[known] = bilinear(self._pixels, places[known])
+        return found
+
+
+def bilinear(
+    pixels: UInt8[np.ndarray, "H W 3"], places: Float64[np.ndarray, "N 2"] | Float32[np.ndarray, "N 2"]
+) -> Float64[np.ndarray, "N 3"]:
+    """Return the colours at places of a texture, as `Mesh.uv` has them; outside of 0 to 1 it is repeated."""
+    height, width = pixels.shape[:2]
+    x, y = np.asarray(places, np.float64).T
+    x, y = (x - np.floor(x)) * width - 0.5, (1.0 - (y - np.floor(y))) * height - 0.5
+    left, above = np.floor(x), np.floor(y)
+    fx, fy = (x - left)[:, None], (y - above)[:, None]
+    x0, y0 = left.astype(np.int64) % width, above.astype(np.int64) % height
+    x1, y1 = (x0 + 1) % width, (y0 + 1) % height
+    flat = pixels.reshape(-1, 3)
+    upper = flat[y0 * width + x0] * (1 - fx) + flat[y0 * width + x1] * fx
+    lower = flat[y1 * width + x0] * (1 - fx) + flat[y1 * width + x1] * fx
+    return upper * (1 - fy) + lower * fy

@@ -1,0 +1,148 @@
+"""The background of a scene as chunks: once as a whole, then its changes, with their colours (paper, section 3.2).
+
+In: the parts of a scene. Out: the payloads of its states, in the order of time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool
+
+from ..analysis.appearance.background import background_colors
+from ..analysis.scene.background import BackgroundOptions
+from ..analysis.survey import Survey
+from ..coding.background import changed, decode_background, decode_change, encode_background, encode_change
+from ..coding.colored import background_canvas, encode_group_colors
+from ..format.budget import Chain, CostlyError
+from ..geometry.closest_points import distances
+from ..geometry.decimate import decimate_faces
+from ..geometry.topology import clean
+from ..types import Mesh, MeshSequence, Placement, evenly
+from .options import AppearanceOptions
+from .parts import Change, Parts
+
+FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
+HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
+LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
+STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
+NEAR = 3.0  # times the noise, within which a frame shows a place of the background (guess)
+LEAST_NEAR = 0.01  # m, the same at least (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class Static:
+    """A state of the background from a frame on: whole, or a patch of the one before."""
+
+    frame: int
+    payload: bytes
+    is_patch: bool
+    colors: bytes = b""  # payload of the colours of its vertices, or of those that the patch adds; none: it has none
+
+
+def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:
+    """Encode the states of the background: as few faces as stay about as near to it as the noise.
+
+    The first state is whole, as are those of a refresh; each change of the room is a patch of the state before.
+    """
+    noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
+    step, most = options.lattice * noise, options.coarse * noise
+    payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
+    found = [] if state.is_empty else [Static(0, payload, False)]
+    chain, changes = Chain(0, len(payload)), {change.frame: change for change in parts.changes}
+    again = set(refreshes(count, frame_rate, options))
+    for frame in sorted({*changes, *again} - {0}):
+        whole = state.is_empty or frame in again
+        if change := changes.get(frame):
+            came = _coded(_normalised(change.came, parts.seen), most, step)[1]
+            before, gone = state, _gone(parts, state, change)
+            payload = encode_change(before, gone, came, step)
+            try:
+                state = decode_change(payload, before)
+                chain = chain.then(before, state, len(payload))
+            except CostlyError:  # no reader would decode it
+                state, whole = changed(before, gone, came), True
+        if whole and not state.is_empty:
+            payload = encode_background(state, step)
+            state = decode_background(payload)  # the next patch counts faces in the decoded order
+            chain = Chain(0, len(payload))
+        if not (whole and state.is_empty):
+            found.append(Static(frame, payload, not whole))
+    return found
+
+
+def refreshes(count: int, frame_rate: float, options: BackgroundOptions) -> range:
+    """Return the frames at which the whole background is sent; the first frame is one of them."""
+    return range(0, count, count if options.refresh is None else max(1, round(options.refresh * frame_rate)))
+
+
+def _gone(parts: Parts, state: Mesh, change: Change) -> Bool[np.ndarray, " F"]:
+    """Return a mask of the background's faces, normalised, that a change removes."""
+    place = Placement(parts.seen.unit, tuple(parts.seen.center))
+    return parts.segmentation.gone(change.frame, place.of(state))
+
+
+def _coded(mesh: Mesh, most: float, step: float) -> tuple[bytes, Mesh]:
+    """Encode a mesh with the fewest vertices that stay within an RMS distance; return payload and decoded mesh."""
+    if mesh.is_empty:
+        return b"", mesh
+    steps = [clean(mesh)]  # each from the one before: these are nearer to the mesh than what is made from it at once
+    for fraction in FRACTIONS:
+        steps.append(decimate_faces(steps[-1], max(4, round(2 * fraction * len(mesh.vertices)))))
+    failed, best, found = 0, mesh, (b"", mesh)
+    for best in reversed(steps):
+        found = _stored(best, step)
+        if is_near := _is_near(mesh, found[1], most):
+            break
+        failed = len(best.faces)
+    for _ in range(HALVINGS if failed and is_near else 0):
+        small = decimate_faces(best, round((failed * len(best.faces)) ** 0.5))
+        stored = _stored(small, step)
+        if _is_near(mesh, stored[1], most):
+            best, found = small, stored
+        else:
+            failed = len(small.faces)
+    return found
+
+
+def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
+    return mesh.at((mesh.vertices - seen.center) / seen.unit)
+
+
+def colored_states(
+    states: list[Static], sequence: MeshSequence, parts: Parts, options: AppearanceOptions | None
+) -> list[Static]:
+    """Return the states of a background with the colours that still surface has from each state to the next."""
+    if options is None or not any(sequence[number].is_colored for number in evenly(len(sequence), 3)):
+        return states
+    found, mesh = list[Static](), Mesh.empty()
+    place = Placement(parts.seen.unit, tuple(parts.seen.center))
+    ends = [state.frame for state in states[1:]] + [len(sequence)]
+    for state, end in zip(states, ends, strict=True):
+        mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
+        canvas = background_canvas(state.payload)
+        [coded] = canvas.meshes
+        shown = place.of(Mesh(mesh.vertices[len(mesh.vertices) - coded.vertices :], mesh.faces[:0]))
+        numbers = [state.frame + number for number in evenly(end - state.frame, STILL_FRAMES)]
+        far = max(NEAR * parts.noise, LEAST_NEAR)
+        colors = background_colors(shown, (_still(sequence[number], parts, number) for number in numbers), far)
+        encoded = encode_group_colors(canvas, [colors], options.colors, None)
+        found.append(replace(state, colors=encoded.payload))
+    return found
+
+
+def _still(mesh: Mesh, parts: Parts, number: int) -> Mesh:
+    """Return what of a frame stands still."""
+    return mesh.with_faces(~parts.segmentation.moving(number, mesh))
+
+
+def _stored(mesh: Mesh, step: float) -> tuple[bytes, Mesh]:
+    """Return the payload of a background, and what it decodes to."""
+    payload = encode_background(mesh, step)
+    return payload, decode_background(payload)
+
+
+def _is_near(mesh: Mesh, small: Mesh, most: float) -> bool:
+    """Return whether a simplified mesh is within an RMS distance of the vertices of a mesh."""
+    return not small.is_empty and float(np.sqrt((distances(mesh.vertices, small) ** 2).mean())) <= most

@@ -1,0 +1,113 @@
+"""Pictures of textures and of colour cameras: any file that Pillow reads, as 8-bit sRGB.
+
+In: a file, or the materials that an OBJ names. Out: an array H x W x 3, read when it is asked for; it is kept a while.
+"""
+
+from __future__ import annotations
+
+import io
+from functools import lru_cache, partial
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+
+from ..errors import InputError
+from ..types import Texture
+from .polygons import Dropped
+from .read import read_file
+from .remote import Place
+
+MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192, 200 MB in memory (guess)
+_DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits of grey
+
+
+def picture_texture(place: Place) -> Texture:
+    """Return the texture of a picture in a file, which is read when its pixels are asked for."""
+    return Texture(partial(read_picture, place))
+
+
+def read_picture(place: Place) -> UInt8[np.ndarray, "H W 3"]:
+    """Read a picture as sRGB, without transparency. Raises InputError where it cannot be read, or is too large."""
+    return _read(place, place.stat().st_mtime_ns if isinstance(place, Path) and place.exists() else 0)
+
+
+@lru_cache(maxsize=4)  # as many as a frame and its neighbours have (guess)
+def _read(place: Place, changed: int) -> UInt8[np.ndarray, "H W 3"]:
+    del changed
+    try:
+        data = read_file(place)
+    except OSError as error:
+        raise InputError(
+            f"{place}: cannot be read ({error.strerror or error}); check it, or give --color none"
+        ) from None
+    return parse_picture(data, str(place))
+
+
+def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
+    """Return the picture in the bytes of a file; errors as `read_picture`, which begin with `where`."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            width, height = image.size
+            if width * height > MOST_PIXELS:
+                raise Image.DecompressionBombError
+            if image.mode in _DEEP:
+                pixels = np.repeat((np.asarray(image).astype(np.float64)[..., None] / 257).round(), 3, axis=2)
+                pixels = np.clip(pixels, 0, 255).astype(np.uint8)
+            else:
+                pixels = np.array(image.convert("RGB"))
+    except Image.DecompressionBombError:
+        raise InputError(f"{where}: has more than 8192 x 8192 pixels; make it smaller") from None
+    except UnidentifiedImageError:
+        raise InputError(f"{where}: is no picture; give PNG or JPEG, or --color none") from None
+    except (OSError, SyntaxError, ValueError) as error:  # SyntaxError: a damaged chunk
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{where}: cannot be read ({reason}); write it again, or give --color none") from None
+    pixels.flags.writeable = False
+    return pixels
+
+
+def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, ...]) -> tuple[Texture | None, Dropped]:
+    """Return the texture that all faces of an OBJ have, and what of its materials is dropped."""
+    known, dropped = dict[str, str | None](), set[str]()
+    for name in files:
+        try:
+            text = read_file(_beside(mesh, name)).decode("utf-8", "replace")
+        except OSError:
+            dropped.add(f"materials ({name} cannot be read)")
+            continue
+        dropped |= _parse_materials(text, known)
+    pictures = {known.get(name) for name in used} if used else {*known.values()}
+    if len(pictures) > 1:
+        return None, frozenset(dropped | {"several materials"})
+    if not pictures or (picture := pictures.pop()) is None:
+        return None, frozenset(dropped)
+    place = _beside(mesh, picture)
+    if isinstance(place, Path) and not place.exists():
+        return None, frozenset(dropped | {f"a texture ({picture} is not there)"})
+    return picture_texture(place), frozenset(dropped)
+
+
+def _beside(mesh: Place, name: str) -> Place:
+    """Return a file that a mesh names, which is beside it or in a folder there."""
+    name = name.replace("\\", "/")
+    return (mesh.parent if isinstance(mesh, Path) else type(mesh)(str(mesh).rsplit("/", 1)[0])) / name
+
+
+def _parse_materials(text: str, known: dict[str, str | None]) -> Dropped:
+    """Add to `known` the picture of each material in a text, None for one without; return what is dropped."""
+    name, dropped = "", set[str]()
+    for words in (line.split(maxsplit=1) for line in text.splitlines()):
+        keyword, rest = words[0].lower() if words else "", words[1].strip() if len(words) > 1 else ""
+        if keyword == "newmtl":
+            name = rest
+            known[name] = None
+        elif keyword == "map_kd" and rest:
+            known[name] = rest.split()[-1] if rest.startswith("-") else rest  # behind options
+        elif keyword == "map_d":
+            dropped.add("transparency")
+        elif keyword in ("norm", "bump", "map_bump", "map_kn"):
+            dropped.add("normal maps")
+    return frozenset(dropped)
