@@ -10,6 +10,7 @@
 #include "meshreel/colors.h"
 #include "meshreel/entropy.h"
 #include "meshreel/layers.h"
+#include "meshreel/places.h"
 
 namespace meshreel {
 namespace {
@@ -301,6 +302,29 @@ nb::tuple decode_colors(nb::bytes records, In<double, 2> positions, In<int32_t, 
     return nb::make_tuple(colors.shaped(frames, vertices, 3), last.shaped(vertices, 3));
 }
 
+// Joins, starts and rests of the places of corners, faces x 3 x 2.
+nb::tuple encode_places(In<double, 2> positions, In<int32_t, 2> faces, In<int32_t, 3> places) {
+    const mr_mesh mesh = mesh_of(positions, faces);
+    expect(places.shape(0) == mesh.face_count && places.shape(1) == 3 && places.shape(2) == 2);
+    Buffer<int32_t> joins(4 * mesh.face_count), starts(6 * mesh.face_count), rests(2 * mesh.face_count);
+    mr_place_symbols symbols{joins.data(), starts.data(), rests.data(), 0, 0, 0};
+    check(mr_encode_places(&mesh, places.data(), &symbols));
+    const size_t counts[] = {symbols.join_count, symbols.start_count, symbols.rest_count};
+    return nb::make_tuple(Buffer<int32_t>(joins.data(), counts[0]).shaped(counts[0]),
+                          Buffer<int32_t>(starts.data(), counts[1]).shaped(counts[1]),
+                          Buffer<int32_t>(rests.data(), counts[2]).shaped(counts[2]));
+}
+
+Out<int32_t, 3> decode_places(In<double, 2> positions, In<int32_t, 2> faces, InOut<int32_t, 1> joins,
+                              InOut<int32_t, 1> starts, InOut<int32_t, 1> rests) {
+    const mr_mesh mesh = mesh_of(positions, faces);
+    const mr_place_symbols symbols{joins.data(),   starts.data(),   rests.data(),
+                                   joins.shape(0), starts.shape(0), rests.shape(0)};
+    Buffer<int32_t> places(6 * mesh.face_count);
+    check_decoded(mr_decode_places(&mesh, &symbols, places.data()));
+    return places.shaped(mesh.face_count, 3, 2);
+}
+
 Out<double, 2> color_values(In<uint8_t, 2> colors, double chroma) {
     const size_t count = colors.shape(0);
     expect(colors.shape(1) == 3);
@@ -344,6 +368,8 @@ void bind_layers(nb::module_& m) {
     m.def("decode_colors", &decode_colors, "records"_a, "vertices"_a, "faces"_a, "levels"_a, "count"_a, "frames"_a,
           "chroma"_a, "before"_a.none());
     m.def("color_values", &color_values);
+    m.def("encode_places", &encode_places);
+    m.def("decode_places", &decode_places);
     m.def("empty", &empty, "count"_a);
     m.def("keep_faces", &keep_faces, "faces"_a, "dropped"_a, "room"_a.noconvert());
 }

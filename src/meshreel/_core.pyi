@@ -230,6 +230,16 @@ def decode_colors(
     chroma: float,
     before: Float64[np.ndarray, "V 3"] | None,
 ) -> tuple[UInt8[np.ndarray, "T V 3"], Float64[np.ndarray, "V 3"]]: ...
+def encode_places(
+    vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"], places: Int32[np.ndarray, "F 3 2"]
+) -> tuple[Int32[np.ndarray, " J"], Int32[np.ndarray, " S"], Int32[np.ndarray, " R"]]: ...
+def decode_places(
+    vertices: Float64[np.ndarray, "V 3"],
+    faces: Int32[np.ndarray, "F 3"],
+    joins: Int32[np.ndarray, " J"],
+    starts: Int32[np.ndarray, " S"],
+    rests: Int32[np.ndarray, " R"],
+) -> Int32[np.ndarray, "F 3 2"]: ...
 def color_values(colors: UInt8[np.ndarray, "N 3"], chroma: float) -> Float64[np.ndarray, "N 3"]: ...
 def empty(count: int) -> Float64[np.ndarray, " N"]: ...
 def keep_faces(

@@ -16,9 +16,11 @@ from ..errors import FormatError
 from ..format.budget import check_colors
 from ..format.layout import DracoGroup, Form, LaplacianGroup, StaticPatch
 from ..format.records import unpack_all
+from ..geometry.subdivision import levels_of
 from ..geometry.topology import concatenate
-from ..shapes import Float64, UInt8
+from ..shapes import Bool, Float32, Float64, Int32, UInt8
 from ..types import Mesh
+from .appearance.atlas import Layout
 from .appearance.colors import ColorCodingOptions, ColoredMesh, EncodedColors, decode_colors, encode_colors
 from .layers.coder import LayersState, base_of, patches_of, read_layers
 from .mesh import decode_mesh
@@ -31,6 +33,20 @@ class Canvas:
     meshes: tuple[ColoredMesh, ...]
     patches: tuple[int, ...] = ()  # vertices of the patch of each frame, which the last of the meshes has together
     is_layered: bool = False  # each level of the first mesh is a layer
+    dropped: Bool[np.ndarray, "T F"] | None = None  # faces of the template that each frame lacks
+    added: tuple[int, ...] = ()  # faces of the patch of each frame
+
+    def uv(self, layout: Layout) -> list[Float32[np.ndarray, "F 3 2"]]:
+        """Return the places of the corners of each frame's faces in a texture; NaN for those of patches."""
+        template = self.meshes[0]
+        whole = layout.uv(template.levels)
+        if self.dropped is None:
+            return [whole] * template.frames
+        found = list[Float32[np.ndarray, "F 3 2"]]()
+        for gone, added in zip(self.dropped, self.added, strict=True):
+            kept = whole[~gone] if gone.any() else whole
+            found.append(np.concatenate([kept, np.full((added, 3, 2), np.nan, np.float32)]) if added else kept)
+        return found
 
     def by_frame(self, colors: Sequence[UInt8[np.ndarray, "T V 3"]]) -> list[UInt8[np.ndarray, "V 3"]]:
         """Return the colours of the vertices of each frame from those of the meshes."""
@@ -65,12 +81,15 @@ def canvas_of(
         records = read_layers(data, layers)
         base, levels = base_of(records, previous), len(records.layers) - 1
         found = patches_of(data, records, layers, 4**levels * len(base.faces))
-        added = tuple(len(mesh.vertices) for mesh in found.meshes) if found else ()
-        template = ColoredMesh(base, levels, len(counts), counts[0] - sum(added[:1]))
-        if found is None or not any(added):
-            return Canvas((template,), is_layered=True)
-        patch = concatenate(found.meshes)
-        return Canvas((template, ColoredMesh(patch, 0, 1, sum(added))), added, is_layered=True)
+        if found is None:
+            return Canvas((ColoredMesh(base, levels, len(counts), counts[0]),), is_layered=True)
+        added = tuple(len(mesh.vertices) for mesh in found.meshes)
+        template = ColoredMesh(base, levels, len(counts), counts[0] - added[0])
+        faces = tuple(len(mesh.faces) for mesh in found.meshes)
+        if not any(added):
+            return Canvas((template,), is_layered=True, dropped=found.dropped, added=faces)
+        patch = ColoredMesh(concatenate(found.meshes), 0, 1, sum(added))
+        return Canvas((template, patch), added, True, found.dropped, faces)
     if form == Form.LAPLACIAN:
         record = unpack_all(LaplacianGroup, data)
         reference = decode_mesh(record.reference, record.step)
@@ -132,6 +151,12 @@ def background_canvas(data: bytes) -> Canvas:
     group = unpack_all(DracoGroup, data)
     whole = decode_mesh(group.meshes[0], group.step) if group.meshes else Mesh.empty()
     return Canvas((ColoredMesh(whole, 0, 1, len(whole.vertices)),))
+
+
+def finest_faces(base: Mesh, levels: int) -> Int32[np.ndarray, "F 3"]:
+    """Return the faces of a base mesh after its subdivisions."""
+    finer = levels_of(base.faces, len(base.vertices), levels)
+    return finer[-1].faces if finer else base.faces
 
 
 def _check_cost(canvas: Canvas, size: int) -> None:

@@ -12,7 +12,7 @@ from itertools import accumulate
 
 from ..errors import FormatError
 from ..format.budget import check_frames, check_head
-from ..format.checks import check_header, check_index, parse_metadata
+from ..format.checks import COMPANIONS, check_header, check_index, parse_metadata
 from ..format.layout import MAGIC, VERSION, Checksum, ChunkKind, Form, Header, Index, Layer, Preamble
 from ..format.records import least_size, unpack, unpack_all
 from ..types import Up, known_up
@@ -54,7 +54,7 @@ class Chunk:
     def __str__(self) -> str:
         if self.kind == ChunkKind.STATIC:
             return f"chunk {self.number} (static)"
-        what = "colours, " if self.kind == ChunkKind.COLORS else ""
+        what = f"{ChunkKind(self.kind).name.lower()}, " if self.kind in COMPANIONS else ""
         track = "" if self.is_alone else f"track {self.track}, "
         return (
             f"chunk {self.number} ({what}{track}frames {self.first_frame} to {self.first_frame + self.frame_count - 1})"
@@ -78,7 +78,7 @@ class ReelReader:
         check_frames(sum(group.frame_count for group in self.groups), self.size)
         if source.size > self.size:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
-        self.colors = {c.depends_on[0]: c for c in self.chunks if c.kind == ChunkKind.COLORS}  # by the coloured chunk
+        self._companions = {(c.depends_on[0], c.kind): c for c in self.chunks if c.kind in COMPANIONS}
         self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
 
@@ -101,6 +101,15 @@ class ReelReader:
     def missing(self) -> tuple[Chunk, ...]:
         """The chunks that a truncated file has lost, whole or in part; none in a whole file."""
         return tuple(chunk for chunk in self.chunks if chunk.end > self._source.size)
+
+    @property
+    def is_colored(self) -> bool:
+        """Whether the file has colours."""
+        return bool(self._companions)
+
+    def companion_of(self, chunk: Chunk, kind: ChunkKind) -> Chunk | None:
+        """Return the chunk of a kind that belongs to a chunk, or None."""
+        return self._companions.get((chunk.number, kind))
 
     @property
     def has_background(self) -> bool:
@@ -182,7 +191,7 @@ def _chunks(index: Index, offset: int) -> tuple[Chunk, ...]:
     frames = [0] * (1 + max((entry.track for entry in index.chunks if entry.kind == ChunkKind.GROUP), default=0))
     for number, entry in enumerate(index.chunks):
         is_group = entry.kind == ChunkKind.GROUP
-        of = chunks[entry.depends_on[0]] if entry.kind == ChunkKind.COLORS else None
+        of = chunks[entry.depends_on[0]] if entry.kind in COMPANIONS else None
         first = frames[entry.track] if is_group else of.first_frame if of is not None else 0
         place = (number, entry.kind, entry.form, first, entry.frames, entry.depends_on, offset, entry.layers)
         chunk = Chunk(*place, entry.track, len(frames) == 1)

@@ -53,6 +53,22 @@ class Stored:
         return data
 
 
+@dataclass(frozen=True, slots=True)
+class Companion:
+    """What belongs to a group or a background: its colours, an atlas, or pictures."""
+
+    kind: ChunkKind
+    payload: bytes | Stored
+    layers: tuple[int, ...] = ()  # where each layer of the payload ends; none: it is one layer
+
+    def __len__(self) -> int:
+        return len(self.payload)
+
+    def read(self) -> bytes:
+        """Return the payload."""
+        return self.payload if isinstance(self.payload, bytes) else self.payload.read()
+
+
 class ReelWriter:
     """Context manager that writes a file: chunks are added by `add_*`, and the file appears when the block succeeds.
 
@@ -141,19 +157,27 @@ class ReelWriter:
         entry = IndexEntry(ChunkKind.GROUP, _form(data), frame_count, track, tuple(depends_on), _layers(data, layers))
         return self._add(entry, payload)
 
-    def add_colors(self, payload: bytes | Stored, layers: Sequence[int], of: int, before: int | None = None) -> int:
-        """Add the colours of the vertices of a chunk, and return the number of theirs; `layers` as for `add_group`.
+    def add_companion(self, companion: Companion, depends_on: Sequence[int]) -> int:
+        """Add what belongs to a chunk, and return the number of its own.
 
-        `before` is the number of the colours that they are predicted from: those of the group before.
+        `depends_on` are the number of that chunk and those of what else it needs.
         """
-        data, entry = payload if isinstance(payload, bytes) else payload.read(), self._entries[of]
-        depends_on = (of,) if before is None else (of, before)
-        kind, form = ChunkKind.COLORS, _form(data)
-        return self._add(IndexEntry(kind, form, entry.frames, entry.track, depends_on, _layers(data, layers)), payload)
+        data, entry = companion.read(), self._entries[depends_on[0]]
+        place = (entry.frames, entry.track, tuple(depends_on))
+        layers = _layers(data, companion.layers)
+        return self._add(IndexEntry(companion.kind, _form(data), *place, layers), companion.payload)
 
-    def colors_of(self, number: int) -> int | None:
-        """Return the number of the chunk that has the colours of a chunk, or None."""
-        return self._checks.colors.get(number)
+    def companion_of(self, number: int | None, kind: ChunkKind) -> int | None:
+        """Return the number of the chunk of a kind that belongs to a chunk, or None."""
+        return None if number is None else self._checks.companions.get((number, kind))
+
+    def atlas_of(self, number: int, before: int | None) -> int:
+        """Return the number of the atlas of a group's pictures: its own, or that of the group before."""
+        own = self.companion_of(number, ChunkKind.ATLAS)
+        found = self._checks.atlas_of(before) if own is None and before is not None else own
+        if found is None:
+            raise InputError(f"pictures of chunk {number}, which has no atlas; add one first")
+        return found
 
     def _add(self, entry: IndexEntry, payload: bytes | Stored) -> int:
         pack(entry)  # refuses what does not fit its field

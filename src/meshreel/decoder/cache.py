@@ -97,8 +97,9 @@ def memory_of(meshes: Sequence[Mesh]) -> int:
 
 def read_only(mesh: Mesh) -> Mesh:
     """Return read-only views of a mesh that is cached and shares its faces with other frames and groups."""
-    arrays = [None if array is None else array.view() for array in (mesh.vertices, mesh.faces, mesh.colors)]
-    for array in arrays:
+    vertices, faces = mesh.vertices.view(), mesh.faces.view()
+    colors, uv = (None if array is None else array.view() for array in (mesh.colors, mesh.uv))
+    for array in (vertices, faces, colors, uv):
         if array is not None:
             array.flags.writeable = False
-    return Mesh(*arrays)  # type: ignore[arg-type]
+    return Mesh(vertices, faces, colors, uv, mesh.texture)

@@ -12,16 +12,17 @@ from dataclasses import replace
 import numpy as np
 
 from ..coding.background import decode_background, decode_change
-from ..coding.colored import canvas_of, decode_group_colors, paint_background
+from ..coding.colored import Canvas, canvas_of, decode_group_colors, paint_background
 from ..coding.group import continue_group, skip_group, write_vertices
 from ..coding.layers.coder import MOST_NUMBERS, LayersState
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError, InputError
 from ..format.budget import Chain, together
-from ..format.layout import Form
+from ..format.layout import ChunkKind, Form
 from ..shapes import Float, UInt8
 from ..types import Frames, Mesh, Placement
 from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
+from .pictures import TrackPictures
 
 MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes: the groups of one frame take no more memory than the largest legal group
 
@@ -32,12 +33,13 @@ class Track(Frames):
     def __init__(self, reader: ReelReader, number: int, layers: int | None = None, colored: bool = True) -> None:
         """Decode track `number` from at most `layers` layers of each group beyond its first; None: from all."""
         self.reader = reader
-        self._colored = colored and bool(reader.colors)
+        self._colored = colored and reader.is_colored
         self.number = number
         self.layers = layers
         self._place = placement(reader)
         self._group = NO_GROUP
         self._states = CachedStates({})
+        self._pictures = TrackPictures(reader)
         self._refusals = Refusals()  # of frames
         self._lost = Refusals()  # of states, which may be whole where frames of the same group are damaged
 
@@ -92,10 +94,7 @@ class Track(Frames):
         payload = self._read(chunk)
         with self._refusals.of(chunk):
             meshes, after = continue_group(payload, chunk.frame_count, self.layers, state, self._place)
-        counts = [len(mesh.vertices) for mesh in meshes]
-        if (colors := self._colors(chunk, payload, counts, state, after)) is not None:
-            meshes = [replace(mesh, colors=some) for mesh, some in zip(meshes, colors[0], strict=True)]
-            after = colors[1]
+        meshes, after = self._painted(chunk, payload, meshes, state, after)
         shown = {id(mesh): read_only(mesh) for mesh in meshes}  # the frames of an empty group are one mesh
         meshes = [shown[id(mesh)] for mesh in meshes]
         self._states = states.add(chunk.number, after, state, self._most)
@@ -116,29 +115,43 @@ class Track(Frames):
             payload = self._read(link)
             with self._lost.of(link):
                 after = skip_group(payload, link.frame_count, self.layers, state)
-            if after is not None:
-                colors = self._colors(link, payload, [after.count] * link.frame_count, state, after)
-                after = after if colors is None else colors[1]
+            after = self._state_with_colors(link, payload, state, after)
             states = states.add(link.number, after, state, self._most)
             state = after
         return state, states
 
+    def _painted(
+        self, chunk: Chunk, payload: bytes, meshes: list[Mesh], before: LayersState | None, after: LayersState | None
+    ) -> tuple[list[Mesh], LayersState | None]:
+        """Return the frames of a group with its colours, and the state that predicts the next with theirs."""
+        if not self._colored or self.reader.companion_of(chunk, ChunkKind.COLORS) is None:
+            return meshes, after
+        counts = [len(mesh.vertices) for mesh in meshes]
+        with self._refusals.of(chunk):
+            canvas = canvas_of(payload, counts, self.layers, before)
+        colors, after = self._colors(chunk, canvas, before, after)
+        meshes = [replace(mesh, colors=some) for mesh, some in zip(meshes, colors, strict=True)]
+        with self._refusals.of(chunk):
+            return self._pictures.textured(chunk, meshes, canvas), after
+
+    def _state_with_colors(
+        self, chunk: Chunk, payload: bytes, before: LayersState | None, after: LayersState | None
+    ) -> LayersState | None:
+        """Return a state with the colours that the next group may be predicted from; none is painted."""
+        if after is None or not self._colored or self.reader.companion_of(chunk, ChunkKind.COLORS) is None:
+            return after
+        canvas = canvas_of(payload, [after.count] * chunk.frame_count, self.layers, before)
+        return self._colors(chunk, canvas, before, after)[1]
+
     def _colors(
-        self,
-        chunk: Chunk,
-        payload: bytes,
-        counts: Sequence[int],
-        before: LayersState | None,
-        after: LayersState | None,
-    ) -> tuple[list[UInt8[np.ndarray, "V 3"]], LayersState | None] | None:
-        """Decode the colours of a group whose frames have so many vertices; None where it has none."""
-        of = self.reader.colors.get(chunk.number) if self._colored else None
-        if of is None:
-            return None
+        self, chunk: Chunk, canvas: Canvas, before: LayersState | None, after: LayersState | None
+    ) -> tuple[list[UInt8[np.ndarray, "V 3"]], LayersState | None]:
+        """Decode the colours of a group that has some."""
+        of = self.reader.companion_of(chunk, ChunkKind.COLORS)
+        assert of is not None
         some = None if self.layers is None or chunk.form != Form.LAYERS else self.layers + 1
         with self._refusals.of(of):
-            data = self.reader.read_chunk(of.number, some)
-            return decode_group_colors(data, canvas_of(payload, counts, self.layers, before), before, after)
+            return decode_group_colors(self.reader.read_chunk(of.number, some), canvas, before, after)
 
     @property
     def _most(self) -> int:
@@ -201,7 +214,7 @@ class Background:
 
     def _painted(self, chunk: Chunk, payload: bytes, mesh: Mesh) -> Mesh:
         """Return a state with its colours, where it has them: those of what a change adds come behind what is left."""
-        of = self.reader.colors.get(chunk.number) if self._colored else None
+        of = self.reader.companion_of(chunk, ChunkKind.COLORS) if self._colored else None
         if of is None:
             return mesh
         with self._refusals.of(of):

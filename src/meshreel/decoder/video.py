@@ -209,7 +209,7 @@ class Video(Sequence[Mesh]):
             "tracks": _counted(len(self.tracks), "track"),
             "background": "with background" if self.reader.has_background else "no background",
         }
-        facts |= {"color": "in colour"} if self.reader.colors and self._colored else {}
+        facts |= {"color": "in colour"} if self.reader.is_colored and self._colored else {}
         return facts if self.layers is None else facts | {"layers": f"at most {_counted(self.layers, 'layer')}"}
 
     def _frame(self, index: int) -> int:

@@ -1,7 +1,8 @@
-"""Colours of what is coded: of the vertices of groups, after their geometry, and of the states of a background.
+"""Colours of what is coded, after its geometry: of the vertices of each group, and the textures of a chain of groups.
 
-In: groups as they are coded, the frames that they are of. Out: the same with the payloads of their colours. Where no
-frame has colours, nothing is done.
+In: groups as they are coded, the frames that they are of. Out: the same with what belongs to them. Where no frame has
+colours, nothing is done. A chain is a group that needs no other, and those that are predicted from it one after the
+other: they have one atlas, in which the surface hardly changes, and their pictures are one video.
 """
 
 from __future__ import annotations
@@ -11,53 +12,121 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..analysis.appearance.lookup import Painted
+from ..analysis.appearance.bake import bake, picture, texels_of
+from ..analysis.appearance.unwrap import unwrap
 from ..analysis.appearance.vertices import vertex_colors
-from ..coding.colored import canvas_of, encode_group_colors
+from ..coding.appearance.atlas import encode_atlas
+from ..coding.appearance.pictures import VideoEncoder, encode_pictures, to_i420
+from ..coding.colored import Canvas, canvas_of, encode_group_colors, finest_faces
 from ..coding.group import continue_group
 from ..coding.layers.coder import LayersState
+from ..container.writer import Companion
 from ..format.budget import CostlyError
+from ..format.layout import ChunkKind, Form
+from ..geometry.painted import Painted
 from ..types import GREY, Frames, Mesh
 from .forms import EncodedGroup
-from .options import AppearanceOptions
-
-STILL_FRAMES = 16  # in which a background is looked at, at most (guess)
-NEAR = 3.0  # times the noise, within which a frame shows a place of the background (guess)
-LEAST_NEAR = 0.01  # m, the same at least (guess)
+from .options import AppearanceOptions, TextureOptions
 
 
 def colored_groups(
     groups: Iterable[EncodedGroup], frames: Frames, options: AppearanceOptions | None
 ) -> Iterator[EncodedGroup]:
     """Yield the groups of an interval with the colours of their frames."""
-    at, state = 0, None
+    if options is None:
+        yield from groups
+        return
+    at, state, chain = 0, None, _Chain()
     for group in groups:
-        numbers = range(at, at + group.frame_count)
-        at = numbers.stop
-        if options is not None:
-            some = [frames[number] for number in numbers]
-            if any(mesh.is_colored for mesh in some):
-                group, state = _colored(group, some, options, state if group.predicted else None)
-        yield group
+        some = [frames[number] for number in range(at, at + group.frame_count)]
+        at += group.frame_count
+        if not group.predicted:
+            yield from chain.done()
+            state, chain = None, _Chain()
+        if any(mesh.is_colored for mesh in some):
+            state = chain.add(group, some, options, state)
+        else:
+            chain.pass_on(group)
+    yield from chain.done()
 
 
-def _colored(
-    group: EncodedGroup, frames: list[Mesh], options: AppearanceOptions, before: LayersState | None
-) -> tuple[EncodedGroup, LayersState | None]:
-    """Return a group with its colours, and the state from which those of the next group may be predicted."""
-    meshes, after = continue_group(group.payload, len(frames), None, before)
-    canvas = canvas_of(group.payload, [len(mesh.vertices) for mesh in meshes], None, before)
-    colors = [_vertex_colors(frame, mesh) for frame, mesh in zip(frames, meshes, strict=True)]
-    known = None if before is None else before.colors
-    try:
-        encoded = encode_group_colors(canvas, colors, options.colors, known)
-    except CostlyError:  # the summary tells of a group without colours
-        return group, after
-    after = None if after is None else replace(after, colors=encoded.state)
-    return replace(group, colors=encoded.payload, color_layers=encoded.layers), after
+class _Chain:
+    """Groups of one chain, and the video of their pictures."""
+
+    def __init__(self) -> None:
+        self._groups = list[EncodedGroup]()
+        self._pictured = list[bool]()  # whether each of the groups has pictures
+        self._packets = list[bytes]()
+        self._video: _Video | None = None
+
+    def pass_on(self, group: EncodedGroup) -> None:
+        """Add a group without colours."""
+        self._groups.append(group)
+        self._pictured.append(False)
+
+    def add(
+        self, group: EncodedGroup, frames: list[Mesh], options: AppearanceOptions, before: LayersState | None
+    ) -> LayersState | None:
+        """Add a group with the colours of its frames; return the state that those of the next are predicted from."""
+        meshes, after = continue_group(group.payload, len(frames), None, before)
+        canvas = canvas_of(group.payload, [len(mesh.vertices) for mesh in meshes], None, before)
+        painted = [None if mesh.is_empty or not mesh.is_colored else Painted(mesh) for mesh in frames]
+        colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(painted, meshes, strict=True)]
+        try:
+            encoded = encode_group_colors(canvas, colors, options.colors, None if before is None else before.colors)
+        except CostlyError:  # the summary tells of a group without colours
+            self.pass_on(group)
+            return after
+        companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
+        texture = options.texture if not self._groups and group.form == Form.LAYERS else None
+        if texture is not None and (texture.always or any(mesh.texture is not None for mesh in frames)):
+            self._video = _Video(canvas, texture)
+            companions.append(Companion(ChunkKind.ATLAS, self._video.atlas))
+        if self._video is not None:
+            for paint, mesh in zip(painted, meshes, strict=True):
+                self._packets += self._video.add(paint, mesh)
+        self._groups.append(replace(group, companions=tuple(companions)))
+        self._pictured.append(self._video is not None)
+        return None if after is None else replace(after, colors=encoded.state)
+
+    def done(self) -> list[EncodedGroup]:
+        """Return the groups with their pictures."""
+        packets = self._packets + ([] if self._video is None else self._video.finish())
+        found, at = list[EncodedGroup](), 0
+        for group, pictured in zip(self._groups, self._pictured, strict=True):
+            if pictured:
+                own = Companion(ChunkKind.PICTURES, encode_pictures(packets[at : at + group.frame_count]))
+                at += group.frame_count
+                group = replace(group, companions=(*group.companions, own))
+            found.append(group)
+        return found
 
 
-def _vertex_colors(frame: Mesh, mesh: Mesh) -> np.ndarray:
-    if frame.is_empty or mesh.is_empty or not frame.is_colored:
+class _Video:
+    """The atlas of a chain, and the video of its pictures."""
+
+    def __init__(self, canvas: Canvas, options: TextureOptions) -> None:
+        template = canvas.meshes[0]
+        layout = unwrap(template.base, options.size)
+        self.atlas = encode_atlas(template.base, layout)
+        self._texels, self._count = texels_of(layout, template.levels), template.vertices
+        self._faces = finest_faces(template.base, template.levels)
+        self._encoder = VideoEncoder(layout.width, layout.height, options.video)
+
+    def add(self, painted: Painted | None, mesh: Mesh) -> list[bytes]:
+        """Add the picture of a frame, whose mesh begins with the template; return packets that are done."""
+        texels = self._texels
+        colors = np.full((len(texels.pixels), 3), GREY, np.uint8)
+        if painted is not None:
+            colors = bake(painted, Mesh(mesh.vertices[: self._count], self._faces), texels)
+        return self._encoder.add(to_i420(picture(texels, colors)))
+
+    def finish(self) -> list[bytes]:
+        """Return the packets that were not done."""
+        return self._encoder.finish()
+
+
+def _vertex_colors(painted: Painted | None, mesh: Mesh) -> np.ndarray:
+    if painted is None or mesh.is_empty:
         return np.full(mesh.vertices.shape, GREY, np.uint8)
-    return vertex_colors(Painted(frame), mesh)
+    return vertex_colors(painted, mesh)

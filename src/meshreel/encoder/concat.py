@@ -16,8 +16,9 @@ from pathlib import Path
 
 from ..container.reader import ReelReader
 from ..container.sources import FileSource, StreamSource
-from ..container.writer import ReelWriter
+from ..container.writer import Companion, ReelWriter
 from ..errors import FormatError, InputError
+from ..format.checks import COMPANIONS
 from ..format.layout import ChunkKind, Header
 from ..io.differences import first_difference
 from ..io.read import read_file
@@ -112,7 +113,7 @@ def _add(writer: ReelWriter, path: Place) -> None:
         reader, first_frame = _opened(source, path), writer.frame_count
         base = writer.chunk_count
         for chunk in reader.chunks:
-            if chunk.kind not in (ChunkKind.GROUP, ChunkKind.COLORS):
+            if chunk.kind != ChunkKind.GROUP and chunk.kind not in COMPANIONS:
                 raise InputError(f"{path}: {chunk} is of a kind that this version cannot join; update meshreel")
             try:
                 payload = reader.read_chunk(chunk.number)
@@ -120,8 +121,8 @@ def _add(writer: ReelWriter, path: Place) -> None:
                 raise FormatError(f"{path}: {error}") from error
             ends = tuple(accumulate(layer.size for layer in chunk.layers))
             depends_on = [base + number for number in chunk.depends_on]
-            if chunk.kind == ChunkKind.COLORS:
-                writer.add_colors(payload, ends, *depends_on)
+            if chunk.kind in COMPANIONS:
+                writer.add_companion(Companion(ChunkKind(chunk.kind), payload, ends), depends_on)
                 continue
             first = first_frame + chunk.first_frame
             writer.add_group(first, chunk.frame_count, payload, ends, depends_on, chunk.track)

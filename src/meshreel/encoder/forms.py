@@ -16,7 +16,7 @@ from ..coding.intra import encode_empty
 from ..coding.paper.displacements import DisplacementOptions
 from ..coding.paper.group import encode_laplacian
 from ..coding.reference_mesh import CodedReference
-from ..container.writer import Stored
+from ..container.writer import Companion, Stored
 from ..errors import InputError
 from ..format.budget import CostlyError
 from ..format.layout import Form
@@ -41,12 +41,9 @@ class EncodedGroup:
     fidelity: Fidelity
     predicted: bool = False  # from the group before
     key: int | None = None  # the frame, counted in the group, whose surface the others follow
-    colors: bytes = field(default=b"", kw_only=True)  # payload of the colours of its vertices; none: it has none
-    color_layers: tuple[int, ...] = field(default=(), kw_only=True)  # where each layer of that payload ends
+    companions: tuple[Companion, ...] = field(default=(), kw_only=True)  # its colours, an atlas, pictures
     digests: tuple[str, ...] = field(default=(), kw_only=True)  # lines of `--debug-digests`
-    # Where the payloads are, in place of `payload` and `colors`, of a group that a journal has.
-    stored: Stored | None = None
-    stored_colors: Stored | None = field(default=None, kw_only=True)
+    stored: Stored | None = None  # where the payload is, in place of `payload`, of a group that a journal has
     work: Work = field(default_factory=dict, kw_only=True)  # that another process did until this group was done
 
 

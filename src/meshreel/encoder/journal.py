@@ -19,9 +19,9 @@ from types import TracebackType
 from typing import Any, BinaryIO
 
 from .. import __version__
-from ..container.writer import Stored
+from ..container.writer import Companion, Stored
 from ..errors import InputError
-from ..format.layout import Form
+from ..format.layout import ChunkKind, Form
 from ..geometry.derived_sequences import Unchanging
 from ..io.differences import first_difference
 from ..io.remote import Place, located, uploaded
@@ -116,7 +116,8 @@ class Journal:
     def keep(self, interval: Interval, groups: Sequence[EncodedGroup]) -> list[EncodedGroup]:
         """Store the groups of an interval; return them with payloads that are read when they are needed."""
         head = {"interval": _place(interval), "groups": [_packed(group) for group in groups]}
-        offset = self._append(head, b"".join(group.payload + group.colors for group in groups))
+        parts = [part for group in groups for part in (group.payload, *(one.read() for one in group.companions))]
+        offset = self._append(head, b"".join(parts))
         self._done += 1
         return self._groups(interval, head, offset)
 
@@ -193,13 +194,16 @@ class Journal:
         """Return the groups that a record tells of. Raises InputError where no encoder wrote it."""
         found = []
         try:
-            for form, count, size, layers, predicted, key, fidelity, color_size, color_layers in head["groups"]:
+            for form, count, size, layers, predicted, key, fidelity, companions in head["groups"]:
                 stored = Stored(self._file, offset, int(size))
-                colors = Stored(self._file, offset + stored.size, int(color_size)) if color_size else None
-                error, ends, more = Fidelity(*fidelity), tuple(layers), tuple(color_layers)
-                group = EncodedGroup(Form(form), count, b"", ends, error, predicted, key, stored)
-                found.append(replace(group, stored_colors=colors, color_layers=more))
-                offset += stored.size + int(color_size)
+                offset += stored.size
+                others = list[Companion]()
+                for kind, length, ends in companions:
+                    others.append(Companion(ChunkKind(kind), Stored(self._file, offset, int(length)), tuple(ends)))
+                    offset += int(length)
+                error = Fidelity(*fidelity)
+                group = EncodedGroup(Form(form), count, b"", tuple(layers), error, predicted, key, stored)
+                found.append(replace(group, companions=tuple(others)))
         except (KeyError, TypeError, ValueError) as error:
             text = f"{self.path}: {_named(interval)} cannot be read ({error})"
             raise InputError(f"{text}; start over with --no-resume (resume=False)") from None
@@ -260,5 +264,6 @@ def _packed(group: EncodedGroup) -> list[Any]:
     """Return a group without its payload, for JSON."""
     layers, key = [int(end) for end in group.layers], None if group.key is None else int(group.key)
     fidelity = [float(value) for value in astuple(group.fidelity)]
-    of_geometry = [int(group.form), int(group.frame_count), len(group.payload), layers, bool(group.predicted), key]
-    return [*of_geometry, fidelity, len(group.colors), [int(end) for end in group.color_layers]]
+    others = [[int(one.kind), len(one), [int(end) for end in one.layers]] for one in group.companions]
+    geometry = [int(group.form), int(group.frame_count), len(group.payload), layers, bool(group.predicted), key]
+    return [*geometry, fidelity, others]

@@ -19,6 +19,7 @@ from ..analysis.scene.background import BackgroundOptions
 from ..analysis.scene.bodies import BodyOptions
 from ..analysis.scene.segmentation import SegmentOptions
 from ..coding.appearance.colors import ColorCodingOptions
+from ..coding.appearance.pictures import VideoOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
@@ -29,6 +30,7 @@ from .target import Fidelity
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
 MOST_SECONDS = 600  # of a key interval: viewers who join late decode that much before the first picture (guess)
 STEP = LayerCodingOptions().step
+TEXTURE_SIZES = (256, 512, 1024, 2048)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,10 +93,24 @@ class SceneOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class TextureOptions:
+    """Options of textures, which need the extra `color`."""
+
+    size: int = 1024  # width of a texture, and its height at most, texels
+    video: VideoOptions = VideoOptions()
+    always: bool = False  # also where frames have colours of their vertices only
+
+    def __post_init__(self) -> None:
+        if self.size not in TEXTURE_SIZES:
+            raise InputError(f"texture {self.size}: give {', '.join(map(str, TEXTURE_SIZES))} texels")
+
+
+@dataclass(frozen=True, slots=True)
 class AppearanceOptions:
     """Options of what surfaces look like; a sequence without colours has none."""
 
-    colors: ColorCodingOptions = ColorCodingOptions()  # of the vertices
+    colors: ColorCodingOptions = ColorCodingOptions()  # of the vertices, which every coloured group has
+    texture: TextureOptions | None = TextureOptions()  # None: no textures
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,11 +14,12 @@ from ..analysis.follow.template import TemplateOptions
 from ..analysis.reference.extraction import ReferenceOptions
 from ..analysis.reference.track import TrackOptions
 from ..coding.appearance.colors import ColorCodingOptions
+from ..coding.appearance.pictures import VideoOptions
 from ..coding.layers.coder import LayerCodingOptions
 from ..coding.paper.displacements import DisplacementOptions
 from ..errors import InputError
 from ..geometry.strict import rounded
-from .options import AppearanceOptions, EncoderOptions, LayersOptions, PaperOptions
+from .options import AppearanceOptions, EncoderOptions, LayersOptions, PaperOptions, TextureOptions
 from .target import Fidelity
 
 PRESETS = ("best", "paper")
@@ -60,7 +61,7 @@ def preset_options(
     )
     if group_size is not None:
         method = replace(method, group_size=group_size)
-    appearance = AppearanceOptions(ColorCodingOptions(step=color_step(float(quality))))
+    appearance = appearance_options(float(quality))
     options = EncoderOptions(method, appearance=appearance, quality=float(quality))
     return options if key_interval is None else replace(options, key_interval=key_interval)
 
@@ -115,6 +116,17 @@ def _thorough(options: LayersOptions) -> LayersOptions:
 def motion_step(quality: float) -> float:
     """Quantiser step of the base's motion as a fraction of the diagonal: .0018 at 50, halved every 25 points."""
     return rounded(0.0018 * 2 ** ((50 - quality) / 25))
+
+
+def appearance_options(quality: float = 50.0) -> AppearanceOptions:
+    """Return the options of colours at a quality."""
+    video = VideoOptions(crf=rate_factor(quality))
+    return AppearanceOptions(ColorCodingOptions(step=color_step(quality)), TextureOptions(video=video))
+
+
+def rate_factor(quality: float) -> int:
+    """Constant rate factor of textures' video: 42 at 50, 54 at 20, 30 at 80."""
+    return round(62 - 0.4 * quality)
 
 
 def color_step(quality: float) -> float:

@@ -129,7 +129,7 @@ def encode_interval(
     else:
         groups = iter(paper.encode_interval(interval, options, stages, find))
     for group in colored_groups(groups, interval.frames, appearance):
-        note(interval.digests, "payload", group.form.name, group.payload, group.colors)
+        note(interval.digests, "payload", group.form.name, group.payload, *(one.read() for one in group.companions))
         yield group if interval.digests is None else replace(group, digests=interval.digests.take())
 
 

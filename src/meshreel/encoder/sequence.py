@@ -24,10 +24,10 @@ from ..analysis.scene.probe import is_scene
 from ..analysis.scene.segmentation import SegmentOptions
 from ..analysis.survey import Survey
 from ..coding.background import decode_background
-from ..container.writer import ReelWriter
+from ..container.writer import Companion, ReelWriter
 from ..decoder.video import open as open_video
 from ..errors import InputError
-from ..format.layout import Form, Header
+from ..format.layout import ChunkKind, Form, Header
 from ..geometry.closest_points import distances
 from ..geometry.derived_sequences import Unchanging, Welded, captured
 from ..geometry.topology import drop_unreferenced
@@ -222,10 +222,7 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
         writer.header = make_header(sequence.frame_rate, seen, metadata | upright(sequence.up))
     measured = evenly(len(sequence), MEASURED)
     psnr = _measured(sequence, file, seen.diagonal, measured)
-    size, tracks = (
-        sum(len(state.payload) + len(state.colors) for state in states),
-        1 + max(group.track for group in groups),
-    )
+    size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
@@ -252,8 +249,8 @@ def _added_in_order(
         while waiting and waiting[0].frame <= each.first_frame:
             state = waiting.popleft()
             static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
-            if state.colors:
-                writer.add_colors(state.colors, (), static[0])
+            for companion in state.companions:
+                writer.add_companion(companion, static)
         with_static = each.track == 0 and not seen.is_bare(each.first_frame)
         groups.append(_added(writer, each, static if with_static else [], seen.unit))
     return groups
@@ -264,13 +261,30 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     group, track, last = each.group, each.track, writer.last_of(each.track)
     before, payload = [last] if group.predicted and last is not None else [], group.stored or group.payload
     number = writer.add_group(each.first_frame, group.frame_count, payload, group.layers, (*static, *before), track)
-    colors = group.stored_colors or group.colors
-    if colors:
-        writer.add_colors(colors, group.color_layers, number, writer.colors_of(before[0]) if before else None)
+    _add_companions(writer, number, group.companions, before[0] if before else None)
     key = None if group.key is None else each.first_frame + group.key
     fidelity = group.fidelity.scaled(unit)
     size, share = len(payload), each.share
-    return GroupSummary(group.form, group.frame_count, size, fidelity, group.predicted, key, track, share, len(colors))
+    return GroupSummary(
+        group.form,
+        group.frame_count,
+        size,
+        fidelity,
+        group.predicted,
+        key,
+        track,
+        share,
+        sum(map(len, group.companions)),
+    )
+
+
+def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:
+    """Write what belongs to a group, which may be predicted from what belongs to the group before."""
+    for companion in companions:
+        depends_on, last = [of], writer.companion_of(before, companion.kind)
+        if companion.kind == ChunkKind.PICTURES:
+            depends_on.append(writer.atlas_of(of, before))
+        writer.add_companion(companion, depends_on if last is None else [*depends_on, last])
 
 
 def _measured(sequence: MeshSequence, file: BinaryIO, diagonal: float, numbers: Sequence[int]) -> float:

@@ -15,7 +15,9 @@ from ..analysis.scene.background import BackgroundOptions
 from ..analysis.survey import Survey
 from ..coding.background import changed, decode_background, decode_change, encode_background, encode_change
 from ..coding.colored import background_canvas, encode_group_colors
+from ..container.writer import Companion
 from ..format.budget import Chain, CostlyError
+from ..format.layout import ChunkKind
 from ..geometry.closest_points import distances
 from ..geometry.decimate import decimate_faces
 from ..geometry.topology import clean
@@ -38,7 +40,10 @@ class Static:
     frame: int
     payload: bytes
     is_patch: bool
-    colors: bytes = b""  # payload of the colours of its vertices, or of those that the patch adds; none: it has none
+    companions: tuple[Companion, ...] = ()  # the colours of its vertices, or of those that the patch adds
+
+    def __len__(self) -> int:
+        return len(self.payload) + sum(map(len, self.companions))
 
 
 def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:
@@ -128,7 +133,7 @@ def colored_states(
         far = max(NEAR * parts.noise, LEAST_NEAR)
         colors = background_colors(shown, (_still(sequence[number], parts, number) for number in numbers), far)
         encoded = encode_group_colors(canvas, [colors], options.colors, None)
-        found.append(replace(state, colors=encoded.payload))
+        found.append(replace(state, companions=(Companion(ChunkKind.COLORS, encoded.payload),)))
     return found
 
 

@@ -12,6 +12,12 @@ from .layout import ChunkKind, Form, Header, Index, IndexEntry
 LARGEST = 1e15  # of the numbers in a header: keeps everything computed from them finite (guess)
 SMALLEST = 1e-15  # of a rate or scale (guess)
 MOST_TRACKS = 256  # a frame needs a group of each track (guess)
+# What belongs to a group or a background, and the form that it has.
+COMPANIONS = {
+    ChunkKind.COLORS: Form.VERTEX_COLORS,
+    ChunkKind.ATLAS: Form.PLACES,
+    ChunkKind.PICTURES: Form.VIDEO,
+}
 GROUP_FORMS = (Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY)
 MOST_CHANGES = 255  # patches on one background: random access decodes all of them (guess)
 
@@ -44,7 +50,9 @@ class IndexChecks:
         self._place = (0, -1)  # first frame and track of the newest group
         # Of each STATIC and GROUP: its frames, its track, and the group that it is predicted from.
         self._whole: dict[int, tuple[int, int, int | None]] = {}
-        self.colors: dict[int, int] = {}  # for each chunk with colours, the number of their chunk
+        # By coded chunk and kind, the number of the chunk that has its colours, its atlas or its pictures.
+        self.companions: dict[tuple[int, int], int] = {}
+        self._atlases: dict[int, int] = {}  # of each group with pictures, the number of its atlas
         self._count = 0
 
     def add(self, entry: IndexEntry) -> int:
@@ -66,10 +74,14 @@ class IndexChecks:
             self._add_group(entry)
             before = next((other for other in entry.depends_on if other not in self._changes), None)
             self._whole[number] = (entry.frames, entry.track, before)
-        elif entry.kind == ChunkKind.COLORS:
-            self._add_colors(entry)
+        elif entry.kind in COMPANIONS:
+            self._add_companion(entry)
         self._count += 1
         return number
+
+    def atlas_of(self, group: int) -> int | None:
+        """Return the number of the atlas that a group's pictures are of."""
+        return self._atlases.get(group)
 
     def finish(self) -> None:
         """Raise FormatError if there are no frames, or if a track has another number of frames than the first."""
@@ -97,17 +109,33 @@ class IndexChecks:
             raise FormatError(f"chunk {number}: patch {MOST_CHANGES + 1} of one background, at most {MOST_CHANGES}")
         return self._changes[before] + 1
 
-    def _add_colors(self, entry: IndexEntry) -> None:
-        number, of = self._count, next(iter(entry.depends_on), -1)
-        if of not in self._whole or of in self.colors:
-            raise FormatError(f"chunk {number}: colours of {of}, which is no chunk before them, or has others")
+    def _add_companion(self, entry: IndexEntry) -> None:
+        """Add what belongs to a chunk before it, which it names first; what else it needs follows from its kind."""
+        number, kind, of = self._count, ChunkKind(entry.kind), next(iter(entry.depends_on), -1)
+        if of not in self._whole or (of, kind) in self.companions:
+            raise FormatError(f"chunk {number}: {kind.name} of {of}, which is no chunk before it, or has others")
         frames, track, before = self._whole[of]
-        if entry.form != Form.VERTEX_COLORS or (entry.frames, entry.track) != (frames, track):
-            text = f"{entry.frames} frames of form {entry.form} and track {entry.track}"
-            raise FormatError(f"chunk {number}: colours of {text}, which are not those of chunk {of}")
-        if entry.depends_on[1:] and (before is None or entry.depends_on[1:] != (self.colors.get(before),)):
-            raise FormatError(f"chunk {number}: colours that depend on {entry.depends_on[1:]}, not on those before")
-        self.colors[of] = number
+        if entry.form != COMPANIONS[kind] or (entry.frames, entry.track) != (frames, track):
+            text = f"{kind.name} of {entry.frames} frames, form {entry.form} and track {entry.track}"
+            raise FormatError(f"chunk {number}: {text}, which are not those of chunk {of}")
+        if entry.depends_on[1:] not in self._needed(kind, of, before):
+            raise FormatError(f"chunk {number}: {kind.name} of {of} that depend on {entry.depends_on[1:]}")
+        self.companions[of, kind] = number
+        if kind == ChunkKind.PICTURES:
+            self._atlases[of] = entry.depends_on[1]
+
+    def _needed(self, kind: ChunkKind, of: int, before: int | None) -> tuple[tuple[int, ...], ...]:
+        """Return what a companion may depend on, beside the chunk that it is of and which `before` predicts."""
+        if kind == ChunkKind.COLORS:
+            known = None if before is None else self.companions.get((before, kind))
+            return ((),) if known is None else ((), (known,))
+        if kind == ChunkKind.ATLAS:
+            return ((),) if self._whole[of][0] and before is None else ()
+        own = self.companions.get((of, ChunkKind.ATLAS))
+        if own is not None:
+            return ((own,),)
+        last = None if before is None else self.companions.get((before, kind))
+        return () if last is None or before is None else ((self._atlases[before], last),)
 
     def _add_group(self, entry: IndexEntry) -> None:
         number, track = self._count, entry.track

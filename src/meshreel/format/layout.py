@@ -24,6 +24,8 @@ class ChunkKind(IntEnum):
     STATIC = 1  # a state of the background; groups refer to it
     GROUP = 2  # a group of consecutive frames of one track
     COLORS = 3  # the colours of the vertices of another chunk
+    ATLAS = 4  # where the faces of a group, and of those predicted from it, are in a texture
+    PICTURES = 5  # the textures of a group's frames
 
 
 class Form(IntEnum):
@@ -35,6 +37,8 @@ class Form(IntEnum):
     EMPTY = 4  # frames without a surface
     PATCH = 5  # a background: another background without some faces, plus a Draco mesh
     VERTEX_COLORS = 6  # colours of vertices, as fields over their connectivity
+    PLACES = 7  # places of corners in a texture
+    VIDEO = 8  # one picture a frame, of a video
 
 
 class AnchorRule(IntEnum):
@@ -99,7 +103,9 @@ class IndexEntry:
         "numbers of the earlier chunks that it needs: "
         "for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; "
         "for a STATIC of form PATCH, the STATIC chunk that it changes; "
-        "for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before",
+        "for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; "
+        "for ATLAS, the GROUP whose base mesh it is of; "
+        "for PICTURES, the GROUP, the ATLAS, and but for the first of this, the PICTURES of the group before",
     ]
     layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]
 
@@ -251,6 +257,36 @@ class ColorsLevel:
     values: Annotated[CodedField, Nested(CodedField), "differences from the means of the ends of their edges"]
 
 
+class VideoCodec(IntEnum):
+    """Coding of pictures."""
+
+    AV1 = 1  # a temporal unit a picture, of the low-overhead format
+
+
+@dataclass(frozen=True, slots=True)
+class Atlas:
+    """The payload of a chunk of form PLACES: of each corner of the base mesh's faces, its place in the texture."""
+
+    form: Annotated[Form, Choice(U8, Form), "PLACES"]
+    width: Annotated[int, U16, "of the texture, texels, even, above 0"]
+    height: Annotated[int, U16, "of the texture, texels, even, above 0"]
+    join_count: Annotated[int, Varint(), "number of integers in `joins`"]
+    start_count: Annotated[int, Varint(), "number of integers in `starts`"]
+    rest_count: Annotated[int, Varint(), "number of integers in `rests`"]
+    joins: Annotated[bytes, Blob(Varint()), "integers: whether faces share the places of an edge, or of a corner"]
+    starts: Annotated[bytes, Blob(Varint()), "integers: places of the faces that share none with one before"]
+    rests: Annotated[bytes, Blob(Varint()), "integers: differences of places from where shapes predict them"]
+
+
+@dataclass(frozen=True, slots=True)
+class Pictures:
+    """The payload of a chunk of form VIDEO: the textures of a group's frames."""
+
+    form: Annotated[Form, Choice(U8, Form), "VIDEO"]
+    codec: Annotated[VideoCodec, Choice(U8, VideoCodec), "coding of the pictures"]
+    packets: Annotated[tuple[bytes, ...], List(U16, Blob(Varint())), "one a frame, in their order"]
+
+
 @dataclass(frozen=True, slots=True)
 class EmptyGroup:
     """The payload of a group of form EMPTY."""
@@ -272,4 +308,6 @@ PAYLOADS = (
     StaticPatch,
     VertexColors,
     ColorsLevel,
+    Atlas,
+    Pictures,
 )

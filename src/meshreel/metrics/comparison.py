@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..types import Mesh
+from .color import color_errors
 from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
 from .render import Looked, Visible
 from .ssim import ssim_normals
@@ -34,8 +35,8 @@ from .viewpoints import (
 
 Row = dict[str, Any]
 Cameras = Sequence[PinholeCamera] | Sequence[OrthographicCamera]
-_LARGER_IS_BETTER = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "ssim", "ssim_masked")
-_PSNRS = _LARGER_IS_BETTER[:4]
+_PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "y_psnr", "u_psnr", "v_psnr", "yuv_psnr")
+_LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked")
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +114,9 @@ def compare_sequences(
 def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras, seen: Callable[[Mesh], Looked] = Visible) -> Row:
     """Return the metrics of one frame by name; SSIM only with cameras."""
     row = _distance_row(surface_errors(original, decoded))
+    if original.is_colored:
+        colors = color_errors(original, decoded)
+        row |= {"y_psnr": colors.y, "u_psnr": colors.u, "v_psnr": colors.v, "yuv_psnr": colors.yuv}
     if cameras:
         ssim = ssim_normals(original, decoded, cameras, seen)
         row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}

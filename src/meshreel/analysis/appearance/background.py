@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import UInt8
 
 from ...geometry.closest_points import Surface
+from ...geometry.painted import Painted
 from ...types import GREY, Mesh
-from .lookup import Painted
 
 
 def background_colors(mesh: Mesh, frames: Iterable[Mesh], far: float) -> UInt8[np.ndarray, "V 3"]:

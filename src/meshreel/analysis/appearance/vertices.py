@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, UInt8
 
+from ...geometry.painted import Painted
 from ...geometry.topology import face_normals
 from ...types import GREY, Mesh
-from .lookup import Painted
 
 # Where each face is looked at: its middle, and on the way from there to each corner. Vertices alone would alias.
 PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float32, Float64, Int32, UInt8
 
-from ...geometry.closest_points import Surface
-from ...geometry.topology import blend
-from ...types import GREY, Mesh
+from ..types import GREY, Mesh
+from .closest_points import Surface
+from .topology import blend
 
 
 class Painted:
@@ -21,11 +21,9 @@ class Painted:
         self._mesh, self._surface = mesh, surface or Surface(mesh)
         self._pixels = None if mesh.uv is None or mesh.texture is None else mesh.texture.pixels
 
-    def at(
-        self, points: Float64[np.ndarray, "N 3"], guesses: Int32[np.ndarray, " N"] | None = None
-    ) -> Float64[np.ndarray, "N 3"]:
-        """Return the colours at the closest points; `guesses` are faces that may be near: they save time."""
-        hits = self._surface.closest(points, guesses)
+    def at(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
+        """Return the colours at the points of the mesh that are closest to places."""
+        hits = self._surface.closest(points)
         return self.on(hits.faces, hits.barycentric)
 
     def on(self, faces: Int32[np.ndarray, " N"], barycentric: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:

@@ -1,0 +1,117 @@
+"""Bake pictures: the colours that a painted surface has at the texels of an atlas, and colours between its charts.
+
+In: an atlas, the mesh that it is of in a frame, and a painted surface. Out: a picture without empty texels, so that a
+video of such pictures has no edges that the surface has not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float64, Int32, Int64, UInt8
+
+from ...coding.appearance.atlas import Layout
+from ...geometry.painted import Painted
+from ...geometry.topology import blend
+from ...types import GREY, Mesh
+
+
+@dataclass(frozen=True, slots=True)
+class Texels:
+    """The texels of an atlas whose middles are on the mesh, and where they are on it."""
+
+    height: int
+    width: int
+    pixels: Int64[np.ndarray, " N"]  # number of each in the picture, row after row
+    faces: Int32[np.ndarray, " N"]  # of the mesh after its subdivisions
+    barycentric: Float64[np.ndarray, "N 3"]  # weights of the face's three corners
+
+    def places(self, mesh: Mesh) -> Float64[np.ndarray, "N 3"]:
+        """Return where the texels are in space on a mesh with these faces."""
+        return blend(mesh.vertices, mesh.faces[self.faces], self.barycentric)
+
+
+def texels_of(layout: Layout, levels: int) -> Texels:
+    """Find the texels of an atlas on a base mesh that is subdivided `levels` times."""
+    pixels, faces, weights = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
+    corners = layout.places.astype(np.float64)
+    low = np.clip(np.ceil(corners.min(axis=1) - 0.5), 0, None).astype(np.int64)
+    high = np.floor(corners.max(axis=1) - 0.5).astype(np.int64)
+    for face, ((a, b, c), (x0, y0), (x1, y1)) in enumerate(zip(corners, low, high, strict=True)):
+        area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        if area == 0 or x1 < x0 or y1 < y0:
+            continue
+        x, y = np.meshgrid(np.arange(x0, x1 + 1) + 0.5, np.arange(y0, y1 + 1) + 0.5)
+        v = ((x - a[0]) * (c[1] - a[1]) - (y - a[1]) * (c[0] - a[0])) / area
+        w = ((b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])) / area
+        inside = (v >= 0) & (w >= 0) & (v + w <= 1)
+        pixels.append((y[inside].astype(np.int64)) * layout.width + x[inside].astype(np.int64))
+        faces.append(np.full(int(inside.sum()), face))
+        weights.append(np.stack([1 - v[inside] - w[inside], v[inside], w[inside]], axis=1))
+    known, first = np.unique(np.concatenate([np.zeros(0, np.int64), *pixels]), return_index=True)
+    found = np.concatenate([np.zeros(0, np.int64), *faces])[first]
+    finer, barycentric = _finer(found, np.concatenate([np.zeros((0, 3)), *weights])[first], levels)
+    return Texels(layout.height, layout.width, known, finer.astype(np.int32), barycentric)
+
+
+def _finer(
+    faces: Int64[np.ndarray, " N"], weights: Float64[np.ndarray, "N 3"], levels: int
+) -> tuple[Int64[np.ndarray, " N"], Float64[np.ndarray, "N 3"]]:
+    """Return places on faces as places on those that `levels` midpoint subdivisions make of them."""
+    for _ in range(levels):
+        largest = weights.argmax(axis=1)
+        at_corner = weights[np.arange(len(weights)), largest] >= 0.5
+        finer = 2 * weights
+        rows = np.flatnonzero(at_corner)
+        finer[rows, largest[rows]] -= 1  # (a, ab, ca), (ab, b, bc), (ca, bc, c)
+        inner = ~at_corner
+        a, b, c = weights[inner].T
+        finer[inner] = np.stack([1 - 2 * c, 1 - 2 * a, 1 - 2 * b], axis=1)  # (ab, bc, ca)
+        faces, weights = 4 * faces + np.where(at_corner, largest, 3), finer
+    return faces, weights
+
+
+def bake(painted: Painted, mesh: Mesh, texels: Texels) -> UInt8[np.ndarray, "N 3"]:
+    """Return the colours that a painted surface has nearest to the texels of a mesh."""
+    return np.clip(np.rint(painted.at(texels.places(mesh))), 0, 255).astype(np.uint8)
+
+
+def picture(texels: Texels, colors: UInt8[np.ndarray, "N 3"]) -> UInt8[np.ndarray, "H W 3"]:
+    """Return a picture with these colours of its texels, and between charts colours that lead from one to the other."""
+    values = np.full((texels.height * texels.width, 3), float(GREY))
+    values[texels.pixels] = colors
+    known = np.zeros(len(values), bool)
+    known[texels.pixels] = True
+    shape = (texels.height, texels.width)
+    filled = _filled(values.reshape(*shape, 3), known.reshape(shape))
+    return np.clip(np.rint(filled), 0, 255).astype(np.uint8)
+
+
+def _filled(values: Float64[np.ndarray, "H W 3"], known: Bool[np.ndarray, "H W"]) -> Float64[np.ndarray, "H W 3"]:
+    """Give unknown pixels the means of known ones nearby: from pictures of half the size, and of half that size ..."""
+    if known.all() or not known.any() or min(known.shape) < 2:
+        mean = values[known].mean(axis=0) if known.any() else np.full(3, float(GREY))
+        return np.where(known[..., None], values, mean)
+    height, width = (size + size % 2 for size in known.shape)
+    pad = ((0, height - known.shape[0]), (0, width - known.shape[1]))
+    weights = np.pad(known, pad).astype(np.float64)
+    sums = _halved(np.pad(np.where(known[..., None], values, 0.0), (*pad, (0, 0))))
+    counts = _halved(weights[..., None])
+    coarse = _filled(sums / np.maximum(counts, 1), counts[..., 0] > 0)
+    return np.where(known[..., None], values, _doubled(coarse)[: known.shape[0], : known.shape[1]])
+
+
+def _halved(values: Float64[np.ndarray, "H W C"]) -> Float64[np.ndarray, "h w C"]:
+    """Return the sums of 2 x 2 pixels."""
+    return values[::2, ::2] + values[1::2, ::2] + values[::2, 1::2] + values[1::2, 1::2]
+
+
+def _doubled(values: Float64[np.ndarray, "h w 3"]) -> Float64[np.ndarray, "H W 3"]:
+    """Return a picture of twice the size, blended between pixels."""
+    for axis in (0, 1):
+        before = np.concatenate([values.take([0], axis), values.take(range(values.shape[axis] - 1), axis)], axis)
+        after = np.concatenate([values.take(range(1, values.shape[axis]), axis), values.take([-1], axis)], axis)
+        pairs = np.stack([0.75 * values + 0.25 * before, 0.75 * values + 0.25 * after], axis=axis + 1)
+        values = pairs.reshape(*values.shape[:axis], 2 * values.shape[axis], *values.shape[axis + 1 :])
+    return values
