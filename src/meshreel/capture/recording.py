@@ -7,7 +7,7 @@ of a camera that stands still measure mostly the same depths in all frames.
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,12 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
+from ..geometry.color_views import ColorPicture, ColorViews, spread_colors
 from ..geometry.depth import DepthPicture
+from ..geometry.topology import vertex_normals
 from ..io.sequence import SequenceOptions
 from ..types import Mesh, MeshSequence, Up
+from .color_cameras import ColorCamera
 from .fusion import FusionOptions, fuse_depths
 from .rig import Rig, read_rig
 
@@ -58,17 +61,31 @@ class Recording(MeshSequence):
             return kept
         depths = self.rig.depths(number)
         try:
-            mesh = fuse_depths(depths, self.options)
+            mesh = self._colored(fuse_depths(depths, self.options), number)
         except InputError as error:
             raise InputError(f"{self.rig.folder}: frame {number}: {error}") from None
         if self._kept is not None:
             self._kept.put(number, mesh)
         return mesh
 
+    def _colored(self, mesh: Mesh, number: int) -> Mesh:
+        """Return a fused mesh with colours of its vertices, where the rig has colour cameras."""
+        found = [camera.picture(number) for camera in self.rig.color_cameras]
+        pictures = [picture for picture in found if picture is not None]
+        if not pictures or mesh.is_empty:
+            return mesh
+        colors, seen = ColorViews(pictures, mesh).at(mesh.vertices, vertex_normals(mesh))
+        return replace(mesh, colors=spread_colors(mesh, colors, seen))
+
     @property
     def up(self) -> Up:
         """The axis that points up, as the rig is described."""
         return self.rig.up
+
+    @property
+    def colors(self) -> RigColors | None:
+        """The colour pictures of the frames; None where the rig has no colour cameras."""
+        return RigColors(self.rig.color_cameras, tuple(self.numbers)) if self.rig.color_cameras else None
 
     @property
     def depth(self) -> RigDepth:
@@ -89,26 +106,39 @@ class RigDepth:
         return [camera.picture(self.rig.depth(k, frame)) if frame in files[k] else None for k, camera in cameras]
 
 
+@dataclass(frozen=True, slots=True)
+class RigColors:
+    """The colour pictures of some frames of a rig's recording (`geometry.color_views.ColorFrames`)."""
+
+    cameras: tuple[ColorCamera, ...]
+    numbers: tuple[int, ...]  # of the frames, in the files' names
+
+    def __getitem__(self, index: int) -> list[ColorPicture | None]:
+        return [camera.picture(self.numbers[index]) for camera in self.cameras]
+
+
 class Kept:
     """Meshes by number in a temporary file without a name, which ends with this object or its process."""
 
     def __init__(self) -> None:
         self._file: Any = None  # io.FileIO
-        self._places: dict[int, tuple[int, int, int]] = {}  # offset in the file, numbers of vertices and of faces
+        # Offset in the file, numbers of vertices and of faces, and whether there are colours.
+        self._places: dict[int, tuple[int, int, int, bool]] = {}
         self._full = False
 
     def get(self, number: int) -> Mesh | None:
         """Return a kept mesh, or None."""
         if self._file is None or number not in self._places:
             return None
-        offset, vertices, faces = self._places[number]
-        data = bytearray(24 * vertices + 12 * faces)
+        offset, vertices, faces, colored = self._places[number]
+        data = bytearray(24 * vertices + 12 * faces + 3 * vertices * colored)
         self._file.seek(offset)
         if self._file.readinto(data) != len(data):
             return None
         points = np.frombuffer(data, np.float64, 3 * vertices)
-        corners = np.frombuffer(data, np.int32, offset=24 * vertices)
-        return Mesh(points.reshape(-1, 3), corners.reshape(-1, 3))
+        corners = np.frombuffer(data, np.int32, 3 * faces, 24 * vertices)
+        colors = np.frombuffer(data, np.uint8, offset=24 * vertices + 12 * faces).reshape(-1, 3) if colored else None
+        return Mesh(points.reshape(-1, 3), corners.reshape(-1, 3), colors)
 
     def put(self, number: int, mesh: Mesh) -> None:
         """Keep a mesh, unless the disk has no room; then none is kept from now on."""
@@ -118,11 +148,12 @@ class Kept:
             if self._file is None:  # without a buffer: one that could not be written would fail again when it is read
                 self._file = tempfile.TemporaryFile(prefix="meshreel-", buffering=0)  # noqa: SIM115
             offset, data = self._file.seek(0, 2), mesh.vertices.tobytes() + mesh.faces.tobytes()
+            data += b"" if mesh.colors is None else mesh.colors.tobytes()
             self._full = self._file.write(data) != len(data)
         except OSError:  # frames that are read again are then fused again
             self._full = True
         if not self._full:
-            self._places[number] = (offset, len(mesh.vertices), len(mesh.faces))
+            self._places[number] = (offset, len(mesh.vertices), len(mesh.faces), mesh.colors is not None)
 
 
 def open_recording(

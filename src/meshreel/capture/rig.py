@@ -21,11 +21,12 @@ from jaxtyping import Float64, UInt16
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..geometry.depth import DepthPicture
-from ..io.depth_pictures import picture_size, read_depth
+from ..io.depth_pictures import read_depth
 from ..io.file_names import last_number
 from ..io.read import read_file
 from ..io.write import make_folder, replacing
 from ..types import UP_AXES, UPS, Up
+from .color_cameras import ColorCamera, distortion_of, pictures_in
 
 RIG, SINGLE = "rig.json", "camera.json"
 MOST_PIXELS = 16_384  # of a picture's side (guess)
@@ -34,7 +35,7 @@ FARTHEST = 1e4  # m from the world's origin: fusion has 32-bit coordinates, whic
 FOCAL = (0.05, 100.0)  # in sides of the picture; a focal length outside is not in pixels (guess)
 AWAY = 10.0  # sides by which a cropped picture may lie beside its optical axis (guess)
 RATES = (1e-9, 1e9)  # 1/s, the range of a sequence of meshes
-_TEXTS = ("name", "depth", "color")
+_TEXTS = ("name", "depth")
 _NUMBERS = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m", "depth_min_m", "depth_max_m")
 _UPRIGHT = 0.5  # least cosine between an axis and the pictures' mean upward direction (guess)
 _SEE = "see `meshreel capture --help`"
@@ -116,6 +117,7 @@ class Rig:
     files: tuple[dict[int, Path], ...]  # of each camera
     frame_rate: float  # 1/s
     remarks: tuple[str, ...] = ()  # warnings about the description, for the user
+    color_cameras: tuple[ColorCamera, ...] = ()
 
     @property
     def up(self) -> Up:
@@ -157,23 +159,23 @@ class Rig:
 
 def read_rig(folder: Path) -> Rig:
     """Read the rig in a folder. Raises InputError where its description or a camera's pictures are missing or wrong."""
-    entries, cameras, rate = _described(folder)
+    entries, cameras, rate, alone = _described(folder)
     folders = [folder / str(e.get("depth", f"{c.name}/depth")) for e, c in zip(entries, cameras, strict=True)]
     files = tuple(_pictures(place, camera) for place, camera in zip(folders, cameras, strict=True))
-    for entry, camera in zip(entries, cameras, strict=True):
-        if "color" in entry:
-            _check_color(folder / str(entry["color"]), camera)
-    return Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)))
+    beside = zip(entries, cameras, strict=True)
+    colors = [_color_camera(folder, e["color"], c.record() | {"name": c.name}) for e, c in beside if "color" in e]
+    colors += [_color_camera(folder, entry, {"name": f"color{number}"}) for number, entry in enumerate(alone)]
+    return Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
 
 
 def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:
     """Read the cameras that a folder describes, and their frame rate, 1/s; their pictures may be missing."""
-    _, cameras, rate = _described(folder)
+    _, cameras, rate, _ = _described(folder)
     return cameras, rate
 
 
-def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float]:
-    """Read a folder's description: its entry per camera, the cameras, and their frame rate, 1/s."""
+def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float, list[Any]]:
+    """Read a description: its entry per camera, the cameras, their frame rate, 1/s, and entries of further cameras."""
     path, single = folder / RIG, folder / SINGLE
     if path.exists():
         record = _json(path)
@@ -183,7 +185,8 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float]
     elif single.exists():
         path = single
         record = _json(path)
-        entries = [{"name": folder.resolve().name, "depth": "depth"} | record]
+        color = {"color": "color"} if (folder / "color").is_dir() else {}
+        entries = [{"name": folder.resolve().name, "depth": "depth"} | color | record]
     else:
         text = f"{folder}: {'' if folder.is_dir() else 'is no folder and '}has neither {RIG} nor {SINGLE}"
         raise InputError(f"{text}; describe its cameras in one of them")
@@ -194,7 +197,10 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float]
     names = [camera.name for camera in cameras]
     if len(set(names)) < len(names):
         raise InputError(f"{path}: two cameras have one name ({', '.join(names)}); name each differently")
-    return entries, cameras, float(rate)
+    alone = record.get("color_cameras", [])
+    if not isinstance(alone, list):
+        raise InputError(f"{path}: color_cameras is {alone!r:.40} and not a list; {_SEE}")
+    return entries, cameras, float(rate), alone
 
 
 def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:
@@ -259,7 +265,7 @@ def _pose(entry: dict[str, Any]) -> Float64[np.ndarray, "4 4"]:
 
 def _unknown(folder: Path, entries: list[Any]) -> Iterator[str]:
     """Yield a warning about unknown keys of cameras: a misspelt key would silently leave a default in place."""
-    known = {*_TEXTS, *_NUMBERS, "camera_to_world", "frames_per_second"}
+    known = {*_TEXTS, *_NUMBERS, "camera_to_world", "frames_per_second", "color", "color_cameras"}
     found = dict.fromkeys(key for entry in entries for key in entry if key not in known)
     near = [(key, difflib.get_close_matches(key, known, 1)) for key in found]
     if near:
@@ -313,12 +319,22 @@ def _pictures(folder: Path, camera: DepthCamera) -> dict[int, Path]:
     return found
 
 
-def _check_color(folder: Path, camera: DepthCamera) -> None:
-    """Check that color pictures, which are not fused, have the size of the depth pictures aligned with them."""
-    first = next((p for p in sorted(folder.glob("*")) if p.suffix.lower() in (".png", ".jpg", ".jpeg")), None)
-    if first is not None and (size := picture_size(first)) != (camera.width, camera.height):
-        text = f"{first}: {size[0]} x {size[1]} pixels where depth has {camera.width} x {camera.height}"
-        raise InputError(f"{text}; align both, or leave `color` out of the rig")
+def _color_camera(folder: Path, entry: Any, beside: dict[str, Any]) -> ColorCamera:
+    """Return the colour camera of an entry, a folder or an object; what it does not say is as `beside` has it."""
+    path, given = folder / RIG, {"folder": entry} if isinstance(entry, str) else entry
+    if not isinstance(given, dict):
+        raise InputError(f"{path}: color of camera {beside['name']} is {entry!r:.40}; give a folder or an object")
+    one = beside | given
+    try:
+        camera = _camera(path, 0, {key: one[key] for key in one if key not in ("folder", "distortion")})
+        place, distortion = one.get("folder"), distortion_of(one)
+        if not isinstance(place, str):
+            raise InputError(f"color camera {camera.name} has no folder; name that of its pictures")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    files = pictures_in(folder / place, camera.name)
+    pose, intrinsic = camera.camera_to_world, camera.intrinsic
+    return ColorCamera(camera.name, camera.width, camera.height, intrinsic, pose, distortion, files)
 
 
 def _json(path: Path) -> dict[str, Any]:

@@ -52,7 +52,7 @@ class Chunk:
         return self.offset + self.size
 
     def __str__(self) -> str:
-        if self.kind == ChunkKind.STATIC:
+        if self.frame_count == 0:
             return f"chunk {self.number} (static)"
         what = f"{ChunkKind(self.kind).name.lower()}, " if self.kind in COMPANIONS else ""
         track = "" if self.is_alone else f"track {self.track}, "

@@ -82,7 +82,7 @@ class TrackPictures:
             place = _Place(atlas, VideoDecoder(*self._sizes[atlas]), at[0], 0)
         self._place, planes = None, None  # until the pictures are decoded: a decoder that failed is of no use
         for link in chain[at.index(place.after) :]:
-            packets = decode_pictures(self._reader.read_chunk(link.number), link.frame_count)
+            packets = decode_pictures(self._reader.read_chunk(link.number), max(1, link.frame_count))
             done = place.count if link.number == place.after else 0
             stop = frame + 1 if link.number == number else len(packets)
             for packet in packets[done:stop]:

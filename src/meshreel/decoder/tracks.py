@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..coding.background import decode_background, decode_change
-from ..coding.colored import Canvas, canvas_of, decode_group_colors, paint_background
+from ..coding.colored import Canvas, background_canvas, canvas_of, decode_group_colors, paint_background
 from ..coding.group import continue_group, skip_group, write_vertices
 from ..coding.layers.coder import MOST_NUMBERS, LayersState
 from ..container.reader import Chunk, ReelReader
@@ -168,6 +168,7 @@ class Background:
     def __init__(self, reader: ReelReader, colored: bool = True) -> None:
         self.reader = reader
         self._colored = colored
+        self._pictures = TrackPictures(reader)
         self._place = placement(reader)
         # Number of a chunk, its mesh, and what led to it; replaced as a whole, as other threads do.
         self._last = (-1, Mesh.empty(), Chain())
@@ -218,7 +219,9 @@ class Background:
         if of is None:
             return mesh
         with self._refusals.of(of):
-            return paint_background(mesh, payload, self.reader.read_chunk(of.number))
+            mesh = paint_background(mesh, payload, self.reader.read_chunk(of.number))
+        with self._refusals.of(chunk):
+            return self._pictures.textured(chunk, [mesh], background_canvas(payload))[0]
 
 
 def copy_vertices(mesh: Mesh, frame: int, out: Float[np.ndarray, "V 3"]) -> None:

@@ -7,7 +7,7 @@ other: they have one atlas, in which the surface hardly changes, and their pictu
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,14 +23,15 @@ from ..coding.layers.coder import LayersState
 from ..container.writer import Companion
 from ..format.budget import CostlyError
 from ..format.layout import ChunkKind, Form
-from ..geometry.painted import Painted
-from ..types import GREY, Frames, Mesh
+from ..geometry.painted import Paint, Painted
+from ..types import GREY, Mesh
 from .forms import EncodedGroup
+from .interval import Interval
 from .options import AppearanceOptions, TextureOptions
 
 
 def colored_groups(
-    groups: Iterable[EncodedGroup], frames: Frames, options: AppearanceOptions | None
+    groups: Iterable[EncodedGroup], interval: Interval, options: AppearanceOptions | None
 ) -> Iterator[EncodedGroup]:
     """Yield the groups of an interval with the colours of their frames."""
     if options is None:
@@ -38,16 +39,26 @@ def colored_groups(
         return
     at, state, chain = 0, None, _Chain()
     for group in groups:
-        some = [frames[number] for number in range(at, at + group.frame_count)]
-        at += group.frame_count
+        numbers = range(at, at + group.frame_count)
+        at = numbers.stop
         if not group.predicted:
             yield from chain.done()
             state, chain = None, _Chain()
-        if any(mesh.is_colored for mesh in some):
-            state = chain.add(group, some, options, state)
+        paints = [_paint(interval, number) for number in numbers]
+        if any(paint is not None for paint in paints):
+            has_pictures = interval.views is not None or any(interval.frames[k].texture is not None for k in numbers)
+            state = chain.add(group, paints, options, state, has_pictures)
         else:
             chain.pass_on(group)
     yield from chain.done()
+
+
+def _paint(interval: Interval, number: int) -> Paint | None:
+    """Return what knows the colours of a frame, counted in its interval."""
+    mesh = interval.frames[number]
+    if mesh.is_empty or not (mesh.is_colored or interval.views is not None):
+        return None
+    return Painted(mesh) if interval.views is None else interval.views.at(interval.first_frame + number)
 
 
 class _Chain:
@@ -65,13 +76,17 @@ class _Chain:
         self._pictured.append(False)
 
     def add(
-        self, group: EncodedGroup, frames: list[Mesh], options: AppearanceOptions, before: LayersState | None
+        self,
+        group: EncodedGroup,
+        paints: Sequence[Paint | None],
+        options: AppearanceOptions,
+        before: LayersState | None,
+        has_pictures: bool,
     ) -> LayersState | None:
         """Add a group with the colours of its frames; return the state that those of the next are predicted from."""
-        meshes, after = continue_group(group.payload, len(frames), None, before)
+        meshes, after = continue_group(group.payload, len(paints), None, before)
         canvas = canvas_of(group.payload, [len(mesh.vertices) for mesh in meshes], None, before)
-        painted = [None if mesh.is_empty or not mesh.is_colored else Painted(mesh) for mesh in frames]
-        colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(painted, meshes, strict=True)]
+        colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(paints, meshes, strict=True)]
         try:
             encoded = encode_group_colors(canvas, colors, options.colors, None if before is None else before.colors)
         except CostlyError:  # the summary tells of a group without colours
@@ -79,11 +94,11 @@ class _Chain:
             return after
         companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
         texture = options.texture if not self._groups and group.form == Form.LAYERS else None
-        if texture is not None and (texture.always or any(mesh.texture is not None for mesh in frames)):
+        if texture is not None and (texture.always or has_pictures):
             self._video = _Video(canvas, texture)
             companions.append(Companion(ChunkKind.ATLAS, self._video.atlas))
         if self._video is not None:
-            for paint, mesh in zip(painted, meshes, strict=True):
+            for paint, mesh in zip(paints, meshes, strict=True):
                 self._packets += self._video.add(paint, mesh)
         self._groups.append(replace(group, companions=tuple(companions)))
         self._pictured.append(self._video is not None)
@@ -111,22 +126,27 @@ class _Video:
         self.atlas = encode_atlas(template.base, layout)
         self._texels, self._count = texels_of(layout, template.levels), template.vertices
         self._faces = finest_faces(template.base, template.levels)
+        count = len(self._texels.pixels)
+        self._colors, self._seen = np.full((count, 3), GREY, np.uint8), np.zeros(count, bool)  # so far
         self._encoder = VideoEncoder(layout.width, layout.height, options.video)
 
-    def add(self, painted: Painted | None, mesh: Mesh) -> list[bytes]:
-        """Add the picture of a frame, whose mesh begins with the template; return packets that are done."""
-        texels = self._texels
-        colors = np.full((len(texels.pixels), 3), GREY, np.uint8)
-        if painted is not None:
-            colors = bake(painted, Mesh(mesh.vertices[: self._count], self._faces), texels)
-        return self._encoder.add(to_i420(picture(texels, colors)))
+    def add(self, paint: Paint | None, mesh: Mesh) -> list[bytes]:
+        """Add the picture of a frame, whose mesh begins with the template; return packets that are done.
+
+        What nobody sees keeps the colour that was seen last.
+        """
+        if paint is not None:
+            colors, seen = bake(paint, Mesh(mesh.vertices[: self._count], self._faces), self._texels)
+            self._colors[seen] = colors[seen]
+            self._seen |= seen
+        return self._encoder.add(to_i420(picture(self._texels, self._colors, self._seen)))
 
     def finish(self) -> list[bytes]:
         """Return the packets that were not done."""
         return self._encoder.finish()
 
 
-def _vertex_colors(painted: Painted | None, mesh: Mesh) -> np.ndarray:
-    if painted is None or mesh.is_empty:
+def _vertex_colors(paint: Paint | None, mesh: Mesh) -> np.ndarray:
+    if paint is None or mesh.is_empty:
         return np.full(mesh.vertices.shape, GREY, np.uint8)
-    return vertex_colors(painted, mesh)
+    return vertex_colors(paint, mesh)

@@ -16,6 +16,7 @@ from ..geometry.derived_sequences import DerivedSequence
 from ..geometry.topology import clean, part_of
 from ..types import Frames, Mesh
 from .digests import Digests
+from .views import Views
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,7 @@ class Interval:
     digests: Digests | None = field(default=None, kw_only=True)  # of what its stages compute; None: nobody asks
     # Digest of the frames; empty where they are frames of the sequence, or pieces of them: it has their digests.
     surface: str = ""
+    views: Views | None = field(default=None, kw_only=True)  # of colour cameras
     weight: Fraction = field(default=Fraction(1), kw_only=True)  # of each frame in progress: bodies share a frame
     larger: float = field(default=1.0, kw_only=True)  # times, the whole frames than the body: targets are of the former
 
@@ -39,7 +41,9 @@ class Interval:
 
     def to_send(self) -> Interval:
         """Return the interval for a worker process, which reads those of its frames that are in files."""
-        return replace(self, frames=self.frames.only() if isinstance(self.frames, NormalisedFrames) else self.frames)
+        frames = self.frames.only() if isinstance(self.frames, NormalisedFrames) else self.frames
+        views = None if self.views is None else self.views.only(range(self.first_frame, self.stop))
+        return replace(self, frames=frames, views=views)
 
     @property
     def observed(self) -> Any:

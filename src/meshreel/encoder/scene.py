@@ -29,6 +29,7 @@ from .parts import Parts
 from .recipe import encode_intervals, longest_interval
 from .static import refreshes
 from .tracks import TrackGroup
+from .views import Views
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,8 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
         normalised = [parts.seen.normalise(mesh) for mesh in meshes]
         for cut in _cut(normalised, frames, parts.seen, longest):
             some = normalised[cut.start : cut.stop]
-            found.append(Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some)))
+            one = Interval(some, parts.body_noise, frames.start + cut.start, track, digest(some))
+            found.append(replace(one, views=Views.of(job.sequence, parts.seen)))
     return found
 
 

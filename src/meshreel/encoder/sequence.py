@@ -249,8 +249,7 @@ def _added_in_order(
         while waiting and waiting[0].frame <= each.first_frame:
             state = waiting.popleft()
             static = [writer.add_static(state.payload, depends_on=static if state.is_patch else ())]
-            for companion in state.companions:
-                writer.add_companion(companion, static)
+            _add_companions(writer, static[0], state.companions, None)
         with_static = each.track == 0 and not seen.is_bare(each.first_frame)
         groups.append(_added(writer, each, static if with_static else [], seen.unit))
     return groups
@@ -279,7 +278,7 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
 
 
 def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:
-    """Write what belongs to a group, which may be predicted from what belongs to the group before."""
+    """Write what belongs to a chunk, which may be predicted from what belongs to the group before."""
     for companion in companions:
         depends_on, last = [of], writer.companion_of(before, companion.kind)
         if companion.kind == ChunkKind.PICTURES:

@@ -8,22 +8,30 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float64, UInt8
 
-from ..analysis.appearance.background import background_colors
+from ..analysis.appearance.background import median_colors
+from ..analysis.appearance.bake import picture, texels_of
+from ..analysis.appearance.unwrap import projected, unwrap
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.survey import Survey
+from ..coding.appearance.atlas import Layout, encode_atlas
+from ..coding.appearance.pictures import VideoEncoder, encode_pictures, to_i420
 from ..coding.background import changed, decode_background, decode_change, encode_background, encode_change
 from ..coding.colored import background_canvas, encode_group_colors
 from ..container.writer import Companion
 from ..format.budget import Chain, CostlyError
 from ..format.layout import ChunkKind
 from ..geometry.closest_points import distances
+from ..geometry.color_views import spread_colors
 from ..geometry.decimate import decimate_faces
-from ..geometry.topology import clean
-from ..types import Mesh, MeshSequence, Placement, evenly
-from .options import AppearanceOptions
+from ..geometry.derived_sequences import CapturedSequence
+from ..geometry.painted import Paint, Painted
+from ..geometry.topology import clean, face_normals, vertex_normals
+from ..types import Mesh, Placement, evenly
+from .options import AppearanceOptions, TextureOptions
 from .parts import Change, Parts
+from .views import Views
 
 FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
@@ -116,30 +124,69 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
 
 
 def colored_states(
-    states: list[Static], sequence: MeshSequence, parts: Parts, options: AppearanceOptions | None
+    states: list[Static], sequence: CapturedSequence, parts: Parts, options: AppearanceOptions | None
 ) -> list[Static]:
     """Return the states of a background with the colours that still surface has from each state to the next."""
     if options is None or not any(sequence[number].is_colored for number in evenly(len(sequence), 3)):
         return states
-    found, mesh = list[Static](), Mesh.empty()
-    place = Placement(parts.seen.unit, tuple(parts.seen.center))
+    found, mesh, looks = list[Static](), Mesh.empty(), _Looks(sequence, parts)
     ends = [state.frame for state in states[1:]] + [len(sequence)]
     for state, end in zip(states, ends, strict=True):
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
         canvas = background_canvas(state.payload)
         [coded] = canvas.meshes
-        shown = place.of(Mesh(mesh.vertices[len(mesh.vertices) - coded.vertices :], mesh.faces[:0]))
-        numbers = [state.frame + number for number in evenly(end - state.frame, STILL_FRAMES)]
-        far = max(NEAR * parts.noise, LEAST_NEAR)
-        colors = background_colors(shown, (_still(sequence[number], parts, number) for number in numbers), far)
-        encoded = encode_group_colors(canvas, [colors], options.colors, None)
-        found.append(replace(state, companions=(Companion(ChunkKind.COLORS, encoded.payload),)))
+        frames = range(state.frame, end)
+        colors, seen = looks.colors(frames, mesh.vertices, vertex_normals(mesh))
+        shown = spread_colors(mesh, colors.astype(np.float64), seen)[len(mesh.vertices) - coded.vertices :]
+        encoded = encode_group_colors(canvas, [shown], options.colors, None)
+        companions = [Companion(ChunkKind.COLORS, encoded.payload)]
+        if not state.is_patch and options.texture is not None and (options.texture.always or looks.has_pictures):
+            companions += _pictured(mesh, frames, looks, options.texture)
+        found.append(replace(state, companions=tuple(companions)))
     return found
 
 
-def _still(mesh: Mesh, parts: Parts, number: int) -> Mesh:
-    """Return what of a frame stands still."""
-    return mesh.with_faces(~parts.segmentation.moving(number, mesh))
+def _pictured(mesh: Mesh, frames: range, looks: _Looks, options: TextureOptions) -> list[Companion]:
+    """Return the atlas of a background and its one picture."""
+    layout = looks.layout(mesh, frames, options.size)
+    texels = texels_of(layout, 0)
+    colors, seen = looks.colors(frames, texels.places(mesh), face_normals(mesh)[0][texels.faces])
+    encoder = VideoEncoder(layout.width, layout.height, options.video)
+    packets = encoder.add(to_i420(picture(texels, colors, seen))) + encoder.finish()
+    atlas = Companion(ChunkKind.ATLAS, encode_atlas(mesh, layout))
+    return [atlas, Companion(ChunkKind.PICTURES, encode_pictures(packets))]
+
+
+class _Looks:
+    """What the frames of a scene show of its still surface, in normalised coordinates."""
+
+    def __init__(self, sequence: CapturedSequence, parts: Parts) -> None:
+        self._sequence, self._parts, self._views = sequence, parts, Views.of(sequence, parts.seen)
+        self.has_pictures = self._views is not None or sequence[0].texture is not None
+
+    def colors(
+        self, frames: range, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+    ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+        """Return the usual colours of places over some frames, and which of them are known."""
+        return median_colors(points, normals, map(self._paint, self._some(frames, STILL_FRAMES)))
+
+    def layout(self, mesh: Mesh, frames: range, size: int) -> Layout:
+        """Return the places of a background in a texture: as the cameras see it, where there are some."""
+        if self._views is None:
+            return unwrap(mesh, size)
+        return projected(mesh, self._views.at(self._some(frames, 1)[0]))
+
+    def _some(self, frames: range, most: int) -> list[int]:
+        return [frames.start + number for number in evenly(len(frames), most)]
+
+    def _paint(self, number: int) -> Paint:
+        if self._views is not None:
+            return self._views.at(number)
+        seen = self._parts.seen
+        mesh = self._sequence[number]
+        still = mesh.with_faces(~self._parts.segmentation.moving(number, mesh))
+        far = max(NEAR * self._parts.noise, LEAST_NEAR) / seen.unit
+        return Painted(still.at((still.vertices - seen.center) / seen.unit), far)
 
 
 def _stored(mesh: Mesh, step: float) -> tuple[bytes, Mesh]:

@@ -24,6 +24,7 @@ from .interval import BodyFrames, Interval, NormalisedFrames
 from .job import Job
 from .options import LayersOptions
 from .recipe import encode_intervals, longest_interval
+from .views import Views
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +77,17 @@ def tracked_bodies(job: Job, seen: Survey) -> TrackedBodies:
 
 def intervals_of(job: Job, seen: Survey, planned: TrackedBodies) -> Iterator[Interval]:
     """Yield an interval for each body of each key interval, whose frames are read where it is encoded."""
+    views = Views.of(job.sequence, seen)
     for frames, bodies in planned.intervals:
         for body in bodies:
             if not body.bodies:
-                yield Interval(NormalisedFrames(job.sequence, seen, frames), first_frame=frames.start)
+                yield Interval(NormalisedFrames(job.sequence, seen, frames), first_frame=frames.start, views=views)
                 continue
             some = BodyFrames(job.sequence, seen, frames, body.number, body.bodies)
             larger = min(seen.diagonals[frames.start : frames.stop]) / min(body.diagonals)
             weight = Fraction(1, len(bodies))
-            yield Interval(some, first_frame=frames.start, track=body.track, weight=weight, larger=larger)
+            one = Interval(some, first_frame=frames.start, track=body.track, weight=weight, larger=larger)
+            yield replace(one, views=views)
 
 
 def encode_tracked(job: Job, seen: Survey) -> Iterator[list[TrackGroup]]:

@@ -50,6 +50,7 @@ class IndexChecks:
         self._place = (0, -1)  # first frame and track of the newest group
         # Of each STATIC and GROUP: its frames, its track, and the group that it is predicted from.
         self._whole: dict[int, tuple[int, int, int | None]] = {}
+        self._bases: set[int] = set()  # chunks that may have an atlas: those that begin with a base mesh
         # By coded chunk and kind, the number of the chunk that has its colours, its atlas or its pictures.
         self.companions: dict[tuple[int, int], int] = {}
         self._atlases: dict[int, int] = {}  # of each group with pictures, the number of its atlas
@@ -70,10 +71,14 @@ class IndexChecks:
         if entry.kind == ChunkKind.STATIC:
             self._changes[number] = self._changes_of(entry)
             self._whole[number] = (0, 0, None)
+            if entry.form == Form.DRACO:
+                self._bases.add(number)
         elif entry.kind == ChunkKind.GROUP:
             self._add_group(entry)
             before = next((other for other in entry.depends_on if other not in self._changes), None)
             self._whole[number] = (entry.frames, entry.track, before)
+            if entry.form == Form.LAYERS and before is None:
+                self._bases.add(number)
         elif entry.kind in COMPANIONS:
             self._add_companion(entry)
         self._count += 1
@@ -130,7 +135,7 @@ class IndexChecks:
             known = None if before is None else self.companions.get((before, kind))
             return ((),) if known is None else ((), (known,))
         if kind == ChunkKind.ATLAS:
-            return ((),) if self._whole[of][0] and before is None else ()
+            return ((),) if of in self._bases else ()
         own = self.companions.get((of, ChunkKind.ATLAS))
         if own is not None:
             return ((own,),)

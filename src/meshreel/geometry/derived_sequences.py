@@ -20,7 +20,8 @@ from jaxtyping import Bool
 from ..errors import InputError
 from ..types import Mesh, MeshSequence, Up, check_up
 from . import work
-from .depth import DepthFrames, DepthPicture
+from .color_views import ColorFrames
+from .depth import DepthFrames
 from .topology import part_of, weld
 
 # Bytes of frames that an encode keeps: the frames of a key interval, 120, with 20,000 vertices each take 115 MB.
@@ -39,6 +40,11 @@ class CapturedSequence(MeshSequence, Protocol):
     @property
     def depth(self) -> DepthFrames | None:
         """The depth pictures from which the meshes were made; None where they are not known."""
+        ...
+
+    @property
+    def colors(self) -> ColorFrames | None:
+        """The pictures of colour cameras; None where there are none."""
         ...
 
 
@@ -104,6 +110,11 @@ class DerivedSequence(MeshSequence):
     def depth(self) -> DepthFrames | None:
         """The depth pictures of the frames; None where the source knows none."""
         return getattr(self._source, "depth", None)
+
+    @property
+    def colors(self) -> ColorFrames | None:
+        """The pictures of colour cameras; None where the source has none."""
+        return getattr(self._source, "colors", None)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -278,7 +289,13 @@ class Chosen(DerivedSequence):
     def depth(self) -> DepthFrames | None:
         """The depth pictures of the chosen frames; None where the source knows none."""
         known = super().depth
-        return None if known is None else _ChosenDepth(known, self._numbers)
+        return None if known is None else _ChosenPictures(known, self._numbers)
+
+    @property
+    def colors(self) -> ColorFrames | None:
+        """The colour pictures of the chosen frames; None where the source has none."""
+        known = super().colors
+        return None if known is None else _ChosenPictures(known, self._numbers)
 
     def only(self, numbers: Sequence[int]) -> DerivedSequence:
         """Return these of the chosen frames, which are read now: what chooses among faces cannot always be sent."""
@@ -316,11 +333,11 @@ def forth_and_back(source: MeshSequence, count: int) -> Chosen:
 
 
 @dataclass(frozen=True, slots=True)
-class _ChosenDepth:
-    """The depth pictures of some frames, by their numbers."""
+class _ChosenPictures:
+    """The depth or colour pictures of some frames, by their numbers."""
 
-    source: DepthFrames
+    source: Any  # DepthFrames or ColorFrames
     numbers: tuple[int, ...]
 
-    def __getitem__(self, index: int) -> list[DepthPicture | None]:
+    def __getitem__(self, index: int) -> Any:
         return self.source[self.numbers[index]]

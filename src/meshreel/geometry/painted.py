@@ -5,26 +5,46 @@ In: a mesh with colours, and places. Out: red, green and blue, 0 to 255, at the 
 
 from __future__ import annotations
 
+from typing import Protocol, runtime_checkable
+
 import numpy as np
-from jaxtyping import Float32, Float64, Int32, UInt8
+from jaxtyping import Bool, Float32, Float64, Int32, UInt8
 
 from ..types import GREY, Mesh
 from .closest_points import Surface
 from .topology import blend
 
 
+@runtime_checkable
+class Paint(Protocol):
+    """What knows the colours of places on a surface."""
+
+    def at(
+        self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+    ) -> tuple[Float64[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+        """Return the colours of places with these normals, 0 to 255, and which of them it knows."""
+        ...
+
+
 class Painted:
     """A mesh with faces and colours, prepared for repeated queries."""
 
-    def __init__(self, mesh: Mesh, surface: Surface | None = None) -> None:
-        """Take the mesh, and the surface of its places where one is at hand already."""
-        self._mesh, self._surface = mesh, surface or Surface(mesh)
+    def __init__(self, mesh: Mesh, far: float = np.inf) -> None:
+        """Take the mesh; of places farther from it than `far`, in the unit of its vertices, it knows nothing."""
+        self._mesh, self._surface, self._far = mesh, Surface(mesh), far
         self._pixels = None if mesh.uv is None or mesh.texture is None else mesh.texture.pixels
 
-    def at(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
-        """Return the colours at the points of the mesh that are closest to places."""
+    def at(
+        self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+    ) -> tuple[Float64[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+        """Return the colours at the closest points of the mesh, whatever their normals, and which are near enough."""
+        del normals
         hits = self._surface.closest(points)
-        return self.on(hits.faces, hits.barycentric)
+        if self._far == np.inf:
+            near = np.ones(len(points), bool)
+        else:
+            near = np.linalg.norm(hits.points - points, axis=1) <= self._far
+        return self.on(hits.faces, hits.barycentric), near
 
     def on(self, faces: Int32[np.ndarray, " N"], barycentric: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
         """Return the colours at places inside faces."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import _core
-from ..shapes import Bool, Float64, Int32, Int64
+from ..shapes import Bool, Float32, Float64, Int32, Int64
 from ..types import GREY, Mesh
 
 
@@ -112,7 +112,7 @@ def with_neighbours(faces: Int32[np.ndarray, "F 3"], chosen: Bool[np.ndarray, " 
 def concatenate(meshes: Sequence[Mesh]) -> Mesh:
     """Join meshes into one, vertices and faces in order; if only one has vertices, it is returned itself.
 
-    Where one has colours of its vertices, those of others are grey. A texture is kept where all have the same one.
+    Where one has colours of its vertices, those of others are grey. A texture is kept where no mesh has another.
     """
     meshes = [mesh for mesh in meshes if len(mesh.vertices)] or list(meshes[:1])
     if len(meshes) <= 1:
@@ -125,15 +125,20 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
         np.add(mesh.faces, np.int32(v), out=faces[f : f + len(mesh.faces)])
         v, f = v + len(mesh.vertices), f + len(mesh.faces)
     colors = [np.full(mesh.vertices.shape, GREY, np.uint8) if mesh.colors is None else mesh.colors for mesh in meshes]
-    uv = [mesh.uv for mesh in meshes if mesh.uv is not None]
-    same = len(uv) == len(meshes) and len({mesh.texture for mesh in meshes}) == 1
+    textures = {mesh.texture for mesh in meshes if mesh.uv is not None and mesh.texture is not None}
+    has_one = len(textures) == 1
     return Mesh(
         vertices,
         faces,
         None if all(mesh.colors is None for mesh in meshes) else np.concatenate(colors),
-        np.concatenate(uv) if same else None,
-        meshes[0].texture if same else None,
+        np.concatenate([_places(mesh) for mesh in meshes]) if has_one else None,
+        textures.pop() if has_one else None,
     )
+
+
+def _places(mesh: Mesh) -> Float32[np.ndarray, "F 3 2"]:
+    """Return the places of a mesh's corners in its texture, NaN where it has none."""
+    return np.full((len(mesh.faces), 3, 2), np.nan, np.float32) if mesh.uv is None else mesh.uv
 
 
 def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:

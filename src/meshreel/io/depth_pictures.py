@@ -43,14 +43,3 @@ def write_depth(depth: UInt16[np.ndarray, "H W"], path: Path) -> None:
     Image.fromarray(depth).save(packed, format="PNG")
     with replacing(path) as file:
         file.write(packed.getvalue())
-
-
-def picture_size(path: Path) -> tuple[int, int]:
-    """Return width and height of a picture, pixels. Raises InputError if it cannot be read."""
-    from PIL import Image
-
-    try:
-        with Image.open(io.BytesIO(read_file(path))) as image:
-            return image.size
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(f"{path}: cannot be read ({error}); delete it, or give a picture") from None

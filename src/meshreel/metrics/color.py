@@ -55,5 +55,5 @@ def color_errors(original: Mesh, decoded: Mesh) -> ColorErrors:
 def _squares(mesh: Mesh, here: Painted, there: Painted) -> Float64[np.ndarray, " 3"]:
     """Return the mean squared differences of luma and colour differences at points of a mesh."""
     some = scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
-    apart = here.on(some.faces.astype(np.int32), some.barycentric) - there.at(some.points)
+    apart = here.on(some.faces.astype(np.int32), some.barycentric) - there.at(some.points, some.points)[0]
     return np.square(apart @ TO_YUV.T).mean(axis=0)

@@ -1,6 +1,6 @@
 """Colours of a background: what its places show in most frames, so that nobody who passes leaves a ghost.
 
-In: a mesh, and frames with colours whose faces stand still or move. Out: 8-bit colours of its vertices.
+In: places with normals, and what knows their colours in some frames. Out: the median of the colours of each place.
 """
 
 from __future__ import annotations
@@ -8,32 +8,30 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, Float64, UInt8
 
-from ...geometry.closest_points import Surface
-from ...geometry.painted import Painted
-from ...types import GREY, Mesh
+from ...geometry.painted import Paint
+from ...types import GREY
+
+BLOCK = 1 << 16  # places whose medians are taken at a time: 16 frames of them take 10 MB
 
 
-def background_colors(mesh: Mesh, frames: Iterable[Mesh], far: float) -> UInt8[np.ndarray, "V 3"]:
-    """Return the medians of the colours that frames have within `far` of each vertex.
-
-    The frames have only what stands still. A vertex that none of them comes near has the colour of what comes nearest;
-    where no frame has a surface, all are grey.
-    """
-    stack, gaps = list[np.ndarray](), list[np.ndarray]()
-    for frame in frames:
-        if frame.is_empty:
-            continue
-        surface = Surface(frame)
-        hits = surface.closest(mesh.vertices)
-        stack.append(Painted(frame, surface).on(hits.faces, hits.barycentric))
-        gaps.append(np.linalg.norm(hits.points - mesh.vertices, axis=1))
+def median_colors(
+    points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"], paints: Iterable[Paint]
+) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+    """Return the medians over frames of the colours of places, and which places some frame knows; others are grey."""
+    stack, known = list[np.ndarray](), list[np.ndarray]()
+    for paint in paints:
+        colors, seen = paint.at(points, normals)
+        stack.append(np.clip(np.rint(colors), 0, 255).astype(np.uint8))
+        known.append(seen)
+    found = np.full(points.shape, GREY, np.uint8)
     if not stack:
-        return np.full(mesh.vertices.shape, GREY, np.uint8)
-    colors, distance = np.stack(stack), np.stack(gaps)
-    nearest = colors[distance.argmin(axis=0), np.arange(len(mesh.vertices))]
-    seen = np.ma.masked_array(colors, np.repeat((distance > far)[..., None], 3, axis=2))
-    found = np.ma.median(seen, axis=0).filled(np.nan)
-    found = np.where(np.isfinite(found), found, nearest)
-    return np.clip(np.rint(found), 0, 255).astype(np.uint8)
+        return found, np.zeros(len(points), bool)
+    seen = np.any(known, axis=0)
+    for start in range(0, len(points), BLOCK):
+        some = slice(start, start + BLOCK)
+        hidden = np.repeat(~np.stack([one[some] for one in known])[..., None], 3, axis=2)
+        medians = np.ma.median(np.ma.masked_array(np.stack([one[some] for one in stack]), hidden), axis=0)
+        found[some] = np.rint(np.ma.filled(medians, float(GREY))).astype(np.uint8)
+    return found, seen

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 
 from ...coding.appearance.atlas import Layout
-from ...geometry.painted import Painted
-from ...geometry.topology import blend
+from ...geometry.painted import Paint
+from ...geometry.topology import blend, face_normals
 from ...types import GREY, Mesh
 
 
@@ -72,17 +72,20 @@ def _finer(
     return faces, weights
 
 
-def bake(painted: Painted, mesh: Mesh, texels: Texels) -> UInt8[np.ndarray, "N 3"]:
-    """Return the colours that a painted surface has nearest to the texels of a mesh."""
-    return np.clip(np.rint(painted.at(texels.places(mesh))), 0, 255).astype(np.uint8)
+def bake(paint: Paint, mesh: Mesh, texels: Texels) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+    """Return the colours of the texels of a mesh, and which of them are known."""
+    colors, seen = paint.at(texels.places(mesh), face_normals(mesh)[0][texels.faces])
+    return np.clip(np.rint(colors), 0, 255).astype(np.uint8), seen
 
 
-def picture(texels: Texels, colors: UInt8[np.ndarray, "N 3"]) -> UInt8[np.ndarray, "H W 3"]:
-    """Return a picture with these colours of its texels, and between charts colours that lead from one to the other."""
+def picture(
+    texels: Texels, colors: UInt8[np.ndarray, "N 3"], seen: Bool[np.ndarray, " N"]
+) -> UInt8[np.ndarray, "H W 3"]:
+    """Return a picture with these colours of its texels, and elsewhere colours that lead from one to the other."""
     values = np.full((texels.height * texels.width, 3), float(GREY))
     values[texels.pixels] = colors
     known = np.zeros(len(values), bool)
-    known[texels.pixels] = True
+    known[texels.pixels] = seen
     shape = (texels.height, texels.width)
     filled = _filled(values.reshape(*shape, 3), known.reshape(shape))
     return np.clip(np.rint(filled), 0, 255).astype(np.uint8)

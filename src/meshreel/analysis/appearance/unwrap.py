@@ -1,14 +1,16 @@
-"""Unwrap a base mesh onto a texture: charts by xatlas (extra `color`), packed with room around each.
+"""Unwrap a mesh onto a texture: by xatlas (extra `color`), whose charts have room around each, or as cameras see it.
 
-In: a base mesh as decoded, and the size of the texture. Out: the places of its faces' corners, in whole texels.
+In: a mesh as decoded, and the size of the texture or the cameras. Out: the places of its faces' corners, in texels.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...coding.appearance.atlas import Layout
+from ...coding.appearance.atlas import MOST_SIDE, Layout
 from ...errors import InputError
+from ...geometry.color_views import ColorViews
+from ...geometry.topology import face_normals
 from ...types import Mesh
 
 GUTTERS = 128  # in the width of a texture; 8 texels of 1024 keep charts apart in three mip levels
@@ -47,3 +49,28 @@ def unwrap(base: Mesh, size: int) -> Layout:
     places = np.rint(uv.astype(np.float64) * [atlas.width, atlas.height]).astype(np.int32)[corners]
     height = -(-int(places[..., 1].max(initial=1)) // BLOCK) * BLOCK
     return Layout(size, min(height, size), np.ascontiguousarray(places))
+
+
+def projected(mesh: Mesh, views: ColorViews) -> Layout:
+    """Return places where the cameras of some views see the faces, their pictures side by side.
+
+    A face is in the picture that sees it most squarely; one that none sees whole has no place. Pictures are made
+    smaller where they would not fit a texture.
+    """
+    normals, middles = face_normals(mesh)[0], mesh.vertices[mesh.faces].mean(axis=1)
+    best, weight = np.full(len(mesh.faces), -1), np.zeros(len(mesh.faces))
+    places, left, height = np.zeros((len(mesh.faces), 3, 2)), 0, 0
+    for number, view in enumerate(views.views):
+        seen, camera = view.weights(middles, normals), view.picture.camera
+        corners = view.picture.project(mesh.vertices)[0][mesh.faces]
+        size = [camera.width, camera.height]
+        with np.errstate(invalid="ignore"):
+            whole = ((corners >= 0) & (corners <= size)).all(axis=(1, 2))
+        better = whole & (seen > weight)
+        best[better], weight[better] = number, seen[better]
+        places[better] = corners[better] + [left, 0]
+        left, height = left + camera.width, max(height, camera.height)
+    scale = min(1.0, MOST_SIDE / max(left, height))
+    found = np.where(best[:, None, None] < 0, 0.0, places * scale)
+    sides = [max(2, -(-round(side * scale) // BLOCK) * BLOCK) for side in (left, height)]
+    return Layout(sides[0], sides[1], np.ascontiguousarray(np.rint(found).astype(np.int32)))

@@ -1,6 +1,7 @@
 """Colours of the vertices of a mesh that show a painted surface best, in the sense of least squares.
 
-In: a painted surface, and the mesh that stands for it. Out: 8-bit colours of its vertices, between which faces blend.
+In: what knows the colours of places, and the mesh that stands for them. Out: 8-bit colours of its vertices, between
+which faces blend.
 """
 
 from __future__ import annotations
@@ -8,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float64, UInt8
 
-from ...geometry.painted import Painted
+from ...geometry.color_views import spread_colors
+from ...geometry.painted import Paint
 from ...geometry.topology import face_normals
 from ...types import GREY, Mesh
 
@@ -17,21 +19,21 @@ PLACES = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3],
 ROUNDS = 4  # of refinement: the rest of the error falls below a grey level (guess)
 
 
-def vertex_colors(painted: Painted, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:
-    """Return the colours of a mesh's vertices; grey where a vertex has no face with an area."""
-    corners = mesh.vertices[mesh.faces]
-    points = np.einsum("pk,fkc->fpc", PLACES, corners).reshape(-1, 3)
-    wanted = painted.at(points).reshape(len(mesh.faces), len(PLACES), 3)
-    areas = face_normals(mesh)[1]
-    weights = areas[:, None, None] * PLACES[None]  # of a face's places on its corners
+def vertex_colors(paint: Paint, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:
+    """Return the colours of a mesh's vertices; those of which nothing is known have the means of their neighbours."""
+    normals, areas = face_normals(mesh)
+    points = np.einsum("pk,fkc->fpc", PLACES, mesh.vertices[mesh.faces]).reshape(-1, 3)
+    colors, seen = paint.at(points, normals.repeat(len(PLACES), axis=0))
+    wanted = colors.reshape(len(mesh.faces), len(PLACES), 3)
+    weights = (areas[:, None] * seen.reshape(-1, len(PLACES)))[..., None] * PLACES  # of a face's places on its corners
     total = _gathered(mesh, weights.sum(axis=1)[..., None])[:, 0]
     known = total > 0
-    colors = np.full((len(mesh.vertices), 3), float(GREY))
+    found = np.full((len(mesh.vertices), 3), float(GREY))
     for _ in range(ROUNDS):
-        shown = np.einsum("pk,fkc->fpc", PLACES, colors[mesh.faces])
+        shown = np.einsum("pk,fkc->fpc", PLACES, found[mesh.faces])
         change = _gathered(mesh, np.einsum("fpk,fpc->fkc", weights, wanted - shown))
-        colors[known] += change[known] / total[known, None]
-    return np.clip(np.rint(colors), 0, 255).astype(np.uint8)
+        found[known] += change[known] / total[known, None]
+    return spread_colors(mesh, found, known)
 
 
 def _gathered(mesh: Mesh, values: Float64[np.ndarray, "F 3 C"]) -> Float64[np.ndarray, "V C"]:

@@ -18,7 +18,7 @@ from ...shapes import Float32, Int32
 from ...types import Mesh
 from ..entropy import decode_integers, encode_integers
 
-MOST_SIDE = 4096  # texels, of a texture: 17 million, as every player's GPU has
+MOST_SIDE = 2048  # texels, of a texture: pictures that a decoder keeps take 60 MB then
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +30,13 @@ class Layout:
     places: Int32[np.ndarray, "F 3 2"]  # right and down
 
     def uv(self, levels: int) -> Float32[np.ndarray, "G 3 2"]:
-        """Return the places of the corners of the faces that `levels` subdivisions make, as `Mesh.uv` has them."""
-        found = finer_places(self.places.astype(np.float64), levels) / [self.width, self.height]
+        """Return the places of the corners of the faces that `levels` subdivisions make, as `Mesh.uv` has them.
+
+        A face whose corners are all in one place has none: it has the colours of its vertices.
+        """
+        places = self.places.astype(np.float64)
+        places[(self.places == self.places[:, :1]).all(axis=(1, 2))] = np.nan
+        found = finer_places(places, levels) / [self.width, self.height]
         found[..., 1] = 1.0 - found[..., 1]
         return found.astype(np.float32)
 

@@ -1,0 +1,83 @@
+"""Colour cameras of a rig, and the pictures that they recorded.
+
+In: entries of `rig.json`. Out: cameras with their pictures by frame number. A depth camera's `color` is a folder of
+pictures that are aligned with its depth, or an object that says what is different; `color_cameras` has those alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64
+
+from ..errors import InputError
+from ..geometry.cameras import PinholeCamera
+from ..geometry.color_views import ColorPicture
+from ..io.file_names import last_number
+from ..io.pictures import read_picture
+
+PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
+KEYS = ("name", "folder", "width", "height", "fx", "fy", "cx", "cy", "camera_to_world", "distortion")
+MOST_DISTORTION = 10.0  # of a coefficient: beyond, the picture would fold many times (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class ColorCamera:
+    """A pinhole camera that takes pictures in colour; its numbers are those of a DepthCamera."""
+
+    name: str
+    width: int  # pixels
+    height: int  # pixels
+    intrinsic: Float64[np.ndarray, "3 3"]  # camera coordinates to homogeneous pixels, whose middles are whole numbers
+    camera_to_world: Float64[np.ndarray, "4 4"]  # m
+    distortion: tuple[float, ...]  # k1, k2, p1, p2, k3, as OpenCV has them
+    files: Mapping[int, Path]  # pictures by frame number
+
+    def picture(self, frame: int) -> ColorPicture | None:
+        """Read the picture of a frame, None where there is none. Raises InputError where it has another size."""
+        if frame not in self.files:
+            return None
+        pixels = read_picture(self.files[frame])
+        if pixels.shape[:2] != (self.height, self.width):
+            size, wanted = f"{pixels.shape[1]} x {pixels.shape[0]}", f"{self.width} x {self.height}"
+            raise InputError(f"{self.files[frame]}: {size} pixels where camera {self.name} has {wanted}; mend either")
+        shifted = self.intrinsic + np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
+        camera = PinholeCamera(self.width, self.height, shifted, np.linalg.inv(self.camera_to_world))
+        return ColorPicture(camera, pixels, self.distortion)
+
+
+def pictures_in(folder: Path, name: str) -> dict[int, Path]:
+    """Return the pictures in a folder by the last number in their names. Raises InputError where there is none."""
+    try:
+        paths = sorted(p for p in folder.iterdir() if p.suffix.lower() in PICTURES and not p.name.startswith("."))
+    except OSError as error:
+        text = f"{folder}: color of camera {name} cannot be read ({error.strerror})"
+        raise InputError(f"{text}; name its folder, or leave `color` out") from None
+    found: dict[int, Path] = {}
+    for path in paths:
+        number = last_number(path.stem)
+        if number is None:
+            raise InputError(f"{path}: has no frame number in its name; name it as color_00012.png")
+        if number in found:
+            raise InputError(f"{path}: is frame {number}, as {found[number].name} is; keep one of them")
+        found[number] = path
+    if not found:
+        raise InputError(f"{folder}: camera {name} has no color pictures; record some, or leave `color` out")
+    return found
+
+
+def distortion_of(entry: Mapping[str, Any]) -> tuple[float, ...]:
+    """Return the five coefficients of an entry; missing ones are 0. Raises InputError for others."""
+    given = entry.get("distortion", [])
+    good = isinstance(given, list) and len(given) <= 5
+    numbers = [float(k) for k in given if isinstance(k, (int, float)) and not isinstance(k, bool)] if good else []
+    if not good or len(numbers) < len(given) or not all(abs(k) <= MOST_DISTORTION for k in numbers):
+        raise InputError(f"distortion is {given!r:.60}; give up to five numbers, k1 k2 p1 p2 k3, as OpenCV has them")
+    if any(math.isnan(k) for k in numbers):
+        raise InputError("distortion has a number that is not finite; calibrate the camera again")
+    return (*numbers, *[0.0] * (5 - len(numbers)))

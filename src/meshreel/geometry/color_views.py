@@ -1,0 +1,173 @@
+"""Colours that cameras saw of places on a surface: projected, checked for what hides them, and blended.
+
+In: pictures with their cameras, and a mesh that may hide places from them. Out: a colour for each place that some
+camera saw, from those that looked at it most squarely.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Bool, Float32, Float64, UInt8
+
+from ..types import GREY, Mesh, Placement
+from .cameras import PinholeCamera
+from .raycast import Rays
+from .strict import products
+
+MOST_SIDE = 512  # pixels, of the pictures of what hides a place: a third of the time of whole ones (guess)
+MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind what is seen (guess)
+FEATHER = 4.0  # pixels from a step in depth within which a colour counts less: it mixes both sides (guess)
+STEP = 0.03  # of the depth between neighbours: a step (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class ColorPicture:
+    """A picture in sRGB with the camera that took it; its lens bends as OpenCV's `k1 k2 p1 p2 k3` say."""
+
+    camera: PinholeCamera
+    pixels: UInt8[np.ndarray, "H W 3"]
+    distortion: tuple[float, ...] = (0.0,) * 5
+
+    def project(
+        self, points: Float64[np.ndarray, "N 3"]
+    ) -> tuple[Float64[np.ndarray, "N 2"], Float64[np.ndarray, " N"]]:
+        """Return positions in the picture, NaN for points that are not in front, and depths along the optical axis."""
+        local = products(points, self.camera.extrinsic[:3, :3].T) + self.camera.extrinsic[:3, 3]
+        depth = local[:, 2]
+        if not any(self.distortion):
+            return self.camera.project(local), depth
+        k1, k2, p1, p2, k3 = self.distortion
+        with np.errstate(all="ignore"):
+            x, y = local[:, 0] / np.where(depth > 0, depth, np.nan), local[:, 1] / np.where(depth > 0, depth, np.nan)
+            r2 = x * x + y * y
+            bend = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+            bent_x = x * bend + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+            bent_y = y * bend + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        return products(np.stack([bent_x, bent_y, np.ones(len(x))], axis=1), self.camera.intrinsic.T)[:, :2], depth
+
+    def placed(self, place: Placement) -> ColorPicture:
+        """Return the picture for places in normalised coordinates."""
+        camera, origin = self.camera, np.asarray(place.origin)
+        extrinsic = camera.extrinsic.copy()
+        extrinsic[:3, 3] = (products(extrinsic[:3, :3], origin[:, None])[:, 0] + extrinsic[:3, 3]) / place.scale
+        return replace(self, camera=replace(camera, extrinsic=extrinsic))
+
+
+@runtime_checkable
+class ColorFrames(Protocol):
+    """The colour pictures of a recording, by frame; its cameras stand still."""
+
+    def __getitem__(self, index: int, /) -> list[ColorPicture | None]:
+        """Return a frame's pictures, one for each camera; None for a camera that lacks the frame."""
+        ...
+
+
+class ColorViews:
+    """The pictures of one moment, prepared for repeated queries."""
+
+    def __init__(self, pictures: Sequence[ColorPicture], hides: Mesh, margin: float = MARGIN) -> None:
+        """Take pictures, and all surface that may hide a place; `margin` is in the unit of its vertices."""
+        rays = Rays(hides)
+        self.views = [View(picture, rays, margin) for picture in pictures]
+
+    def at(
+        self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+    ) -> tuple[Float64[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+        """Return the colours of places with these normals, 0 to 255, and which of them some camera saw."""
+        sums, weights = np.zeros((len(points), 3)), np.zeros(len(points))
+        for view in self.views:
+            weight = view.weights(points, normals)
+            colors = view.colors(points, weight > 0)
+            sums += colors * weight[:, None]
+            weights += weight
+        seen = weights > 0
+        sums[seen] /= weights[seen, None]
+        return sums, seen
+
+
+class View:
+    """A picture, and the depth that it sees at each of its pixels, coarser where it is large."""
+
+    def __init__(self, picture: ColorPicture, rays: Rays, margin: float) -> None:
+        from scipy.ndimage import distance_transform_edt
+
+        self.picture, self._margin, camera = picture, margin, picture.camera
+        self._shrink = max(1, -(-max(camera.width, camera.height) // MOST_SIDE))
+        width, height = -(-camera.width // self._shrink), -(-camera.height // self._shrink)
+        intrinsic = camera.intrinsic.copy()
+        intrinsic[:2] /= self._shrink
+        self._depth = rays.look(PinholeCamera(width, height, intrinsic, camera.extrinsic)).depth
+        self._from_step = distance_transform_edt(~_steps(self._depth)) * self._shrink
+
+    def weights(
+        self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+    ) -> Float64[np.ndarray, " N"]:
+        """Return how well the picture shows places: the cube of the cosine of the view, less near steps; 0: not."""
+        positions, depth = self.picture.project(points)
+        to_eye = self.picture.camera.eye - points
+        cosine = np.einsum("nd,nd->n", normals, to_eye) / np.maximum(np.linalg.norm(to_eye, axis=1), 1e-12)
+        size = np.array([self.picture.camera.width, self.picture.camera.height])
+        with np.errstate(invalid="ignore"):
+            inside = (positions >= 0.5).all(axis=1) & (positions <= size - 0.5).all(axis=1) & (cosine > 0)
+        rows = np.flatnonzero(inside)
+        cells = np.minimum(positions[rows] / self._shrink, np.array(self._depth.shape[::-1]) - 1e-9).astype(np.int64)
+        at = (cells[:, 1], cells[:, 0])
+        hidden = depth[rows] > self._depth[at] + np.maximum(self._margin, MARGIN * depth[rows])
+        near = np.clip(self._from_step[at] / FEATHER, 0.05, 1.0)
+        weights = np.zeros(len(points))
+        weights[rows] = np.where(hidden, 0.0, cosine[rows] ** 3 * near)
+        return weights
+
+    def colors(self, points: Float64[np.ndarray, "N 3"], chosen: Bool[np.ndarray, " N"]) -> Float64[np.ndarray, "N 3"]:
+        """Return the colours of the chosen places in the picture; 0 of others."""
+        found = np.zeros((len(points), 3))
+        found[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0])
+        return found
+
+
+def _steps(depth: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
+    """Return the pixels beside a step in depth."""
+    found = np.zeros(depth.shape, bool)
+    for axis in (0, 1):
+        one, two = np.moveaxis(depth, axis, 0)[:-1], np.moveaxis(depth, axis, 0)[1:]
+        with np.errstate(invalid="ignore"):
+            apart = ~(np.abs(one - two) <= STEP * np.minimum(one, two))  # also where one of both sees nothing
+        apart &= np.isfinite(one) | np.isfinite(two)
+        edge = np.moveaxis(found, axis, 0)
+        edge[:-1] |= apart
+        edge[1:] |= apart
+    return found
+
+
+def sampled(pixels: UInt8[np.ndarray, "H W 3"], positions: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, "N 3"]:
+    """Return the colours at positions in a picture, blended between the middles of pixels."""
+    height, width = pixels.shape[:2]
+    x, y = np.clip(positions - 0.5, 0, [width - 1, height - 1]).T
+    x0, y0 = np.minimum(x.astype(np.int64), width - 2), np.minimum(y.astype(np.int64), height - 2)
+    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+    flat, at = pixels.reshape(-1, 3), y0 * width + x0
+    upper = flat[at] * (1 - fx) + flat[at + 1] * fx
+    lower = flat[at + width] * (1 - fx) + flat[at + width + 1] * fx
+    return upper * (1 - fy) + lower * fy
+
+
+def spread_colors(
+    mesh: Mesh, colors: Float64[np.ndarray, "V 3"], seen: Bool[np.ndarray, " V"]
+) -> UInt8[np.ndarray, "V 3"]:
+    """Return colours of all vertices of a mesh: those that no camera saw have the means of neighbours, ring by ring."""
+    ends = np.concatenate([mesh.faces, mesh.faces[:, [1, 2, 0]]]).reshape(-1)
+    others = np.concatenate([mesh.faces[:, [1, 2, 0]], mesh.faces]).reshape(-1)
+    found, known = np.where(seen[:, None], colors, float(GREY)), seen.copy()
+    while True:
+        reached = known[others] & ~known[ends]
+        if not reached.any():
+            return np.clip(np.rint(found), 0, 255).astype(np.uint8)
+        at, counts = ends[reached], np.bincount(ends[reached], minlength=len(known))
+        sums = np.stack([np.bincount(at, found[others[reached], k], len(known)) for k in range(3)], axis=1)
+        new = counts > 0
+        found[new] = sums[new] / counts[new, None]
+        known |= new
