@@ -61,6 +61,14 @@ class Coding:
     key_interval: float | None = None
     """Longest time between frames that decode without earlier ones, s (4). Preset `best` only."""
 
+    color: Literal["auto", "texture", "vertices", "none"] = "auto"
+    """`auto` codes colours of vertices, and textures where frames have textures or colour cameras; `texture` makes
+    textures of colours of vertices, too; `vertices` and `none` leave textures, or all colours, out."""
+    color_quality: float | None = None
+    """Quality of colours, 0 to 100; the quality of the geometry if not given."""
+    texture: Literal[128, 256, 512, 1024, 2048] | None = None
+    """Width of a body's texture, texels; as the pictures have detail, at most 1024, if not given."""
+
     def goal(self) -> Goal | None:
         """Return the target, None without one. Raises InputError for a target with a quality, or out of range."""
         if self.target_psnr is None and self.target_mbps is None:
@@ -81,6 +89,9 @@ class Coding:
             self.centers,
             key_interval=self.key_interval,
             effort=self.effort,
+            color=self.color,
+            color_quality=self.color_quality,
+            texture=self.texture,
         )
 
 

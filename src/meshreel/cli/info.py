@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,8 @@ from ..container.sources import FileSource
 from ..errors import FormatError
 from ..format.layout import ChunkKind, Form
 from .console import Common
+
+COMPANION_NAMES = {ChunkKind.COLORS: "vertex colors", ChunkKind.ATLAS: "atlas", ChunkKind.PICTURES: "pictures"}
 
 
 def command(file: Path, /, *, common: Common = Common()) -> None:
@@ -85,9 +87,21 @@ def _describe_group(reader: ReelReader, chunk: Chunk, there: int) -> dict[str, A
     """Describe a group of a file of which the first `there` bytes exist."""
     row: dict[str, Any] = {"chunk": chunk.number, "track": chunk.track}
     row |= {"first_frame": chunk.first_frame, "frames": chunk.frame_count}
-    row |= {"form": chunk.form_name, "bytes": chunk.size, "layers": len(chunk.layers) - 1}
+    row |= {"form": chunk.form_name, "bytes": _size_of(reader, chunk), "layers": len(chunk.layers) - 1}
     row["predicted"] = reader.group_before(chunk) is not None
     return row | _contents(reader, chunk, there, payload_bytes_by_purpose)
+
+
+def _size_of(reader: ReelReader, chunk: Chunk) -> int:
+    """Return the bytes of a chunk and of all that belongs to it."""
+    return chunk.size + sum(other.size for _, other in _companions(reader, chunk))
+
+
+def _companions(reader: ReelReader, chunk: Chunk) -> Iterator[tuple[str, Chunk]]:
+    """Yield the chunks that belong to a chunk, with the names of what they have."""
+    for kind, name in COMPANION_NAMES.items():
+        if (other := reader.companion_of(chunk, kind)) is not None:
+            yield name if chunk.frame_count else f"background's {name}", other
 
 
 def _shown(reader: ReelReader) -> dict[int, list[tuple[int, int]]]:
@@ -102,7 +116,7 @@ def _shown(reader: ReelReader) -> dict[int, list[tuple[int, int]]]:
 
 def _describe_state(reader: ReelReader, chunk: Chunk, there: int, shown: Iterable[tuple[int, int]]) -> dict[str, Any]:
     """Describe a state of the background: the state that it changes, if any, and the frames that show it."""
-    row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form_name, "bytes": chunk.size}
+    row: dict[str, Any] = {"chunk": chunk.number, "form": chunk.form_name, "bytes": _size_of(reader, chunk)}
     row["changes"] = chunk.depends_on[0] if chunk.depends_on else None
     row["ranges"] = _merged(shown)
     return row | _contents(reader, chunk, there, lambda payload: {"background": len(payload)})
@@ -124,12 +138,17 @@ def _contents(
     reader: ReelReader, chunk: Chunk, there: int, sizes_of: Callable[[bytes], dict[str, int]]
 ) -> dict[str, Any]:
     """Return the bytes of a chunk by content; for a damaged chunk its error, and which of its bytes are missing."""
-    try:
-        return {"bytes_by_content": sizes_of(reader.read_chunk(chunk.number))}
-    except FormatError as error:
-        missing = min(max(chunk.end - there, 0), chunk.size)
-        sizes = {"damaged": chunk.size - missing, "missing": missing}
-        return {"bytes_by_content": {name: size for name, size in sizes.items() if size}, "error": str(error)}
+    sizes, errors = dict[str, int](), list[str]()
+    for name, one in [("", chunk), *_companions(reader, chunk)]:
+        try:
+            payload = reader.read_chunk(one.number)
+            found = {name: len(payload)} if name else sizes_of(payload)
+        except FormatError as error:
+            missing = min(max(one.end - there, 0), one.size)
+            found = {"damaged": one.size - missing, "missing": missing}
+            errors.append(str(error))
+        sizes = _sum([sizes, {what: size for what, size in found.items() if size}])
+    return {"bytes_by_content": sizes} | ({"error": errors[0]} if errors else {})
 
 
 def _sum(rows: Iterable[dict[str, int]]) -> dict[str, int]:

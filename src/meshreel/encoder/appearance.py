@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -21,13 +22,34 @@ from ..coding.colored import Canvas, canvas_of, encode_group_colors, finest_face
 from ..coding.group import continue_group
 from ..coding.layers.coder import LayersState
 from ..container.writer import Companion
+from ..errors import InputError
 from ..format.budget import CostlyError
 from ..format.layout import ChunkKind, Form
 from ..geometry.painted import Paint, Painted
 from ..types import GREY, Mesh
 from .forms import EncodedGroup
 from .interval import Interval
-from .options import AppearanceOptions, TextureOptions
+from .options import TEXTURE_SIZES, AppearanceOptions, EncoderOptions, TextureOptions
+
+USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
+MOST_FITTING = 1024  # texels, unless a larger texture is asked for: 2 mm on a person
+
+
+def as_installed(options: EncoderOptions) -> tuple[EncoderOptions, tuple[str, ...]]:
+    """Return options without textures where the packages for these are missing, unless they are asked for; a warning.
+
+    Raises InputError where they are asked for.
+    """
+    appearance = options.appearance
+    if appearance is None or appearance.texture is None:
+        return options, ()
+    missing = [name for name in ("av", "xatlas") if find_spec(name) is None]
+    if not missing:
+        return options, ()
+    text = f"no textures: {' and '.join(missing)} missing; pip install 'meshreel[color]'"
+    if appearance.texture.always:
+        raise InputError(f"{text}, or give --color vertices")
+    return replace(options, appearance=replace(appearance, texture=None)), (f"{text}; colours of vertices are kept",)
 
 
 def colored_groups(
@@ -95,7 +117,7 @@ class _Chain:
         companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
         texture = options.texture if not self._groups and group.form == Form.LAYERS else None
         if texture is not None and (texture.always or has_pictures):
-            self._video = _Video(canvas, texture)
+            self._video = _Video(canvas, texture, paints, meshes)
             companions.append(Companion(ChunkKind.ATLAS, self._video.atlas))
         if self._video is not None:
             for paint, mesh in zip(paints, meshes, strict=True):
@@ -120,9 +142,11 @@ class _Chain:
 class _Video:
     """The atlas of a chain, and the video of its pictures."""
 
-    def __init__(self, canvas: Canvas, options: TextureOptions) -> None:
+    def __init__(
+        self, canvas: Canvas, options: TextureOptions, paints: Sequence[Paint | None], meshes: Sequence[Mesh]
+    ) -> None:
         template = canvas.meshes[0]
-        layout = unwrap(template.base, options.size)
+        layout = unwrap(template.base, options.size or fitting_size(paints, meshes))
         self.atlas = encode_atlas(template.base, layout)
         self._texels, self._count = texels_of(layout, template.levels), template.vertices
         self._faces = finest_faces(template.base, template.levels)
@@ -150,3 +174,11 @@ def _vertex_colors(paint: Paint | None, mesh: Mesh) -> np.ndarray:
     if paint is None or mesh.is_empty:
         return np.full(mesh.vertices.shape, GREY, np.uint8)
     return vertex_colors(paint, mesh)
+
+
+def fitting_size(paints: Sequence[Paint | None], meshes: Sequence[Mesh]) -> int:
+    """Return the width of the texture that has the detail of the pictures that show some of these frames."""
+    some = next((k for k, paint in enumerate(paints) if paint is not None), 0)
+    paint = paints[some]
+    wanted = 0.0 if paint is None else paint.pixels_on(meshes[some]) / USED
+    return next((size for size in TEXTURE_SIZES if size <= MOST_FITTING and size * size >= wanted), MOST_FITTING)

@@ -30,7 +30,7 @@ from .target import Fidelity
 MOST_FRAMES = 64  # in a group: the tracker's distances and the basis grow with it (guess)
 MOST_SECONDS = 600  # of a key interval: viewers who join late decode that much before the first picture (guess)
 STEP = LayerCodingOptions().step
-TEXTURE_SIZES = (256, 512, 1024, 2048)
+TEXTURE_SIZES = (128, 256, 512, 1024, 2048)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,12 +96,12 @@ class SceneOptions:
 class TextureOptions:
     """Options of textures, which need the extra `color`."""
 
-    size: int = 1024  # width of a texture, and its height at most, texels
+    size: int | None = None  # width of a texture, and its height at most, texels; None: as the pictures have detail
     video: VideoOptions = VideoOptions()
     always: bool = False  # also where frames have colours of their vertices only
 
     def __post_init__(self) -> None:
-        if self.size not in TEXTURE_SIZES:
+        if self.size is not None and self.size not in TEXTURE_SIZES:
             raise InputError(f"texture {self.size}: give {', '.join(map(str, TEXTURE_SIZES))} texels")
 
 

@@ -23,6 +23,7 @@ from .options import AppearanceOptions, EncoderOptions, LayersOptions, PaperOpti
 from .target import Fidelity
 
 PRESETS = ("best", "paper")
+COLORS = ("auto", "texture", "vertices", "none")
 EFFORTS = ("fast", "normal", "thorough")
 
 
@@ -34,11 +35,16 @@ def preset_options(
     centers: int | None = None,
     key_interval: float | None = None,
     effort: str = "normal",
+    color: str = "auto",
+    color_quality: float | None = None,
+    texture: int | None = None,
 ) -> EncoderOptions:
     """Return the encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
 
-    `effort` is how long the preset `best` searches: see `EFFORTS`. Raises InputError for an unknown preset or values
-    out of range.
+    `effort` is how long the preset `best` searches: see `EFFORTS`. `color` is one of `COLORS`: textures where the
+    frames have pictures, textures always, colours of vertices only, or none; `color_quality` is that of colours, by
+    default `quality`; `texture` is the width of textures, texels. Raises InputError for an unknown preset or values out
+    of range.
     """
     if preset not in PRESETS:
         raise InputError(f"no preset is called {preset!r}; known: {', '.join(PRESETS)}")
@@ -61,7 +67,7 @@ def preset_options(
     )
     if group_size is not None:
         method = replace(method, group_size=group_size)
-    appearance = appearance_options(float(quality))
+    appearance = appearance_options(float(quality if color_quality is None else color_quality), color, texture)
     options = EncoderOptions(method, appearance=appearance, quality=float(quality))
     return options if key_interval is None else replace(options, key_interval=key_interval)
 
@@ -118,10 +124,22 @@ def motion_step(quality: float) -> float:
     return rounded(0.0018 * 2 ** ((50 - quality) / 25))
 
 
-def appearance_options(quality: float = 50.0) -> AppearanceOptions:
-    """Return the options of colours at a quality."""
-    video = VideoOptions(crf=rate_factor(quality))
-    return AppearanceOptions(ColorCodingOptions(step=color_step(quality)), TextureOptions(video=video))
+def appearance_options(
+    quality: float = 50.0, color: str = "auto", texture: int | None = None
+) -> AppearanceOptions | None:
+    """Return the options of colours at a quality; None for no colours. Raises InputError for values out of range."""
+    if color not in COLORS:
+        raise InputError(f"no way of colours is called {color!r}; known: {', '.join(COLORS)}")
+    if not 0 <= quality <= 100:
+        raise InputError(f"color quality must be in 0 to 100, got {quality:g}")
+    if texture is not None and color in ("vertices", "none"):
+        raise InputError(f"texture {texture} and color {color!r}: there are no textures; leave one of both out")
+    if color == "none":
+        return None
+    vertices, video = ColorCodingOptions(step=color_step(quality)), VideoOptions(crf=rate_factor(quality))
+    if color == "vertices":
+        return AppearanceOptions(vertices, None)
+    return AppearanceOptions(vertices, TextureOptions(texture, video, always=color == "texture"))
 
 
 def rate_factor(quality: float) -> int:

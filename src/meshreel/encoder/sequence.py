@@ -35,6 +35,7 @@ from ..geometry.work import since, so_far
 from ..io.remote import Place
 from ..metrics.distance import PSNR_CEILING, psnr
 from ..types import MeshSequence, as_sequence, evenly
+from .appearance import as_installed
 from .digests import WriteLines
 from .excerpt import Excerpt, write_survey
 from .interval import Interval
@@ -51,7 +52,7 @@ from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
 
-QUALITY, PRESET, EFFORT = 50.0, "best", "normal"  # the default operating point (decision 9)
+QUALITY, PRESET, EFFORT, COLOR = 50.0, "best", "normal", "auto"  # the default operating point (decision 9)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
 ASTRAY = 0.005  # of the surface: noise, and what a border of the background lacks, is less (guess)
 
@@ -63,6 +64,7 @@ def encode(
     preset: str = PRESET,
     *,
     effort: str = EFFORT,
+    color: str = COLOR,
     options: EncoderOptions | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -71,8 +73,9 @@ def encode(
     """Encode meshes as a .reel file at `path`, also a URL (extra `remote`); it appears only when it is complete.
 
     `sequence` is a MeshSequence or an iterable of meshes (`types.as_sequence`, which also takes a frame rate); vertices
-    at equal positions are welded. `effort` is `fast`, `normal` or `thorough`. `options` replace quality, preset and
-    effort; make them with `preset_options`. Most of a scene stands still: it becomes a background and bodies. Bodies
+    at equal positions are welded. `effort` is `fast`, `normal` or `thorough`. `color` is `auto`, `texture`,
+    `vertices` or `none`, as `preset_options` says. `options` replace quality, preset, effort and color; make them with
+    `preset_options`. Most of a scene stands still: it becomes a background and bodies. Bodies
     that never touch are coded apart in any sequence. With an executor, intervals are encoded side by side, to the same
     bytes; memory then holds an interval for each worker and one more. Warns of surface that the file lacks.
     Raises InputError for frames that cannot be used, before anything is encoded.
@@ -82,10 +85,10 @@ def encode(
     InputError where there is something to continue.
     """
     if options is None:
-        options = preset_options(preset, quality, effort=effort)
-    elif (quality, preset, effort) != (QUALITY, PRESET, EFFORT):
-        text = f"options and quality {quality:g}, preset {preset!r}, effort {effort!r}: options already have them"
-        raise InputError(f"{text}; leave these out, or give preset_options(preset, quality, effort=effort) as options")
+        options = preset_options(preset, quality, effort=effort, color=color)
+    elif (quality, preset, effort, color) != (QUALITY, PRESET, EFFORT, COLOR):
+        text = f"options and quality {quality:g}, preset {preset!r}, effort {effort!r}, color {color!r}"
+        raise InputError(f"{text}: options already have them; leave these out, or give preset_options(...) as options")
     summary = Encoder(Welded(as_sequence(sequence)), executor, progress).encode(path, options, resume)
     for text in summary.warnings:
         warnings.warn(text, stacklevel=2)
@@ -152,6 +155,7 @@ class Encoder:
         if options.scene is None and self._masker is not None:
             raise InputError("masks for a sequence that is not taken apart (scene=None): give one of both")
         before, excerpt = so_far(), self._excerpt
+        options, lacking = as_installed(options)
         if excerpt is not None:
             excerpt.surveyed.check(self.sequence)
             if self._is_scene(options):
@@ -162,7 +166,8 @@ class Encoder:
         made = made_of(self.sequence, options, self._masker)
         journal.begin(made if excerpt is None else made | {"part": str(excerpt.frames)})
         summary = _encode_tracked(job, file, seen) if parts is None else _encode_scene(job, file, parts)
-        return replace(summary, work=since(before))
+        colored = any(group.colors for group in summary.groups)
+        return replace(summary, work=since(before), warnings=summary.warnings + (lacking if colored else ()))
 
     def survey(self, path: Path) -> Survey:
         """Survey the sequence, and write a file of it for encodes of its parts."""

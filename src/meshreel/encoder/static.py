@@ -29,6 +29,7 @@ from ..geometry.derived_sequences import CapturedSequence
 from ..geometry.painted import Paint, Painted
 from ..geometry.topology import clean, face_normals, vertex_normals
 from ..types import Mesh, Placement, evenly
+from .appearance import fitting_size
 from .options import AppearanceOptions, TextureOptions
 from .parts import Change, Parts
 from .views import Views
@@ -170,10 +171,10 @@ class _Looks:
         """Return the usual colours of places over some frames, and which of them are known."""
         return median_colors(points, normals, map(self._paint, self._some(frames, STILL_FRAMES)))
 
-    def layout(self, mesh: Mesh, frames: range, size: int) -> Layout:
+    def layout(self, mesh: Mesh, frames: range, size: int | None) -> Layout:
         """Return the places of a background in a texture: as the cameras see it, where there are some."""
         if self._views is None:
-            return unwrap(mesh, size)
+            return unwrap(mesh, size or fitting_size([self._paint(frames.start)], [mesh]))
         return projected(mesh, self._views.at(self._some(frames, 1)[0]))
 
     def _some(self, frames: range, most: int) -> list[int]:

@@ -17,6 +17,7 @@ from ..types import GREY, Mesh, Placement
 from .cameras import PinholeCamera
 from .raycast import Rays
 from .strict import products
+from .topology import face_normals
 
 MOST_SIDE = 512  # pixels, of the pictures of what hides a place: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind what is seen (guess)
@@ -87,6 +88,17 @@ class ColorViews:
         seen = weights > 0
         sums[seen] /= weights[seen, None]
         return sums, seen
+
+    def pixels_on(self, mesh: Mesh) -> float:
+        """Return how many pixels of the pictures show a mesh: each face counts in the one that sees it finest."""
+        normals, areas = face_normals(mesh)
+        middles, most = mesh.vertices[mesh.faces].mean(axis=1), np.zeros(len(mesh.faces))
+        for view in self.views:
+            camera, depth = view.picture.camera, view.picture.project(middles)[1]
+            cosine = np.cbrt(view.weights(middles, normals))  # less near steps
+            finest = camera.intrinsic[0, 0] * camera.intrinsic[1, 1] / np.maximum(depth, 1e-9) ** 2
+            most = np.maximum(most, finest * cosine * areas)
+        return float(most.sum())
 
 
 class View:

@@ -25,6 +25,10 @@ class Paint(Protocol):
         """Return the colours of places with these normals, 0 to 255, and which of them it knows."""
         ...
 
+    def pixels_on(self, mesh: Mesh) -> float:
+        """Return how many pixels of the pictures that it has show a mesh; infinite where it has none."""
+        ...
+
 
 class Painted:
     """A mesh with faces and colours, prepared for repeated queries."""
@@ -45,6 +49,15 @@ class Painted:
         else:
             near = np.linalg.norm(hits.points - points, axis=1) <= self._far
         return self.on(hits.faces, hits.barycentric), near
+
+    def pixels_on(self, mesh: Mesh) -> float:
+        """Return how many texels of its texture the painted mesh has, whatever the mesh; infinite without a texture."""
+        del mesh
+        if self._pixels is None or self._mesh.uv is None:
+            return np.inf
+        a, b, c = np.moveaxis(self._mesh.uv.astype(np.float64), 1, 0)
+        areas = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+        return float(np.nansum(areas)) * self._pixels.shape[0] * self._pixels.shape[1]
 
     def on(self, faces: Int32[np.ndarray, " N"], barycentric: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 3"]:
         """Return the colours at places inside faces."""

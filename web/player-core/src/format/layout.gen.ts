@@ -33,6 +33,8 @@ export const ChunkKind = {
   STATIC: 1,
   GROUP: 2,
   COLORS: 3,
+  ATLAS: 4,
+  PICTURES: 5,
 } as const;
 
 export const Form = {
@@ -42,6 +44,8 @@ export const Form = {
   EMPTY: 4,
   PATCH: 5,
   VERTEX_COLORS: 6,
+  PLACES: 7,
+  VIDEO: 8,
 } as const;
 
 export const AnchorRule = {
@@ -57,6 +61,10 @@ export const Origin = {
 export const Presence = {
   ABSENT: 0,
   PRESENT: 1,
+} as const;
+
+export const VideoCodec = {
+  AV1: 1,
 } as const;
 
 /** The first bytes of a file: its signature, and the size of the head. */
@@ -111,7 +119,7 @@ export interface IndexEntry {
   readonly form: number; // coding; equal to the first byte of the chunk
   readonly frames: number; // number of frames; 0 if and only if STATIC, or COLORS of a STATIC
   readonly track: number; // number of the moving body, from 0; 0 if STATIC
-  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before
+  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; for ATLAS, the GROUP whose base mesh it is of; for PICTURES, the GROUP, the ATLAS, and but for the first of this, the PICTURES of the group before
   readonly layers: readonly Layer[]; // at least one
 }
 export const IndexEntry: Kind<IndexEntry> = record("IndexEntry", {
@@ -313,4 +321,40 @@ export interface ColorsLevel {
 export const ColorsLevel: Kind<ColorsLevel> = record("ColorsLevel", {
   siblingWeight: u8,
   values: nested(() => CodedField),
+});
+
+/** The payload of a chunk of form PLACES: of each corner of the base mesh's faces, its place in the texture. */
+export interface Atlas {
+  readonly form: number; // PLACES
+  readonly width: number; // of the texture, texels, even, above 0
+  readonly height: number; // of the texture, texels, even, above 0
+  readonly joinCount: number; // number of integers in `joins`
+  readonly startCount: number; // number of integers in `starts`
+  readonly restCount: number; // number of integers in `rests`
+  readonly joins: Uint8Array; // integers: whether faces share the places of an edge, or of a corner
+  readonly starts: Uint8Array; // integers: places of the faces that share none with one before
+  readonly rests: Uint8Array; // integers: differences of places from where shapes predict them
+}
+export const Atlas: Kind<Atlas> = record("Atlas", {
+  form: choice(u8, Form),
+  width: u16,
+  height: u16,
+  joinCount: varint,
+  startCount: varint,
+  restCount: varint,
+  joins: blob(varint),
+  starts: blob(varint),
+  rests: blob(varint),
+});
+
+/** The payload of a chunk of form VIDEO: the textures of a group's frames. */
+export interface Pictures {
+  readonly form: number; // VIDEO
+  readonly codec: number; // coding of the pictures
+  readonly packets: readonly Uint8Array[]; // one a frame, in their order
+}
+export const Pictures: Kind<Pictures> = record("Pictures", {
+  form: choice(u8, Form),
+  codec: choice(u8, VideoCodec),
+  packets: list(u16, blob(varint)),
 });
