@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from meshreel.coding import entropy
+from meshreel.coding.appearance.atlas import Layout, decode_atlas, encode_atlas
+from meshreel.coding.appearance.colors import ColorCodingOptions, ColoredMesh, decode_colors, encode_colors
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, decode_layers, encode_layers
 from meshreel.coding.layers.patches import encode_patches
@@ -20,7 +22,19 @@ from meshreel.coding.paper.displacements import DisplacementOptions, decode_disp
 from meshreel.coding.reference_mesh import code_reference
 from meshreel.coding.steps import step_of
 from meshreel.format import records
-from meshreel.format.layout import AnchorRule, DisplacementHead, LayersGroup, LayersLevel, Origin, StaticPatch
+from meshreel.format.layout import (
+    AnchorRule,
+    Atlas,
+    CodedField,
+    ColorsLevel,
+    DisplacementHead,
+    LayersGroup,
+    LayersLevel,
+    Origin,
+    StaticPatch,
+    VertexColors,
+)
+from meshreel.format.records import pack
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
@@ -166,3 +180,48 @@ def test_the_document_decodes_patches_to_the_bit(decoder: dict[str, Any]) -> Non
                 np.testing.assert_array_equal(kept, np.flatnonzero(~dropped[t]))
                 np.testing.assert_array_equal(np.reshape(places, (-1, 3)), decoded[t].vertices)
                 np.testing.assert_array_equal(np.reshape(faces, (-1, 3)), decoded[t].faces)
+
+
+def test_the_document_decodes_colors_to_the_bit(decoder: dict[str, Any]) -> None:
+    generator, mesh, frames = np.random.default_rng(8), body(), 3
+    count = len(subdivide_midpoint(mesh, 2).vertices)
+    shape = ColoredMesh(mesh, 2, frames, count)
+    plain = [tuple(point) for point in mesh.vertices.tolist()], [tuple(face) for face in mesh.faces.tolist()]
+    state: np.ndarray | None = None
+    left: Any = None
+    for round_number in range(2):
+        wanted = generator.integers(0, 256, (1, count, 3)) + 9 * np.arange(frames)[:, None, None] + 20 * round_number
+        colors = np.clip(wanted, 0, 255).astype(np.uint8)
+        data = encode_colors([shape], [colors], ColorCodingOptions(1 / 8), state).payload
+        [found], state = decode_colors(data, [shape], state)
+        head, offset = records.unpack(VertexColors, data)
+        assert (head.origin == Origin.PREVIOUS) == (round_number > 0)
+        coded, offset = records.unpack(CodedField, data, offset)
+        levels = []
+        for _ in range(2):
+            level, offset = records.unpack(ColorsLevel, data, offset)
+            levels.append(level)
+        told, left = decoder["decode_colors"](head, coded, levels, *plain, frames, left)
+        np.testing.assert_array_equal(told, found)
+
+
+def test_the_document_decodes_an_atlas(decoder: dict[str, Any]) -> None:
+    mesh, generator = body(), np.random.default_rng(9)
+    flat = np.rint(mesh.vertices[:, :2] * 300).astype(np.int32) + 8
+    flat = np.clip(flat, 0, 1024)
+    for places in (flat[mesh.faces], generator.integers(0, 64, (len(mesh.faces), 3, 2)).astype(np.int32)):
+        places = np.ascontiguousarray(places)
+        record = records.unpack_all(Atlas, encode_atlas(mesh, Layout(1024, 1024, places)))
+        streams = [
+            decoder["decode_integers"](data, count)
+            for data, count in (
+                (record.joins, record.join_count),
+                (record.starts, record.start_count),
+                (record.rests, record.rest_count),
+            )
+        ]
+        plain = [tuple(point) for point in mesh.vertices.tolist()], [tuple(face) for face in mesh.faces.tolist()]
+        told = decoder["decode_places"](*streams, *plain)
+        proper = [f for f, face in enumerate(mesh.faces.tolist()) if len(set(face)) == 3]
+        np.testing.assert_array_equal(np.array(told)[proper], places[proper])
+        np.testing.assert_array_equal(decode_atlas(pack(record), mesh).places[proper], places[proper])
