@@ -21,9 +21,7 @@ from meshreel.types import GREY, Mesh, Texture
 
 RNG = np.random.default_rng(5)
 BALL = trimesh.creation.icosphere(2)
-PAINTED = replace(
-    Mesh.of(BALL.vertices, BALL.faces), colors=RNG.integers(0, 256, BALL.vertices.shape).astype(np.uint8)
-)
+PAINTED = replace(Mesh.of(BALL.vertices, BALL.faces), colors=RNG.integers(0, 256, BALL.vertices.shape).astype(np.uint8))
 PICTURE = RNG.integers(0, 256, (8, 16, 3)).astype(np.uint8)
 SQUARE = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl skin\n"
 QUAD = SQUARE + "f 1/1 2/2 3/3 4/4\n"

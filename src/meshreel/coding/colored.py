@@ -36,19 +36,19 @@ class Canvas:
     dropped: Bool[np.ndarray, "T F"] | None = None  # faces of the template that each frame lacks
     added: tuple[int, ...] = ()  # faces of the patch of each frame
 
-    def uv(self, layout: Layout) -> list[Float32[np.ndarray, "F 3 2"]]:
+    def uv(self, layout: Layout) -> list[Float32[np.ndarray, "_ 3 2"]]:
         """Return the places of the corners of each frame's faces in a texture; NaN for those of patches."""
         template = self.meshes[0]
         whole = layout.uv(template.levels)
         if self.dropped is None:
             return [whole] * template.frames
-        found = list[Float32[np.ndarray, "F 3 2"]]()
+        found = list[Float32[np.ndarray, "_ 3 2"]]()
         for gone, added in zip(self.dropped, self.added, strict=True):
             kept = whole[~gone] if gone.any() else whole
             found.append(np.concatenate([kept, np.full((added, 3, 2), np.nan, np.float32)]) if added else kept)
         return found
 
-    def by_frame(self, colors: Sequence[UInt8[np.ndarray, "T V 3"]]) -> list[UInt8[np.ndarray, "V 3"]]:
+    def by_frame(self, colors: Sequence[UInt8[np.ndarray, "_ _ 3"]]) -> list[UInt8[np.ndarray, "_ 3"]]:
         """Return the colours of the vertices of each frame from those of the meshes."""
         if not self.patches:
             return [frame for some in colors for frame in some]  # frames without surface have none
@@ -56,10 +56,10 @@ class Canvas:
         bounds = pairwise(np.cumsum([0, *self.patches]).tolist())
         return [np.concatenate([frame, added[a:b]]) for frame, (a, b) in zip(template, bounds, strict=True)]
 
-    def by_mesh(self, colors: Sequence[UInt8[np.ndarray, "V 3"]]) -> list[UInt8[np.ndarray, "T V 3"]]:
+    def by_mesh(self, colors: Sequence[UInt8[np.ndarray, "_ 3"]]) -> list[UInt8[np.ndarray, "_ _ 3"]]:
         """Return the colours of the vertices of each mesh from those of the frames."""
         if not self.patches:
-            found, rest = list[UInt8[np.ndarray, "T V 3"]](), list(colors)
+            found, rest = list[UInt8[np.ndarray, "_ _ 3"]](), list(colors)
             for mesh in self.meshes:
                 found.append(np.stack(rest[: mesh.frames]))
                 rest = rest[mesh.frames :]
@@ -103,7 +103,7 @@ def canvas_of(
 
 def encode_group_colors(
     canvas: Canvas,
-    colors: Sequence[UInt8[np.ndarray, "V 3"]],
+    colors: Sequence[UInt8[np.ndarray, "_ 3"]],
     options: ColorCodingOptions,
     before: Float64[np.ndarray, "V 3"] | None,
 ) -> EncodedColors:
@@ -115,7 +115,7 @@ def encode_group_colors(
 
 def decode_group_colors(
     data: bytes, canvas: Canvas, before: LayersState | None, after: LayersState | None
-) -> tuple[list[UInt8[np.ndarray, "V 3"]], LayersState | None]:
+) -> tuple[list[UInt8[np.ndarray, "_ 3"]], LayersState | None]:
     """Decode the colours of the vertices of each frame of a group, by the states of geometry before and after it.
 
     Return also the state after it with what the next colours are predicted from. Raises FormatError where the colours
@@ -151,6 +151,13 @@ def background_canvas(data: bytes) -> Canvas:
     group = unpack_all(DracoGroup, data)
     whole = decode_mesh(group.meshes[0], group.step) if group.meshes else Mesh.empty()
     return Canvas((ColoredMesh(whole, 0, 1, len(whole.vertices)),))
+
+
+def atlas_base(data: bytes) -> Mesh:
+    """Return the mesh that an atlas is of, from the first layer of its group, or from a background."""
+    if data[:1] == bytes([Form.LAYERS]):
+        return base_of(read_layers(data, 0), None)
+    return background_canvas(data).meshes[0].base
 
 
 def finest_faces(base: Mesh, levels: int) -> Int32[np.ndarray, "F 3"]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..coding.appearance.atlas import Layout, decode_atlas
 from ..coding.appearance.pictures import VideoDecoder, decode_pictures, from_i420
-from ..coding.colored import Canvas
+from ..coding.colored import Canvas, atlas_base
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
 from ..format.layout import ChunkKind
@@ -50,7 +50,8 @@ class TrackPictures:
             return meshes
         atlas = self._reader.chunks[pictures.depends_on[1]]
         if self._layouts is None or self._layouts[0] != atlas.number:
-            base = canvas.meshes[0].base
+            whole = None if chunk.frame_count == 0 else 1
+            base = atlas_base(self._reader.read_chunk(atlas.depends_on[0], whole))
             layout = decode_atlas(self._reader.read_chunk(atlas.number), base)
             self._layouts, self._sizes[atlas.number] = (atlas.number, layout), (layout.width, layout.height)
         places = canvas.uv(self._layouts[1])

@@ -68,11 +68,19 @@ def colored_groups(
             state, chain = None, _Chain()
         paints = [_paint(interval, number) for number in numbers]
         if any(paint is not None for paint in paints):
-            has_pictures = interval.views is not None or any(interval.frames[k].texture is not None for k in numbers)
-            state = chain.add(group, paints, options, state, has_pictures)
+            state = chain.add(group, paints, options, state, has_pictures(interval, numbers, options))
         else:
             chain.pass_on(group)
     yield from chain.done()
+
+
+def has_pictures(interval: Interval, numbers: range, options: AppearanceOptions | None) -> bool:
+    """Return whether these frames of an interval are to have textures, where their form allows it."""
+    if options is None or options.texture is None:
+        return False
+    if options.texture.always or interval.views is not None:
+        return True
+    return any(interval.frames[number].texture is not None for number in numbers)
 
 
 def _paint(interval: Interval, number: int) -> Paint | None:
@@ -103,7 +111,7 @@ class _Chain:
         paints: Sequence[Paint | None],
         options: AppearanceOptions,
         before: LayersState | None,
-        has_pictures: bool,
+        pictured: bool,
     ) -> LayersState | None:
         """Add a group with the colours of its frames; return the state that those of the next are predicted from."""
         meshes, after = continue_group(group.payload, len(paints), None, before)
@@ -115,9 +123,8 @@ class _Chain:
             self.pass_on(group)
             return after
         companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
-        texture = options.texture if not self._groups and group.form == Form.LAYERS else None
-        if texture is not None and (texture.always or has_pictures):
-            self._video = _Video(canvas, texture, paints, meshes)
+        if pictured and not self._groups and group.form == Form.LAYERS and options.texture is not None:
+            self._video = _Video(canvas, options.texture, paints, meshes)
             companions.append(Companion(ChunkKind.ATLAS, self._video.atlas))
         if self._video is not None:
             for paint, mesh in zip(paints, meshes, strict=True):

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from ..geometry.work import add, heard, since, so_far
 from . import layers, paper
-from .appearance import colored_groups
+from .appearance import colored_groups, has_pictures
 from .digests import Digests, note
 from .forms import EncodedGroup
 from .interval import Interval
@@ -125,6 +125,8 @@ def encode_interval(
     """
     options = replace(options, target=options.target.scaled(interval.larger))
     if isinstance(options, LayersOptions):
+        if has_pictures(interval, range(1), appearance):  # a frame in the `draco` form has none
+            options = replace(options, floor=False)
         groups = layers.encode_interval(interval, options, stages)
     else:
         groups = iter(paper.encode_interval(interval, options, stages, find))

@@ -19,6 +19,7 @@ from .even_points import scatter
 
 POINTS = 60_000  # on each surface: those of a person's texture of 1024 texels are seven times as many (guess)
 PEAK = 255.0
+LEAST = 1e-12  # squared difference: below are roundings of equal colours
 SHARES = np.array([6.0, 1.0, 1.0]) / 8  # of luma and of colour differences in one number, as MPEG weighs PSNRs
 TO_YUV = np.array(
     [[0.2126, 0.7152, 0.0722], [-0.2126 / 1.8556, -0.7152 / 1.8556, 0.5], [0.5, -0.7152 / 1.5748, -0.0722 / 1.5748]]
@@ -49,7 +50,9 @@ def color_errors(original: Mesh, decoded: Mesh) -> ColorErrors:
         return ColorErrors(same, same, same)
     pair = Painted(original), Painted(decoded)
     squares = np.maximum(_squares(original, *pair), _squares(decoded, *pair[::-1]))
-    return ColorErrors(*(10 * math.log10(PEAK**2 / square) if square > 0 else math.inf for square in squares.tolist()))
+    return ColorErrors(
+        *(10 * math.log10(PEAK**2 / square) if square > LEAST else math.inf for square in squares.tolist())
+    )
 
 
 def _squares(mesh: Mesh, here: Painted, there: Painted) -> Float64[np.ndarray, " 3"]:

@@ -1,0 +1,109 @@
+"""Baking: texels and the places that they have, colours of texels and vertices, and what lies between charts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from meshreel.analysis.appearance.background import median_colors
+from meshreel.analysis.appearance.bake import bake, picture, texels_of
+from meshreel.analysis.appearance.unwrap import unwrap
+from meshreel.analysis.appearance.vertices import vertex_colors
+from meshreel.coding.appearance.atlas import Layout
+from meshreel.geometry.painted import Painted, bilinear
+from meshreel.geometry.topology import subdivide_midpoint
+from meshreel.types import GREY, Mesh, Texture
+from tests.metrics.shapes import sphere
+
+SQUARE = Mesh.of([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+PLACES = (np.array([[0, 32], [32, 32], [32, 0], [0, 0]], np.int32))[SQUARE.faces]
+LAYOUT = Layout(64, 32, np.ascontiguousarray(PLACES))
+PICTURE = np.random.default_rng(0).integers(0, 256, (16, 16, 3)).astype(np.uint8)
+TEXTURED = replace(SQUARE, uv=(LAYOUT.uv(0) * [2, 1]).astype(np.float32), texture=Texture.of(PICTURE))
+
+
+@pytest.mark.parametrize("levels", [0, 1, 2])
+def test_texels_are_where_the_square_has_them(levels: int) -> None:
+    texels = texels_of(LAYOUT, levels)
+    rows, columns = np.divmod(texels.pixels, 64)
+    assert len(texels.pixels) == 32 * 32 and columns.max() == 31
+    wanted = np.stack([(columns + 0.5) / 32, 1 - (rows + 0.5) / 32, 0 * rows], axis=1)
+    np.testing.assert_allclose(texels.places(subdivide_midpoint(SQUARE, levels)), wanted, atol=1e-12)
+
+
+def test_a_texture_of_twice_the_size_has_the_same_colors() -> None:
+    texels = texels_of(LAYOUT, 1)
+    colors, seen = bake(Painted(TEXTURED), subdivide_midpoint(SQUARE, 1), texels)
+    rows, columns = np.divmod(texels.pixels, 64)
+    wanted = bilinear(PICTURE, np.stack([(columns + 0.5) / 32, 1 - (rows + 0.5) / 32], axis=1))
+    assert seen.all() and np.abs(colors - wanted).max() <= 0.51
+
+
+def test_places_outside_of_a_texture_are_those_of_its_repetition() -> None:
+    places = np.random.default_rng(1).random((50, 2))
+    np.testing.assert_allclose(bilinear(PICTURE, places), bilinear(PICTURE, places + [3, -2]), atol=1e-6)
+    assert bilinear(PICTURE, np.array([[0.5 / 16, 1 - 0.5 / 16]]))[0].tolist() == PICTURE[0, 0].tolist()
+
+
+def test_faces_without_a_place_have_the_colors_of_their_vertices() -> None:
+    uv = TEXTURED.uv.copy()
+    uv[1] = np.nan
+    red = np.tile(np.array([200, 0, 0], np.uint8), (4, 1))
+    some = Painted(replace(TEXTURED, uv=uv, colors=red))
+    assert some.on(np.array([1], np.int32), np.array([[0.2, 0.3, 0.5]])).tolist() == [[200, 0, 0]]
+    assert Painted(replace(TEXTURED, uv=uv)).on(np.array([1], np.int32), np.ones((1, 3)) / 3).tolist() == [[GREY] * 3]
+
+
+def test_what_is_between_charts_leads_from_one_to_the_other() -> None:
+    texels = texels_of(LAYOUT, 0)
+    colors = np.full((len(texels.pixels), 3), 200, np.uint8)
+    whole = picture(texels, colors, np.ones(len(colors), bool))
+    assert whole.shape == (32, 64, 3) and (whole == 200).all()
+    half = texels.pixels % 64 < 16
+    colors[half] = 100
+    unseen = picture(texels, colors, (texels.pixels % 64 < 8) | (texels.pixels % 64 >= 24))
+    assert (np.diff(unseen[10, :32, 0].astype(int)) >= 0).all() and 100 < unseen[10, 16, 0] < 200
+    assert (picture(texels, colors, np.zeros(len(colors), bool)) == GREY).all()
+
+
+def test_colors_that_are_linear_on_faces_are_those_of_the_vertices() -> None:
+    ball = subdivide_midpoint(sphere(levels=2), 1)
+    colors = (120 + 100 * ball.vertices / np.abs(ball.vertices).max()).astype(np.uint8)
+    found = vertex_colors(Painted(replace(ball, colors=colors)), ball)
+    assert np.abs(found.astype(int) - colors).max() <= 4
+
+
+def test_the_median_has_no_ghost_of_who_passes() -> None:
+    points = SQUARE.vertices
+    usual, passer = np.full((4, 3), 50.0), np.full((4, 3), 250.0)
+
+    class Seen:
+        def __init__(self, colors: np.ndarray, known: list[bool]) -> None:
+            self.answer = colors, np.array(known)
+
+        def at(self, *_):
+            return self.answer
+
+        def pixels_on(self, _):
+            return 0.0
+
+    frames = [Seen(usual, [True, True, True, False])] * 3 + [Seen(passer, [True, True, False, False])]
+    colors, seen = median_colors(points, points, frames)
+    assert seen.tolist() == [True, True, True, False]
+    assert colors[:3].tolist() == [[50, 50, 50]] * 3 and colors[3].tolist() == [GREY] * 3
+    assert not median_colors(points, points, [])[1].any()
+
+
+def test_unwrapped_faces_do_not_overlap_and_fill_a_third_of_the_texture() -> None:
+    pytest.importorskip("xatlas")
+    ball = sphere(levels=3)
+    layout = unwrap(ball, 256)
+    assert layout.width == 256 and layout.height <= 256 and layout.places.min() >= 0
+    texels = texels_of(layout, 0)
+    a, b, c = np.moveaxis(layout.places.astype(float), 1, 0)
+    areas = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    assert areas.sum() > layout.width * layout.height / 3
+    assert abs(len(texels.pixels) / areas.sum() - 1) < 0.02  # texels that two faces have would count once
+    np.testing.assert_array_equal(unwrap(ball, 256).places, layout.places)
