@@ -14,6 +14,8 @@ export interface Box {
  */
 export interface PackedVertices {
   readonly texels: Uint16Array;
+  /** Red, green and blue (sRGB) and 255, a texel for each of `texels` and in their order; null where there are no colours. */
+  readonly colors: Uint8Array | null;
   readonly box: Box;
 }
 
@@ -80,6 +82,7 @@ export interface Info {
   readonly trackCount: number;
   readonly mostLayers: number; // layers beyond the first that the richest group has
   readonly size: number; // bytes
+  readonly hasColors: boolean; // whether some of it has colours of its own
   readonly metadata: Readonly<Record<string, unknown>>;
 }
 

@@ -40,10 +40,11 @@ describe("attributes", () => {
   test("layers are a whole number from 0, else auto", () => {
     expect(["0", " 3 ", "auto", "-1", "1.5", "", null].map(parse.parseLayers)).toEqual([0, 3, "auto", "auto", "auto", "auto", "auto"]);
   });
-  test("a mode that is not known is shaded", () => {
-    expect(["normal", "WIREFRAME", "color", "colour", "x", null].map(parse.parseMode)).toEqual([
-      "normal", "wireframe", "colour", "colour", "shaded", "shaded",
-    ]);
+  test("a mode that is not known is the recording's colours, or where it has none shaded", () => {
+    const texts = ["normal", "WIREFRAME", "tracks", "color", "colour", "x", null];
+    const read = (hasColors: boolean): Mode[] => texts.map((text) => parse.parseMode(text, hasColors));
+    expect(read(true)).toEqual(["normal", "wireframe", "tracks", "color", "color", "color", "color"]);
+    expect(read(false)).toEqual(["normal", "wireframe", "tracks", "shaded", "shaded", "shaded", "shaded"]);
   });
   test("an axis that points up is one of four, or nobody's word", () => {
     expect(["y", "Z", " -y ", "-z", "x", "", null].map(parse.parseUp)).toEqual(["y", "z", "-y", "-z", null, null, null]);
@@ -161,10 +162,11 @@ describe("menus", () => {
     expect(layersValue(3, "auto")).toBe("auto");
     expect(layersChoices(0, 9).map(({ value }) => value)).toEqual(["auto", "0"]);
   });
-  test("the next mode of the last is the first", () => {
-    const all = modeChoices().map(({ value }) => value);
-    let mode: Mode = MODES[0];
-    for (const expected of [...all.slice(1), all[0]]) expect((mode = nextMode(mode))).toBe(expected);
+  test.each([true, false])("the next mode of the last is the first; colours are offered where there are some", (hasColors) => {
+    const all = modeChoices(hasColors).map(({ value }) => value);
+    expect(all).toEqual(hasColors ? [...MODES] : MODES.slice(1));
+    let mode = all[0] as Mode;
+    for (const expected of [...all.slice(1), all[0]]) expect((mode = nextMode(mode, hasColors))).toBe(expected);
   });
 });
 

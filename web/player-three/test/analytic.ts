@@ -77,7 +77,7 @@ export function makeGroup(options: GroupOptions = {}): MadeGroup {
   const extra = Uint32Array.from(lone?.faces ?? [], (corner) => vertexCount + corner);
   const extraStarts = Uint32Array.from({ length: frameCount + 1 }, (_, t) => (t > squareFrame ? extra.length : 0));
   const packed: PackedGroup = {
-    kind: "group", chunk: 1, track, firstFrame, frameCount, vertexCount, textureWidth, textureHeight, texels, box,
+    kind: "group", chunk: 1, track, firstFrame, frameCount, vertexCount, textureWidth, textureHeight, texels, colors: null, box,
     faces: Uint32Array.from(frames[0].faces), extra, extraStarts, layers: 0, bytes: 1000, decodeMs: 1,
   };
   const positions = frames.map((frame, t) => [...frame.positions, ...(lone?.positions ?? []).map((p) => (t === squareFrame ? p : null))]);
@@ -99,7 +99,7 @@ export function makeFloor(cells = 6): { packed: PackedStatic; positions: Vector[
   const box = boxAround(positions);
   const texels = pack([{ positions, normals, faces }], box);
   const packed: PackedStatic = {
-    kind: "static", chunk: 0, vertexCount: positions.length, texels, box, faces: Uint32Array.from(faces), bytes: 500, decodeMs: 1,
+    kind: "static", chunk: 0, vertexCount: positions.length, texels, colors: null, box, faces: Uint32Array.from(faces), bytes: 500, decodeMs: 1,
   };
   return { packed, positions };
 }

@@ -134,7 +134,7 @@ describeInBrowser("a scene in Chromium", () => {
   test("modes and flat normals differ, and every mode draws the same silhouette", async () => {
     await prepare(true, true);
     await open.page.evaluate(() => window.api.camera(0.8, 1, 2.6));
-    const looks: [Mode, boolean][] = [["shaded", false], ["normal", false], ["wireframe", false], ["colour", false], ["shaded", true], ["normal", true]];
+    const looks: [Mode, boolean][] = [["shaded", false], ["normal", false], ["wireframe", false], ["tracks", false], ["shaded", true], ["normal", true]];
     const pictures: Picture[] = [];
     for (const [mode, flat] of looks) {
       await look(mode, flat);
@@ -156,7 +156,7 @@ describeInBrowser("a scene in Chromium", () => {
       await show(2);
       return picture();
     };
-    const colour = await looking("colour");
+    const colour = await looking("tracks");
     expect(colour.at([0.2, 0, 0])).toBeNear(trackColor(0).map((share) => 255 * share), 2);
     expect(colour.at([0, 0.8, 0])).toBeNear(trackColor(1).map((share) => 255 * share), 2);
     const shaded = await looking("shaded");

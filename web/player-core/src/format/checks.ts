@@ -8,6 +8,7 @@ const LARGEST = 1e15;
 const SMALLEST = 1e-15;
 const MOST_TRACKS = 256;
 const MOST_CHANGES = 255;
+const FORMS: readonly number[] = [Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY, Form.PATCH];
 
 function require(holds: boolean, message: string): void {
   if (!holds) throw new FormatError(message);
@@ -41,16 +42,23 @@ class IndexChecks {
   private readonly groups: number[] = []; // number of the newest group of each track
   private readonly changes = new Map<number, number>(); // for each STATIC chunk, how many patches lead to it
   private place: readonly [number, number] = [0, -1]; // first frame and track of the newest group
+  // Of each STATIC and GROUP: its entry, and the group that it is predicted from.
+  private readonly whole = new Map<number, { readonly entry: IndexEntry; readonly before: number | undefined }>();
+  private readonly colors = new Map<number, number>(); // for each chunk with colours, the number of their chunk
   private count = 0;
 
   add(entry: IndexEntry): void {
     const name = `chunk ${this.count}`;
     const isStatic = entry.kind === ChunkKind.STATIC;
-    require(isStatic === (entry.frames === 0), `${name}: of kind ${entry.kind} with ${entry.frames} frames`);
+    const isWhole = isStatic || entry.kind === ChunkKind.GROUP;
+    require(!isWhole || isStatic === (entry.frames === 0), `${name}: of kind ${entry.kind} with ${entry.frames} frames`);
+    require(!isWhole || FORMS.includes(entry.form), `${name}: of kind ${entry.kind} and form ${entry.form}`);
     require(entry.layers.length > 0 && entry.layers.every((layer) => layer.size > 0), `${name}: a chunk or a layer without bytes`);
     require(new Set(entry.dependsOn).size === entry.dependsOn.length, `${name}: depends on ${entry.dependsOn}, on one of them twice`);
     if (isStatic) this.changes.set(this.count, this.changesOf(entry, name));
-    else this.addGroup(entry, name);
+    else if (isWhole) this.addGroup(entry, name);
+    else if (entry.kind === ChunkKind.COLORS) this.addColors(entry, name);
+    if (isWhole) this.whole.set(this.count, { entry, before: isStatic ? undefined : entry.dependsOn.find((other) => !this.changes.has(other)) });
     this.count += 1;
   }
 
@@ -71,6 +79,18 @@ class IndexChecks {
     if (changes === undefined) throw new FormatError(`${name}: a patch that depends on ${entry.dependsOn}, which is no static chunk before it`);
     require(changes < MOST_CHANGES, `${name}: patch ${changes + 1} of one background, at most ${MOST_CHANGES}`);
     return changes + 1;
+  }
+
+  private addColors({ form, frames, track, dependsOn }: IndexEntry, name: string): void {
+    const [of, ...before] = dependsOn;
+    const whole = this.whole.get(of);
+    if (whole === undefined || this.colors.has(of)) throw new FormatError(`${name}: colours of ${of}, which is no chunk before them, or has others`);
+    const fits = form === Form.VERTEX_COLORS && frames === whole.entry.frames && track === whole.entry.track;
+    require(fits, `${name}: colours of ${frames} frames of form ${form} and track ${track}, which are not those of chunk ${of}`);
+    const known = whole.before === undefined ? undefined : this.colors.get(whole.before);
+    const isNext = before.length === 0 || (known !== undefined && before.length === 1 && before[0] === known);
+    require(isNext, `${name}: colours that depend on ${before}, not on those before`);
+    this.colors.set(of, this.count);
   }
 
   private addGroup(entry: IndexEntry, name: string): void {
