@@ -19,7 +19,7 @@ export type CompanionKind = "colors";
 /** Where a chunk lies and what it holds. */
 export interface Chunk {
   readonly number: number;
-  /** Companions come with a chunk of frames or of the background, and add to it; "unknown": of a later version, never fetched. */
+  /** Companions come with a chunk of frames or of the background, and add to it; "unknown": what this player does not decode, and never fetches. */
   readonly kind: "static" | "group" | CompanionKind | "unknown";
   readonly form: number;
   readonly track: number; // 0 for static
@@ -168,8 +168,8 @@ function isCompanionKind(kind: Chunk["kind"]): kind is CompanionKind {
 /** "chunk 3 (track 0, frames 10 to 19)", for messages. */
 export function describe(chunk: Pick<Chunk, "number" | "kind" | "track" | "firstFrame" | "frameCount">): string {
   const { number, kind, track, firstFrame, frameCount } = chunk;
-  if (kind === "unknown") return `chunk ${number} (of an unknown kind)`;
-  const what = kind === "colors" ? "colours, " : "";
+  if (kind === "unknown") return `chunk ${number} (of another kind)`;
+  const what = isCompanionKind(kind) ? `${kind}, ` : "";
   if (frameCount === 0) return `chunk ${number} (${what}static)`;
   return `chunk ${number} (${what}track ${track}, frames ${firstFrame} to ${firstFrame + frameCount - 1})`;
 }
