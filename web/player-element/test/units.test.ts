@@ -218,7 +218,7 @@ describe("small parts", () => {
     const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
     expect(Object.fromEntries(lines)).toMatchObject({
       Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Layers: "3 of 3",
-      "Skipped groups": "0", Display: "60 fps, 0.4 ms each",
+      "Skipped groups": "0", Colours: "none", Display: "60 fps, 0.4 ms each",
     });
     playback.dispose();
   });
