@@ -1,7 +1,6 @@
 // What passes between the player and its decoding workers.
 
-import type { CompanionKind } from "./format/reader.ts";
-import type { Packed } from "./types.ts";
+import type { CompanionKind, Packed } from "./types.ts";
 
 export type ToWorker =
   | { type: "start"; core: ArrayBuffer | string; draco: ArrayBuffer | string } // wasm bytes, or their URLs

@@ -72,6 +72,9 @@ export interface Shown {
   readonly background: PackedStatic | null;
 }
 
+/** What a chunk may add to another one, which is shown without it where it is damaged. */
+export type CompanionKind = "colors";
+
 /** What is known from the head, before any chunk is there. */
 export interface Info {
   readonly frameCount: number;

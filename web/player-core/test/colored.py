@@ -1,5 +1,6 @@
 """Paints the .reel files that are named, for tests of colours: adds colours of all vertices, predicted where groups are.
 
+With `--flat` before the names all vertices have the same colour.
 Writes a JSON object to standard output: of each name the painted file, and for each of its frames the SHA-256 of the
 colours that Python decodes, from all layers and from one beyond the first.
 """
@@ -11,6 +12,7 @@ import hashlib
 import io
 import json
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import accumulate
 from pathlib import Path
@@ -30,13 +32,15 @@ from meshreel.format.layout import ChunkKind
 from meshreel.types import Mesh
 
 OPTIONS = ColorCodingOptions(step=1 / 64)
+Colors = Callable[[np.ndarray, int], np.ndarray]  # of vertices in a frame
 
 
 class Painter:
     """Chunks as they are, each with its colours behind it."""
 
-    def __init__(self, reader: ReelReader, writer: ReelWriter) -> None:
+    def __init__(self, reader: ReelReader, writer: ReelWriter, colors_at: Colors) -> None:
         self._reader = reader
+        self._colors_at = colors_at
         self._writer = writer
         self._numbers: dict[int, int] = {}  # of chunks in the file that is written, by those in the one that is read
         self._states: dict[int, LayersState | None] = {}
@@ -62,7 +66,7 @@ class Painter:
         self._backgrounds[chunk.number] = mesh
         canvas = background_canvas(payload)
         added = mesh.vertices[len(mesh.vertices) - canvas.meshes[0].vertices :]
-        return encode_group_colors(canvas, [colors_at(added, 0)], OPTIONS, None)
+        return encode_group_colors(canvas, [self._colors_at(added, 0)], OPTIONS, None)
 
     def _group(self, chunk: Chunk, payload: bytes) -> EncodedColors | None:
         before = self._reader.group_before(chunk)
@@ -71,7 +75,7 @@ class Painter:
         canvas = canvas_of(payload, [len(mesh.vertices) for mesh in meshes], None, state)
         if canvas.meshes == ():
             return None
-        colors = [colors_at(mesh.vertices, t) for t, mesh in enumerate(meshes)]
+        colors = [self._colors_at(mesh.vertices, t) for t, mesh in enumerate(meshes)]
         coded = encode_group_colors(canvas, colors, OPTIONS, None if state is None else state.colors)
         self._states[chunk.number] = None if after is None else replace(after, colors=coded.state)
         return coded
@@ -84,16 +88,21 @@ class Painter:
         self._writer.add_companion(Companion(ChunkKind.COLORS, coded.payload, coded.layers), needed)
 
 
-def colors_at(vertices: np.ndarray, t: int) -> np.ndarray:
+def flat(vertices: np.ndarray, _: int) -> np.ndarray:
+    """One colour."""
+    return np.full(vertices.shape, (201, 44, 87), np.uint8)
+
+
+def waves(vertices: np.ndarray, t: int) -> np.ndarray:
     """Colours of places, which change slowly with time."""
     return np.clip(128 + 110 * np.sin(9 * vertices + 0.2 * t), 0, 255).astype(np.uint8)
 
 
-def painted(data: bytes) -> bytes:
+def painted(data: bytes, colors_at: Colors) -> bytes:
     """The file with colours."""
     file = io.BytesIO()
     with open_video(data) as video, ReelWriter(file, video.reader.header) as writer:
-        painter = Painter(video.reader, writer)
+        painter = Painter(video.reader, writer, colors_at)
         for chunk in video.reader.chunks:
             painter.add(chunk)
     return file.getvalue()
@@ -105,11 +114,12 @@ def digests(video: Video) -> list[str]:
     return [hashlib.sha256(b"" if some is None else some.tobytes()).hexdigest() for some in colors]
 
 
-def main(paths: list[str]) -> None:
+def main(arguments: list[str]) -> None:
     """Writes the object."""
     found = {}
-    for path in map(Path, paths):
-        file = painted(path.read_bytes())
+    is_flat = arguments[:1] == ["--flat"]
+    for path in map(Path, arguments[is_flat:]):
+        file = painted(path.read_bytes(), flat if is_flat else waves)
         with open_video(file) as video:
             text = base64.b64encode(file).decode()
             found[path.stem] = {"file": text, "frames": digests(video), "framesOfOneLayer": digests(video.at(1))}

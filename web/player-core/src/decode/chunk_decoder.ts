@@ -12,8 +12,7 @@ import type { Led } from "../format/budget.ts";
 import { packGroup, packStatic } from "./pack.ts";
 import type { Damage, DecodeJob } from "../protocol.ts";
 import { describe } from "../format/reader.ts";
-import type { CompanionKind } from "../format/reader.ts";
-import type { Packed } from "../types.ts";
+import type { CompanionKind, Packed } from "../types.ts";
 
 const MOST_STATES = 64; // of groups, of all tracks and files; the oldest goes first
 const MOST_STATICS = 4;

@@ -8,13 +8,10 @@ import { FormatError } from "../errors.ts";
 import { Checksum, ChunkKind, Form, Header, Index, LIMITS, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
 import type { Layer } from "./layout.gen.ts";
 import { unpack, unpackAll } from "./records.ts";
-import type { Box, Info } from "../types.ts";
+import type { Box, CompanionKind, Info } from "../types.ts";
 
 export const FIRST_REQUEST = 16384; // bytes; the head of some minutes of video
 const PREAMBLE_SIZE = Preamble.least;
-
-/** What a chunk may add to another one, which is shown without it where it is damaged. */
-export type CompanionKind = "colors";
 
 /** Where a chunk lies and what it holds. */
 export interface Chunk {
