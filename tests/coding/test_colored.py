@@ -1,15 +1,16 @@
 from dataclasses import replace
 from io import BytesIO
+from itertools import accumulate
 
 import numpy as np
 
 import meshreel
-from conformance.make_golden import draco_group, header, patched_groups
 from meshreel.coding.appearance.colors import ColorCodingOptions
 from meshreel.coding.colored import canvas_of, decode_group_colors, encode_group_colors
 from meshreel.coding.group import continue_group
 from meshreel.container.writer import Companion, ReelWriter
 from meshreel.format.layout import ChunkKind
+from tests.golden import GOLDEN
 
 OPTIONS = ColorCodingOptions(step=1 / 64)
 
@@ -19,8 +20,9 @@ def waves(vertices: np.ndarray) -> np.ndarray:
 
 
 def test_frames_without_surface_have_no_colours_and_those_around_them_keep_theirs() -> None:
-    frames, payload, _, _ = draco_group()
-    meshes, _ = continue_group(payload, frames, None, None)
+    with meshreel.open(GOLDEN / "draco.reel") as video:
+        payload = video.reader.read_chunk(0)
+        meshes, _ = continue_group(payload, len(video), None, None)
     canvas = canvas_of(payload, [len(mesh.vertices) for mesh in meshes])
     colors = [waves(mesh.vertices) for mesh in meshes]
     coded = encode_group_colors(canvas, colors, OPTIONS, None)
@@ -33,11 +35,16 @@ def test_frames_without_surface_have_no_colours_and_those_around_them_keep_their
 
 def test_colours_behind_a_group_with_patches_are_the_same_whichever_frame_is_asked_for_first() -> None:
     file, state = BytesIO(), None
-    with ReelWriter(file, header()) as writer:
-        for frames, payload, ends, _ in patched_groups():
-            last = writer.last_of(0)
-            group = writer.add_group(writer.frames_of(0), frames, payload, ends, () if last is None else (last,))
-            meshes, after = continue_group(payload, frames, None, state)
+    with (
+        meshreel.open(GOLDEN / "layers_patched.reel") as video,
+        ReelWriter(file, video.reader.header) as writer,
+    ):
+        for chunk in video.reader.groups:
+            payload, last = video.reader.read_chunk(chunk.number), writer.last_of(0)
+            ends = tuple(accumulate(layer.size for layer in chunk.layers))
+            needed = () if last is None else (last,)
+            group = writer.add_group(chunk.first_frame, chunk.frame_count, payload, ends, needed)
+            meshes, after = continue_group(payload, chunk.frame_count, None, state)
             assert after is not None
             canvas = canvas_of(payload, [len(mesh.vertices) for mesh in meshes], None, state)
             known = None if state is None else state.colors
@@ -48,4 +55,5 @@ def test_colours_behind_a_group_with_patches_are_the_same_whichever_frame_is_ask
             state = replace(after, colors=coded.state)
     with meshreel.open(file.getvalue()) as first, meshreel.open(file.getvalue()) as played:
         frames = [mesh.colors for mesh in played]
+        assert len(video.reader.groups) > 1
         assert np.array_equal(first[len(frames) - 1].colors, frames[-1])

@@ -49,7 +49,7 @@ class Canvas:
             found.append(np.concatenate([kept, np.full((added, 3, 2), np.nan, np.float32)]) if added else kept)
         return found
 
-    def by_frame(self, colors: Sequence[UInt8[np.ndarray, "T V 3"]]) -> list[UInt8[np.ndarray, "V 3"]]:
+    def by_frame(self, colors: Sequence[UInt8[np.ndarray, "_ _ 3"]]) -> list[UInt8[np.ndarray, "_ 3"]]:
         """Return the colours of the vertices of each frame from those of the meshes."""
         if not self.patches:
             found = [frame for some in colors for frame in some]
@@ -60,10 +60,10 @@ class Canvas:
         bounds = pairwise(np.cumsum([0, *self.patches]).tolist())
         return [np.concatenate([frame, added[a:b]]) for frame, (a, b) in zip(template, bounds, strict=True)]
 
-    def by_mesh(self, colors: Sequence[UInt8[np.ndarray, "V 3"]]) -> list[UInt8[np.ndarray, "T V 3"]]:
+    def by_mesh(self, colors: Sequence[UInt8[np.ndarray, "_ 3"]]) -> list[UInt8[np.ndarray, "_ _ 3"]]:
         """Return the colours of the vertices of each mesh from those of the frames."""
         if not self.patches:
-            found, rest = list[UInt8[np.ndarray, "T V 3"]](), list(colors)
+            found, rest = list[UInt8[np.ndarray, "_ _ 3"]](), list(colors)
             for number in reversed(self.empty):
                 del rest[number]
             for mesh in self.meshes:
@@ -110,7 +110,7 @@ def canvas_of(
 
 def encode_group_colors(
     canvas: Canvas,
-    colors: Sequence[UInt8[np.ndarray, "V 3"]],
+    colors: Sequence[UInt8[np.ndarray, "_ 3"]],
     options: ColorCodingOptions,
     before: Float64[np.ndarray, "V 3"] | None,
 ) -> EncodedColors:
@@ -122,7 +122,7 @@ def encode_group_colors(
 
 def decode_group_colors(
     data: bytes, canvas: Canvas, before: LayersState | None, after: LayersState | None
-) -> tuple[list[UInt8[np.ndarray, "V 3"]], LayersState | None]:
+) -> tuple[list[UInt8[np.ndarray, "_ 3"]], LayersState | None]:
     """Decode the colours of the vertices of each frame of a group, by the states of geometry before and after it.
 
     Return also the state after it with what the next colours are predicted from. Raises FormatError where the colours

@@ -146,7 +146,7 @@ class Track(Frames):
 
     def _colors(
         self, chunk: Chunk, canvas: Canvas, before: LayersState | None, after: LayersState | None
-    ) -> tuple[list[UInt8[np.ndarray, "V 3"]], LayersState | None]:
+    ) -> tuple[list[UInt8[np.ndarray, "_ 3"]], LayersState | None]:
         """Decode the colours of a group that has some."""
         of = self.reader.companion_of(chunk, ChunkKind.COLORS)
         assert of is not None

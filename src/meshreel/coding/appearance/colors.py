@@ -56,13 +56,13 @@ class EncodedColors:
 
     payload: bytes
     layers: tuple[int, ...]  # offset at which each layer ends
-    colors: tuple[UInt8[np.ndarray, "T V 3"], ...]  # of each mesh
+    colors: tuple[UInt8[np.ndarray, "_ _ 3"], ...]  # of each mesh
     state: Float64[np.ndarray, "V 3"] | None  # of the first mesh, from which the next group may be predicted
 
 
 def encode_colors(
     meshes: Sequence[ColoredMesh],
-    colors: Sequence[UInt8[np.ndarray, "T V 3"]],
+    colors: Sequence[UInt8[np.ndarray, "_ _ 3"]],
     options: ColorCodingOptions,
     before: Float64[np.ndarray, "V 3"] | None = None,
     layered: bool = False,
@@ -72,7 +72,7 @@ def encode_colors(
     With `layered`, each level of the first mesh is a layer of its own, and so are the other meshes together.
     """
     head = VertexColors(Form.VERTEX_COLORS, Origin.ALONE if before is None else Origin.PREVIOUS, CHROMA)
-    parts, found, state = [pack(head)], list[UInt8[np.ndarray, "T V 3"]](), None
+    parts, found, state = [pack(head)], list[UInt8[np.ndarray, "_ _ 3"]](), None
     for number, (mesh, wanted) in enumerate(zip(meshes, colors, strict=True)):
         records = _encode_mesh(mesh, wanted, options, None if number else before)
         decoded, last = _decode_mesh(b"".join(records), mesh, head, None if number else before)
@@ -89,7 +89,7 @@ def encode_colors(
 
 def decode_colors(
     data: bytes, meshes: Sequence[ColoredMesh], before: Float64[np.ndarray, "V 3"] | None = None
-) -> tuple[list[UInt8[np.ndarray, "T V 3"]], Float64[np.ndarray, "V 3"] | None]:
+) -> tuple[list[UInt8[np.ndarray, "_ _ 3"]], Float64[np.ndarray, "V 3"] | None]:
     """Decode the colours of the vertices of meshes, and the state that the next group may be predicted from.
 
     `data` may go on behind the records of these meshes where the last of them have fewer levels than were coded, or
@@ -100,7 +100,7 @@ def decode_colors(
         raise FormatError(f"colours of form {head.form} and chroma {head.chroma}")
     if head.origin == Origin.PREVIOUS and before is None:
         raise FormatError("colours that are predicted from those of a group which is not at hand")
-    found, state = list[UInt8[np.ndarray, "T V 3"]](), None
+    found, state = list[UInt8[np.ndarray, "_ _ 3"]](), None
     for number, mesh in enumerate(meshes):
         start = offset
         _, offset = unpack(CodedField, data, offset)
@@ -145,7 +145,7 @@ def _encode_mesh(
 
 def _decode_mesh(
     records: bytes, mesh: ColoredMesh, head: VertexColors, before: Float64[np.ndarray, "V 3"] | None
-) -> tuple[UInt8[np.ndarray, "T V 3"], Float64[np.ndarray, "V 3"]]:
+) -> tuple[UInt8[np.ndarray, "_ _ 3"], Float64[np.ndarray, "V 3"]]:
     if before is not None and len(before) != mesh.vertices:
         raise FormatError(f"colours of {mesh.vertices} vertices, predicted from those of {len(before)}")
     base = mesh.base

@@ -46,6 +46,7 @@ export function checkIndex(index: Index): void {
 interface Whole {
   readonly entry: IndexEntry;
   readonly before: number | undefined; // the group that it is predicted from
+  readonly isBase: boolean; // whether it begins with a base mesh, and may have an atlas
 }
 
 class IndexChecks {
@@ -69,7 +70,7 @@ class IndexChecks {
     if (isStatic) this.changes.set(this.count, this.changesOf(entry, name));
     else if (isWhole) this.addGroup(entry, name);
     else if (COMPANIONS.has(entry.kind)) this.addCompanion(entry, name);
-    if (isWhole) this.whole.set(this.count, { entry, before: isStatic ? undefined : entry.dependsOn.find((other) => !this.changes.has(other)) });
+    if (isWhole) this.whole.set(this.count, this.wholeOf(entry));
     this.count += 1;
   }
 
@@ -92,6 +93,12 @@ class IndexChecks {
     return changes + 1;
   }
 
+  private wholeOf(entry: IndexEntry): Whole {
+    if (entry.kind === ChunkKind.STATIC) return { entry, before: undefined, isBase: entry.form === Form.DRACO };
+    const before = entry.dependsOn.find((other) => !this.changes.has(other));
+    return { entry, before, isBase: entry.form === Form.LAYERS && before === undefined };
+  }
+
   /** What belongs to a chunk before it, which it names first; what else it needs follows from its kind. */
   private addCompanion({ kind, form, frames, track, dependsOn }: IndexEntry, name: string): void {
     const [of, ...others] = dependsOn;
@@ -106,10 +113,10 @@ class IndexChecks {
   }
 
   /** What a companion may depend on, beside the chunk that it is of. */
-  private needed(kind: number, of: number, { entry, before }: Whole): readonly (readonly number[])[] {
+  private needed(kind: number, of: number, { before, isBase }: Whole): readonly (readonly number[])[] {
     const last = before === undefined ? undefined : this.companion(before, kind);
     if (kind === ChunkKind.COLORS) return last === undefined ? [[]] : [[], [last]];
-    if (kind === ChunkKind.ATLAS) return entry.frames > 0 && before === undefined ? [[]] : [];
+    if (kind === ChunkKind.ATLAS) return isBase ? [[]] : [];
     const own = this.companion(of, ChunkKind.ATLAS);
     if (own !== undefined) return [[own]];
     return last === undefined ? [] : [[this.atlases.get(before!)!, last]];
