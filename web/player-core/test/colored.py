@@ -1,8 +1,8 @@
-"""Paints the .reel files that are named, for tests of colours: adds colours of all vertices, predicted where groups are.
+"""Paints .reel files, for tests of colours: `colored.py [--flat] FILE...` adds colours of all vertices to each.
 
-With `--flat` before the names all vertices have the same colour.
-Writes a JSON object to standard output: of each name the painted file, and for each of its frames the SHA-256 of the
-colours that Python decodes, from all layers and from one beyond the first.
+They are predicted where groups are; with `--flat` all are the same. Writes a JSON object to standard output: of each
+name the painted file, and for each of its frames the SHA-256 of the colours that Python decodes, from all layers and
+from one beyond the first.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 
 from meshreel.coding.appearance.colors import ColorCodingOptions, EncodedColors
 from meshreel.coding.background import decode_background, decode_change
-from meshreel.coding.colored import Canvas, background_canvas, canvas_of, encode_group_colors
+from meshreel.coding.colored import background_canvas, canvas_of, encode_group_colors
 from meshreel.coding.group import continue_group
 from meshreel.coding.layers.coder import LayersState
 from meshreel.container.reader import Chunk, ReelReader
