@@ -115,7 +115,7 @@ describe("a worker that dies", () => {
     workers.workers[0].crash("trap");
     submit(2, 0, 1);
     await pass(1);
-    expect(outcomes.get(1)).toEqual({ kind: "failed", message: "its decoder crashed (trap)", missingState: false });
+    expect(outcomes.get(1)).toEqual({ kind: "failed", message: "its decoder crashed (trap)", damage: [], missingState: false });
     expect(outcomes.get(2)).toMatchObject({ kind: "failed", missingState: true });
     expect(share.isAt(0, (outcomes.get(0) as { worker: number }).worker)).toBe(false);
     expect(workers.workers.map(({ isTerminated }) => isTerminated)).toEqual([true, false]);
