@@ -35,6 +35,7 @@ class Canvas:
     is_layered: bool = False  # each level of the first mesh is a layer
     dropped: Bool[np.ndarray, "T F"] | None = None  # faces of the template that each frame lacks
     added: tuple[int, ...] = ()  # faces of the patch of each frame
+    empty: tuple[int, ...] = ()  # frames without surface, where each has a mesh of its own: they have none
 
     def uv(self, layout: Layout) -> list[Float32[np.ndarray, "_ 3 2"]]:
         """Return the places of the corners of each frame's faces in a texture; NaN for those of patches."""
@@ -51,7 +52,10 @@ class Canvas:
     def by_frame(self, colors: Sequence[UInt8[np.ndarray, "_ _ 3"]]) -> list[UInt8[np.ndarray, "_ 3"]]:
         """Return the colours of the vertices of each frame from those of the meshes."""
         if not self.patches:
-            return [frame for some in colors for frame in some]  # frames without surface have none
+            found = [frame for some in colors for frame in some]
+            for number in self.empty:
+                found.insert(number, np.zeros((0, 3), np.uint8))
+            return found
         template, [added] = colors
         bounds = pairwise(np.cumsum([0, *self.patches]).tolist())
         return [np.concatenate([frame, added[a:b]]) for frame, (a, b) in zip(template, bounds, strict=True)]
@@ -60,6 +64,8 @@ class Canvas:
         """Return the colours of the vertices of each mesh from those of the frames."""
         if not self.patches:
             found, rest = list[UInt8[np.ndarray, "_ _ 3"]](), list(colors)
+            for number in reversed(self.empty):
+                del rest[number]
             for mesh in self.meshes:
                 found.append(np.stack(rest[: mesh.frames]))
                 rest = rest[mesh.frames :]
@@ -97,8 +103,9 @@ def canvas_of(
     if form == Form.DRACO:
         group = unpack_all(DracoGroup, data)
         pairs = zip(group.meshes, counts, strict=True)
-        return Canvas(tuple(ColoredMesh(decode_mesh(one, group.step), group.levels, 1, n) for one, n in pairs if n))
-    return Canvas(())
+        meshes = (ColoredMesh(decode_mesh(one, group.step), group.levels, 1, n) for one, n in pairs if n)
+        return Canvas(tuple(meshes), empty=tuple(t for t, n in enumerate(counts) if not n))
+    return Canvas((), empty=tuple(range(len(counts))))
 
 
 def encode_group_colors(

@@ -140,7 +140,8 @@ class Track(Frames):
         """Return a state with the colours that the next group may be predicted from; none is painted."""
         if after is None or not self._colored or self.reader.companion_of(chunk, ChunkKind.COLORS) is None:
             return after
-        canvas = canvas_of(payload, [after.count] * chunk.frame_count, self.layers, before)
+        levels = len(after.scalars)  # without the patches, from which nothing is predicted
+        canvas = canvas_of(payload, [after.count] * chunk.frame_count, levels, before)
         return self._colors(chunk, canvas, before, after)[1]
 
     def _colors(

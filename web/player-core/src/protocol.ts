@@ -1,6 +1,6 @@
 // What passes between the player and its decoding workers.
 
-import type { Packed } from "./types.ts";
+import type { CompanionKind, Packed } from "./types.ts";
 
 export type ToWorker =
   | { type: "start"; core: ArrayBuffer | string; draco: ArrayBuffer | string } // wasm bytes, or their URLs
@@ -18,13 +18,29 @@ export interface DecodeJob {
   frameCount: number;
   payload: Uint8Array; // its buffer is transferred
   ranges: { size: number; crc: number }[]; // of the layers in `payload`
+  companions: Companion[];
   layers: number | null; // layers beyond the first; null: all
   previous: number | null; // chunk whose state it needs, decoded earlier in this worker; or the static chunk that a patch changes
   scale: number;
   stateOnly: boolean; // decode for the chain's sake, pack nothing
 }
 
+/** What a job's chunk is decoded with. */
+export interface Companion {
+  chunk: number;
+  kind: CompanionKind;
+  form: number;
+  payload: Uint8Array; // its buffer is transferred
+  ranges: { size: number; crc: number }[];
+}
+
+/** A companion that cannot be decoded; its chunk was decoded without it. */
+export interface Damage {
+  chunk: number; // the companion's
+  message: string;
+}
+
 export type FromWorker =
   | { type: "started" }
-  | { type: "decoded"; id: number; packed: Packed | null; ms: number } // null for stateOnly
-  | { type: "failed"; id: number; message: string; missingState: boolean }; // the state was evicted: send the chain again
+  | { type: "decoded"; id: number; packed: Packed | null; damage: Damage[]; ms: number } // null for stateOnly
+  | { type: "failed"; id: number; message: string; damage: Damage[]; missingState: boolean }; // the state was evicted: send the chain again

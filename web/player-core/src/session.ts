@@ -5,8 +5,9 @@ import { Timeline } from "./time/clock.ts";
 import { Decoding } from "./time/decoding.ts";
 import type { DecodingEvents } from "./time/decoding.ts";
 import { Fetcher } from "./net/fetcher.ts";
+import type { When, Wish } from "./net/fetcher.ts";
 import { Form } from "./format/layout.gen.ts";
-import { Links, sizeOfLayers } from "./format/links.ts";
+import { Links, companionLayers, sizeWithCompanions } from "./format/links.ts";
 import type { Opened } from "./net/opening.ts";
 import { Picture } from "./time/picture.ts";
 import type { Share } from "./time/pool.ts";
@@ -102,7 +103,7 @@ export class Session {
     this.decoding.run(this.#plan);
     this.decoding.release(STATICS * memory);
     const later = LATER * outlook.fetchSeconds;
-    this.fetcher.want(made.steps.map(({ chunk, layers, ahead }) => ({ chunk, count: layers + 1, when: ahead <= 0 ? "now" : ahead < later ? "soon" : "later" })));
+    this.fetcher.want(made.steps.flatMap((step) => this.#wishesOf(step, step.ahead <= 0 ? "now" : step.ahead < later ? "soon" : "later")));
     if (aim.layers === "auto") this.#adapt(aim);
   }
 
@@ -137,8 +138,9 @@ export class Session {
   rateAt(layers: number): number {
     let rate = this.#rates.get(layers);
     if (rate === undefined) {
+      const shown = this.head.chunks.filter(({ kind }) => kind === "static" || kind === "group");
       const layersOf = (chunk: Chunk): number => (chunk.kind === "static" ? chunk.layers.length : layers + 1);
-      const size = this.head.chunks.reduce((sum, chunk) => sum + sizeOfLayers(chunk, layersOf(chunk)), 0);
+      const size = shown.reduce((sum, chunk) => sum + sizeWithCompanions(this.head, chunk, layersOf(chunk)), 0);
       rate = (8 * size) / this.timeline.duration;
       this.#rates.set(layers, rate);
     }
@@ -156,6 +158,13 @@ export class Session {
     this.decoding.close();
   }
 
+  /** A chunk's layers, and behind them what comes with these. */
+  #wishesOf({ chunk, layers }: Step, when: When): Wish[] {
+    const count = layers + 1;
+    const companions = this.decoding.companionsOf(chunk).map((other) => ({ chunk: other, count: companionLayers(chunk, other, count), when }));
+    return [{ chunk, count, when }, ...companions];
+  }
+
   #adapt(aim: Aim): void {
     const before = this.#adaptive.level;
     const level = this.#adaptive.decide({
@@ -163,7 +172,7 @@ export class Session {
       time: aim.time,
       speed: aim.speed,
       bandwidth: this.#bandwidth,
-      fetched: this.#firstAhead(({ chunk, layers }) => this.fetcher.layersOf(chunk) <= layers) / aim.speed,
+      fetched: this.#firstAhead((step) => !this.decoding.hasBytes(step)) / aim.speed,
       decoded: this.#firstAhead(({ decode, chunk }) => decode && !this.decoding.isSettled(chunk)) / aim.speed,
       load: this.load,
       isWaiting: aim.isWaiting,

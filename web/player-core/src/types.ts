@@ -14,6 +14,8 @@ export interface Box {
  */
 export interface PackedVertices {
   readonly texels: Uint16Array;
+  /** Red, green and blue (sRGB) and 255, a texel for each of `texels` and in their order; null where there are no colours. */
+  readonly colors: Uint8Array | null;
   readonly box: Box;
 }
 
@@ -70,6 +72,9 @@ export interface Shown {
   readonly background: PackedStatic | null;
 }
 
+/** What a chunk may add to another one, which is shown without it where it is damaged. */
+export type CompanionKind = "colors";
+
 /** What is known from the head, before any chunk is there. */
 export interface Info {
   readonly frameCount: number;
@@ -80,6 +85,7 @@ export interface Info {
   readonly trackCount: number;
   readonly mostLayers: number; // layers beyond the first that the richest group has
   readonly size: number; // bytes
+  readonly hasColors: boolean; // whether some of it has colours of its own
   readonly metadata: Readonly<Record<string, unknown>>;
 }
 

@@ -97,7 +97,7 @@ export class FakeWorker implements WorkerLike {
     const missing = job.previous !== null && !this.#states.has(`${job.file}/${job.previous}`);
     setTimeout(() => {
       this.#isBusy = false;
-      if (wrong || missing) this.#answer({ type: "failed", id, message: wrong || "the state is not there", missingState: !wrong });
+      if (wrong || missing) this.#answer({ type: "failed", id, message: wrong || "the state is not there", damage: [], missingState: !wrong });
       else this.#finish(id, job);
     }, this.#all.msOf(job));
   }
@@ -109,7 +109,8 @@ export class FakeWorker implements WorkerLike {
       for (const key of this.#states.keys()) if (this.#states.size > this.#all.mostStates) this.#states.delete(key);
     }
     const packed = job.stateOnly ? null : packedOf(job, this.#all.bytesPerFrame);
-    this.#answer({ type: "decoded", id, packed, ms: this.#all.msOf(job) });
+    const damage = job.companions.filter((companion) => isDamaged(companion)).map(({ chunk }) => ({ chunk, message: "a layer is damaged" }));
+    this.#answer({ type: "decoded", id, packed, damage, ms: this.#all.msOf(job) });
   }
 
   /** Damage, which a real worker finds, too; and offences of the player, which it would not. */
@@ -122,21 +123,27 @@ export class FakeWorker implements WorkerLike {
       const state = this.#states.get(`${job.file}/${job.previous}`);
       if (state !== undefined && state < job.ranges.length - 1) offences.push(`chunk ${job.chunk}: finer than chunk ${job.previous} before it`);
     }
-    let at = 0;
-    for (const { size: bytes, crc } of job.ranges) {
-      if (crc32(job.payload.subarray(at, (at += bytes))) !== crc) return "a layer is damaged";
-    }
-    return "";
+    return isDamaged(job) ? "a layer is damaged" : "";
   }
+}
+
+function isDamaged({ payload, ranges }: Pick<DecodeJob, "payload" | "ranges">): boolean {
+  let at = 0;
+  return ranges.some(({ size, crc }) => crc32(payload.subarray(at, (at += size))) !== crc);
 }
 
 function packedOf(job: DecodeJob, bytesPerFrame: number): Packed {
   const box = { minimum: [0, 0, 0], size: [1, 1, 1] } as const;
-  const shared = { chunk: job.chunk, vertexCount: 1, faces: new Uint32Array(3), box, bytes: job.payload.length, decodeMs: 1 };
+  const shared = { chunk: job.chunk, vertexCount: 1, faces: new Uint32Array(3), box, colors: colorsOf(job), bytes: job.payload.length, decodeMs: 1 };
   if (job.kind === "static") return { kind: "static", texels: new Uint16Array(4), ...shared };
   const { track, firstFrame, frameCount } = job;
   const texels = new Uint16Array((frameCount * bytesPerFrame) / 2);
   const layers = job.ranges.length - 1;
   const extra = { extra: new Uint32Array(0), extraStarts: new Uint32Array(frameCount + 1), textureWidth: 1, textureHeight: 1 };
   return { kind: "group", track, firstFrame, frameCount, layers, texels, ...extra, ...shared };
+}
+
+/** One texel, where the colours are sound. */
+function colorsOf({ companions }: DecodeJob): Uint8Array | null {
+  return companions.some((companion) => companion.kind === "colors" && !isDamaged(companion)) ? new Uint8Array(4) : null;
 }

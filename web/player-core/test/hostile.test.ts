@@ -13,6 +13,7 @@ import type { DecodeJob } from "../src/protocol.ts";
 import { Head } from "../src/format/reader.ts";
 import type { Chunk } from "../src/format/reader.ts";
 import { CoreStopped } from "../src/wasm/memory.ts";
+import { noDamage } from "./jobs.ts";
 import { noise } from "./server.ts";
 import { ROOT, nodeTools } from "./tools.ts";
 
@@ -27,11 +28,12 @@ beforeAll(async () => {
 });
 
 function jobOf(chunk: Chunk, payload: Uint8Array, previous: Chunk | null): DecodeJob {
-  const { number, kind, form, track, firstFrame, frameCount } = chunk;
+  const { number, form, track, firstFrame, frameCount } = chunk;
+  const kind = chunk.kind as DecodeJob["kind"];
   let at = 0;
   const ranges = chunk.layers.map(({ size }) => ({ size, crc: crc32(payload.subarray(at, (at += size))) }));
   const place = { kind, form, track, firstFrame, frameCount } as const;
-  return { file: 1, chunk: number, ...place, payload, ranges, layers: null, previous: previous?.number ?? null, scale: 1, stateOnly: false };
+  return { file: 1, chunk: number, ...place, payload, ranges, companions: [], layers: null, previous: previous?.number ?? null, scale: 1, stateOnly: false };
 }
 
 /** With one to four bytes changed, most of them near the start, where sizes and counts are; never the form. */
@@ -55,7 +57,7 @@ describe.each(NAMES)("%s", (name) => {
   test("with content that is changed is refused in words or decoded, and decodes as before behind it", () => {
     const payloadOf = ({ offset, size }: Chunk): Uint8Array => data.slice(offset, offset + size);
     const decode = (decoder: ChunkDecoder, chunk: Chunk, payload = payloadOf(chunk)): unknown => {
-      const packed = decoder.decode(jobOf(chunk, payload, links.previousOf(chunk)));
+      const packed = decoder.decode(jobOf(chunk, payload, links.previousOf(chunk)), noDamage);
       return packed && { ...packed, decodeMs: 0 };
     };
     const sound = new ChunkDecoder(tools);
@@ -80,7 +82,7 @@ test("where Draco has no memory the decoder stops, and does not write over what 
   const payload = data.slice(chunk.offset, chunk.offset + chunk.size);
   const malloc = vi.spyOn(tools.draco, "_malloc").mockReturnValue(0);
   try {
-    expect(() => new ChunkDecoder(tools).decode(jobOf(chunk, payload, null))).toThrow(CoreStopped);
+    expect(() => new ChunkDecoder(tools).decode(jobOf(chunk, payload, null), noDamage)).toThrow(CoreStopped);
   } finally {
     malloc.mockRestore();
   }

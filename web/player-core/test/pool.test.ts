@@ -39,7 +39,7 @@ function submit(chunk: number, lane = chunk, previous: number | null = null, of 
       const payload = Uint8Array.of(1, 2, 3);
       const place = { track: 0, firstFrame: 10 * chunk, frameCount: 10, scale: 1 };
       const ranges = [{ size: 3, crc: crc32(payload) }];
-      return { chunk, kind: "group", form: Form.LAYERS, payload, ranges, layers: null, previous, stateOnly: false, ...place };
+      return { chunk, kind: "group", form: Form.LAYERS, payload, ranges, companions: [], layers: null, previous, stateOnly: false, ...place };
     },
     settle: (outcome) => outcomes.set(chunk, outcome),
   });
@@ -115,7 +115,7 @@ describe("a worker that dies", () => {
     workers.workers[0].crash("trap");
     submit(2, 0, 1);
     await pass(1);
-    expect(outcomes.get(1)).toEqual({ kind: "failed", message: "its decoder crashed (trap)", missingState: false });
+    expect(outcomes.get(1)).toEqual({ kind: "failed", message: "its decoder crashed (trap)", damage: [], missingState: false });
     expect(outcomes.get(2)).toMatchObject({ kind: "failed", missingState: true });
     expect(share.isAt(0, (outcomes.get(0) as { worker: number }).worker)).toBe(false);
     expect(workers.workers.map(({ isTerminated }) => isTerminated)).toEqual([true, false]);

@@ -1,11 +1,13 @@
 // Files made of noise: an index as told, and payloads that nothing but a stand-in for a worker can decode.
 
 import { crc32 } from "../src/format/crc.ts";
-import { Form } from "../src/format/layout.gen.ts";
+import { ChunkKind, Form } from "../src/format/layout.gen.ts";
 import { noise } from "./server.ts";
 
+const KINDS = { static: ChunkKind.STATIC, group: ChunkKind.GROUP, colors: ChunkKind.COLORS, atlas: ChunkKind.ATLAS, pictures: ChunkKind.PICTURES, future: 200 };
+
 export interface FakeChunk {
-  readonly kind: "static" | "group";
+  readonly kind: keyof typeof KINDS;
   readonly form: number;
   readonly frames: number;
   readonly track: number;
@@ -21,6 +23,11 @@ export interface FakeHeader {
 
 export function group(frames: number, layers: readonly number[], more: Partial<FakeChunk> = {}): FakeChunk {
   return { kind: "group", form: Form.LAYERS, frames, track: 0, dependsOn: [], layers, ...more };
+}
+
+/** Colours of a group of ten frames, or of what `more` says; `dependsOn`: that chunk, then the colours that they are predicted from. */
+export function colors(dependsOn: readonly number[], layers: readonly number[], more: Partial<FakeChunk> = {}): FakeChunk {
+  return { kind: "colors", form: Form.VERTEX_COLORS, frames: 10, track: 0, dependsOn, layers, ...more };
 }
 
 export function background(bytes: number, dependsOn: readonly number[] = []): FakeChunk {
@@ -43,7 +50,7 @@ export function makeReel(chunks: readonly FakeChunk[], { frameRate, intervals = 
   });
   const index = new Writer().u32(chunks.length);
   chunks.forEach((chunk, k) => {
-    index.u8(chunk.kind === "static" ? 1 : 2).u8(chunk.form).u16(chunk.frames).varint(chunk.track).u8(chunk.dependsOn.length);
+    index.u8(KINDS[chunk.kind]).u8(chunk.form).u16(chunk.frames).varint(chunk.track).u8(chunk.dependsOn.length);
     for (const number of chunk.dependsOn) index.varint(number);
     index.u16(chunk.layers.length);
     let at = 0;

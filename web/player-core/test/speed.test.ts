@@ -8,7 +8,7 @@ import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
 import type { Tools } from "../src/decode/group.ts";
 import { Head } from "../src/format/reader.ts";
 import type { PackedGroup } from "../src/types.ts";
-import { jobOf } from "./jobs.ts";
+import { jobOf, noDamage } from "./jobs.ts";
 import { nodeTools } from "./tools.ts";
 
 const SHARE = 0.5; // of a group's own duration, at most
@@ -26,7 +26,7 @@ test.runIf(ALL && hasPython)("a group of 10 frames of 20k vertices takes at most
   for (let pass = 0; pass < PASSES; pass++) {
     const decoder = new ChunkDecoder(tools);
     head.chunks.forEach((chunk, k) => {
-      const { vertexCount, frameCount, decodeMs } = decoder.decode(jobOf(head, chunk, data)) as PackedGroup;
+      const { vertexCount, frameCount, decodeMs } = decoder.decode(jobOf(head, chunk, data), noDamage) as PackedGroup;
       expect(frameCount).toBe(10);
       expect(vertexCount).toBeGreaterThan(20_000);
       times[k].push(decodeMs);

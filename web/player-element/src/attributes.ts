@@ -24,7 +24,7 @@ const readNumber: Reader<number> = (text) => (text.trim() !== "" && Number.isFin
 
 const readLayers: Reader<Layers> = (text) => (/^\s*\d+\s*$/.test(text) ? Number(text) : words("auto")(text));
 
-const readMode: Reader<Mode> = (text) => (words("color")(text) ? "colour" : words(...MODES)(text));
+const readMode: Reader<Mode> = (text) => (words("colour")(text) ? "color" : words(...MODES)(text));
 
 const readTheme = words<Theme>("auto", "light", "dark");
 
@@ -70,8 +70,10 @@ export function parseLayers(text: string | null): Layers {
   return readLayers(text ?? "") ?? "auto";
 }
 
-export function parseMode(text: string | null): Mode {
-  return readMode(text ?? "") ?? "shaded";
+/** How surfaces look: the recording's own colours where the text is none; shaded in place of colours that it has not. */
+export function parseMode(text: string | null, hasColors: boolean): Mode {
+  const mode = readMode(text ?? "") ?? "color";
+  return mode === "color" && !hasColors ? "shaded" : mode;
 }
 
 /** The axis that points up, in place of the one in the file; null where none is given. */

@@ -139,7 +139,7 @@ export class MeshreelPlayer extends Reflected {
     return ranges(0, this.duration);
   }
 
-  get info(): Info | null {
+  override get info(): Info | null {
     return this.#playback?.info ?? null;
   }
   get currentFrame(): number {
@@ -313,8 +313,8 @@ export class MeshreelPlayer extends Reflected {
     const info = this.#playback?.info;
     if (!info || !this.#view) return;
     this.#view.stage.begin(info);
-    const camera = this.getAttribute("camera");
-    if (camera) this.#view.stage.camera = camera;
+    applyToStage("mode", this, this.#view.stage); // where none is set, the recording decides
+    if (this.getAttribute("camera")) applyToStage("camera", this, this.#view.stage);
   }
 
   #fail(error: Error): void {

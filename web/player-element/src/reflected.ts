@@ -1,6 +1,6 @@
 // Properties that are attributes: the attribute is the one place where a setting is kept, so HTML, scripts and controls agree.
 
-import type { Layers } from "@meshreel/player-core/types";
+import type { Info, Layers } from "@meshreel/player-core/types";
 import type { Mode } from "@meshreel/player-three/modes";
 import * as parse from "./attributes.ts";
 import type { Up } from "./upright.ts";
@@ -18,6 +18,11 @@ export class Reflected extends Element {
       Reflect.deleteProperty(this, name);
       Reflect.set(this, name, value);
     }
+  }
+
+  /** What is known of the recording; null before its head is there. */
+  get info(): Info | null {
+    return null;
   }
 
   /** True while an attribute is put back. */
@@ -111,8 +116,9 @@ export class Reflected extends Element {
     this.setAttribute("interpolate", value ? "on" : "off");
   }
 
+  /** How surfaces look; `color` where none is set, and `shaded` in its place while the recording has no colours. */
   get mode(): Mode {
-    return parse.parseMode(this.getAttribute("mode"));
+    return parse.parseMode(this.getAttribute("mode"), this.info?.hasColors ?? false);
   }
   set mode(value: Mode) {
     this.setAttribute("mode", value);

@@ -20,6 +20,7 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
     ["Decode", `${stats.decodeMs.toFixed(1)} ms a group, load ${(stats.decodeLoad * 100).toFixed(0)} %`],
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
     ["Layers", layersText(stats, info?.mostLayers ?? 0)],
+    ["Colours", info?.hasColors ? "of vertices" : "none"],
     ["Triangles", formatCount(stats.triangles)],
     ["Display", stats.fps > 0 ? `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each` : "still"],
     ["GPU memory", formatAmount(stats.gpuBytes, "B")],

@@ -8,7 +8,7 @@ import type { Engine, Settings, Stage } from "../src/stage.ts";
 
 export const INFO: Info = {
   frameCount: 48, frameRate: 24, duration: 2, origin: [0, 0, 0], box: { minimum: [-1, 0, -1], size: [2, 2, 2] }, trackCount: 1,
-  mostLayers: 3, size: 123_456, metadata: {},
+  mostLayers: 3, size: 123_456, hasColors: false, metadata: {},
 };
 
 /** Keeps time like a real one; a head comes after 10 ms, a seek takes 20 ms. An address with "404" in it fails. */

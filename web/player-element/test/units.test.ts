@@ -40,10 +40,11 @@ describe("attributes", () => {
   test("layers are a whole number from 0, else auto", () => {
     expect(["0", " 3 ", "auto", "-1", "1.5", "", null].map(parse.parseLayers)).toEqual([0, 3, "auto", "auto", "auto", "auto", "auto"]);
   });
-  test("a mode that is not known is shaded", () => {
-    expect(["normal", "WIREFRAME", "color", "colour", "x", null].map(parse.parseMode)).toEqual([
-      "normal", "wireframe", "colour", "colour", "shaded", "shaded",
-    ]);
+  test("a mode that is not known is the recording's colours, or where it has none shaded", () => {
+    const texts = ["normal", "WIREFRAME", "tracks", "color", "colour", "x", null];
+    const read = (hasColors: boolean): Mode[] => texts.map((text) => parse.parseMode(text, hasColors));
+    expect(read(true)).toEqual(["normal", "wireframe", "tracks", "color", "color", "color", "color"]);
+    expect(read(false)).toEqual(["normal", "wireframe", "tracks", "shaded", "shaded", "shaded", "shaded"]);
   });
   test("an axis that points up is one of four, or nobody's word", () => {
     expect(["y", "Z", " -y ", "-z", "x", "", null].map(parse.parseUp)).toEqual(["y", "z", "-y", "-z", null, null, null]);
@@ -161,10 +162,11 @@ describe("menus", () => {
     expect(layersValue(3, "auto")).toBe("auto");
     expect(layersChoices(0, 9).map(({ value }) => value)).toEqual(["auto", "0"]);
   });
-  test("the next mode of the last is the first", () => {
-    const all = modeChoices().map(({ value }) => value);
-    let mode: Mode = MODES[0];
-    for (const expected of [...all.slice(1), all[0]]) expect((mode = nextMode(mode))).toBe(expected);
+  test.each([true, false])("the next mode of the last is the first; colours are offered where there are some", (hasColors) => {
+    const all = modeChoices(hasColors).map(({ value }) => value);
+    expect(all).toEqual(hasColors ? [...MODES] : MODES.slice(1));
+    let mode = all[0] as Mode;
+    for (const expected of [...all.slice(1), all[0]]) expect((mode = nextMode(mode, hasColors))).toBe(expected);
   });
 });
 
@@ -216,7 +218,7 @@ describe("small parts", () => {
     const lines = statisticsLines({ ...playback.stats, triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0, fps: 60, frameMs: 0.42, drawn: 1 }, INFO, 4);
     expect(Object.fromEntries(lines)).toMatchObject({
       Frame: "5 of 48, 24 fps", Rate: "2.41 Mbit/s", Bandwidth: "48.2 Mbit/s", Triangles: "41,234", "GPU memory": "12.3 MB", Layers: "3 of 3",
-      "Skipped groups": "0", Display: "60 fps, 0.4 ms each",
+      "Skipped groups": "0", Colours: "none", Display: "60 fps, 0.4 ms each",
     });
     playback.dispose();
   });

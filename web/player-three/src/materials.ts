@@ -23,6 +23,8 @@ export interface PartUniforms {
   readonly boxMinimum: IUniform<Vector>;
   readonly boxSize: IUniform<Vector>;
   readonly vertices: IUniform<DataTexture | null>;
+  readonly colors: IUniform<DataTexture | null>;
+  readonly hasColors: IUniform<boolean>;
   readonly movingCount: IUniform<number>;
   readonly here: IUniform<number>;
   readonly next: IUniform<number>;
@@ -35,6 +37,8 @@ export function makeUniforms(): PartUniforms {
     boxMinimum: { value: [0, 0, 0] },
     boxSize: { value: [0, 0, 0] },
     vertices: { value: null },
+    colors: { value: null },
+    hasColors: { value: false },
     movingCount: { value: 0 },
     here: { value: 0 },
     next: { value: 0 },
@@ -57,7 +61,8 @@ export function surfaceMaterial(feed: Feed, look: Look, uniforms: PartUniforms, 
     fragmentShader: SURFACE_FRAGMENT,
     defines: {
       NORMAL_MODE: MODES.indexOf("normal"),
-      COLOUR_MODE: MODES.indexOf("colour"),
+      COLOR_MODE: MODES.indexOf("color"),
+      TRACKS_MODE: MODES.indexOf("tracks"),
       ...(feed === "corner" ? { EDGES: 1 } : {}),
     },
     uniforms: {

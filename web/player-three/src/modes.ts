@@ -1,5 +1,8 @@
 // How surfaces may look.
 
-/** Lit clay; rgb = (n + 1) / 2; lit clay with its triangles' edges; an unlit colour of each track. */
-export const MODES = ["shaded", "normal", "wireframe", "colour"] as const;
+/**
+ * The recording's own colours, unlit; these lit, or clay where there are none; rgb = (n + 1) / 2; as "shaded", with the triangles' edges; an
+ * unlit colour of each track. What has no colours of its own is shaded in place of "color".
+ */
+export const MODES = ["color", "shaded", "normal", "wireframe", "tracks"] as const;
 export type Mode = (typeof MODES)[number];

@@ -49,7 +49,7 @@ export class Part extends Group {
     this.visible = false;
     this.#upload = null;
     this.#faces.geometry = this.#extra.geometry = NOTHING;
-    this.#uniforms.vertices.value = null;
+    this.#uniforms.vertices.value = this.#uniforms.colors.value = null;
   }
 
   /** Shows a frame of the recording and what is `blend` of the way to the next one. */
@@ -77,11 +77,13 @@ export class Part extends Group {
   }
 }
 
-/** What is the same in all frames. To be called after the upload's geometry was asked for, which may make the texture. */
+/** What is the same in all frames. To be called after the upload's geometry was asked for, which may make the textures. */
 export function setUpload(uniforms: PartUniforms, upload: Upload): void {
   uniforms.boxMinimum.value = upload.packed.box.minimum;
   uniforms.boxSize.value = upload.packed.box.size;
   uniforms.vertices.value = upload.texture;
+  uniforms.colors.value = upload.colors;
+  uniforms.hasColors.value = upload.packed.colors !== null;
   uniforms.movingCount.value = upload.packed.vertexCount;
 }
 

@@ -149,9 +149,10 @@ export class ReelScene extends Group {
 
 function checkSize(packed: Packed, renderer: WebGLRenderer): void {
   if (packed.kind === "static") return;
-  const { textureWidth, textureHeight, texels } = packed;
+  const { textureWidth, textureHeight, texels, colors } = packed;
   const most = renderer.capabilities.maxTextureSize;
   const size = `a texture of ${textureWidth} x ${textureHeight}`;
   if (Math.max(textureWidth, textureHeight) > most) throw new RangeError(`group of chunk ${packed.chunk}: ${size}, the GPU's largest is ${most}; choose fewer layers`);
   if (texels.length !== 4 * textureWidth * textureHeight) throw new RangeError(`group of chunk ${packed.chunk}: ${texels.length / 4} texels for ${size}`);
+  if (colors !== null && colors.length !== texels.length) throw new RangeError(`group of chunk ${packed.chunk}: ${colors.length / 4} colours for ${size}`);
 }

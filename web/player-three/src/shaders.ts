@@ -6,6 +6,7 @@ export type Feed = "attribute" | "texture" | "corner";
 const PRECISION = /* glsl */ `
 precision highp float;
 precision highp int;
+precision highp sampler2D;
 precision highp usampler2D;
 `;
 
@@ -31,6 +32,7 @@ vec3 normalOf(uvec4 texel) {
 
 const FROM_ATTRIBUTE = /* glsl */ `
 in uvec4 texel;
+in vec4 rgba;
 
 int vertexNumber() { return gl_VertexID; }
 
@@ -38,22 +40,29 @@ void readVertex(int vertex, out vec3 position, out vec3 normal) {
   position = positionOf(texel);
   normal = normalOf(texel);
 }
+
+vec3 readColor(int vertex) { return rgba.rgb; }
 `;
 
 // here and next: the texels of vertex 0 in the two frames between which `blend` lies; behind: added to the number of a vertex that
 // does not move.
 const FROM_TEXTURE = /* glsl */ `
 uniform usampler2D vertices;
+uniform sampler2D colors;
 uniform int movingCount;
 uniform int here;
 uniform int next;
 uniform int behind;
 uniform float blend;
 
-uvec4 texelAt(int number) {
+ivec2 placeOf(int number) {
   int width = textureSize(vertices, 0).x;
-  return texelFetch(vertices, ivec2(number % width, number / width), 0);
+  return ivec2(number % width, number / width);
 }
+
+uvec4 texelAt(int number) { return texelFetch(vertices, placeOf(number), 0); }
+
+vec3 colorAt(int number) { return texelFetch(colors, placeOf(number), 0).rgb; }
 
 void readVertex(int vertex, out vec3 position, out vec3 normal) {
   bool moves = vertex < movingCount;
@@ -65,6 +74,12 @@ void readVertex(int vertex, out vec3 position, out vec3 normal) {
     position = mix(position, positionOf(second), blend);
     normal = mix(normal, normalOf(second), blend);
   }
+}
+
+vec3 readColor(int vertex) {
+  bool moves = vertex < movingCount;
+  vec3 first = colorAt(vertex + (moves ? here : behind));
+  return moves && blend > 0.0 ? mix(first, colorAt(vertex + next), blend) : first;
 }
 `;
 
@@ -87,15 +102,19 @@ const FEEDS: Readonly<Record<Feed, string>> = {
 const SURFACE_VERTEX = /* glsl */ `
 uniform mat4 modelViewMatrix;
 uniform mat4 projectionMatrix;
+uniform bool hasColors;
 out vec3 scenePosition;
 out vec3 sceneNormal;
+out vec3 ownColor;
 out vec3 toEye; // in the scene's own axes, any length
 #ifdef EDGES
 out vec3 barycentric;
 #endif
 
 void main() {
-  readVertex(vertexNumber(), scenePosition, sceneNormal);
+  int vertex = vertexNumber();
+  readVertex(vertex, scenePosition, sceneNormal);
+  ownColor = hasColors ? readColor(vertex) : vec3(0.0);
   vec4 seen = modelViewMatrix * vec4(scenePosition, 1.0);
   toEye = -(seen.xyz * mat3(modelViewMatrix));
   gl_Position = projectionMatrix * seen;
@@ -115,11 +134,13 @@ export function surfaceVertex(feed: Feed): string {
 export const SURFACE_FRAGMENT = `${PRECISION}
 uniform int mode; // the number of a Mode in modes.ts
 uniform bool flatNormals;
-uniform vec3 clay; // of a lit surface
-uniform vec3 color; // of an unlit one
+uniform bool hasColors;
+uniform vec3 clay; // of a surface without colours of its own
+uniform vec3 color; // of its track
 uniform vec3 edgeColor;
 in vec3 scenePosition;
 in vec3 sceneNormal;
+in vec3 ownColor;
 in vec3 toEye;
 #ifdef EDGES
 in vec3 barycentric;
@@ -129,7 +150,7 @@ out vec4 fragment;
 vec3 shaded(vec3 n) {
   float head = max(dot(n, normalize(toEye)), 0.0);
   float sky = 0.5 + 0.5 * n.y;
-  return clay * (0.22 + 0.2 * sky + 0.58 * head);
+  return (hasColors ? ownColor : clay) * (0.22 + 0.2 * sky + 0.58 * head);
 }
 
 #ifdef EDGES
@@ -148,7 +169,8 @@ void main() {
   vec3 n = flatNormals ? (seenFromOutside ? facing : -facing) : normalize(sceneNormal);
   vec3 result;
   if (mode == NORMAL_MODE) result = 0.5 * (n + 1.0);
-  else if (mode == COLOUR_MODE) result = color;
+  else if (mode == TRACKS_MODE) result = color;
+  else if (mode == COLOR_MODE && hasColors) result = ownColor;
   else result = shaded(seenFromOutside ? n : -n);
 #ifdef EDGES
   result = mix(result, edgeColor, edge());

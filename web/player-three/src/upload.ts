@@ -1,10 +1,11 @@
 // What the GPU holds of one packed value. Everything lies over the value's own arrays: nothing is copied, and a lost context can
 // be filled again from them.
 
-import { BufferAttribute, BufferGeometry, DataTexture, IntType, RGBAIntegerFormat, Sphere, UnsignedShortType, Vector3 } from "three";
-import type { Box, Packed, PackedVertices } from "@meshreel/player-core/types";
+import { BufferAttribute, BufferGeometry, DataTexture, IntType, RGBAFormat, RGBAIntegerFormat, Sphere, UnsignedByteType, UnsignedShortType, Vector3 } from "three";
+import type { Box, Packed, PackedStatic } from "@meshreel/player-core/types";
 
 const TEXEL_BYTES = 8;
+const COLOR_BYTES = 4; // of a texel
 
 /** Triangles of three corners each: with an index, and where edges are wanted without one, each corner an attribute. */
 interface Triangles {
@@ -17,6 +18,8 @@ export class Upload {
   readonly packed: Packed;
   /** The vertices; a background has them only while edges are drawn. */
   texture: DataTexture | null = null;
+  /** Their colours, texel for texel; null where there are none. */
+  colors: DataTexture | null = null;
   readonly #sphere: Sphere;
   readonly #faces: Triangles;
   readonly #extra: Triangles | null = null;
@@ -30,8 +33,9 @@ export class Upload {
       const texels = new BufferAttribute(packed.texels, 4);
       texels.gpuType = IntType;
       this.#faces.indexed.setAttribute("texel", texels);
+      if (packed.colors !== null) this.#faces.indexed.setAttribute("rgba", new BufferAttribute(packed.colors, 4, true));
     } else {
-      this.texture = vertexTexture(packed, packed.textureWidth, packed.textureHeight);
+      this.#setTextures(packed, packed.textureWidth, packed.textureHeight);
       if (packed.extra.length > 0) this.#extra = this.#triangles(packed.extra);
     }
   }
@@ -40,9 +44,9 @@ export class Upload {
   get bytes(): number {
     const { packed } = this;
     const corners = packed.faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength : 0);
-    const attributes = packed.kind === "static" ? packed.texels.byteLength : 0;
-    const texture = this.texture === null ? 0 : this.texture.image.width * this.texture.image.height * TEXEL_BYTES;
-    return attributes + texture + corners * (this.#hasEdges ? 2 : 1);
+    const attributes = packed.kind === "static" ? packed.texels.byteLength + (packed.colors?.byteLength ?? 0) : 0;
+    const textures = texelsOf(this.texture) * TEXEL_BYTES + texelsOf(this.colors) * COLOR_BYTES;
+    return attributes + textures + corners * (this.#hasEdges ? 2 : 1);
   }
 
   /** Triangles of every frame, to be drawn with edges or without. */
@@ -63,16 +67,13 @@ export class Upload {
       triangles.unindexed?.dispose();
       triangles.unindexed = null;
     }
-    if (this.packed.kind === "static") {
-      this.texture?.dispose();
-      this.texture = null;
-    }
+    if (this.packed.kind === "static") this.#dropTextures();
   }
 
   dispose(): void {
     this.dropEdges();
     for (const triangles of this.#parts()) triangles.indexed.dispose();
-    this.texture?.dispose();
+    this.#dropTextures();
   }
 
   #parts(): readonly Triangles[] {
@@ -99,8 +100,19 @@ export class Upload {
       triangles.unindexed.setAttribute("corner", new BufferAttribute(triangles.corners, 1));
       triangles.unindexed.setDrawRange(0, triangles.corners.length);
     }
-    this.texture ??= paddedTexture(this.packed);
+    if (this.packed.kind === "static") this.#setTextures(padded(this.packed), PADDED_WIDTH, paddedHeight(this.packed));
     this.#hasEdges = true;
+  }
+
+  #setTextures({ texels, colors }: Texels, width: number, height: number): void {
+    this.texture = vertexTexture(texels, width, height);
+    this.colors = colors && colorTexture(colors, width, height);
+  }
+
+  #dropTextures(): void {
+    this.texture?.dispose();
+    this.colors?.dispose();
+    this.texture = this.colors = null;
   }
 
   #geometry(): BufferGeometry {
@@ -116,19 +128,38 @@ function sphereAround(box: Box): Sphere {
   return new Sphere(new Vector3(...box.minimum).add(half), half.length());
 }
 
-function vertexTexture(vertices: PackedVertices, width: number, height: number): DataTexture {
-  const texture = new DataTexture(vertices.texels, width, height, RGBAIntegerFormat, UnsignedShortType);
+type Texels = Pick<Packed, "texels" | "colors">;
+
+function vertexTexture(texels: Uint16Array, width: number, height: number): DataTexture {
+  const texture = new DataTexture(texels, width, height, RGBAIntegerFormat, UnsignedShortType);
   texture.internalFormat = "RGBA16UI";
   texture.needsUpdate = true;
   return texture;
 }
 
+/** Bytes as they are: the screen's colours (sRGB), like all others here. */
+function colorTexture(colors: Uint8Array, width: number, height: number): DataTexture {
+  const texture = new DataTexture(colors, width, height, RGBAFormat, UnsignedByteType);
+  texture.needsUpdate = true;
+  return texture;
+}
+
+function texelsOf(texture: DataTexture | null): number {
+  return texture === null ? 0 : texture.image.width * texture.image.height;
+}
+
 const PADDED_WIDTH = 2048; // every WebGL 2 has textures of this width
 
-/** A texture of vertices that come without padding; this one is a copy. */
-function paddedTexture(vertices: PackedVertices): DataTexture {
-  const height = Math.max(1, Math.ceil(vertices.texels.length / 4 / PADDED_WIDTH));
-  const texels = new Uint16Array(4 * PADDED_WIDTH * height);
-  texels.set(vertices.texels);
-  return vertexTexture({ texels, box: vertices.box }, PADDED_WIDTH, height);
+function paddedHeight({ texels }: PackedStatic): number {
+  return Math.max(1, Math.ceil(texels.length / 4 / PADDED_WIDTH));
+}
+
+/** Copies of a background's vertices and colours that fill a texture. */
+function padded(background: PackedStatic): Texels {
+  const room = 4 * PADDED_WIDTH * paddedHeight(background);
+  const texels = new Uint16Array(room);
+  texels.set(background.texels);
+  const colors = background.colors && new Uint8Array(room);
+  colors?.set(background.colors!);
+  return { texels, colors };
 }

@@ -33,12 +33,13 @@ export class Warmer {
     const feed = upload.packed.kind === "group" ? "texture" : "attribute";
     this.#mesh.material = this.#materials[edges ? "corner" : feed];
     const geometries = [upload.faces(edges), upload.extra(edges)].filter((geometry) => geometry !== null);
-    this.#uniforms.vertices.value = upload.texture; // which the geometries may have made
+    this.#uniforms.vertices.value = upload.texture; // which the geometries may have made, as the other one
+    this.#uniforms.colors.value = upload.colors;
     drawOffscreen(renderer, this.#target, () => {
       for (const geometry of geometries) this.#draw(geometry, renderer);
     });
     this.#mesh.geometry = NOTHING;
-    this.#uniforms.vertices.value = null;
+    this.#uniforms.vertices.value = this.#uniforms.colors.value = null;
   }
 
   dispose(): void {

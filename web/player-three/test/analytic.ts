@@ -54,11 +54,20 @@ export interface GroupOptions {
   readonly center?: (t: number) => Vector;
   /** The frame, counted in the group, that alone has the square; -1 for none. */
   readonly squareFrame?: number;
+  /** Whether it has colours of its own: those of `sphereColor` and SQUARE_COLOR. */
+  readonly isColored?: boolean;
 }
 
 export const RADIUS = 0.3; // m
 export const SQUARE: Vector = [0, 0.6, 0];
 export const SQUARE_HALF = 0.2; // m
+export const SQUARE_COLOR = [250, 3, 99] as const;
+export const FLOOR_COLOR = [12, 134, 56] as const;
+
+/** Bytes of the sphere in frame t of the group. */
+export function sphereColor(t: number): readonly number[] {
+  return [40 + 50 * t, 200, 17];
+}
 
 /** A group with a sphere that moves and, in one frame, a square above it. */
 export function makeGroup(options: GroupOptions = {}): MadeGroup {
@@ -76,8 +85,11 @@ export function makeGroup(options: GroupOptions = {}): MadeGroup {
   texels.set(pack(all, box));
   const extra = Uint32Array.from(lone?.faces ?? [], (corner) => vertexCount + corner);
   const extraStarts = Uint32Array.from({ length: frameCount + 1 }, (_, t) => (t > squareFrame ? extra.length : 0));
+  const shown = [...frames.map((_, t) => sphereColor(t)), SQUARE_COLOR];
+  const colors = options.isColored ? new Uint8Array(texels.length) : null;
+  colors?.set(all.flatMap(({ positions }, k) => positions.flatMap(() => [...shown[k], 255])));
   const packed: PackedGroup = {
-    kind: "group", chunk: 1, track, firstFrame, frameCount, vertexCount, textureWidth, textureHeight, texels, box,
+    kind: "group", chunk: 1, track, firstFrame, frameCount, vertexCount, textureWidth, textureHeight, texels, colors, box,
     faces: Uint32Array.from(frames[0].faces), extra, extraStarts, layers: 0, bytes: 1000, decodeMs: 1,
   };
   const positions = frames.map((frame, t) => [...frame.positions, ...(lone?.positions ?? []).map((p) => (t === squareFrame ? p : null))]);
@@ -85,7 +97,7 @@ export function makeGroup(options: GroupOptions = {}): MadeGroup {
 }
 
 /** A floor of `cells` x `cells` squares of half a metre below the sphere; normals look up. */
-export function makeFloor(cells = 6): { packed: PackedStatic; positions: Vector[] } {
+export function makeFloor(cells = 6, isColored = false): { packed: PackedStatic; positions: Vector[] } {
   const positions: Vector[] = [];
   const faces: number[] = [];
   for (let i = 0; i <= cells; i++) for (let j = 0; j <= cells; j++) positions.push([(i - cells / 2) / 2, -0.5, (j - cells / 2) / 2]);
@@ -98,8 +110,9 @@ export function makeFloor(cells = 6): { packed: PackedStatic; positions: Vector[
   const normals = positions.map((): Vector => [0, 1, 0]);
   const box = boxAround(positions);
   const texels = pack([{ positions, normals, faces }], box);
+  const colors = isColored ? Uint8Array.from(positions.flatMap(() => [...FLOOR_COLOR, 255])) : null;
   const packed: PackedStatic = {
-    kind: "static", chunk: 0, vertexCount: positions.length, texels, box, faces: Uint32Array.from(faces), bytes: 500, decodeMs: 1,
+    kind: "static", chunk: 0, vertexCount: positions.length, texels, colors, box, faces: Uint32Array.from(faces), bytes: 500, decodeMs: 1,
   };
   return { packed, positions };
 }

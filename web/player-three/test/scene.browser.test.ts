@@ -1,8 +1,8 @@
 import { fileURLToPath } from "node:url";
-import { afterAll, afterEach, beforeAll, beforeEach, expect, test } from "vitest";
+import { afterAll, afterEach, beforeAll, beforeEach, describe, expect, test } from "vitest";
 import { describeInBrowser, openPage } from "../../test/browser.ts";
 import type { OpenPage } from "../../test/browser.ts";
-import { makeFloor, makeGroup, RADIUS, SQUARE } from "./analytic.ts";
+import { FLOOR_COLOR, makeFloor, makeGroup, RADIUS, sphereColor, SQUARE, SQUARE_COLOR } from "./analytic.ts";
 import { trackColor } from "../src/colors.ts";
 import type { Vector } from "../src/colors.ts";
 import { Picture } from "./picture.ts";
@@ -134,7 +134,7 @@ describeInBrowser("a scene in Chromium", () => {
   test("modes and flat normals differ, and every mode draws the same silhouette", async () => {
     await prepare(true, true);
     await open.page.evaluate(() => window.api.camera(0.8, 1, 2.6));
-    const looks: [Mode, boolean][] = [["shaded", false], ["normal", false], ["wireframe", false], ["colour", false], ["shaded", true], ["normal", true]];
+    const looks: [Mode, boolean][] = [["shaded", false], ["normal", false], ["wireframe", false], ["tracks", false], ["shaded", true], ["normal", true]];
     const pictures: Picture[] = [];
     for (const [mode, flat] of looks) {
       await look(mode, flat);
@@ -156,7 +156,7 @@ describeInBrowser("a scene in Chromium", () => {
       await show(2);
       return picture();
     };
-    const colour = await looking("colour");
+    const colour = await looking("tracks");
     expect(colour.at([0.2, 0, 0])).toBeNear(trackColor(0).map((share) => 255 * share), 2);
     expect(colour.at([0, 0.8, 0])).toBeNear(trackColor(1).map((share) => 255 * share), 2);
     const shaded = await looking("shaded");
@@ -164,6 +164,63 @@ describeInBrowser("a scene in Chromium", () => {
     const edges = await looking("wireframe");
     const line = Array.from({ length: 40 }, (_, k) => edges.at([0.05 + 0.0075 * k, 0.02, 0])[0]);
     expect(Math.min(...line)).toBeLessThan(Math.max(...line) - 60);
+  });
+
+  describe("colours of its own", () => {
+    const FLOOR: Vector = [-0.85, -0.5, 0.9];
+    const LONE: Vector = [0.9, 0.8, 0]; // the middle of what has none
+    const looking = async (mode: Mode, frame: number, blend = 0): Promise<Picture> => {
+      await look(mode);
+      await show(frame, blend);
+      return picture();
+    };
+    beforeEach(() => open.page.evaluate(() => window.api.prepareColored()));
+
+    test("are the file's to the byte, of every frame and of single ones; what has none is shaded", async () => {
+      for (const t of [0, 2]) {
+        const drawn = await looking("color", t);
+        expect(drawn.at([-0.6 + 0.4 * t, 0, 0])).toEqual(sphereColor(t));
+        expect(drawn.at(FLOOR)).toEqual(FLOOR_COLOR);
+        if (t === 2) expect(drawn.at(SQUARE)).toEqual(SQUARE_COLOR);
+        expect(drawn.at(LONE)).toEqual((await looking("shaded", t)).at(LONE));
+      }
+    });
+
+    test("were uploaded before the first picture", async () => {
+      expect(await open.page.evaluate(() => window.api.uploadsWhileShowing(2))).toEqual([]);
+    });
+
+    test("are blended between frames", async () => {
+      const drawn = await looking("color", 0, 0.25);
+      expect(drawn.at([-0.5, 0, 0])).toBeNear([40 + 12.5, 200, 17], 1);
+    });
+
+    test("take the place of clay in light, with edges as well", async () => {
+      const [shaded, edges, clay] = [await looking("shaded", 2), await looking("wireframe", 2), await looking("tracks", 2)];
+      for (const drawn of [shaded, edges]) {
+        const lit = drawn.at(FLOOR);
+        const share = lit[1] / FLOOR_COLOR[1];
+        expect(share).toBeGreaterThan(0.2);
+        expect(share).toBeLessThan(1);
+        expect(lit).toBeNear(FLOOR_COLOR.map((value) => share * value), 1);
+      }
+      expect(shaded.at([0.2, 0, 0])).toBeNear(sphereColor(2).map((value) => 0.9 * value), 2); // looks at the viewer
+      expect(clay.at([0.2, 0, 0])).toBeNear(trackColor(0).map((value) => 255 * value), 2);
+    });
+
+    test("are on the GPU as long as what has them, edges or not", async () => {
+      const [group, floor, lone] = [makeGroup({ isColored: true }).packed, makeFloor(6, true).packed, makeGroup({ track: 1, squareFrame: -1 }).packed];
+      const bytes = [group, floor, lone].map(({ texels, colors, faces }) => texels.byteLength + (colors?.byteLength ?? 0) + faces.byteLength);
+      expect((await numbers()).gpuBytes).toBe(bytes.reduce((a, b) => a + b, group.extra.byteLength));
+      await looking("color", 2);
+      const plain = await numbers();
+      await looking("wireframe", 2);
+      expect((await numbers()).textures).toBe(plain.textures + 2); // of the floor
+      await looking("color", 2);
+      expect(await numbers()).toMatchObject({ gpuBytes: plain.gpuBytes, textures: plain.textures, geometries: plain.geometries });
+      await open.page.evaluate(() => window.api.release());
+      expect((await numbers()).gpuBytes).toBe(0);
+    });
   });
 
   test("what it shows later costs no upload", async () => {
@@ -233,8 +290,8 @@ describeInBrowser("a scene in Chromium", () => {
   });
 
   test("a lost context comes back with the same picture", async () => {
-    await prepare(true, true);
-    await look("shaded");
+    await open.page.evaluate(() => window.api.prepareColored());
+    await look("color");
     await show(2);
     const before = await picture();
     await open.page.evaluate(() => window.api.loseContext());

@@ -147,7 +147,7 @@ def _encode_mesh(
 
 def _decode_mesh(
     records: bytes, mesh: ColoredMesh, head: VertexColors, before: Float64[np.ndarray, "V 3"] | None
-) -> tuple[UInt8[np.ndarray, "T V 3"], Float64[np.ndarray, "V 3"]]:
+) -> tuple[UInt8[np.ndarray, "_ _ 3"], Float64[np.ndarray, "V 3"]]:
     if before is not None and len(before) != mesh.vertices:
         raise FormatError(f"colours of {mesh.vertices} vertices, predicted from those of {len(before)}")
     base = mesh.base

@@ -1,16 +1,18 @@
 // The inside of a decoding worker: jobs in, packed groups out. Keeps what groups that follow are predicted from.
 
+import { paintStatic } from "./colors.ts";
 import type { Tools } from "./group.ts";
-import { continueGroup, decodeStatic } from "./group.ts";
+import { colorGroup, continueGroup, decodeStatic } from "./group.ts";
 import type { LayersState } from "./layers.ts";
 import { checkPayload } from "./decoder.ts";
 import type { Placement } from "../mesh.ts";
+import { FormatError } from "../errors.ts";
 import { led } from "../format/budget.ts";
 import type { Led } from "../format/budget.ts";
 import { packGroup, packStatic } from "./pack.ts";
-import type { DecodeJob } from "../protocol.ts";
+import type { Damage, DecodeJob } from "../protocol.ts";
 import { describe } from "../format/reader.ts";
-import type { Packed } from "../types.ts";
+import type { CompanionKind, Packed } from "../types.ts";
 
 const MOST_STATES = 64; // of groups, of all tracks and files; the oldest goes first
 const MOST_STATICS = 4;
@@ -51,12 +53,15 @@ export class ChunkDecoder {
 
   constructor(private readonly tools: Tools) {}
 
-  /** What the job's chunk is, in metres from the header's origin; null where only its state is wanted. */
-  decode(job: DecodeJob): Packed | null {
+  /**
+   * What the job's chunk is, in metres from the header's origin; null where only its state is wanted. A companion that cannot be decoded is
+   * told to `damage`, and the chunk is decoded without it.
+   */
+  decode(job: DecodeJob, damage: (damage: Damage) => void): Packed | null {
     const start = performance.now();
     checkPayload(describe({ ...job, number: job.chunk }), job.form, job.payload, job.ranges);
     const place = { scale: job.scale, origin: [0, 0, 0] };
-    const made = job.kind === "static" ? this.background(job, place) : this.group(job, place);
+    const made = job.kind === "static" ? this.background(job, place, damage) : this.group(job, place, damage);
     return made && { ...made, decodeMs: performance.now() - start };
   }
 
@@ -66,22 +71,27 @@ export class ChunkDecoder {
     this.statics.forget(file);
   }
 
-  private group(job: DecodeJob, place: Placement): Packed | null {
-    const { file, chunk, track, firstFrame, payload } = job;
+  private group(job: DecodeJob, place: Placement, damage: (damage: Damage) => void): Packed | null {
+    const { file, chunk, track, firstFrame, layers, payload } = job;
+    const { core } = this.tools;
     const previous = this.needed(this.states, job);
-    const { group, state } = continueGroup(this.tools, payload, { frameCount: job.frameCount, layers: job.layers, previous, place });
+    const made = continueGroup(this.tools, payload, { frameCount: job.frameCount, layers, previous, place });
+    const colored = companion(job, "colors", damage, (data) => colorGroup(core, made, data, { layers, previous }));
+    const [colors, state] = colored ?? [null, made.state];
     if (state !== null) this.states.set(file, chunk, state);
     if (job.stateOnly) return null;
-    const layers = Math.max(0, job.ranges.length - 1);
-    return { kind: "group", chunk, track, firstFrame, ...packGroup(this.tools.core, group), layers, bytes: payload.length, decodeMs: 0 };
+    const shape = packGroup(core, made.group, colors);
+    return { kind: "group", chunk, track, firstFrame, ...shape, layers: Math.max(0, job.ranges.length - 1), bytes: bytesOf(job), decodeMs: 0 };
   }
 
-  private background(job: DecodeJob, place: Placement): Packed | null {
+  private background(job: DecodeJob, place: Placement, damage: (damage: Damage) => void): Packed | null {
+    const { core } = this.tools;
     const before = this.needed(this.statics, job);
-    const mesh = decodeStatic(this.tools, job.payload, before && before.mesh, place);
+    const made = decodeStatic(this.tools, job.payload, before && before.mesh, place);
+    const mesh = companion(job, "colors", damage, (data) => paintStatic(core, made, data)) ?? made.mesh;
     this.statics.set(job.file, job.chunk, led(before, mesh, job.payload.length));
     if (job.stateOnly) return null;
-    return { kind: "static", chunk: job.chunk, ...packStatic(this.tools.core, mesh), bytes: job.payload.length, decodeMs: 0 };
+    return { kind: "static", chunk: job.chunk, ...packStatic(core, mesh), bytes: bytesOf(job), decodeMs: 0 };
   }
 
   private needed<T>(kept: Kept<T>, job: DecodeJob): T | null {
@@ -92,8 +102,29 @@ export class ChunkDecoder {
   }
 }
 
+/** What a companion of a job's chunk decodes to; null where it has none, or a damaged one. Throws what stops the core, damage or not. */
+function companion<T>(job: DecodeJob, kind: CompanionKind, damage: (damage: Damage) => void, decode: (payload: Uint8Array) => T): T | null {
+  const found = job.companions.find((other) => other.kind === kind);
+  if (found === undefined) return null;
+  const { chunk, form, payload, ranges } = found;
+  try {
+    checkPayload(describe({ ...job, number: chunk, kind }), form, payload, ranges);
+    return decode(payload);
+  } catch (error) {
+    damage({ chunk, message: error instanceof Error ? error.message : String(error) });
+    if (error instanceof FormatError) return null;
+    throw error;
+  }
+}
+
+/** Bytes that a job's chunk is decoded from. */
+function bytesOf({ payload, companions }: DecodeJob): number {
+  return companions.reduce((sum, other) => sum + other.payload.length, payload.length);
+}
+
 /** The buffers of a packed value, to be handed over with it. */
 export function buffersOf(packed: Packed): ArrayBufferLike[] {
-  const arrays = packed.kind === "group" ? [packed.texels, packed.faces, packed.extra, packed.extraStarts] : [packed.texels, packed.faces];
+  const { texels, colors, faces } = packed;
+  const arrays = [texels, faces, ...(colors === null ? [] : [colors]), ...(packed.kind === "group" ? [packed.extra, packed.extraStarts] : [])];
   return [...new Set(arrays.map((array) => array.buffer))];
 }

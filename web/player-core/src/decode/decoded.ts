@@ -1,5 +1,6 @@
 // A group of frames as decoded: vertices and faces that all frames share, and the additions of single frames.
 
+import { joined } from "../bytes.ts";
 import { EMPTY, concatenate } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
 
@@ -14,9 +15,20 @@ export interface DecodedGroup {
   readonly patches: readonly Mesh[] | null;
 }
 
+/** Red, green and blue of a group's vertices: of those that all frames share, frame after frame, then of those of single frames. */
+export type GroupColors = Uint8Array;
+
 /** Frames that share nothing. */
 export function ofMeshes(meshes: readonly Mesh[]): DecodedGroup {
   return { frameCount: meshes.length, vertexCount: 0, positions: new Float64Array(0), faces: new Int32Array(0), dropped: null, patches: meshes };
+}
+
+/** Colours of the vertices of frame t, in the order of `frameOf`. */
+export function colorsOf(group: DecodedGroup, colors: GroupColors, t: number): Uint8Array {
+  const shared = 3 * group.vertexCount;
+  const counts = (group.patches ?? []).map((mesh) => mesh.vertices.length);
+  const start = counts.slice(0, t).reduce((sum, count) => sum + count, group.frameCount * shared);
+  return joined([colors.subarray(t * shared, (t + 1) * shared), colors.subarray(start, start + (counts[t] ?? 0))]);
 }
 
 /** Frame t as one mesh: its vertices behind the shared ones, its faces behind those that it keeps. */

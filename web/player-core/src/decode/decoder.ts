@@ -1,14 +1,17 @@
 // A whole .reel file in memory, frame by frame. Beside decoder.py; the player decodes in workers instead.
 
-import { continueGroup, decodeStatic } from "./group.ts";
+import { paintStatic } from "./colors.ts";
+import { colorGroup, continueGroup, decodeStatic } from "./group.ts";
 import type { Continued, Tools } from "./group.ts";
-import { frameOf } from "./decoded.ts";
+import { colorsOf, frameOf } from "./decoded.ts";
+import type { GroupColors } from "./decoded.ts";
 import { led } from "../format/budget.ts";
 import type { Led } from "../format/budget.ts";
 import { crc32 } from "../format/crc.ts";
 import { FormatError } from "../errors.ts";
 import { EMPTY, concatenate } from "../mesh.ts";
 import type { Mesh, Placement } from "../mesh.ts";
+import { Form } from "../format/layout.gen.ts";
 import { Head, describe } from "../format/reader.ts";
 import type { Chunk } from "../format/reader.ts";
 
@@ -24,10 +27,15 @@ export function checkPayload(name: string, form: number, payload: Uint8Array, la
   if (payload[0] !== form) throw new FormatError(`${name}: its form is ${payload[0]}, the index says ${form}`);
 }
 
+/** A group with its colours, where it has some. */
+interface Colored extends Continued {
+  readonly colors: GroupColors | null;
+}
+
 export class Video {
   readonly head: Head;
   private readonly place: Placement;
-  private readonly groups = new Map<number, Continued | FormatError>();
+  private readonly groups = new Map<number, Colored | FormatError>();
   private readonly states = new Map<number, Led | FormatError>();
 
   constructor(
@@ -39,23 +47,30 @@ export class Video {
     this.place = { scale: this.head.header.scale, origin: this.head.header.origin };
   }
 
-  /** Frame `index` in metres: its background, then its tracks, as one mesh. FormatError where a chunk is damaged. */
+  /** Frame `index` in metres: its background, then its tracks, as one mesh with its colours. FormatError where a chunk is damaged. */
   frame(index: number): Mesh {
     const state = this.head.staticOfFrame(index);
     const moving = this.head.tracks.map((_, track) => {
       const chunk = this.head.chunkOfFrame(index, track);
-      return frameOf(this.decoded(chunk).group, index - chunk.firstFrame);
+      const { group, colors } = this.decoded(chunk);
+      const mesh = frameOf(group, index - chunk.firstFrame);
+      return colors === null ? mesh : { ...mesh, colors: colorsOf(group, colors, index - chunk.firstFrame) };
     });
     return concatenate([state === null ? EMPTY : this.state(state).mesh, ...moving]);
   }
 
-  private decoded(chunk: Chunk): Continued {
+  private decoded(chunk: Chunk): Colored {
     return once(this.groups, chunk, () => {
       const before = this.head.groupBefore(chunk);
       const previous = before === null ? null : this.decoded(before).state;
       const count = this.layers === null ? chunk.layers.length : this.layers + 1;
       const { layers, place } = this;
-      return continueGroup(this.tools, this.payload(chunk, count), { frameCount: chunk.frameCount, layers, previous, place });
+      const made = continueGroup(this.tools, this.payload(chunk, count), { frameCount: chunk.frameCount, layers, previous, place });
+      const of = this.colorsOf(chunk);
+      if (of === null) return { ...made, colors: null };
+      const data = this.payload(of, chunk.form === Form.LAYERS && layers !== null ? layers + 1 : of.layers.length);
+      const [colors, state] = colorGroup(this.tools.core, made, data, { layers, previous });
+      return { ...made, state, colors };
     });
   }
 
@@ -64,8 +79,15 @@ export class Video {
       const changed = this.head.changedFrom(chunk);
       const before = changed && this.state(changed);
       const payload = this.payload(chunk, chunk.layers.length);
-      return led(before, decodeStatic(this.tools, payload, before && before.mesh, this.place), payload.length);
+      const made = decodeStatic(this.tools, payload, before && before.mesh, this.place);
+      const of = this.colorsOf(chunk);
+      const mesh = of === null ? made.mesh : paintStatic(this.tools.core, made, this.payload(of, of.layers.length));
+      return led(before, mesh, payload.length);
     });
+  }
+
+  private colorsOf(chunk: Chunk): Chunk | null {
+    return this.head.companionsOf(chunk).find(({ kind }) => kind === "colors") ?? null;
   }
 
   private payload(chunk: Chunk, count: number): Uint8Array {

@@ -10,8 +10,11 @@ import type { Mesh, Placement } from "../mesh.ts";
 import { unpackAll } from "../format/records.ts";
 import { checkClaims } from "../wasm/draco.ts";
 import type { Core } from "../wasm/memory.ts";
+import type { ColoredMesh } from "../wasm/colors.ts";
+import { decodeColors } from "./colors.ts";
+import type { Canvas, StaticCanvas } from "./colors.ts";
 import { ofMeshes } from "./decoded.ts";
-import type { DecodedGroup } from "./decoded.ts";
+import type { DecodedGroup, GroupColors } from "./decoded.ts";
 import { claimsOf, decodeDisplacements } from "./displacements.ts";
 import { decodeIntegers } from "./entropy.ts";
 import { placeLayers, readLayers } from "./layers.ts";
@@ -29,6 +32,7 @@ export interface Tools {
 export interface Continued {
   readonly group: DecodedGroup;
   readonly state: LayersState | null;
+  readonly canvas: Canvas; // what its colours are coded over
 }
 
 /** What decoding a group needs in addition to its payload. */
@@ -49,42 +53,73 @@ export function continueGroup(tools: Tools, data: Uint8Array, context: GroupCont
 
 function decodeLayers({ core, draco }: Tools, data: Uint8Array, { layers, previous, place }: GroupContext): Continued {
   const records = readLayers(data, layers);
-  const { faces, positions, state } = placeLayers(core, draco, records, previous, place);
+  const { base, faces, positions, state } = placeLayers(core, draco, records, previous, place);
   const frameCount = records.head.frames;
   const vertices = positions.length / 3 / frameCount;
   const group = { frameCount, vertexCount: vertices, positions, faces, dropped: null, patches: null };
+  const template = { base, levels: records.layers.length - 1, frames: frameCount, vertices };
   const isPlain = records.end === data.length || (layers !== null && layers <= records.head.levels);
-  if (isPlain) return { group, state };
+  if (isPlain) return { group, state, canvas: [template] };
   const record = unpackAll(LayersPatches, data.subarray(records.end));
   const { dropped, meshes } = decodePatches(core, draco, record, frameCount, faces.length / 3);
-  return { group: { ...group, dropped, patches: meshes.map((mesh) => placed(mesh, place)) }, state };
+  const added = wholeOf(concatenate(meshes));
+  const canvas = added.vertices > 0 ? [template, added] : [template];
+  return { group: { ...group, dropped, patches: meshes.map((mesh) => placed(mesh, place)) }, state, canvas };
+}
+
+/** A mesh whose colours are coded over itself. */
+function wholeOf(base: Mesh): ColoredMesh {
+  return { base, levels: 0, frames: 1, vertices: vertexCount(base) };
+}
+
+/** The colours of a group that was decoded from as many layers; its state then has what the next colours may be predicted from. */
+export function colorGroup(core: Core, made: Continued, data: Uint8Array, { layers, previous }: Pick<GroupContext, "layers" | "previous">): [GroupColors, LayersState | null] {
+  const { canvas, state } = made;
+  let before = previous?.colors ?? null;
+  if (layers !== null) before = before && before.subarray(0, 3 * (canvas[0]?.vertices ?? 0)); // the group before may have finer levels
+  const { colors, last } = decodeColors(core, data, canvas, before);
+  return [colors, state && { ...state, colors: last }];
 }
 
 function decodeAlone(tools: Tools, data: Uint8Array, { frameCount, layers, place }: GroupContext): Continued {
   switch (data[0]) {
     case Form.EMPTY:
       unpackAll(EmptyGroup, data);
-      return { group: ofMeshes(Array.from({ length: frameCount }, () => EMPTY)), state: null };
-    case Form.DRACO:
-      return { group: ofMeshes(decodeIntra(tools, data).map((mesh) => placed(mesh, place))), state: null };
-    case Form.LAPLACIAN:
-      return { group: decodeLaplacian(tools, data, layers, place), state: null };
+      return { group: ofMeshes(Array.from({ length: frameCount }, () => EMPTY)), state: null, canvas: [] };
+    case Form.DRACO: {
+      const meshes = decodeIntra(tools, data);
+      const canvas = meshes.map(({ colored }) => colored).filter(({ vertices }) => vertices > 0);
+      return { group: ofMeshes(meshes.map(({ mesh }) => placed(mesh, place))), state: null, canvas };
+    }
+    case Form.LAPLACIAN: {
+      const { group, reference } = decodeLaplacian(tools, data, layers, place);
+      return { group, state: null, canvas: [reference] };
+    }
     default:
       throw new FormatError(`group form ${data[0]} is not known to this player`);
   }
 }
 
-function decodeIntra({ core, draco }: Tools, data: Uint8Array): Mesh[] {
+/** A mesh, and what its colours are coded over. */
+interface IntraMesh {
+  readonly mesh: Mesh;
+  readonly colored: ColoredMesh;
+}
+
+function decodeIntra({ core, draco }: Tools, data: Uint8Array): IntraMesh[] {
   const record = unpackAll(DracoGroup, data);
   checkStep(record.step);
   checkClaims(core, record.meshes); // of all frames together
   const meshes = record.meshes.map((frame) => decodeMesh(core, draco, frame, record.step));
   for (const mesh of meshes) checkGrowth(mesh, record.levels, meshes.length);
   checkCost(dracoCost(meshes.map((mesh) => elementsOf(mesh, record.levels))), data.length, "draco");
-  return meshes.map((mesh) => subdivideMidpoint(core, mesh, record.levels));
+  return meshes.map((base) => {
+    const mesh = subdivideMidpoint(core, base, record.levels);
+    return { mesh, colored: { base, levels: record.levels, frames: 1, vertices: vertexCount(mesh) } };
+  });
 }
 
-function decodeLaplacian({ core, draco }: Tools, data: Uint8Array, layers: number | null, place: Placement): DecodedGroup {
+function decodeLaplacian({ core, draco }: Tools, data: Uint8Array, layers: number | null, place: Placement): { group: DecodedGroup; reference: ColoredMesh } {
   const record = unpackAll(LaplacianGroup, data);
   checkStep(record.step);
   const reference = decodeMesh(core, draco, record.reference, record.step);
@@ -103,21 +138,23 @@ function decodeLaplacian({ core, draco }: Tools, data: Uint8Array, layers: numbe
       }
     }
   }
-  return { frameCount, vertexCount: count, positions, faces: base.faces, dropped: null, patches: null };
+  const group = { frameCount, vertexCount: count, positions, faces: base.faces, dropped: null, patches: null };
+  return { group, reference: { base: reference, levels: record.levels, frames: frameCount, vertices: count } };
 }
 
 /** A state of the background, placed; `before` is the one that it changes, as this gave it. FormatError on damaged bytes. */
-export function decodeStatic(tools: Tools, data: Uint8Array, before: Mesh | null, place: Placement): Mesh {
+export function decodeStatic(tools: Tools, data: Uint8Array, before: Mesh | null, place: Placement): StaticCanvas {
   if (data[0] === Form.PATCH) {
     if (before === null) throw new FormatError("background: a patch of a state that is not at hand");
     return decodeChange(tools, data, before, place);
   }
   const meshes = decodeIntra(tools, data);
   if (meshes.length !== 1) throw new FormatError(`background: ${meshes.length} meshes, a state has one`);
-  return placed(meshes[0], place);
+  const [{ mesh, colored }] = meshes;
+  return { mesh: placed(mesh, place), added: wholeOf(colored.base), isChange: false };
 }
 
-function decodeChange({ core, draco }: Tools, data: Uint8Array, before: Mesh, place: Placement): Mesh {
+function decodeChange({ core, draco }: Tools, data: Uint8Array, before: Mesh, place: Placement): StaticCanvas {
   const record = unpackAll(StaticPatch, data);
   checkStep(record.step);
   const kept = keptOf(core, record, before);
@@ -126,7 +163,7 @@ function decodeChange({ core, draco }: Tools, data: Uint8Array, before: Mesh, pl
   checkCost(changeCost(before, added), data.length, "background");
   const after = concatenate([kept, placed(added, place)]);
   checkGrowth(after, 0);
-  return after;
+  return { mesh: after, added: wholeOf(added), isChange: true };
 }
 
 /** What the patch leaves of the state before. */

@@ -22,6 +22,7 @@ export interface LayersState {
   readonly base: Float64Array; // its vertices in the last frame
   readonly scalars: readonly Float64Array[]; // of the last frame, for each level decoded
   readonly finer: readonly Connectivity[];
+  readonly colors: Float64Array | null; // values of the colours of all decoded vertices (colors.ts)
 }
 
 /** The records of a payload, or those of its first levels. */
@@ -32,6 +33,7 @@ export interface LayersRecords {
 }
 
 export interface DecodedLayers {
+  readonly base: Mesh;
   readonly faces: Int32Array;
   readonly positions: Float64Array; // T x V x 3
   readonly state: LayersState;
@@ -75,7 +77,7 @@ export function placeLayers(core: Core, draco: DecoderModule, records: LayersRec
     finer.push(near);
   });
   positions ??= framesOfRows(core, rows, vertices, place);
-  return { faces, positions, state: { faces: base.faces, base: last, scalars, finer } };
+  return { base, faces, positions, state: { faces: base.faces, base: last, scalars, finer, colors: null } };
 }
 
 function baseOf(core: Core, draco: DecoderModule, head: LayersGroup, previous: LayersState | null): Mesh {

@@ -1,7 +1,7 @@
 // Decoded groups and backgrounds as the GPU takes them; what types.ts says of PackedGroup and PackedStatic.
 
 import { frameOf } from "./decoded.ts";
-import type { DecodedGroup } from "./decoded.ts";
+import type { DecodedGroup, GroupColors } from "./decoded.ts";
 import { FormatError } from "../errors.ts";
 import { vertexCount } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
@@ -16,10 +16,10 @@ const MOST_ROWS = 16384; // that nearly every one has; 33 million vertices
 /** A group without its texels. */
 export type GroupShape = Pick<
   PackedGroup,
-  "frameCount" | "vertexCount" | "textureWidth" | "textureHeight" | "faces" | "extra" | "extraStarts" | "texels" | "box"
+  "frameCount" | "vertexCount" | "textureWidth" | "textureHeight" | "faces" | "extra" | "extraStarts" | "texels" | "colors" | "box"
 >;
 
-export function packGroup(core: Core, group: DecodedGroup): GroupShape {
+export function packGroup(core: Core, group: DecodedGroup, colors: GroupColors | null): GroupShape {
   const { frameCount, vertexCount: shared } = group;
   const frames = Array.from({ length: frameCount }, (_, t) => frameOf(group, t));
   const alone = frames.map((mesh) => vertexCount(mesh) - shared); // vertices that a frame has for itself
@@ -36,13 +36,27 @@ export function packGroup(core: Core, group: DecodedGroup): GroupShape {
     behind += alone[t];
   });
   const box = boxOf(bounds);
-  return { frameCount, vertexCount: shared, textureWidth: TEXTURE_WIDTH, textureHeight: rows, ...corners(group), texels, box };
+  const packed = { texels, colors: colors && colorTexels(colors, TEXTURE_WIDTH * rows) };
+  return { frameCount, vertexCount: shared, textureWidth: TEXTURE_WIDTH, textureHeight: rows, ...corners(group), ...packed, box };
 }
 
-export function packStatic(core: Core, mesh: Mesh): Pick<PackedStatic, "texels" | "box" | "vertexCount" | "faces"> {
+export function packStatic(core: Core, mesh: Mesh): Pick<PackedStatic, "texels" | "colors" | "box" | "vertexCount" | "faces"> {
   const bounds = growBox(core, mesh.vertices, noBounds());
   const texels = packVertices(core, mesh, bounds);
-  return { texels, box: boxOf(bounds), vertexCount: vertexCount(mesh), faces: Uint32Array.from(mesh.faces) };
+  const colors = mesh.colors ? colorTexels(mesh.colors, vertexCount(mesh)) : null;
+  return { texels, colors, box: boxOf(bounds), vertexCount: vertexCount(mesh), faces: Uint32Array.from(mesh.faces) };
+}
+
+/** Four bytes a colour, and room for `count`: their order is that of a group's texels. */
+function colorTexels(colors: Uint8Array, count: number): Uint8Array {
+  const texels = new Uint8Array(4 * count);
+  for (let [from, to] = [0, 0]; from < colors.length; from += 3, to += 4) {
+    texels[to] = colors[from];
+    texels[to + 1] = colors[from + 1];
+    texels[to + 2] = colors[from + 2];
+    texels[to + 3] = 255;
+  }
+  return texels;
 }
 
 /** The faces of all frames, and those of single ones: kept there though not everywhere, or of the frame's own mesh. */

@@ -2,7 +2,7 @@
 // again.
 
 import { ChunkDecoder, MissingState, buffersOf } from "./chunk_decoder.ts";
-import type { DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
+import type { Damage, DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
 import { makeTools } from "./tools.ts";
 import { CoreStopped } from "../wasm/memory.ts";
 
@@ -18,7 +18,7 @@ export function serve(scope: Scope): void {
   let last: Promise<void> = Promise.resolve();
   scope.onmessage = (event) => {
     last = last.then(() => worker.answer(event.data)).catch((error: unknown) => {
-      scope.postMessage({ type: "failed", id: -1, message: error instanceof Error ? error.message : String(error), missingState: false }, []);
+      scope.postMessage({ type: "failed", id: -1, message: error instanceof Error ? error.message : String(error), damage: [], missingState: false }, []);
     });
   };
 }
@@ -41,15 +41,17 @@ class Served {
 
   private async decode(id: number, job: DecodeJob): Promise<void> {
     const start = performance.now();
+    const damage: Damage[] = [];
     try {
       if (this.decoder === null) throw new Error("a job before the start");
-      const packed = this.decoder.decode(job);
-      const message: FromWorker = { type: "decoded", id, packed, ms: performance.now() - start };
+      const packed = this.decoder.decode(job, (found) => damage.push(found));
+      const message: FromWorker = { type: "decoded", id, packed, damage, ms: performance.now() - start };
       this.scope.postMessage(message, packed === null ? [] : (buffersOf(packed) as Transferable[]));
     } catch (error) {
       const told = error instanceof Error ? error.message : String(error);
       if (error instanceof CoreStopped || error instanceof WebAssembly.RuntimeError) await this.restart();
-      this.scope.postMessage({ type: "failed", id, message: told, missingState: error instanceof MissingState }, []);
+      // Where a companion stopped the core, the chunk is sound: it may come again without that.
+      this.scope.postMessage({ type: "failed", id, message: told, damage, missingState: error instanceof MissingState || damage.length > 0 }, []);
     }
   }
 

@@ -69,6 +69,14 @@ export function checkFrames(frames: number, size: number): void {
   if (frames > most) throw new FormatError(`${frames} frames of all tracks in a file of ${size} bytes, over ${most}`);
 }
 
+/** FormatError where colours of so many vertices in so many frames, of each mesh, cost more than `size` bytes may. */
+export function checkColors(meshes: readonly { readonly vertices: number; readonly frames: number }[], size: number): void {
+  const largest = meshes.reduce((most, { vertices }) => Math.max(most, vertices), 0);
+  const sum = meshes.reduce((total, { vertices, frames }) => total + vertices * frames, 0);
+  const cost = LIMITS.painted * sum + LIMITS.painting * largest;
+  if (cost > LIMITS.colors + LIMITS.perByte * size) throw new FormatError(`colours: ${size} bytes that cost ${cost} to decode`);
+}
+
 /** FormatError where decoding costs more than `size` bytes may. */
 export function checkCost(cost: number, size: number, what: string): void {
   if (cost > allowance(size)) throw new FormatError(`${what}: ${size} bytes that cost ${cost} to decode, over ${allowance(size)}`);

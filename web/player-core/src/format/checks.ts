@@ -8,6 +8,13 @@ const LARGEST = 1e15;
 const SMALLEST = 1e-15;
 const MOST_TRACKS = 256;
 const MOST_CHANGES = 255;
+/** What belongs to a group or a background, and the form that it has. */
+const COMPANIONS: ReadonlyMap<number, number> = new Map([
+  [ChunkKind.COLORS, Form.VERTEX_COLORS],
+  [ChunkKind.ATLAS, Form.PLACES],
+  [ChunkKind.PICTURES, Form.VIDEO],
+]);
+const FORMS: readonly number[] = [Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY, Form.PATCH];
 
 function require(holds: boolean, message: string): void {
   if (!holds) throw new FormatError(message);
@@ -36,21 +43,34 @@ export function checkIndex(index: Index): void {
   checks.finish();
 }
 
+interface Whole {
+  readonly entry: IndexEntry;
+  readonly before: number | undefined; // the group that it is predicted from
+  readonly isBase: boolean; // whether it begins with a base mesh, and may have an atlas
+}
+
 class IndexChecks {
   private readonly frames: number[] = []; // of each track so far
   private readonly groups: number[] = []; // number of the newest group of each track
   private readonly changes = new Map<number, number>(); // for each STATIC chunk, how many patches lead to it
   private place: readonly [number, number] = [0, -1]; // first frame and track of the newest group
+  private readonly whole = new Map<number, Whole>(); // each STATIC and GROUP
+  private readonly companions = new Map<string, number>(); // by coded chunk and kind, the number of what belongs to it
+  private readonly atlases = new Map<number, number>(); // of each group with pictures, the number of its atlas
   private count = 0;
 
   add(entry: IndexEntry): void {
     const name = `chunk ${this.count}`;
     const isStatic = entry.kind === ChunkKind.STATIC;
-    require(isStatic === (entry.frames === 0), `${name}: of kind ${entry.kind} with ${entry.frames} frames`);
+    const isWhole = isStatic || entry.kind === ChunkKind.GROUP;
+    require(!isWhole || isStatic === (entry.frames === 0), `${name}: of kind ${entry.kind} with ${entry.frames} frames`);
+    require(!isWhole || FORMS.includes(entry.form), `${name}: of kind ${entry.kind} and form ${entry.form}`);
     require(entry.layers.length > 0 && entry.layers.every((layer) => layer.size > 0), `${name}: a chunk or a layer without bytes`);
     require(new Set(entry.dependsOn).size === entry.dependsOn.length, `${name}: depends on ${entry.dependsOn}, on one of them twice`);
     if (isStatic) this.changes.set(this.count, this.changesOf(entry, name));
-    else this.addGroup(entry, name);
+    else if (isWhole) this.addGroup(entry, name);
+    else if (COMPANIONS.has(entry.kind)) this.addCompanion(entry, name);
+    if (isWhole) this.whole.set(this.count, this.wholeOf(entry));
     this.count += 1;
   }
 
@@ -71,6 +91,39 @@ class IndexChecks {
     if (changes === undefined) throw new FormatError(`${name}: a patch that depends on ${entry.dependsOn}, which is no static chunk before it`);
     require(changes < MOST_CHANGES, `${name}: patch ${changes + 1} of one background, at most ${MOST_CHANGES}`);
     return changes + 1;
+  }
+
+  private wholeOf(entry: IndexEntry): Whole {
+    if (entry.kind === ChunkKind.STATIC) return { entry, before: undefined, isBase: entry.form === Form.DRACO };
+    const before = entry.dependsOn.find((other) => !this.changes.has(other));
+    return { entry, before, isBase: entry.form === Form.LAYERS && before === undefined };
+  }
+
+  /** What belongs to a chunk before it, which it names first; what else it needs follows from its kind. */
+  private addCompanion({ kind, form, frames, track, dependsOn }: IndexEntry, name: string): void {
+    const [of, ...others] = dependsOn;
+    const whole = this.whole.get(of);
+    if (whole === undefined || this.companion(of, kind) !== undefined) throw new FormatError(`${name}: of kind ${kind}, of ${of}, which is no chunk before it, or has others`);
+    const fits = form === COMPANIONS.get(kind) && frames === whole.entry.frames && track === whole.entry.track;
+    require(fits, `${name}: ${frames} frames of form ${form} and track ${track}, which are not those of chunk ${of}`);
+    const isNeeded = this.needed(kind, of, whole).some((numbers) => numbers.length === others.length && numbers.every((number, k) => number === others[k]));
+    require(isNeeded, `${name}: of kind ${kind}, of ${of}, that depends on ${others}`);
+    this.companions.set(`${of} ${kind}`, this.count);
+    if (kind === ChunkKind.PICTURES) this.atlases.set(of, others[0]);
+  }
+
+  /** What a companion may depend on, beside the chunk that it is of. */
+  private needed(kind: number, of: number, { before, isBase }: Whole): readonly (readonly number[])[] {
+    const last = before === undefined ? undefined : this.companion(before, kind);
+    if (kind === ChunkKind.COLORS) return last === undefined ? [[]] : [[], [last]];
+    if (kind === ChunkKind.ATLAS) return isBase ? [[]] : [];
+    const own = this.companion(of, ChunkKind.ATLAS);
+    if (own !== undefined) return [[own]];
+    return last === undefined ? [] : [[this.atlases.get(before!)!, last]];
+  }
+
+  private companion(of: number, kind: number): number | undefined {
+    return this.companions.get(`${of} ${kind}`);
   }
 
   private addGroup(entry: IndexEntry, name: string): void {

@@ -1,5 +1,7 @@
 // Which chunk needs which: the chains that groups and states of the background are predicted in.
 
+import { Form } from "./layout.gen.ts";
+import { isCompanion } from "./reader.ts";
 import type { Chunk, Head } from "./reader.ts";
 
 export class Links {
@@ -9,7 +11,7 @@ export class Links {
 
   constructor(head: Head) {
     const { chunks } = head;
-    this.#previous = chunks.map((chunk) => (chunk.kind === "group" ? head.groupBefore(chunk) : head.changedFrom(chunk)));
+    this.#previous = chunks.map((chunk) => previousOf(head, chunk));
     this.#roots = new Int32Array(chunks.length);
     this.#dependents = chunks.map(() => []);
     this.#previous.forEach((previous, number) => {
@@ -18,7 +20,10 @@ export class Links {
     });
   }
 
-  /** The chunk whose state one needs to be decoded: the group before it, or the state of the background that it changes. */
+  /**
+   * The chunk whose state one needs to be decoded: the group before it, or the state of the background that it changes. Of a companion the one
+   * of that chunk, where it needs it.
+   */
   previousOf(chunk: Chunk): Chunk | null {
     return this.#previous[chunk.number];
   }
@@ -28,12 +33,17 @@ export class Links {
     return this.#roots[chunk.number];
   }
 
-  /** A chunk and all that cannot be decoded without it. */
+  /** A chunk and all that cannot be decoded without it, but for companions of these. */
   withDependents(number: number): number[] {
     const found = [number];
     for (const other of found) for (const dependent of this.#dependents[other]) found.push(dependent);
     return found;
   }
+}
+
+function previousOf(head: Head, chunk: Chunk): Chunk | null {
+  if (chunk.kind === "group") return head.groupBefore(chunk);
+  return isCompanion(chunk) ? head.companionBefore(chunk) : head.changedFrom(chunk);
 }
 
 /** The most layers beyond the first that a chunk has. */
@@ -46,4 +56,16 @@ export function sizeOfLayers(chunk: Chunk, layers: number): number {
   let size = 0;
   for (let k = 0; k < Math.min(layers, chunk.layers.length); k++) size += chunk.layers[k].size;
   return size;
+}
+
+/** How many layers of a companion are wanted with the first `layers` of its chunk. */
+export function companionLayers(chunk: Chunk, companion: Chunk, layers: number): number {
+  const isScaled = chunk.form === Form.LAYERS && layers < chunk.layers.length;
+  return isScaled ? Math.min(layers, companion.layers.length) : companion.layers.length;
+}
+
+/** Bytes of the first layers of a chunk, and of what is wanted of its companions with these. */
+export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number): number {
+  const own = sizeOfLayers(chunk, layers);
+  return head.companionsOf(chunk).reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
 }

@@ -8,7 +8,7 @@ import { FormatError } from "../errors.ts";
 import { Checksum, ChunkKind, Form, Header, Index, LIMITS, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
 import type { Layer } from "./layout.gen.ts";
 import { unpack, unpackAll } from "./records.ts";
-import type { Box, Info } from "../types.ts";
+import type { Box, CompanionKind, Info } from "../types.ts";
 
 export const FIRST_REQUEST = 16384; // bytes; the head of some minutes of video
 const PREAMBLE_SIZE = Preamble.least;
@@ -16,20 +16,25 @@ const PREAMBLE_SIZE = Preamble.least;
 /** Where a chunk lies and what it holds. */
 export interface Chunk {
   readonly number: number;
-  readonly kind: "static" | "group";
+  /** Companions come with a chunk of frames or of the background, and add to it; "unknown": what this player does not decode, and never fetches. */
+  readonly kind: "static" | "group" | CompanionKind | "unknown";
   readonly form: number;
   readonly track: number; // 0 for static
-  readonly firstFrame: number; // 0 for static
-  readonly frameCount: number; // 0 for static
-  readonly dependsOn: readonly number[]; // of a static chunk, and where it is predicted of the group before it
+  readonly firstFrame: number; // of a group and of its companions
+  readonly frameCount: number; // of a group and of its companions
+  readonly dependsOn: readonly number[]; // of a static chunk, and where it is predicted of the group before it; of a companion, as FORMAT.md says
   readonly offset: number; // bytes from the start of the file
   readonly size: number; // bytes of all layers
   readonly layers: readonly Layer[];
 }
 
+/** A chunk that adds to another one. */
+export type CompanionChunk = Chunk & { readonly kind: CompanionKind };
+
 export class Head {
   readonly info: Info;
   readonly tracks: readonly (readonly Chunk[])[]; // the groups of each
+  private readonly companions = new Map<number, readonly CompanionChunk[]>(); // by the chunk that they add to
   private readonly times: Float64Array; // s from the first frame; empty where they follow from the rate
 
   private constructor(
@@ -37,6 +42,7 @@ export class Head {
     readonly chunks: readonly Chunk[],
   ) {
     this.tracks = byTrack(chunks);
+    for (const chunk of chunks) if (isCompanion(chunk)) this.companions.set(chunk.dependsOn[0], [...this.companionsOf(chunks[chunk.dependsOn[0]]), chunk]);
     const groups = this.tracks[0];
     const last = groups[groups.length - 1];
     const frameCount = last.firstFrame + last.frameCount;
@@ -125,6 +131,19 @@ export class Head {
     return chunk.kind === "static" && chunk.dependsOn.length > 0 ? this.chunks[chunk.dependsOn[0]] : null;
   }
 
+  /** The chunks that add to one: its colours. */
+  companionsOf(chunk: Chunk): readonly CompanionChunk[] {
+    return this.companions.get(chunk.number) ?? [];
+  }
+
+  /** The companion of another chunk that one is predicted from, or that has the colours of what a change of the background keeps. */
+  companionBefore(chunk: Chunk): Chunk | null {
+    const of = this.chunks[chunk.dependsOn[0]];
+    const changed = this.changedFrom(of);
+    if (changed !== null) return this.companionsOf(changed).find(({ kind }) => kind === chunk.kind) ?? null;
+    return chunk.dependsOn.length > 1 ? this.chunks[chunk.dependsOn[1]] : null;
+  }
+
   private checkFrame(frame: number): void {
     if (!(frame >= 0 && frame < this.frameCount)) throw new RangeError(`frame ${frame}: the file has frames 0 to ${this.frameCount - 1}`);
   }
@@ -134,25 +153,54 @@ export class Head {
   }
 }
 
+/** Whether a chunk adds to another one. */
+export function isCompanion(chunk: Chunk): chunk is CompanionChunk {
+  return isCompanionKind(chunk.kind);
+}
+
+function isCompanionKind(kind: Chunk["kind"]): kind is CompanionKind {
+  return kind === "colors";
+}
+
 /** "chunk 3 (track 0, frames 10 to 19)", for messages. */
 export function describe(chunk: Pick<Chunk, "number" | "kind" | "track" | "firstFrame" | "frameCount">): string {
-  if (chunk.kind === "static") return `chunk ${chunk.number} (static)`;
-  return `chunk ${chunk.number} (track ${chunk.track}, frames ${chunk.firstFrame} to ${chunk.firstFrame + chunk.frameCount - 1})`;
+  const { number, kind, track, firstFrame, frameCount } = chunk;
+  if (kind === "unknown") return `chunk ${number} (of another kind)`;
+  const what = isCompanionKind(kind) ? `${kind}, ` : "";
+  if (frameCount === 0) return `chunk ${number} (${what}static)`;
+  return `chunk ${number} (${what}track ${track}, frames ${firstFrame} to ${firstFrame + frameCount - 1})`;
 }
 
 function chunksOf(index: Index, start: number): Chunk[] {
   const frames: number[] = [];
+  const chunks: Chunk[] = [];
   let offset = start;
-  return index.chunks.map((entry, number) => {
-    const isGroup = entry.kind === ChunkKind.GROUP;
+  index.chunks.forEach((entry, number) => {
+    const kind = kindOf(entry.kind);
     const size = entry.layers.reduce((sum, layer) => sum + layer.size, 0);
-    const firstFrame = isGroup ? (frames[entry.track] ?? 0) : 0;
-    if (isGroup) frames[entry.track] = firstFrame + entry.frames;
     const { form, track, dependsOn, layers } = entry;
-    const chunk: Chunk = { number, kind: isGroup ? "group" : "static", form, track, firstFrame, frameCount: entry.frames, dependsOn, offset, size, layers };
+    let firstFrame = isCompanionKind(kind) ? chunks[dependsOn[0]].firstFrame : 0;
+    if (kind === "group") {
+      firstFrame = frames[track] ?? 0;
+      frames[track] = firstFrame + entry.frames;
+    }
+    chunks.push({ number, kind, form, track, firstFrame, frameCount: entry.frames, dependsOn, offset, size, layers });
     offset += size;
-    return chunk;
   });
+  return chunks;
+}
+
+function kindOf(kind: number): Chunk["kind"] {
+  switch (kind) {
+    case ChunkKind.STATIC:
+      return "static";
+    case ChunkKind.GROUP:
+      return "group";
+    case ChunkKind.COLORS:
+      return "colors";
+    default:
+      return "unknown";
+  }
 }
 
 function byTrack(chunks: readonly Chunk[]): Chunk[][] {
@@ -174,7 +222,7 @@ function timesOf(intervals: readonly number[]): Float64Array {
 
 function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, frameCount: number, lastTime: number): Info {
   const last = chunks[chunks.length - 1];
-  const scaled = chunks.filter((chunk) => chunk.form === Form.LAYERS || chunk.form === Form.LAPLACIAN);
+  const scaled = chunks.filter(({ kind, form }) => kind === "group" && (form === Form.LAYERS || form === Form.LAPLACIAN));
   return {
     frameCount,
     frameRate: header.frameRate,
@@ -184,6 +232,7 @@ function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, fr
     trackCount,
     mostLayers: scaled.reduce((most, chunk) => Math.max(most, chunk.layers.length - 1), 0),
     size: last.offset + last.size,
+    hasColors: chunks.some(({ kind }) => kind === "colors"),
     metadata: metadataOf(header.metadata),
   };
 }

@@ -1,7 +1,7 @@
 // How many layers are played follows the network and the processor: layers are dropped before frames are.
 
 import type { Timeline } from "./clock.ts";
-import { mostLayers, sizeOfLayers } from "../format/links.ts";
+import { mostLayers, sizeWithCompanions } from "../format/links.ts";
 import type { Head } from "../format/reader.ts";
 import { groupsBetween } from "./scheduler.ts";
 
@@ -69,7 +69,7 @@ export class Adaptive {
     const frames = groups.reduce((sum, group) => sum + group.frameCount, 0);
     const perByte = (8 * this.#head.tracks.length * frameCount) / (frames * duration);
     const most = groups.reduce((found, group) => Math.max(found, mostLayers(group)), 0);
-    return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeOfLayers(group, level + 1), 0));
+    return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeWithCompanions(this.#head, group, level + 1), 0));
   }
 
   #forNetwork(rates: readonly number[], { bandwidth, speed, fetched, isWaiting }: Conditions): number {

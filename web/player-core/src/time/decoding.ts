@@ -4,12 +4,13 @@ import { FormatError } from "../errors.ts";
 import type { Fetcher } from "../net/fetcher.ts";
 import { together } from "../format/budget.ts";
 import { Form } from "../format/layout.gen.ts";
-import { mostLayers } from "../format/links.ts";
+import { companionLayers, mostLayers } from "../format/links.ts";
 import type { Links } from "../format/links.ts";
 import type { Outcome, Share } from "./pool.ts";
-import { describe } from "../format/reader.ts";
-import type { Chunk, Head } from "../format/reader.ts";
+import { describe, isCompanion } from "../format/reader.ts";
+import type { Chunk, CompanionChunk, Head } from "../format/reader.ts";
 import type { Holdings, Plan, Step } from "./scheduler.ts";
+import type { Companion, DecodeJob } from "../protocol.ts";
 import type { Packed } from "../types.ts";
 
 export interface DecodingEvents {
@@ -81,6 +82,17 @@ export class Decoding implements Holdings {
     return this.#failed.has(chunk.number);
   }
 
+  /** What a chunk is decoded with, but for what can never be. */
+  companionsOf(chunk: Chunk): readonly CompanionChunk[] {
+    return this.#head.companionsOf(chunk).filter((companion) => !this.isFailed(companion));
+  }
+
+  /** Whether the bytes of a step are at hand. */
+  hasBytes({ chunk, layers }: Step): boolean {
+    const has = (other: Chunk, count: number): boolean => this.#fetcher.layersOf(other) >= count;
+    return has(chunk, layers + 1) && this.companionsOf(chunk).every((companion) => has(companion, companionLayers(chunk, companion, layers + 1)));
+  }
+
   bytesOf(chunk: Chunk): number {
     return this.#decoded.get(chunk.number)?.bytes ?? this.#bytesPerFrame * chunk.frameCount;
   }
@@ -106,7 +118,7 @@ export class Decoding implements Holdings {
     this.#submitted.clear();
     for (const step of steps) {
       if (!step.decode || this.#running.has(step.chunk.number)) continue;
-      if (this.#fetcher.layersOf(step.chunk) <= step.layers || !this.#hasState(step)) continue;
+      if (!this.hasBytes(step) || !this.#hasState(step)) continue;
       this.#submitted.set(step.chunk.number, step);
     }
     for (const step of [...this.#submitted.values()]) this.#submit(step);
@@ -134,6 +146,8 @@ export class Decoding implements Holdings {
 
   /** Damaged chunks may be tried again, as with fewer layers. */
   forgive(): void {
+    const damaged = [...this.#failed].map((number) => this.#head.chunks[number]).filter(isCompanion);
+    for (const { dependsOn } of damaged) this.#forgetStates(dependsOn[0]); // they were made without it
     this.#failed.clear();
     this.#tries.clear();
     this.version++;
@@ -180,12 +194,12 @@ export class Decoding implements Holdings {
     const { chunk, layers } = step;
     const job = {
       chunk: chunk.number,
-      kind: chunk.kind,
+      kind: chunk.kind as DecodeJob["kind"], // a plan has no others
       form: chunk.form,
       track: chunk.track,
       firstFrame: chunk.firstFrame,
       frameCount: chunk.frameCount,
-      ranges: chunk.layers.slice(0, layers + 1).map(({ size, crc }) => ({ size, crc })),
+      ranges: rangesOf(chunk, layers + 1),
       layers: layers === mostLayers(chunk) ? null : layers,
       previous: this.#links.previousOf(chunk)?.number ?? null,
       scale: this.#head.header.scale,
@@ -196,15 +210,26 @@ export class Decoding implements Holdings {
       start: () => {
         this.#submitted.delete(chunk.number);
         this.#running.set(chunk.number, step);
-        return { ...job, payload: this.#fetcher.payload(chunk, layers + 1) };
+        return { ...job, payload: this.#fetcher.payload(chunk, layers + 1), companions: this.#companionJobs(step) };
       },
       settle: (outcome) => this.#settle(step, outcome),
+    });
+  }
+
+  #companionJobs({ chunk, layers }: Step): Companion[] {
+    return this.companionsOf(chunk).map((companion) => {
+      const count = companionLayers(chunk, companion, layers + 1);
+      const { number, kind, form } = companion;
+      return { chunk: number, kind, form, payload: this.#fetcher.payload(companion, count), ranges: rangesOf(companion, count) };
     });
   }
 
   #settle(step: Step, outcome: Outcome): void {
     const { chunk, layers } = step;
     this.#running.delete(chunk.number);
+    for (const { chunk: number, message } of outcome.damage) {
+      if (!this.#failed.has(number)) this.#fail(this.#head.chunks[number], message); // or it was predicted from one that is damaged
+    }
     if (outcome.kind === "decoded") {
       this.#states.set(chunk.number, { layers, worker: outcome.worker });
       this.#tries.delete(chunk.number);
@@ -272,11 +297,19 @@ export class Decoding implements Holdings {
   }
 
   #forgetChain(chunk: Chunk): void {
-    for (const number of this.#links.withDependents(this.#links.rootOf(chunk))) this.#states.delete(number);
+    this.#forgetStates(this.#links.rootOf(chunk));
+  }
+
+  #forgetStates(first: number): void {
+    for (const number of this.#links.withDependents(first)) this.#states.delete(number);
   }
 }
 
+function rangesOf(chunk: Chunk, layers: number): { size: number; crc: number }[] {
+  return chunk.layers.slice(0, layers).map(({ size, crc }) => ({ size, crc }));
+}
+
 function bytesOf(packed: Packed): number {
-  const { texels, faces } = packed;
-  return texels.byteLength + faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength + packed.extraStarts.byteLength : 0);
+  const { texels, colors, faces } = packed;
+  return texels.byteLength + (colors?.byteLength ?? 0) + faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength + packed.extraStarts.byteLength : 0);
 }

@@ -1,6 +1,6 @@
 // Decoding workers, one for each spare core, with one job at a time.
 
-import type { DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
+import type { Damage, DecodeJob, FromWorker, ToWorker } from "../protocol.ts";
 import type { Packed } from "../types.ts";
 
 /** What the pool needs of a Worker; one of Node's `worker_threads` needs a wrapper. */
@@ -22,13 +22,13 @@ export interface WorkerSetup {
 }
 
 export type Outcome =
-  | { readonly kind: "decoded"; readonly packed: Packed | null; readonly ms: number; readonly worker: number }
-  | { readonly kind: "failed"; readonly message: string; readonly missingState: boolean };
+  | { readonly kind: "decoded"; readonly packed: Packed | null; readonly damage: readonly Damage[]; readonly ms: number; readonly worker: number }
+  | { readonly kind: "failed"; readonly message: string; readonly damage: readonly Damage[]; readonly missingState: boolean };
 
 /** A job that waits for its worker. */
 export interface Task {
   readonly lane: number; // jobs of one lane are done in one worker, in their order, because states live there
-  start(): Omit<DecodeJob, "file">; // the job; its payload's buffer must be its own
+  start(): Omit<DecodeJob, "file">; // the job; its payloads' buffers must be its own
   settle(outcome: Outcome): void;
 }
 
@@ -157,7 +157,8 @@ export class WorkerPool {
     slot.running = { id, share, task };
     this.#watch(slot);
     const job: DecodeJob = { ...task.start(), file: share.file };
-    slot.worker.postMessage({ type: "decode", id, job }, [job.payload.buffer as ArrayBuffer]);
+    const buffers = [job, ...job.companions].map(({ payload }) => payload.buffer as ArrayBuffer);
+    slot.worker.postMessage({ type: "decode", id, job }, buffers);
   }
 
   #start(): void {
@@ -203,7 +204,7 @@ export class WorkerPool {
     this.#end(slot);
     if (!slot.isStarted && ++this.#failedStarts >= FAILED_STARTS) this.#giveUp(message);
     else this.#start();
-    this.#settle(slot, { kind: "failed", message: `its decoder crashed (${message})`, missingState: false });
+    this.#settle(slot, { kind: "failed", message: `its decoder crashed (${message})`, damage: [], missingState: false });
   }
 
   #settle(slot: Slot, outcome: Outcome): void {

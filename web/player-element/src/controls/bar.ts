@@ -3,7 +3,8 @@
 import type { MeshreelPlayer } from "../element.ts";
 import { formatTime, timeDigits } from "../format.ts";
 import type { Action } from "../keyboard.ts";
-import { parseLayers, parseMode } from "../attributes.ts";
+import type { Mode } from "@meshreel/player-three/modes";
+import { parseLayers } from "../attributes.ts";
 import { layersChoices, layersValue, modeChoices, speedChoices } from "./choices.ts";
 import { Button, type Look, make, Menu, setText } from "./dom.ts";
 import { SeekBar } from "./seek.ts";
@@ -138,7 +139,8 @@ export class Bar {
       new Menu("layers", "Layers",
         () => ({ choices: layersChoices(most(), player.layers), value: layersValue(most(), player.layers), enabled: most() > 0 }),
         (value) => void (player.layers = parseLayers(value))),
-      new Menu("mode", "Shading", () => ({ choices: modeChoices(), value: player.mode }), (value) => void (player.mode = parseMode(value))),
+      new Menu("mode", "Shading", () => ({ choices: modeChoices(player.info?.hasColors ?? false), value: player.mode }),
+        (value) => void (player.mode = value as Mode)),
     ];
     this.#parts.push(...menus);
     return menus.map((menu) => menu.element);

@@ -34,6 +34,11 @@ const api = {
     if (withFloor) prepared.push(makeFloor().packed);
     for (const packed of prepared) scene.prepare(packed, renderer);
   },
+  /** Prepares the moving sphere and the floor with colours of their own, and a second track above without. */
+  prepareColored(): void {
+    prepared = [makeGroup({ isColored: true }).packed, makeGroup({ track: 1, squareFrame: -1, center: () => [0.9, 0.8, 0] }).packed, makeFloor(6, true).packed];
+    for (const packed of prepared) scene.prepare(packed, renderer);
+  },
   show(frame: number, blend = 0, held = frame): void {
     const groups = prepared.filter((packed) => packed.kind === "group");
     const background = prepared.find((packed) => packed.kind === "static") ?? null;
