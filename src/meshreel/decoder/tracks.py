@@ -129,7 +129,8 @@ class Track(Frames):
         counts = [len(mesh.vertices) for mesh in meshes]
         with self._refusals.of(chunk):
             canvas = canvas_of(payload, counts, self.layers, before)
-        colors, after = self._colors(chunk, canvas, before, after)
+        layers = None if chunk.form != Form.LAYERS else self.layers
+        colors, after = self._colors(chunk, canvas, layers, before, after)
         meshes = [replace(mesh, colors=some) for mesh, some in zip(meshes, colors, strict=True)]
         with self._refusals.of(chunk):
             return self._pictures.textured(chunk, meshes, canvas), after
@@ -142,17 +143,17 @@ class Track(Frames):
             return after
         levels = len(after.scalars)  # without the patches, from which nothing is predicted
         canvas = canvas_of(payload, [after.count] * chunk.frame_count, levels, before)
-        return self._colors(chunk, canvas, before, after)[1]
+        return self._colors(chunk, canvas, levels, before, after)[1]
 
     def _colors(
-        self, chunk: Chunk, canvas: Canvas, before: LayersState | None, after: LayersState | None
+        self, chunk: Chunk, canvas: Canvas, layers: int | None, before: LayersState | None, after: LayersState | None
     ) -> tuple[list[UInt8[np.ndarray, "_ 3"]], LayersState | None]:
-        """Decode the colours of a group that has some."""
+        """Decode the colours of a group that has some, from at most `layers` layers beyond the first; None: from all."""
         of = self.reader.companion_of(chunk, ChunkKind.COLORS)
         assert of is not None
-        some = None if self.layers is None or chunk.form != Form.LAYERS else self.layers + 1
         with self._refusals.of(of):
-            return decode_group_colors(self.reader.read_chunk(of.number, some), canvas, before, after)
+            data = self.reader.read_chunk(of.number, None if layers is None else layers + 1)
+            return decode_group_colors(data, canvas, before, after)
 
     @property
     def _most(self) -> int:
