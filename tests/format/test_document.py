@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from meshreel.coding import entropy
-from meshreel.coding.appearance.atlas import Layout, decode_atlas, encode_atlas
+from meshreel.coding.appearance.atlas import decode_atlas, encode_atlas
 from meshreel.coding.appearance.colors import ColorCodingOptions, ColoredMesh, decode_colors, encode_colors
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
 from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, decode_layers, encode_layers
@@ -35,6 +35,7 @@ from meshreel.format.layout import (
     VertexColors,
 )
 from meshreel.format.records import pack
+from meshreel.geometry.atlas import Layout
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 

@@ -16,11 +16,11 @@ from ..errors import FormatError
 from ..format.budget import check_colors
 from ..format.layout import DracoGroup, Form, LaplacianGroup, StaticPatch
 from ..format.records import unpack_all
+from ..geometry.atlas import Layout
 from ..geometry.subdivision import levels_of
 from ..geometry.topology import concatenate
 from ..shapes import Bool, Float32, Float64, Int32, UInt8
 from ..types import Mesh
-from .appearance.atlas import Layout
 from .appearance.colors import ColorCodingOptions, ColoredMesh, EncodedColors, decode_colors, encode_colors
 from .layers.coder import LayersState, base_of, patches_of, read_layers
 from .mesh import decode_mesh

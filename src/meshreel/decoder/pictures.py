@@ -12,12 +12,13 @@ from functools import partial
 
 import numpy as np
 
-from ..coding.appearance.atlas import Layout, decode_atlas
+from ..coding.appearance.atlas import decode_atlas
 from ..coding.appearance.pictures import VideoDecoder, decode_pictures, from_i420
 from ..coding.colored import Canvas, atlas_base
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
 from ..format.layout import ChunkKind
+from ..geometry.atlas import Layout
 from ..shapes import UInt8
 from ..types import Mesh, Texture
 

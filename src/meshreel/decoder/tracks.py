@@ -148,7 +148,7 @@ class Track(Frames):
     def _colors(
         self, chunk: Chunk, canvas: Canvas, layers: int | None, before: LayersState | None, after: LayersState | None
     ) -> tuple[list[UInt8[np.ndarray, "_ 3"]], LayersState | None]:
-        """Decode the colours of a group that has some, from at most `layers` layers beyond the first; None: from all."""
+        """Decode the colours of a group that has some, from at most `layers` layers beyond its first; None: all."""
         of = self.reader.companion_of(chunk, ChunkKind.COLORS)
         assert of is not None
         with self._refusals.of(of):

@@ -15,13 +15,14 @@ from ..analysis.appearance.bake import picture, texels_of
 from ..analysis.appearance.unwrap import projected, unwrap
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.survey import Survey
-from ..coding.appearance.atlas import Layout, encode_atlas
+from ..coding.appearance.atlas import encode_atlas
 from ..coding.appearance.pictures import VideoEncoder, encode_pictures, to_i420
 from ..coding.background import changed, decode_background, decode_change, encode_background, encode_change
 from ..coding.colored import background_canvas, encode_group_colors
 from ..container.writer import Companion
 from ..format.budget import Chain, CostlyError
 from ..format.layout import ChunkKind
+from ..geometry.atlas import Layout
 from ..geometry.closest_points import distances
 from ..geometry.color_views import spread_colors
 from ..geometry.decimate import decimate_faces

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from meshreel.coding.appearance.atlas import Layout, decode_atlas, encode_atlas
+from meshreel.coding.appearance.atlas import decode_atlas, encode_atlas
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import Atlas
 from meshreel.format.records import pack, unpack_all
+from meshreel.geometry.atlas import Layout
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 from tests.metrics.shapes import sphere

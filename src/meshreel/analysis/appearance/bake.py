@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64, UInt8
 
-from ...coding.appearance.atlas import Layout
+from ...geometry.atlas import Layout
 from ...geometry.painted import Paint
 from ...geometry.topology import blend, face_normals
 from ...types import GREY, Mesh

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...coding.appearance.atlas import MOST_SIDE, Layout
 from ...errors import InputError
+from ...geometry.atlas import MOST_SIDE, Layout
 from ...geometry.color_views import ColorViews
 from ...geometry.topology import face_normals
 from ...types import Mesh
