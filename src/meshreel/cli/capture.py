@@ -44,7 +44,8 @@ def command(
         "fx": 504, "fy": 504, "cx": 320, "cy": 288, "camera_to_world": 4 x 4 rows in metres, "depth_unit_m": 0.001,
         "depth_min_m": 0.1, "depth_max_m": 5, "depth": "left/depth"}]}, each `depth` a folder of 16-bit PNG whose names
         end in the frame's number. Cameras look along +z, x right, y down. Or a folder with camera.json (one such
-        camera, with frames_per_second) and depth/.
+        camera, with frames_per_second), depth/ and, for colours, color/. A camera's `color` is a folder of pictures
+        aligned with its depth, or an object with a folder and what differs; `color_cameras` lists others.
     output
         The directory for frame_00000.ply and so on; created if needed.
     voxel

@@ -114,7 +114,7 @@ def compare_sequences(
 def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras, seen: Callable[[Mesh], Looked] = Visible) -> Row:
     """Return the metrics of one frame by name; SSIM only with cameras."""
     row = _distance_row(surface_errors(original, decoded))
-    if original.is_colored:
+    if original.is_colored and decoded.is_colored:
         colors = color_errors(original, decoded)
         row |= {"y_psnr": colors.y, "u_psnr": colors.u, "v_psnr": colors.v, "yuv_psnr": colors.yuv}
     if cameras:

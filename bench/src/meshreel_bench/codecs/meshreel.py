@@ -51,6 +51,9 @@ class MeshreelCodec(Prepared):
     basis_size: int | None = None
     group_size: int | None = None
     centers: int | None = None
+    color: str = "none"  # studies of geometry compare with codecs that have no colours
+    color_quality: float | None = None
+    texture: int | None = None
     variant: str | None = None
 
     def __post_init__(self) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from meshreel.capture.recording import Recording
 from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.color_views import ColorFrames
 from meshreel.geometry.depth import DepthFrames
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import frame_names, make_folder, write_mesh
@@ -44,6 +45,11 @@ class Captured(Frames):
     def up(self) -> Up:
         """The axis that points up."""
         return self._recording.up
+
+    @property
+    def colors(self) -> ColorFrames | None:
+        """The pictures of the colour cameras, by frame."""
+        return self._recording.colors
 
     @property
     def depth(self) -> DepthFrames:
