@@ -10,11 +10,12 @@ import math
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import overload
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float64, Int64
 
 from ..errors import InputError
 from ..geometry.topology import concatenate, weld
@@ -23,10 +24,13 @@ from .figure import Pose, figure
 from .implicit import polygonize
 from .procedural import grid_of_frame
 from .rig import DepthCamera
+from .simulated_color import ColorSensorOptions
 from .simulated_rig import SceneFrame, SensorOptions, corner_cameras, simulate_rig
+from .solid_colors import CHILD, WALKER, person_colors, room_colors
 
 # Sizes and speeds for a demo of a minute or two.
 WIDTH = 256  # pixels of a depth picture (guess)
+COLOR_SCALE = 1.5  # of a colour picture's width to that of depth (guess)
 NOISE = 0.3  # of the sensor, see `SensorOptions.noise` (guess)
 VOXEL = 0.03  # m, for the fusion of such pictures (guess)
 SIZE = (3.0, 1.7, 2.6)  # m, of the room; its origin is the middle of the floor (guess)
@@ -92,14 +96,36 @@ class Room(Sequence[SceneFrame]):
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
         number = range(len(self))[operator.index(index)]
-        return SceneFrame.of([self.still], self.people(number))
+        people = self.people(number)
+        parts = np.repeat(np.arange(1 + len(people)), [len(mesh.faces) for mesh in (self.still, *people)])
+        return replace(SceneFrame.of([self.still], people), paint=partial(self._colors, number, parts))
 
     def people(self, number: int) -> list[Mesh]:
         """Return the closed meshes of a frame's people: one walks around the middle, a child jumps there."""
-        spacing = self.options.spacing
-        grid = grid_of_frame(number, spacing, self.options.seed)
-        poses = (_walker(number / self.options.frame_rate), _child(number / self.options.frame_rate))
-        return [polygonize((figure(pose, 0.7 * spacing),), _TOUCH, grid) for pose in poses]
+        grid = grid_of_frame(number, self.options.spacing, self.options.seed)
+        return [polygonize((figure(pose, self._thinnest),), _TOUCH, grid) for pose in self._poses(number)]
+
+    @property
+    def _thinnest(self) -> float:
+        return 0.7 * self.options.spacing
+
+    def _poses(self, number: int) -> tuple[Pose, Pose]:
+        seconds = number / self.options.frame_rate
+        return _walker(seconds), _child(seconds)
+
+    def _colors(
+        self,
+        number: int,
+        parts: Int64[np.ndarray, " F"],
+        points: Float64[np.ndarray, "N 3"],
+        faces: Int64[np.ndarray, " N"],
+    ) -> Float64[np.ndarray, "N 3"]:
+        """Return the colours of places on faces of a frame, of which `parts` are the room's (0) and each person's."""
+        colors, part = room_colors(points), parts[faces]
+        for person, (pose, outfit) in enumerate(zip(self._poses(number), (WALKER, CHILD), strict=True), 1):
+            some = part == person
+            colors[some] = person_colors(pose, self._thinnest, outfit, points[some])
+        return colors
 
 
 def furnished_room(options: RoomOptions | None = None) -> Room:
@@ -121,7 +147,8 @@ def record_room(
 ) -> None:
     """Write what four depth cameras measure, and the truth; `progress` gets the number of finished frames."""
     sensor, cameras = SensorOptions(noise=NOISE, seed=options.seed), room_cameras(width)
-    simulate_rig(folder, furnished_room(options), cameras, options.frame_rate, sensor, progress)
+    color = ColorSensorOptions(scale=COLOR_SCALE)
+    simulate_rig(folder, furnished_room(options), cameras, options.frame_rate, sensor, progress, color)
 
 
 def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -211,9 +211,13 @@ def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:
     return folders
 
 
-def write_rig(folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float) -> None:
-    """Write `rig.json`."""
+def write_rig(
+    folder: Path, cameras: tuple[DepthCamera, ...], frame_rate: float, colors: Sequence[dict[str, Any]] = ()
+) -> None:
+    """Write `rig.json`; `colors` describe the colour cameras beside the first of the cameras."""
     entries = [camera.record() | {"depth": f"{camera.name}/depth"} for camera in cameras]
+    for entry, color in zip(entries, colors, strict=False):
+        entry["color"] = color
     with replacing(folder / RIG) as file:
         file.write((json.dumps({"frames_per_second": frame_rate, "cameras": entries}, indent=1) + "\n").encode())
 

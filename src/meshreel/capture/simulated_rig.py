@@ -20,9 +20,11 @@ from ..geometry.closest_points import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import concatenate, face_normals
 from ..io.depth_pictures import write_depth
+from ..io.pictures import write_picture
 from ..io.write import make_folder, replacing, write_mesh
 from ..types import Mesh
 from .rig import RIG, DepthCamera, make_folders, write_rig
+from .simulated_color import ColorSensorOptions, Painter, SimulatedColor
 
 TRUTH = "truth"  # folder of the clean meshes
 LABELS = "dynamic.npz"  # file in that folder: for each frame, a bit per face of its mesh
@@ -58,6 +60,7 @@ class SceneFrame:
 
     mesh: Mesh
     dynamic: Bool[np.ndarray, " F"]
+    paint: Painter | None = None  # the colours of places on it, where they are known
 
     @staticmethod
     def of(still: Sequence[Mesh], moving: Sequence[Mesh]) -> SceneFrame:
@@ -112,19 +115,28 @@ def simulate_rig(
     frame_rate: float,
     sensor: SensorOptions = SensorOptions(),
     progress: Callable[[int], None] = lambda _done: None,
+    color: ColorSensorOptions | None = None,
 ) -> int:
     """Write what the cameras measure of each frame, and the truth; return the number of frames.
+
+    With `color`, each has a colour camera beside it, which sees frames that have a `paint`.
 
     `rig.json` is written last: a folder without it is incomplete. `progress` gets the number of finished frames.
     """
     places = make_folders(folder, cameras)
     make_folder(folder / TRUTH)
     labels, count = {}, 0
+    eyes = _color_cameras(cameras, sensor, color)
+    for camera in cameras[: len(eyes)]:
+        make_folder(folder / camera.name / "color")
     for number, frame in enumerate(frames):
         scene = _Rays(frame.mesh)
         for which, (camera, place) in enumerate(zip(cameras, places, strict=True)):
             random = np.random.default_rng([sensor.seed, number, which])
             write_depth(_measured(scene, camera, sensor, random), place / f"depth_{number:05}.png")
+            if which < len(eyes) and frame.paint is not None:
+                picture = eyes[which].picture(frame.mesh, frame.paint, number, random)
+                write_picture(picture, folder / camera.name / "color" / f"color_{number:05}.png")
         write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
         labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
         count = number + 1
@@ -135,8 +147,18 @@ def simulate_rig(
         record = {"frames_per_second": frame_rate, "cameras": [camera.record() for camera in cameras]}
         file.write((json.dumps(record, indent=1) + "\n").encode())
     random = np.random.default_rng([sensor.seed, 1 << 30])
-    write_rig(folder, tuple(_mistaken(camera, sensor, random) for camera in cameras), frame_rate)
+    wrong = tuple(_mistaken(camera, sensor, random) for camera in cameras)
+    described = [eye.record(f"{camera.name}/color", random) for camera, eye in zip(cameras, eyes, strict=False)]
+    write_rig(folder, wrong, frame_rate, described)
     return count
+
+
+def _color_cameras(
+    cameras: tuple[DepthCamera, ...], sensor: SensorOptions, color: ColorSensorOptions | None
+) -> list[SimulatedColor]:
+    """Return a colour camera beside each depth camera; none without `color`."""
+    random = np.random.default_rng([sensor.seed, 1 << 29])
+    return [] if color is None else [SimulatedColor.beside(camera, color, random) for camera in cameras]
 
 
 class _Rays:

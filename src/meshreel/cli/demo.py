@@ -104,7 +104,7 @@ def _forget(folder: Path, names: list[str]) -> None:
         return
     if not (folder / TRUTH).is_dir() or [camera.name for camera in read_cameras(folder)[0]] != names:
         raise InputError(f"{folder}: has a rig that is not of a demo, and would be overwritten; give another --output")
-    for pattern in ("rig.json", "corner*/depth/depth_*.png", f"{TRUTH}/frame_*.ply"):
+    for pattern in ("rig.json", "corner*/depth/depth_*.png", "corner*/color/color_*.png", f"{TRUTH}/frame_*.ply"):
         for path in folder.glob(pattern):
             path.unlink()
 

@@ -1,0 +1,98 @@
+"""Simulation of colour cameras: what they would see of a mesh whose colours are known, with sensor errors.
+
+In: a mesh, the colours of places on it, a depth camera beside which the colour camera is. Out: pictures.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float64, Int64, UInt8
+
+from ..errors import InputError
+from ..geometry.raycast import Rays
+from ..geometry.strict import products
+from ..geometry.topology import face_normals
+from ..types import Mesh
+from .rig import DepthCamera
+
+# Colours, 0 to 255, of places and the faces that they are on.
+Painter = Callable[[Float64[np.ndarray, "N 3"], Int64[np.ndarray, " N"]], Float64[np.ndarray, "N 3"]]
+AMBIENT = 0.8  # of the light that comes from everywhere (guess)
+LIGHT = (0.3, 0.9, 0.3)  # where the rest comes from, at first; it turns about the second axis (guess)
+TURNS = 0.02  # of the light a frame, rad (guess)
+
+
+@dataclass(frozen=True, slots=True)
+class ColorSensorOptions:
+    """Errors of colour cameras."""
+
+    scale: float = 2.0  # pixels of a colour picture's width for each of a depth picture's
+    gain: float = 0.0  # standard deviation of a camera's exposure, as a share
+    balance: float = 0.0  # the same of each channel's
+    blur: float = 0.5  # pixels, standard deviation
+    noise: float = 1.5  # levels of 255, standard deviation
+    pose_error: float = 0.0  # degrees, standard deviation of the error in the rig's file
+
+    def __post_init__(self) -> None:
+        numbers = (self.gain, self.balance, self.blur, self.noise, self.pose_error)
+        if not all(math.isfinite(value) and value >= 0 for value in numbers) or not 0.1 <= self.scale <= 16:
+            raise InputError(f"color sensor {numbers}, scale {self.scale:g}: give numbers from 0 on, scale 0.1 to 16")
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedColor:
+    """A colour camera with the eyes of a depth camera."""
+
+    camera: DepthCamera  # with the size and the numbers of the colour pictures
+    gains: Float64[np.ndarray, "3"]  # of the channels
+    sensor: ColorSensorOptions
+
+    @staticmethod
+    def beside(depth: DepthCamera, sensor: ColorSensorOptions, random: np.random.Generator) -> SimulatedColor:
+        """Return a camera in the place of a depth camera, with errors of its own."""
+        width, height = round(depth.width * sensor.scale), round(depth.height * sensor.scale)
+        ratios = (width / depth.width, height / depth.height)
+        focal = (depth.focal[0] * ratios[0], depth.focal[1] * ratios[1])
+        center = ((depth.center[0] + 0.5) * ratios[0] - 0.5, (depth.center[1] + 0.5) * ratios[1] - 0.5)
+        camera = replace(depth, width=width, height=height, focal=focal, center=center)
+        gains = np.exp(sensor.gain * random.standard_normal() + sensor.balance * random.standard_normal(3))
+        return SimulatedColor(camera, gains, sensor)
+
+    def record(self, folder: str, random: np.random.Generator) -> dict[str, Any]:
+        """Return the object of `rig.json` that describes it, with the error of its pose."""
+        from scipy.spatial.transform import Rotation
+
+        pose = self.camera.camera_to_world.copy()
+        error = Rotation.from_rotvec(self.sensor.pose_error * random.standard_normal(3), degrees=True)
+        pose[:3, :3] = error.as_matrix() @ pose[:3, :3]
+        known = replace(self.camera, camera_to_world=pose).record()
+        names = ("width", "height", "fx", "fy", "cx", "cy", "camera_to_world")
+        return {"folder": folder} | {name: known[name] for name in names}
+
+    def picture(
+        self, mesh: Mesh, paint: Painter, frame: int, random: np.random.Generator
+    ) -> UInt8[np.ndarray, "H W 3"]:
+        """Return what the camera sees of a mesh in a frame; black where it sees nothing."""
+        from scipy.ndimage import gaussian_filter
+
+        camera = self.camera.view
+        seen = Rays(mesh).look(camera)
+        rows, columns = np.nonzero(seen.faces >= 0)
+        depth, faces = seen.depth[rows, columns].astype(np.float64), seen.faces[rows, columns].astype(np.int64)
+        ahead = np.linalg.solve(camera.intrinsic, np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])).T
+        turn, eye = self.camera.camera_to_world[:3, :3], self.camera.camera_to_world[:3, 3]
+        points = products(ahead * depth[:, None], turn.T) + eye
+        light = np.array(LIGHT) / np.linalg.norm(LIGHT)
+        c, s = math.cos(TURNS * frame), math.sin(TURNS * frame)
+        light = np.array([c * light[0] + s * light[2], light[1], c * light[2] - s * light[0]])
+        shade = AMBIENT + (1 - AMBIENT) * np.abs(face_normals(mesh)[0][faces] @ light)
+        image = np.zeros((*seen.faces.shape, 3))
+        image[rows, columns] = paint(points, faces) * shade[:, None] * self.gains
+        image = np.stack([gaussian_filter(image[..., k], self.sensor.blur) for k in range(3)], axis=2)
+        image += self.sensor.noise * random.standard_normal(image.shape)
+        return np.clip(np.rint(image), 0, 255).astype(np.uint8)
