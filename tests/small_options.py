@@ -24,9 +24,13 @@ def quick(
     centers: int | None = None,
     key_interval: float | None = None,
     effort: str = "normal",
+    color: str = "auto",
+    color_quality: float | None = None,
+    texture: int | None = None,
 ) -> EncoderOptions:
     """The preset's options made small; takes what `preset_options` takes."""
-    options = preset_options(preset, quality, basis_size, group_size, centers, key_interval, effort)
+    colors = {"color": color, "color_quality": color_quality, "texture": texture}
+    options = preset_options(preset, quality, basis_size, group_size, centers, key_interval, effort, **colors)  # type: ignore[arg-type]
     method = options.method
     method = _quick_layers(method) if isinstance(method, LayersOptions) else _quick_paper(method)
     return replace(options, method=method, scene=SceneOptions(SegmentOptions(views=VIEWS)))

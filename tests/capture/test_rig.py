@@ -107,7 +107,10 @@ def mirrored(rig):
         (lambda r: r["cameras"][0].update(cx=1e300), "camera front: focal .* center"),
         (lambda r: r["cameras"][0].update(name=None), "name is None; give text"),
         (lambda r: r["cameras"][0].update(depth=None), "depth is None; give text"),
-        (lambda r: r["cameras"][0].update(color=["a"]), r"color is \['a'\]; give text"),
+        (
+            lambda r: r["cameras"][0].update(color=["a"]),
+            "color of camera front is",
+        ),
         (lambda r: r["cameras"][0].update(camera_to_world="x"), "camera_to_world is not 4 rows"),
         (lambda r: r["cameras"][0].update(camera_to_world=[[1], [0, 1], [0], [1]]), "camera_to_world is not 4 rows"),
         (lambda r: r["cameras"][0]["camera_to_world"][0].__setitem__(3, 1e6), r"front.*1e\+06 m from the world"),
@@ -166,10 +169,50 @@ def test_a_folder_without_a_readable_rig_is_refused(tmp_path):
 
 def test_colour_of_another_size_is_refused(folder):
     changed(folder, lambda rig: rig["cameras"][0].update(color="front/color"))
-    read_rig(folder)  # there are no pictures of it: legal
+    with pytest.raises(InputError, match=r"front/color: color of camera front cannot be read"):
+        read_rig(folder)
     (folder / "front" / "color").mkdir()
+    with pytest.raises(InputError, match="camera front has no color pictures"):
+        read_rig(folder)
     Image.new("RGB", (50, 40)).save(folder / "front" / "color" / "0.png")
-    with pytest.raises(InputError, match="50 x 40 pixels where depth has 96 x 96"):
+    with pytest.raises(InputError, match="50 x 40 pixels where camera front has 96 x 96"):
+        read_rig(folder)
+
+
+def test_colour_cameras_are_read_beside_depth_and_alone(folder):
+    (folder / "pictures").mkdir()
+    Image.new("RGB", (50, 40), (9, 8, 7)).save(folder / "pictures" / "color_0.png")
+    whole = json.loads((folder / "rig.json").read_text())["cameras"][0]
+    size = {"folder": "pictures", "width": 50, "height": 40, "fx": 40, "fy": 40, "cx": 25, "cy": 20}
+    alone = {key: whole[key] for key in ("camera_to_world",)} | size | {"name": "eye"}
+    changed(folder, lambda rig: rig["cameras"][0].update(color=size | {"distortion": [0.1, 0, 0.01]}))
+    changed(folder, lambda rig: rig.update(color_cameras=[alone]))
+    rig = read_rig(folder)
+    beside, other = rig.color_cameras
+    assert (beside.name, other.name) == ("front", "eye") and rig.remarks == ()
+    assert beside.distortion == (0.1, 0.0, 0.01, 0.0, 0.0) and not any(other.distortion)
+    np.testing.assert_array_equal(beside.camera_to_world, rig.cameras[0].camera_to_world)
+    picture = other.picture(0)
+    assert picture.pixels[0, 0].tolist() == [9, 8, 7] and other.picture(1) is None
+    np.testing.assert_array_equal(picture.camera.intrinsic, [[40, 0, 25.5], [0, 40, 20.5], [0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"distortion": "none"}, "distortion is 'none'"),
+        ({"distortion": [0, 0, 0, 0, 0, 0]}, "give up to five numbers"),
+        ({"distortion": [99]}, "give up to five numbers"),
+        ({"folder": 3}, "has no folder"),
+        ({"fx": -1}, "focal"),
+        ({"width": "wide"}, "width is 'wide' and not a number"),
+    ],
+)
+def test_colour_cameras_that_are_wrong_are_refused(folder, change, words):
+    (folder / "front" / "color").mkdir()
+    Image.new("RGB", (96, 96)).save(folder / "front" / "color" / "0.png")
+    changed(folder, lambda rig: rig["cameras"][0].update(color={"folder": "front/color"} | change))
+    with pytest.raises(InputError, match=words):
         read_rig(folder)
 
 

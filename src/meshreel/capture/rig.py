@@ -336,9 +336,10 @@ def _color_camera(folder: Path, entry: Any, beside: dict[str, Any]) -> ColorCame
             raise InputError(f"color camera {camera.name} has no folder; name that of its pictures")
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    files = pictures_in(folder / place, camera.name)
-    pose, intrinsic = camera.camera_to_world, camera.intrinsic
-    return ColorCamera(camera.name, camera.width, camera.height, intrinsic, pose, distortion, files)
+    files, pose = pictures_in(folder / place, camera.name), camera.camera_to_world
+    found = ColorCamera(camera.name, camera.width, camera.height, camera.intrinsic, pose, distortion, files)
+    found.picture(min(files))  # an error of its size is told before anything else is done
+    return found
 
 
 def _json(path: Path) -> dict[str, Any]:
