@@ -148,8 +148,8 @@ def rate_factor(quality: float) -> int:
 
 
 def color_step(quality: float) -> float:
-    """Quantiser step of colours of vertices as a share of their range: 1/11 at 50, halved every 35 points."""
-    return rounded(2 ** ((50 - quality) / 35) / 11)
+    """Quantiser step of colours of vertices as a share of their range: .0909 at 50, halved every 35 points."""
+    return rounded(0.0909 * 2 ** ((50 - quality) / 35))
 
 
 def displacement_step(quality: float) -> float:

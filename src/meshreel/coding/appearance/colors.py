@@ -41,7 +41,7 @@ class ColoredMesh:
 class ColorCodingOptions:
     """Options of the colours of vertices."""
 
-    step: float = 1 / 16  # quantiser step, in units of the whole range
+    step: float = 0.0909  # quantiser step, in units of the whole range
     finer: float = 0.65  # step of the base, on which all others rest, in steps (guess)
     price: float = 0.12  # price of a bit, in squared steps (guess)
 

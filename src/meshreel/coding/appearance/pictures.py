@@ -28,7 +28,7 @@ BLUE, RED = 1.8556, 1.5748  # what a full colour difference is of blue and of re
 class VideoOptions:
     """Options of the video of a chain's pictures."""
 
-    crf: int = 45  # SVT's constant rate factor, 1 to 63; larger is coarser
+    crf: int = 42  # SVT's constant rate factor, 1 to 63; larger is coarser
     preset: int = PRESET
 
     def __post_init__(self) -> None:
