@@ -40,6 +40,7 @@ export class Player extends PlaybackTarget implements Playback {
   #loop = false;
   #rate = 1;
   #layers: Layers = "auto";
+  #textures = true;
   #level = NaN; // layers beyond the first, as last reported by `layerschange`
   interpolate = true;
 
@@ -138,6 +139,15 @@ export class Player extends PlaybackTarget implements Playback {
     this.#wake();
   }
 
+  get textures(): boolean {
+    return this.#textures;
+  }
+
+  set textures(on: boolean) {
+    this.#textures = on;
+    if (this.#session) this.#session.textures.on = on;
+  }
+
   get stats(): Stats {
     const session = this.#session;
     const shown = session?.picture.shown;
@@ -154,6 +164,7 @@ export class Player extends PlaybackTarget implements Playback {
       wholeLayers: session?.picture.wholeLayers ?? 0,
       stalls: this.#stalls,
       skippedGroups: session?.decoding.failedGroups ?? 0,
+      textures: session?.textures.stateOf(shown ?? null) ?? "none",
     };
   }
 
@@ -172,7 +183,7 @@ export class Player extends PlaybackTarget implements Playback {
       this.#tell("play");
     }
     if (this.#clock?.isRunning) return;
-    if (!this.#session?.picture.isReady(this.currentFrame)) this.#tell("waiting");
+    if (!this.#session?.picture.canShow(this.currentFrame)) this.#tell("waiting");
     this.#wake();
     return new Promise((resolve, reject) => this.#plays.push({ resolve, reject }));
   }
@@ -201,6 +212,7 @@ export class Player extends PlaybackTarget implements Playback {
     const frame = timeline.frameAt(clock.time);
     const isShown = picture.show(frame, this.interpolate ? timeline.blendAt(clock.time, frame) : 0);
     if (clock.isRunning && !isShown) {
+      if (picture.isReady(frame)) session.textures.late(now);
       clock.hold();
       this.#hasStalled = this.#isStallNew = true;
       this.#wake();
@@ -233,7 +245,8 @@ export class Player extends PlaybackTarget implements Playback {
         warn: (error) => this.#tell("warning", error),
         changed: () => this.#wake(this.#clock?.isRunning ? SOON_MS : 0),
         failed: (error) => this.#fail(error),
-      });
+        textured: () => this.#onTexture(),
+      }, this.#textures);
       this.#clock = new Clock(this.#session.timeline);
       this.#clock.rate = this.#rate;
       this.#clock.loop = this.#loop;
@@ -280,7 +293,7 @@ export class Player extends PlaybackTarget implements Playback {
       this.#stalls++;
       this.#tell("waiting");
     }
-    if (session.picture.isReady(this.currentFrame)) this.#goOn(session, clock);
+    if (session.picture.canShow(this.currentFrame)) this.#goOn(session, clock);
     if (clock.isAtEnd && !this.#paused && !this.#seeking) this.#end();
     else if (clock.isRunning) this.#tell("timeupdate");
   }
@@ -330,6 +343,12 @@ export class Player extends PlaybackTarget implements Playback {
     this.#source.close(); // else a server that ignores ranges sends on, into memory
     if (!wasPaused) this.#tell("pause");
     this.#tell("error", this.#error);
+  }
+
+  #onTexture(): void {
+    if (this.#clock?.isRunning) return; // it is looked for with each picture
+    this.#tell("texturechange");
+    this.#wake();
   }
 
   #tellProgress(session: Session): void {

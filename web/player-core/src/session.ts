@@ -15,6 +15,7 @@ import type { Chunk, Head } from "./format/reader.ts";
 import { plan } from "./time/scheduler.ts";
 import type { Plan, Step } from "./time/scheduler.ts";
 import type { Source } from "./net/source.ts";
+import { Textures } from "./time/textures.ts";
 import type { Layers } from "./types.ts";
 
 export interface Limits {
@@ -34,6 +35,7 @@ export interface Aim {
 
 export interface SessionEvents extends DecodingEvents {
   failed(error: unknown): void;
+  textured(): void; // a texture came, or went
 }
 
 const BEHIND = 1; // s of content: what is decoded behind the play head is kept
@@ -46,6 +48,7 @@ export class Session {
   readonly timeline: Timeline;
   readonly picture: Picture;
   readonly decoding: Decoding;
+  readonly textures: Textures;
   readonly fetcher: Fetcher;
   readonly #links: Links;
   readonly #source: Source;
@@ -55,11 +58,11 @@ export class Session {
   readonly #adaptive: Adaptive;
   readonly #movingTracks: number; // that have something to decode
   readonly #rates = new Map<number, number>(); // bits/s by layers beyond the first
-  #plan: Plan = { steps: [], keep: new Set(), chainCount: 0 };
+  #plan: Plan = { steps: [], keep: new Set(), chainCount: 0, coming: [] };
   #size: number | null = null; // of the file, as the source had it last
   #speed = 1;
 
-  constructor({ head, first }: Opened, source: Source, share: Share, limits: Limits, events: SessionEvents) {
+  constructor({ head, first }: Opened, source: Source, share: Share, limits: Limits, events: SessionEvents, textures: boolean) {
     this.head = head;
     this.#source = source;
     this.#share = share;
@@ -71,7 +74,8 @@ export class Session {
     this.fetcher = new Fetcher(head, source, { arrived: events.changed, failed: events.failed }, COMPRESSED);
     this.fetcher.put(first, 0);
     this.decoding = new Decoding(head, this.#links, this.fetcher, share, events);
-    this.picture = new Picture(head, this.decoding);
+    this.textures = new Textures(head, this.fetcher, this.decoding, { warn: events.warn, changed: events.textured }, textures);
+    this.picture = new Picture(head, this.decoding, this.textures);
     this.#adaptive = new Adaptive(head, this.timeline, this.#bandwidth, 1);
   }
 
@@ -96,14 +100,15 @@ export class Session {
       layers: aim.layers === "auto" ? this.#adaptive.level : aim.layers,
       exact: aim.layers !== "auto",
     };
+    this.textures.loop = aim.loop;
     const made = plan(this.head, this.#links, this.timeline, outlook, this.decoding);
     const keep = new Set(made.keep);
     this.picture.addTo(keep);
     this.#plan = { ...made, keep };
     this.decoding.run(this.#plan);
     this.decoding.release(STATICS * memory);
-    const later = LATER * outlook.fetchSeconds;
-    this.fetcher.want(made.steps.flatMap((step) => this.#wishesOf(step, step.ahead <= 0 ? "now" : step.ahead < later ? "soon" : "later")));
+    const whenOf = (ahead: number): When => (ahead <= 0 ? "now" : ahead < LATER * outlook.fetchSeconds ? "soon" : "later");
+    this.fetcher.want([...this.#pictureWishes(made, whenOf), ...made.steps.flatMap((step) => this.#wishesOf(step, whenOf(step.ahead)))]);
     if (aim.layers === "auto") this.#adapt(aim);
   }
 
@@ -155,6 +160,7 @@ export class Session {
 
   close(): void {
     this.stop();
+    this.textures.close();
     this.decoding.close();
   }
 
@@ -163,6 +169,17 @@ export class Session {
     const count = layers + 1;
     const companions = this.decoding.companionsOf(chunk).map((other) => ({ chunk: other, count: companionLayers(chunk, other, count), when }));
     return [{ chunk, count, when }, ...companions];
+  }
+
+  /** Pictures that lie before those of the play head in their video, and those of groups that are decoded already. */
+  #pictureWishes({ coming, steps }: Plan, whenOf: (ahead: number) => When): Wish[] {
+    const layers = new Map(steps.map((step) => [step.chunk, step.layers]));
+    return coming.flatMap(({ chunk, ahead }) => {
+      const pictures = this.decoding.picturesOf(chunk, layers.get(chunk) ?? this.decoding.decodedAt(chunk));
+      if (pictures === null || (ahead > 0 && layers.has(chunk))) return [];
+      const lead = ahead > 0 ? [pictures] : this.textures.leadTo(pictures);
+      return lead.map((other) => ({ chunk: other, count: 1, when: whenOf(ahead) }));
+    });
   }
 
   #adapt(aim: Aim): void {

@@ -58,9 +58,10 @@ export function sizeOfLayers(chunk: Chunk, layers: number): number {
   return size;
 }
 
-/** How many layers of a companion are wanted with the first `layers` of its chunk. */
+/** How many layers of a companion are wanted with the first `layers` of its chunk: textures are what goes first, where the first layer alone is. */
 export function companionLayers(chunk: Chunk, companion: Chunk, layers: number): number {
   const isScaled = chunk.form === Form.LAYERS && layers < chunk.layers.length;
+  if (isScaled && layers === 1 && companion.kind !== "colors") return 0;
   return isScaled ? Math.min(layers, companion.layers.length) : companion.layers.length;
 }
 
