@@ -6,7 +6,7 @@ import { PlaybackTarget } from "./events.ts";
 import { open } from "./net/opening.ts";
 import { WorkerPool } from "./time/pool.ts";
 import type { Share, WorkerSetup } from "./time/pool.ts";
-import { Session } from "./session.ts";
+import { NO_STATS, Session } from "./session.ts";
 import type { Limits } from "./session.ts";
 import type { Source } from "./net/source.ts";
 import { PLAYBACK_RATES } from "./types.ts";
@@ -22,7 +22,6 @@ const LIMITS: Limits = { bufferSeconds: 10, decodedSeconds: 3, memory: 1 << 28 }
 const TICK_MS = 250; // between plans, and between events of time and progress, while it plays
 const SOON_MS = 40; // from a group's arrival to the next plan while it plays: there are some more until then
 const ENOUGH = [0.25, 1] as const; // s of display time that must be at hand to start, and to go on after a stall
-const MOST_BUFFERED = 60; // s of content that `stats` looks ahead
 
 export class Player extends PlaybackTarget implements Playback {
   readonly #source: Source;
@@ -149,23 +148,9 @@ export class Player extends PlaybackTarget implements Playback {
   }
 
   get stats(): Stats {
-    const session = this.#session;
-    const shown = session?.picture.shown;
-    const layers = Math.max(0, ...(shown?.groups ?? []).map((group) => group?.layers ?? 0));
-    const ahead = session?.readyAhead(this.currentTime, this.#loop, MOST_BUFFERED) ?? 0;
-    return {
-      mbps: session ? session.rateAt(layers) / 1e6 : 0,
-      bandwidthMbps: this.#source.bandwidth / 1e6,
-      decodeMs: session?.decoding.lastMs ?? 0,
-      decodeLoad: session?.load ?? 0,
-      bufferedSeconds: Math.min(ahead, this.#loop ? this.duration : this.duration - this.currentTime),
-      fetchedBytes: this.#bytes,
-      layers,
-      wholeLayers: session?.picture.wholeLayers ?? 0,
-      stalls: this.#stalls,
-      skippedGroups: session?.decoding.failedGroups ?? 0,
-      textures: session?.textures.stateOf(shown ?? null) ?? "none",
-    };
+    const bandwidthMbps = this.#source.bandwidth / 1e6;
+    const found = this.#session?.statsAt(this.currentTime, this.#loop) ?? NO_STATS;
+    return { ...found, bandwidthMbps, fetchedBytes: this.#bytes, stalls: this.#stalls };
   }
 
   /** Reads the head and goes on to fetch; `play` does so by itself. Rejects with what the event `error` carries. */

@@ -16,7 +16,7 @@ import { plan } from "./time/scheduler.ts";
 import type { Plan, Step } from "./time/scheduler.ts";
 import type { Source } from "./net/source.ts";
 import { Textures } from "./time/textures.ts";
-import type { Layers } from "./types.ts";
+import type { Layers, Stats } from "./types.ts";
 
 export interface Limits {
   readonly bufferSeconds: number; // of bytes fetched ahead, at normal speed
@@ -41,7 +41,16 @@ export interface SessionEvents extends DecodingEvents {
 const BEHIND = 1; // s of content: what is decoded behind the play head is kept
 const COMPRESSED = 1 << 25; // bytes of chunks kept though they are not wanted now: they may be again
 const LATER = 3 / 4; // of the seconds that are fetched ahead: what lies beyond waits until it fills a request
+const MOST_BUFFERED = 60; // s of content that `statsAt` looks ahead
 const STATICS = 1 / 4; // share of the memory that states of the background may keep
+
+/** Numbers that are a session's own. */
+type SessionStats = Omit<Stats, "bandwidthMbps" | "fetchedBytes" | "stalls">;
+
+/** Before there is one. */
+export const NO_STATS: SessionStats = {
+  mbps: 0, decodeMs: 0, decodeLoad: 0, bufferedSeconds: 0, layers: 0, wholeLayers: 0, skippedGroups: 0, textures: "none",
+};
 
 export class Session {
   readonly head: Head;
@@ -137,6 +146,23 @@ export class Session {
     const workers = Math.max(1, Math.min(this.#share.size, this.#plan.chainCount));
     const framesPerMs = (this.#speed * this.#movingTracks * frameCount) / (1000 * duration);
     return (this.decoding.msPerFrame * framesPerMs) / workers;
+  }
+
+  /** What there is to tell at a time, s. */
+  statsAt(time: number, loop: boolean): SessionStats {
+    const { shown, wholeLayers } = this.picture;
+    const layers = Math.max(0, ...(shown?.groups ?? []).map((group) => group?.layers ?? 0));
+    const { duration } = this.timeline;
+    return {
+      mbps: this.rateAt(layers) / 1e6,
+      decodeMs: this.decoding.lastMs,
+      decodeLoad: this.load,
+      bufferedSeconds: Math.min(this.readyAhead(time, loop, MOST_BUFFERED), loop ? duration : duration - time),
+      layers,
+      wholeLayers,
+      skippedGroups: this.decoding.failedGroups,
+      textures: this.textures.stateOf(shown),
+    };
   }
 
   /** Bits a second of content of the whole stream, with `layers` layers beyond the first. */
