@@ -148,9 +148,8 @@ export class Player extends PlaybackTarget implements Playback {
   }
 
   get stats(): Stats {
-    const bandwidthMbps = this.#source.bandwidth / 1e6;
     const found = this.#session?.statsAt(this.currentTime, this.#loop) ?? NO_STATS;
-    return { ...found, bandwidthMbps, fetchedBytes: this.#bytes, stalls: this.#stalls };
+    return { ...found, bandwidthMbps: this.#source.bandwidth / 1e6, fetchedBytes: this.#bytes, stalls: this.#stalls };
   }
 
   /** Reads the head and goes on to fetch; `play` does so by itself. Rejects with what the event `error` carries. */

@@ -66,7 +66,7 @@ export class Session {
   readonly #events: SessionEvents;
   readonly #adaptive: Adaptive;
   readonly #movingTracks: number; // that have something to decode
-  readonly #rates = new Map<number, number>(); // bits/s by layers beyond the first
+  readonly #rates = new Map<string, number>(); // bits/s by layers beyond the first, with textures and without
   #plan: Plan = { steps: [], keep: new Set(), chainCount: 0, coming: [] };
   #size: number | null = null; // of the file, as the source had it last
   #speed = 1;
@@ -167,13 +167,15 @@ export class Session {
 
   /** Bits a second of content of the whole stream, with `layers` layers beyond the first. */
   rateAt(layers: number): number {
-    let rate = this.#rates.get(layers);
+    const textures = this.textures.isOn;
+    const key = `${layers} ${textures}`;
+    let rate = this.#rates.get(key);
     if (rate === undefined) {
       const shown = this.head.chunks.filter(({ kind }) => kind === "static" || kind === "group");
       const layersOf = (chunk: Chunk): number => (chunk.kind === "static" ? chunk.layers.length : layers + 1);
-      const size = shown.reduce((sum, chunk) => sum + sizeWithCompanions(this.head, chunk, layersOf(chunk)), 0);
+      const size = shown.reduce((sum, chunk) => sum + sizeWithCompanions(this.head, chunk, layersOf(chunk), textures), 0);
       rate = (8 * size) / this.timeline.duration;
-      this.#rates.set(layers, rate);
+      this.#rates.set(key, rate);
     }
     return rate;
   }
@@ -209,6 +211,7 @@ export class Session {
   }
 
   #adapt(aim: Aim): void {
+    this.#adaptive.textures = this.textures.isOn;
     const before = this.#adaptive.level;
     const level = this.#adaptive.decide({
       now: performance.now(),

@@ -65,8 +65,9 @@ export function companionLayers(chunk: Chunk, companion: Chunk, layers: number):
   return isScaled ? Math.min(layers, companion.layers.length) : companion.layers.length;
 }
 
-/** Bytes of the first layers of a chunk, and of what is wanted of its companions with these. */
-export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number): number {
+/** Bytes of the first layers of a chunk, and of what is wanted of its companions with these, textures among them or not. */
+export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number, textures: boolean): number {
   const own = sizeOfLayers(chunk, layers);
-  return head.companionsOf(chunk).reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
+  const companions = head.companionsOf(chunk).filter(({ kind }) => textures || kind === "colors");
+  return companions.reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
 }
