@@ -6,7 +6,7 @@ import { PlaybackTarget } from "./events.ts";
 import { open } from "./net/opening.ts";
 import { WorkerPool } from "./time/pool.ts";
 import type { Share, WorkerSetup } from "./time/pool.ts";
-import { Session } from "./session.ts";
+import { NO_STATS, Session } from "./session.ts";
 import type { Limits } from "./session.ts";
 import type { Source } from "./net/source.ts";
 import { PLAYBACK_RATES } from "./types.ts";
@@ -22,7 +22,6 @@ const LIMITS: Limits = { bufferSeconds: 10, decodedSeconds: 3, memory: 1 << 28 }
 const TICK_MS = 250; // between plans, and between events of time and progress, while it plays
 const SOON_MS = 40; // from a group's arrival to the next plan while it plays: there are some more until then
 const ENOUGH = [0.25, 1] as const; // s of display time that must be at hand to start, and to go on after a stall
-const MOST_BUFFERED = 60; // s of content that `stats` looks ahead
 
 export class Player extends PlaybackTarget implements Playback {
   readonly #source: Source;
@@ -40,6 +39,7 @@ export class Player extends PlaybackTarget implements Playback {
   #loop = false;
   #rate = 1;
   #layers: Layers = "auto";
+  #textures = true;
   #level = NaN; // layers beyond the first, as last reported by `layerschange`
   interpolate = true;
 
@@ -138,23 +138,18 @@ export class Player extends PlaybackTarget implements Playback {
     this.#wake();
   }
 
+  get textures(): boolean {
+    return this.#textures;
+  }
+
+  set textures(on: boolean) {
+    this.#textures = on;
+    if (this.#session) this.#session.textures.on = on;
+  }
+
   get stats(): Stats {
-    const session = this.#session;
-    const shown = session?.picture.shown;
-    const layers = Math.max(0, ...(shown?.groups ?? []).map((group) => group?.layers ?? 0));
-    const ahead = session?.readyAhead(this.currentTime, this.#loop, MOST_BUFFERED) ?? 0;
-    return {
-      mbps: session ? session.rateAt(layers) / 1e6 : 0,
-      bandwidthMbps: this.#source.bandwidth / 1e6,
-      decodeMs: session?.decoding.lastMs ?? 0,
-      decodeLoad: session?.load ?? 0,
-      bufferedSeconds: Math.min(ahead, this.#loop ? this.duration : this.duration - this.currentTime),
-      fetchedBytes: this.#bytes,
-      layers,
-      wholeLayers: session?.picture.wholeLayers ?? 0,
-      stalls: this.#stalls,
-      skippedGroups: session?.decoding.failedGroups ?? 0,
-    };
+    const found = this.#session?.statsAt(this.currentTime, this.#loop) ?? NO_STATS;
+    return { ...found, bandwidthMbps: this.#source.bandwidth / 1e6, fetchedBytes: this.#bytes, stalls: this.#stalls };
   }
 
   /** Reads the head and goes on to fetch; `play` does so by itself. Rejects with what the event `error` carries. */
@@ -172,7 +167,7 @@ export class Player extends PlaybackTarget implements Playback {
       this.#tell("play");
     }
     if (this.#clock?.isRunning) return;
-    if (!this.#session?.picture.isReady(this.currentFrame)) this.#tell("waiting");
+    if (!this.#session?.picture.canShow(this.currentFrame)) this.#tell("waiting");
     this.#wake();
     return new Promise((resolve, reject) => this.#plays.push({ resolve, reject }));
   }
@@ -201,6 +196,7 @@ export class Player extends PlaybackTarget implements Playback {
     const frame = timeline.frameAt(clock.time);
     const isShown = picture.show(frame, this.interpolate ? timeline.blendAt(clock.time, frame) : 0);
     if (clock.isRunning && !isShown) {
+      if (picture.isReady(frame)) session.textures.late(now);
       clock.hold();
       this.#hasStalled = this.#isStallNew = true;
       this.#wake();
@@ -233,7 +229,8 @@ export class Player extends PlaybackTarget implements Playback {
         warn: (error) => this.#tell("warning", error),
         changed: () => this.#wake(this.#clock?.isRunning ? SOON_MS : 0),
         failed: (error) => this.#fail(error),
-      });
+        textured: () => this.#onTexture(),
+      }, this.#textures);
       this.#clock = new Clock(this.#session.timeline);
       this.#clock.rate = this.#rate;
       this.#clock.loop = this.#loop;
@@ -280,7 +277,7 @@ export class Player extends PlaybackTarget implements Playback {
       this.#stalls++;
       this.#tell("waiting");
     }
-    if (session.picture.isReady(this.currentFrame)) this.#goOn(session, clock);
+    if (session.picture.canShow(this.currentFrame)) this.#goOn(session, clock);
     if (clock.isAtEnd && !this.#paused && !this.#seeking) this.#end();
     else if (clock.isRunning) this.#tell("timeupdate");
   }
@@ -330,6 +327,12 @@ export class Player extends PlaybackTarget implements Playback {
     this.#source.close(); // else a server that ignores ranges sends on, into memory
     if (!wasPaused) this.#tell("pause");
     this.#tell("error", this.#error);
+  }
+
+  #onTexture(): void {
+    if (this.#clock?.isRunning) return; // it is looked for with each picture
+    this.#tell("texturechange");
+    this.#wake();
   }
 
   #tellProgress(session: Session): void {

@@ -18,7 +18,8 @@ export interface DecodeJob {
   frameCount: number;
   payload: Uint8Array; // its buffer is transferred
   ranges: { size: number; crc: number }[]; // of the layers in `payload`
-  companions: Companion[];
+  companions: Companion[]; // pictures are not among them: they are decoded elsewhere
+  textured: boolean; // whether pictures of it will be shown
   layers: number | null; // layers beyond the first; null: all
   previous: number | null; // chunk whose state it needs, decoded earlier in this worker; or the static chunk that a patch changes
   scale: number;

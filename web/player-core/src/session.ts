@@ -15,7 +15,8 @@ import type { Chunk, Head } from "./format/reader.ts";
 import { plan } from "./time/scheduler.ts";
 import type { Plan, Step } from "./time/scheduler.ts";
 import type { Source } from "./net/source.ts";
-import type { Layers } from "./types.ts";
+import { Textures } from "./time/textures.ts";
+import type { Layers, Stats } from "./types.ts";
 
 export interface Limits {
   readonly bufferSeconds: number; // of bytes fetched ahead, at normal speed
@@ -34,18 +35,29 @@ export interface Aim {
 
 export interface SessionEvents extends DecodingEvents {
   failed(error: unknown): void;
+  textured(): void; // a texture came, or went
 }
 
 const BEHIND = 1; // s of content: what is decoded behind the play head is kept
 const COMPRESSED = 1 << 25; // bytes of chunks kept though they are not wanted now: they may be again
 const LATER = 3 / 4; // of the seconds that are fetched ahead: what lies beyond waits until it fills a request
+const MOST_BUFFERED = 60; // s of content that `statsAt` looks ahead
 const STATICS = 1 / 4; // share of the memory that states of the background may keep
+
+/** Numbers that are a session's own. */
+type SessionStats = Omit<Stats, "bandwidthMbps" | "fetchedBytes" | "stalls">;
+
+/** Before there is one. */
+export const NO_STATS: SessionStats = {
+  mbps: 0, decodeMs: 0, decodeLoad: 0, bufferedSeconds: 0, layers: 0, wholeLayers: 0, skippedGroups: 0, textures: "none",
+};
 
 export class Session {
   readonly head: Head;
   readonly timeline: Timeline;
   readonly picture: Picture;
   readonly decoding: Decoding;
+  readonly textures: Textures;
   readonly fetcher: Fetcher;
   readonly #links: Links;
   readonly #source: Source;
@@ -54,12 +66,12 @@ export class Session {
   readonly #events: SessionEvents;
   readonly #adaptive: Adaptive;
   readonly #movingTracks: number; // that have something to decode
-  readonly #rates = new Map<number, number>(); // bits/s by layers beyond the first
-  #plan: Plan = { steps: [], keep: new Set(), chainCount: 0 };
+  readonly #rates = new Map<string, number>(); // bits/s by layers beyond the first, with textures and without
+  #plan: Plan = { steps: [], keep: new Set(), chainCount: 0, coming: [] };
   #size: number | null = null; // of the file, as the source had it last
   #speed = 1;
 
-  constructor({ head, first }: Opened, source: Source, share: Share, limits: Limits, events: SessionEvents) {
+  constructor({ head, first }: Opened, source: Source, share: Share, limits: Limits, events: SessionEvents, textures: boolean) {
     this.head = head;
     this.#source = source;
     this.#share = share;
@@ -71,7 +83,8 @@ export class Session {
     this.fetcher = new Fetcher(head, source, { arrived: events.changed, failed: events.failed }, COMPRESSED);
     this.fetcher.put(first, 0);
     this.decoding = new Decoding(head, this.#links, this.fetcher, share, events);
-    this.picture = new Picture(head, this.decoding);
+    this.textures = new Textures(head, this.fetcher, this.decoding, { warn: events.warn, changed: events.textured }, textures);
+    this.picture = new Picture(head, this.decoding, this.textures);
     this.#adaptive = new Adaptive(head, this.timeline, this.#bandwidth, 1);
   }
 
@@ -96,14 +109,15 @@ export class Session {
       layers: aim.layers === "auto" ? this.#adaptive.level : aim.layers,
       exact: aim.layers !== "auto",
     };
+    this.textures.loop = aim.loop;
     const made = plan(this.head, this.#links, this.timeline, outlook, this.decoding);
     const keep = new Set(made.keep);
     this.picture.addTo(keep);
     this.#plan = { ...made, keep };
     this.decoding.run(this.#plan);
     this.decoding.release(STATICS * memory);
-    const later = LATER * outlook.fetchSeconds;
-    this.fetcher.want(made.steps.flatMap((step) => this.#wishesOf(step, step.ahead <= 0 ? "now" : step.ahead < later ? "soon" : "later")));
+    const whenOf = (ahead: number): When => (ahead <= 0 ? "now" : ahead < LATER * outlook.fetchSeconds ? "soon" : "later");
+    this.fetcher.want([...this.#pictureWishes(made, whenOf), ...made.steps.flatMap((step) => this.#wishesOf(step, whenOf(step.ahead)))]);
     if (aim.layers === "auto") this.#adapt(aim);
   }
 
@@ -134,15 +148,34 @@ export class Session {
     return (this.decoding.msPerFrame * framesPerMs) / workers;
   }
 
+  /** What there is to tell at a time, s. */
+  statsAt(time: number, loop: boolean): SessionStats {
+    const { shown, wholeLayers } = this.picture;
+    const layers = Math.max(0, ...(shown?.groups ?? []).map((group) => group?.layers ?? 0));
+    const { duration } = this.timeline;
+    return {
+      mbps: this.rateAt(layers) / 1e6,
+      decodeMs: this.decoding.lastMs,
+      decodeLoad: this.load,
+      bufferedSeconds: Math.min(this.readyAhead(time, loop, MOST_BUFFERED), loop ? duration : duration - time),
+      layers,
+      wholeLayers,
+      skippedGroups: this.decoding.failedGroups,
+      textures: this.textures.stateOf(shown),
+    };
+  }
+
   /** Bits a second of content of the whole stream, with `layers` layers beyond the first. */
   rateAt(layers: number): number {
-    let rate = this.#rates.get(layers);
+    const textures = this.textures.isOn;
+    const key = `${layers} ${textures}`;
+    let rate = this.#rates.get(key);
     if (rate === undefined) {
       const shown = this.head.chunks.filter(({ kind }) => kind === "static" || kind === "group");
       const layersOf = (chunk: Chunk): number => (chunk.kind === "static" ? chunk.layers.length : layers + 1);
-      const size = shown.reduce((sum, chunk) => sum + sizeWithCompanions(this.head, chunk, layersOf(chunk)), 0);
+      const size = shown.reduce((sum, chunk) => sum + sizeWithCompanions(this.head, chunk, layersOf(chunk), textures), 0);
       rate = (8 * size) / this.timeline.duration;
-      this.#rates.set(layers, rate);
+      this.#rates.set(key, rate);
     }
     return rate;
   }
@@ -155,6 +188,7 @@ export class Session {
 
   close(): void {
     this.stop();
+    this.textures.close();
     this.decoding.close();
   }
 
@@ -165,7 +199,19 @@ export class Session {
     return [{ chunk, count, when }, ...companions];
   }
 
+  /** Pictures that lie before those of the play head in their video, and those of groups that are decoded already. */
+  #pictureWishes({ coming, steps }: Plan, whenOf: (ahead: number) => When): Wish[] {
+    const layers = new Map(steps.map((step) => [step.chunk, step.layers]));
+    return coming.flatMap(({ chunk, ahead }) => {
+      const pictures = this.decoding.picturesOf(chunk, layers.get(chunk) ?? this.decoding.decodedAt(chunk));
+      if (pictures === null || (ahead > 0 && layers.has(chunk))) return [];
+      const lead = ahead > 0 ? [pictures] : this.textures.leadTo(pictures);
+      return lead.map((other) => ({ chunk: other, count: 1, when: whenOf(ahead) }));
+    });
+  }
+
   #adapt(aim: Aim): void {
+    this.#adaptive.textures = this.textures.isOn;
     const before = this.#adaptive.level;
     const level = this.#adaptive.decide({
       now: performance.now(),

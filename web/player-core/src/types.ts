@@ -17,7 +17,21 @@ export interface PackedVertices {
   /** Red, green and blue (sRGB) and 255, a texel for each of `texels` and in their order; null where there are no colours. */
   readonly colors: Uint8Array | null;
   readonly box: Box;
+  /** Null where there is no texture. */
+  readonly places: PackedPlaces | null;
 }
+
+/** Where the corners of triangles are in a texture. */
+export interface PackedPlaces {
+  readonly width: number; // of the texture, texels
+  readonly height: number;
+  /** Right and down from its upper left corner, in PLACE_SCALEths of its sides, for each corner of `faces`; NO_PLACE for those of a face that has none. */
+  readonly faces: Uint16Array;
+  readonly extra: Uint16Array; // of each corner of a group's `extra`
+}
+
+export const PLACE_SCALE = 65534;
+export const NO_PLACE = 65535;
 
 /** A decoded group of frames of one track, ready for upload. All buffers are its own, so that they can be transferred. */
 export interface PackedGroup extends PackedVertices {
@@ -70,10 +84,27 @@ export interface Shown {
   readonly groups: readonly (PackedGroup | null)[];
   /** The state of this frame; where that is damaged the one that was shown last. */
   readonly background: PackedStatic | null;
+  /** For each track its texture in this frame, of the size that `places` of its group tells; null where it is shown in the colours of its vertices. */
+  readonly images: readonly (TextureImage | null)[];
+  readonly backgroundImage: TextureImage | null;
 }
 
+/** A decoded picture: a VideoFrame of the browser's, open as long as it is shown. */
+export interface TextureImage {
+  readonly displayWidth: number;
+  readonly displayHeight: number;
+  readonly timestamp: number;
+  close(): void;
+}
+
+/**
+ * Whether textures are shown, and if not, why: the file has none, they are switched off, the browser cannot decode them or not in time, they are
+ * damaged, or left out with layers.
+ */
+export type TextureState = "shown" | "none" | "off" | "unsupported" | "slow" | "damaged" | "left out";
+
 /** What a chunk may add to another one, which is shown without it where it is damaged. */
-export type CompanionKind = "colors";
+export type CompanionKind = "colors" | "atlas" | "pictures";
 
 /** What is known from the head, before any chunk is there. */
 export interface Info {
@@ -86,6 +117,7 @@ export interface Info {
   readonly mostLayers: number; // layers beyond the first that the richest group has
   readonly size: number; // bytes
   readonly hasColors: boolean; // whether some of it has colours of its own
+  readonly hasTextures: boolean; // whether some of these are in textures
   readonly metadata: Readonly<Record<string, unknown>>;
 }
 
@@ -107,6 +139,7 @@ export interface Stats {
   readonly wholeLayers: number; // those that these groups have in the file, where it may have fewer than `Info.mostLayers`
   readonly stalls: number;
   readonly skippedGroups: number; // damaged ones
+  readonly textures: TextureState;
 }
 
 /** Events of a `Playback`, as a media element has them; those that are its own carry a `detail`. */
@@ -124,6 +157,7 @@ export interface PlaybackEvents {
   ended: Event;
   ratechange: Event;
   layerschange: Event;
+  texturechange: Event; // a texture of what is shown came, or went
   ready: CustomEvent<Packed>; // decoded: upload it ahead of time
   release: CustomEvent<Packed>; // will not be shown again soon: free what was made of it
   warning: CustomEvent<Error>; // playback goes on: a damaged group is skipped, the network is tried again
@@ -144,6 +178,7 @@ export interface Playback extends EventTarget {
   playbackRate: number; // within PLAYBACK_RATES
   interpolate: boolean; // blend between frames of a group
   layers: Layers;
+  textures: boolean; // whether textures are fetched and shown
   play(): Promise<void>;
   pause(): void;
   /** Pauses and moves by a number of frames; a negative one goes back. */

@@ -193,6 +193,7 @@ describe.skipIf(!hasPython)("colours", () => {
   test("of another form or without chroma are refused", () => {
     expect(() => decodeColors(tools.core, Uint8Array.of(6, 0, 0), [], null)).toThrow(/chroma 0/);
     expect(() => decodeColors(tools.core, Uint8Array.of(2, 0, 64), [], null)).toThrow(/form 2/);
+    expect(() => decodeColors(tools.core, Uint8Array.of(6, 0, 64, 9, 9), [], null)).toThrow(/^colours: 2 bytes too many$/);
     expect(() => decodeColors(tools.core, Uint8Array.of(6), [], null)).toThrow(FormatError);
   });
 

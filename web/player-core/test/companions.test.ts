@@ -161,7 +161,7 @@ describe("the index", () => {
     const next = [group(10, FULL, { dependsOn: [0] }), colors([4, 1], [9]), { ...pictures, dependsOn: [4, 2, 3] }, group(10, FULL, { dependsOn: [4] }), colors([7], [9])];
     const head = Head.parse(makeReel([...chunks, ...next], RATE));
     const links = new Links(head);
-    expect(head.chunks.map((chunk) => head.companionsOf(chunk).map(({ number }) => number))).toEqual([[1], [], [], [], [5], [], [], [8], []]);
-    expect(head.chunks.map((chunk) => links.previousOf(chunk)?.number ?? null)).toEqual([null, null, null, null, 0, 1, null, 4, null]);
+    expect(head.chunks.map((chunk) => head.companionsOf(chunk).map(({ number }) => number))).toEqual([[1, 2, 3], [], [], [], [5, 6], [], [], [8], []]);
+    expect(head.chunks.map((chunk) => links.previousOf(chunk)?.number ?? null)).toEqual([null, null, null, 2, 0, 1, 3, 4, null]);
   });
 });

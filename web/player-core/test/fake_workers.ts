@@ -134,7 +134,7 @@ function isDamaged({ payload, ranges }: Pick<DecodeJob, "payload" | "ranges">): 
 
 function packedOf(job: DecodeJob, bytesPerFrame: number): Packed {
   const box = { minimum: [0, 0, 0], size: [1, 1, 1] } as const;
-  const shared = { chunk: job.chunk, vertexCount: 1, faces: new Uint32Array(3), box, colors: colorsOf(job), bytes: job.payload.length, decodeMs: 1 };
+  const shared = { chunk: job.chunk, vertexCount: 1, faces: new Uint32Array(3), box, colors: colorsOf(job), places: placesOf(job), bytes: job.payload.length, decodeMs: 1 };
   if (job.kind === "static") return { kind: "static", texels: new Uint16Array(4), ...shared };
   const { track, firstFrame, frameCount } = job;
   const texels = new Uint16Array((frameCount * bytesPerFrame) / 2);
@@ -146,4 +146,9 @@ function packedOf(job: DecodeJob, bytesPerFrame: number): Packed {
 /** One texel, where the colours are sound. */
 function colorsOf({ companions }: DecodeJob): Uint8Array | null {
   return companions.some((companion) => companion.kind === "colors" && !isDamaged(companion)) ? new Uint8Array(4) : null;
+}
+
+/** Of a texture of 64 x 32 texels, where pictures will be shown. */
+function placesOf({ textured }: DecodeJob): Packed["places"] {
+  return textured ? { width: 64, height: 32, faces: new Uint16Array(6), extra: new Uint16Array(0) } : null;
 }

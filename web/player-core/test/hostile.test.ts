@@ -33,7 +33,7 @@ function jobOf(chunk: Chunk, payload: Uint8Array, previous: Chunk | null): Decod
   let at = 0;
   const ranges = chunk.layers.map(({ size }) => ({ size, crc: crc32(payload.subarray(at, (at += size))) }));
   const place = { kind, form, track, firstFrame, frameCount } as const;
-  return { file: 1, chunk: number, ...place, payload, ranges, companions: [], layers: null, previous: previous?.number ?? null, scale: 1, stateOnly: false };
+  return { file: 1, chunk: number, ...place, payload, ranges, companions: [], layers: null, previous: previous?.number ?? null, scale: 1, stateOnly: false, textured: false };
 }
 
 /** With one to four bytes changed, most of them near the start, where sizes and counts are; never the form. */

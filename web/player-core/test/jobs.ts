@@ -8,9 +8,10 @@ export function jobOf(head: Head, chunk: Chunk, data: Uint8Array): DecodeJob {
   const before = chunk.kind === "static" ? head.changedFrom(chunk) : head.groupBefore(chunk);
   const { number, form, track, firstFrame, frameCount } = chunk;
   const kind = chunk.kind as DecodeJob["kind"];
-  const companions = head.companionsOf(chunk).map((other): Companion => ({ chunk: other.number, kind: other.kind, form: other.form, ...bytesOf(other, data) }));
+  const others = head.companionsOf(chunk);
+  const companions = others.filter(({ kind }) => kind !== "pictures").map((other): Companion => ({ chunk: other.number, kind: other.kind, form: other.form, ...bytesOf(other, data) }));
   const previous = before?.number ?? null;
-  const whole = { layers: null, previous, scale: head.header.scale, stateOnly: false };
+  const whole = { layers: null, previous, scale: head.header.scale, stateOnly: false, textured: companions.length < others.length };
   return { file: 1, chunk: number, kind, form, track, firstFrame, frameCount, ...bytesOf(chunk, data), companions, ...whole };
 }
 

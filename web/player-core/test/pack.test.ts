@@ -109,7 +109,7 @@ test("normals are those of the frame's own faces, to a degree", () => {
 
 test("a vertex that no face uses has the normal +z, and its code is that of the tests", () => {
   const mesh = { vertices: Float64Array.of(0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 5, 5), faces: Int32Array.of(0, 1, 2) };
-  const codes = [...packStatic(tools.core, mesh).texels].filter((_, k) => k % 4 === 3);
+  const codes = [...packStatic(tools.core, mesh, null).texels].filter((_, k) => k % 4 === 3);
   expect(codes).toEqual([...Array.from({ length: 3 }, () => encodeNormal([0, -1, 0])), encodeNormal([0, 0, 1])]);
 });
 

@@ -39,7 +39,7 @@ function submit(chunk: number, lane = chunk, previous: number | null = null, of 
       const payload = Uint8Array.of(1, 2, 3);
       const place = { track: 0, firstFrame: 10 * chunk, frameCount: 10, scale: 1 };
       const ranges = [{ size: 3, crc: crc32(payload) }];
-      return { chunk, kind: "group", form: Form.LAYERS, payload, ranges, companions: [], layers: null, previous, stateOnly: false, ...place };
+      return { chunk, kind: "group", form: Form.LAYERS, payload, ranges, companions: [], layers: null, previous, stateOnly: false, textured: false, ...place };
     },
     settle: (outcome) => outcomes.set(chunk, outcome),
   });

@@ -13,6 +13,7 @@ export interface FakeChunk {
   readonly track: number;
   readonly dependsOn: readonly number[];
   readonly layers: readonly number[]; // bytes of each
+  readonly body?: Uint8Array; // in place of noise
 }
 
 export interface FakeHeader {
@@ -43,8 +44,8 @@ export function stream(seconds: number, rates: readonly number[], chain = 1, fra
 }
 
 export function makeReel(chunks: readonly FakeChunk[], { frameRate, intervals = [], metadata = "{}" }: FakeHeader): Uint8Array<ArrayBuffer> {
-  const bodies = chunks.map(({ form, layers }, k) => {
-    const body = noise(layers.reduce((sum, size) => sum + size, 0), 7 + k);
+  const bodies = chunks.map(({ form, layers, body: given }, k) => {
+    const body = given ?? noise(layers.reduce((sum, size) => sum + size, 0), 7 + k);
     body[0] = form;
     return body;
   });

@@ -8,6 +8,7 @@ export function applyToPlayback(name: string, settings: Reflected, playback: Pla
   if (name === "loop") playback.loop = settings.loop;
   if (name === "layers") playback.layers = settings.layers;
   if (name === "speed" || name === "playbackrate") playback.playbackRate = settings.playbackRate;
+  if (name === "textures") playback.textures = settings.textures;
   if (name === "interpolate") playback.interpolate = settings.interpolate;
 }
 

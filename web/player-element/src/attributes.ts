@@ -11,7 +11,7 @@ export type Theme = "auto" | "light" | "dark";
 /** Attributes whose change the element must hear of. */
 export const OBSERVED = [
   "src", "controls", "autoplay", "loop", "poster", "layers", "speed", "playbackrate", "interpolate", "mode", "camera",
-  "up", "stats", "background", "theme",
+  "up", "stats", "background", "theme", "textures",
 ] as const;
 
 /** What a text says, "" taken for nothing; null where it says nothing that the attribute can be. */
@@ -36,7 +36,7 @@ export const readCamera: Reader<readonly number[]> = (text) => {
   return values.length === 6 && values.every((value) => value !== null) ? values : null;
 };
 
-const readInterpolate: Reader<boolean> = (text) => {
+const readSwitch: Reader<boolean> = (text) => {
   const word = words("on", "true", "yes", "1", "off", "false", "no", "0")(text);
   return word === null ? null : ["on", "true", "yes", "1"].includes(word);
 };
@@ -44,7 +44,8 @@ const readInterpolate: Reader<boolean> = (text) => {
 /** Attributes that keep their value where a new one is none. Text without anything in it is as no attribute. */
 const RULES: Readonly<Record<string, { read: Reader<unknown>; wanted: string }>> = {
   camera: { read: readCamera, wanted: "six numbers with commas, as 0,1,3,0,1,0" },
-  interpolate: { read: readInterpolate, wanted: "on, or off" },
+  interpolate: { read: readSwitch, wanted: "on, or off" },
+  textures: { read: readSwitch, wanted: "on, or off" },
   mode: { read: readMode, wanted: MODES.join(", ") },
   playbackrate: { read: readNumber, wanted: "a number" },
   layers: { read: readLayers, wanted: "auto, or a whole number of layers from 0" },
@@ -81,9 +82,9 @@ export function parseUp(text: string | null): Up | null {
   return readUp(text ?? "");
 }
 
-/** Interpolation is on unless it is switched off. */
-export function parseInterpolate(text: string | null): boolean {
-  return readInterpolate(text ?? "") ?? true;
+/** Of what is on unless it is switched off: interpolation, and textures. */
+export function parseSwitch(text: string | null): boolean {
+  return readSwitch(text ?? "") ?? true;
 }
 
 export function parseTheme(text: string | null): Theme {
@@ -97,6 +98,6 @@ export function parseFlag(text: string | null): boolean {
 
 /** Properties that a page may have set before the element was defined. */
 export const PROPERTIES = [
-  "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "layers", "playbackRate", "interpolate", "mode", "theme",
+  "src", "poster", "preload", "controls", "autoplay", "loop", "stats", "layers", "playbackRate", "interpolate", "textures", "mode", "theme",
   "up", "background", "camera", "currentTime",
 ];

@@ -28,7 +28,7 @@ export class RealEngine implements Engine {
     this.#files = files;
   }
 
-  open(source: string | Blob, { layers, interpolate, loop, playbackRate }: Settings): Player {
+  open(source: string | Blob, { layers, interpolate, textures, loop, playbackRate }: Settings): Player {
     const { worker, core, draco } = this.#files;
     const create = (): WorkerLike => openWorker(worker);
     const shared = (this.#shared ??= { workers: new WorkerPool({ create, core: core.href, draco: draco.href }), users: 0 });
@@ -40,7 +40,7 @@ export class RealEngine implements Engine {
     player.leave = () => this.#leave(shared);
     // Workers that could not be started are not tried again by their pool: whoever tries again gets new ones.
     player.addEventListener("error", () => this.#forget(shared));
-    Object.assign(player, { layers, interpolate, loop, playbackRate });
+    Object.assign(player, { layers, interpolate, textures, loop, playbackRate });
     player.load().catch(() => undefined); // reported by the error event
     return player;
   }

@@ -110,10 +110,18 @@ export class Reflected extends Element {
 
   /** Whether motion is blended between frames. */
   get interpolate(): boolean {
-    return parse.parseInterpolate(this.getAttribute("interpolate"));
+    return parse.parseSwitch(this.getAttribute("interpolate"));
   }
   set interpolate(value: boolean) {
     this.setAttribute("interpolate", value ? "on" : "off");
+  }
+
+  /** Whether textures are fetched and shown; without them surfaces have the colours of their vertices. */
+  get textures(): boolean {
+    return parse.parseSwitch(this.getAttribute("textures"));
+  }
+  set textures(value: boolean) {
+    this.setAttribute("textures", value ? "on" : "off");
   }
 
   /** How surfaces look; `color` where none is set, and `shaded` in its place while the recording has no colours. */

@@ -47,6 +47,7 @@ export interface Stage extends EventTarget {
 export interface Settings {
   readonly layers: Layers;
   readonly interpolate: boolean;
+  readonly textures: boolean;
   readonly loop: boolean;
   readonly playbackRate: number;
 }

@@ -8,7 +8,7 @@ import type { Engine, Settings, Stage } from "../src/stage.ts";
 
 export const INFO: Info = {
   frameCount: 48, frameRate: 24, duration: 2, origin: [0, 0, 0], box: { minimum: [-1, 0, -1], size: [2, 2, 2] }, trackCount: 1,
-  mostLayers: 3, size: 123_456, hasColors: false, metadata: {},
+  mostLayers: 3, size: 123_456, hasColors: false, hasTextures: false, metadata: {},
 };
 
 /** Keeps time like a real one; a head comes after 10 ms, a seek takes 20 ms. An address with "404" in it fails. */
@@ -20,6 +20,7 @@ export class FakePlayback extends EventTarget implements Playback {
   loop: boolean;
   playbackRate: number;
   interpolate: boolean;
+  textures: boolean;
   layers: Layers;
   stalled = false; // set by tests
   updates = 0;
@@ -36,6 +37,7 @@ export class FakePlayback extends EventTarget implements Playback {
     this.loop = settings.loop;
     this.playbackRate = settings.playbackRate;
     this.interpolate = settings.interpolate;
+    this.textures = settings.textures;
     this.layers = settings.layers;
     const bad = typeof source === "string" && source.includes("404");
     this.#later(10, () => (bad ? this.fail(`${String(source)}: not found (404), check the address`, "missing") : this.#head()));
@@ -65,7 +67,7 @@ export class FakePlayback extends EventTarget implements Playback {
   get stats(): Stats {
     return {
       mbps: 2.41, bandwidthMbps: 48.2, decodeMs: 12.3, decodeLoad: 0.08, bufferedSeconds: this.info ? 0.75 : 0, fetchedBytes: 61_000,
-      layers: 3, wholeLayers: 3, stalls: 0, skippedGroups: 0,
+      layers: 3, wholeLayers: 3, stalls: 0, skippedGroups: 0, textures: "none",
     };
   }
 
@@ -94,7 +96,7 @@ export class FakePlayback extends EventTarget implements Playback {
       if (this.#time >= this.duration) this.#end();
     }
     this.#before = now;
-    if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, frames: [this.currentFrame], groups: [null], background: null };
+    if (this.#shown?.frame !== this.currentFrame) this.#shown = { frame: this.currentFrame, blend: 0, frames: [this.currentFrame], groups: [null], background: null, images: [null], backgroundImage: null };
     return this.#shown;
   }
 

@@ -1,7 +1,8 @@
 // Materials: one set of uniforms for each part of the scene, one program for each way its vertices come.
 
 import { DoubleSide, GLSL3, RawShaderMaterial } from "three";
-import type { DataTexture, IUniform } from "three";
+import type { DataTexture, IUniform, Texture } from "three";
+import { PLACE_SCALE } from "@meshreel/player-core/types";
 import { EDGE_COLOR } from "./colors.ts";
 import type { Vector } from "./colors.ts";
 import { MODES } from "./modes.ts";
@@ -25,6 +26,8 @@ export interface PartUniforms {
   readonly vertices: IUniform<DataTexture | null>;
   readonly colors: IUniform<DataTexture | null>;
   readonly hasColors: IUniform<boolean>;
+  readonly image: IUniform<Texture | null>;
+  readonly hasImage: IUniform<boolean>;
   readonly movingCount: IUniform<number>;
   readonly here: IUniform<number>;
   readonly next: IUniform<number>;
@@ -39,6 +42,8 @@ export function makeUniforms(): PartUniforms {
     vertices: { value: null },
     colors: { value: null },
     hasColors: { value: false },
+    image: { value: null },
+    hasImage: { value: false },
     movingCount: { value: 0 },
     here: { value: 0 },
     next: { value: 0 },
@@ -52,8 +57,14 @@ export interface Paint {
   readonly color: Vector;
 }
 
+/** What is drawn beside the surface; both need the feed `corner`. */
+export interface Extras {
+  readonly edges: boolean;
+  readonly places: boolean; // of corners, in a texture
+}
+
 /** A material whose values are `uniforms`: changes of them take effect at once. */
-export function surfaceMaterial(feed: Feed, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
+export function surfaceMaterial(feed: Feed, { edges, places }: Extras, look: Look, uniforms: PartUniforms, paint: Paint): RawShaderMaterial {
   return new RawShaderMaterial({
     name: `meshreel ${feed}`,
     glslVersion: GLSL3,
@@ -63,7 +74,8 @@ export function surfaceMaterial(feed: Feed, look: Look, uniforms: PartUniforms, 
       NORMAL_MODE: MODES.indexOf("normal"),
       COLOR_MODE: MODES.indexOf("color"),
       TRACKS_MODE: MODES.indexOf("tracks"),
-      ...(feed === "corner" ? { EDGES: 1 } : {}),
+      ...(edges ? { EDGES: 1 } : {}),
+      ...(places ? { PLACES: 1, PLACE_SCALE } : {}),
     },
     uniforms: {
       ...look,
@@ -74,4 +86,22 @@ export function surfaceMaterial(feed: Feed, look: Look, uniforms: PartUniforms, 
     },
     side: DoubleSide,
   });
+}
+
+/** The materials of a part, by what is drawn: with edges or without, textured or not. */
+export class Materials {
+  readonly #all: readonly RawShaderMaterial[];
+
+  /** `feed`: of what has neither. */
+  constructor(feed: Feed, look: Look, uniforms: PartUniforms, paint: Paint) {
+    this.#all = [0, 1, 2, 3].map((k) => surfaceMaterial(k === 0 ? feed : "corner", { edges: (k & 1) !== 0, places: (k & 2) !== 0 }, look, uniforms, paint));
+  }
+
+  of({ edges, places }: Extras): RawShaderMaterial {
+    return this.#all[(edges ? 1 : 0) + (places ? 2 : 0)];
+  }
+
+  dispose(): void {
+    for (const material of this.#all) material.dispose();
+  }
 }

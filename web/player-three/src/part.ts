@@ -2,8 +2,9 @@
 
 import { BufferGeometry, Group, Mesh } from "three";
 import type { RawShaderMaterial } from "three";
-import type { PackedGroup } from "@meshreel/player-core/types";
-import { makeUniforms, surfaceMaterial } from "./materials.ts";
+import type { PackedGroup, TextureImage } from "@meshreel/player-core/types";
+import { ImageTexture } from "./image.ts";
+import { Materials, makeUniforms } from "./materials.ts";
 import type { Look, Paint, PartUniforms } from "./materials.ts";
 import { localFrame } from "./ranges.ts";
 import type { Feed } from "./shaders.ts";
@@ -14,8 +15,8 @@ const NOTHING = new BufferGeometry();
 /** Shows one upload at a time. After the first picture of an upload nothing is allocated. */
 export class Part extends Group {
   readonly #uniforms: PartUniforms = makeUniforms();
-  readonly #plain: RawShaderMaterial;
-  readonly #edged: RawShaderMaterial;
+  readonly #materials: Materials;
+  readonly #image = new ImageTexture();
   readonly #faces: Mesh<BufferGeometry, RawShaderMaterial>;
   readonly #extra: Mesh<BufferGeometry, RawShaderMaterial>;
   #edges = false;
@@ -23,10 +24,10 @@ export class Part extends Group {
 
   constructor(feed: Feed, look: Look, paint: Paint) {
     super();
-    this.#plain = surfaceMaterial(feed, look, this.#uniforms, paint);
-    this.#edged = surfaceMaterial("corner", look, this.#uniforms, paint);
-    this.#faces = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, this.#plain);
-    this.#extra = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, this.#plain);
+    this.#materials = new Materials(feed, look, this.#uniforms, paint);
+    const plain = this.#materials.of({ edges: false, places: false });
+    this.#faces = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, plain);
+    this.#extra = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, plain);
     this.add(this.#faces, this.#extra);
     this.visible = false;
   }
@@ -40,7 +41,6 @@ export class Part extends Group {
     if (edges === this.#edges) return;
     this.hide();
     this.#edges = edges;
-    this.#faces.material = this.#extra.material = edges ? this.#edged : this.#plain;
   }
 
   /** Shows nothing, and keeps no reference to what it showed. */
@@ -49,12 +49,20 @@ export class Part extends Group {
     this.visible = false;
     this.#upload = null;
     this.#faces.geometry = this.#extra.geometry = NOTHING;
-    this.#uniforms.vertices.value = this.#uniforms.colors.value = null;
+    this.#uniforms.vertices.value = this.#uniforms.colors.value = this.#uniforms.image.value = null;
+    this.#image.show(null);
   }
 
-  /** Shows a frame of the recording and what is `blend` of the way to the next one. */
-  show(upload: Upload, frame: number, blend: number): void {
+  /** Bytes of its texture on the GPU. */
+  get imageBytes(): number {
+    return this.#image.bytes;
+  }
+
+  /** Shows a frame of the recording and what is `blend` of the way to the next one, with the frame's texture where it has one. */
+  show(upload: Upload, frame: number, blend: number, image: TextureImage | null): void {
     if (upload !== this.#upload) this.#take(upload);
+    this.#uniforms.image.value = this.#image.show(upload.isTextured ? image : null);
+    this.#uniforms.hasImage.value = this.#uniforms.image.value !== null;
     if (upload.packed.kind === "static") return;
     const extra = this.#extra.geometry === NOTHING ? null : this.#extra.geometry;
     this.#extra.visible = setFrame(this.#uniforms, extra, upload.packed, frame, blend);
@@ -63,13 +71,14 @@ export class Part extends Group {
   override dispose(): void {
     super.dispose();
     this.hide();
-    this.#plain.dispose();
-    this.#edged.dispose();
+    this.#materials.dispose();
+    this.#image.dispose();
   }
 
   #take(upload: Upload): void {
     this.#upload = upload;
     this.visible = true;
+    this.#faces.material = this.#extra.material = this.#materials.of({ edges: this.#edges, places: upload.isTextured });
     this.#faces.geometry = upload.faces(this.#edges);
     this.#extra.geometry = upload.extra(this.#edges) ?? NOTHING;
     this.#extra.visible = false;

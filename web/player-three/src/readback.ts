@@ -27,9 +27,9 @@ export function readPositions(upload: Upload, renderer: WebGLRenderer, frame: nu
   });
   const uniforms = makeUniforms();
   setUpload(uniforms, upload);
-  const extra = upload.extra(false);
+  const geometries = upload.indexed;
+  const extra = geometries[1] ?? null;
   if (upload.packed.kind === "group") setFrame(uniforms, extra, upload.packed, frame, blend);
-  const geometries = extra === null ? [upload.faces(false)] : [upload.faces(false), extra];
   const material = readbackMaterial(upload, uniforms, new Vector2(WIDTH, height));
   drawInto(target, geometries, material, renderer);
   const pixels = new Uint32Array(4 * WIDTH * height);

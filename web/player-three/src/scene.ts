@@ -2,7 +2,7 @@
 
 import { Group } from "three";
 import type { WebGLRenderer } from "three";
-import type { Packed, Shown } from "@meshreel/player-core/types";
+import type { Packed, Shown, TextureImage } from "@meshreel/player-core/types";
 import { BACKGROUND_CLAY, BACKGROUND_COLOR, trackClay, trackColor } from "./colors.ts";
 import { makeLook } from "./materials.ts";
 import { MODES } from "./modes.ts";
@@ -32,10 +32,11 @@ export class ReelScene extends Group {
     this.add(this.#background);
   }
 
-  /** Bytes of textures and buffers that it has on the GPU, without the picture's own. */
+  /** Bytes of textures and buffers that it has on the GPU, without those of what it is drawn into. */
   get gpuBytes(): number {
     let bytes = 0;
     for (const upload of this.#uploads.values()) bytes += upload.bytes;
+    for (const part of this.#parts()) bytes += part.imageBytes;
     return bytes;
   }
 
@@ -80,9 +81,9 @@ export class ReelScene extends Group {
     while (this.#tracks.length < shown.groups.length) this.#addTrack();
     for (let track = 0; track < this.#tracks.length; track++) {
       const frame = shown.frames[track] ?? shown.frame;
-      this.#showPart(this.#tracks[track], shown.groups[track] ?? null, frame, frame === shown.frame ? shown.blend : 0);
+      this.#showPart(this.#tracks[track], shown.groups[track] ?? null, frame, frame === shown.frame ? shown.blend : 0, shown.images[track] ?? null);
     }
-    this.#showPart(this.#background, shown.background, shown.frame, 0);
+    this.#showPart(this.#background, shown.background, shown.frame, 0, shown.backgroundImage);
   }
 
   /** Frees what the GPU holds of a value. Its arrays are no longer referred to. */
@@ -111,12 +112,12 @@ export class ReelScene extends Group {
     return [...this.#tracks, this.#background];
   }
 
-  #showPart(part: Part, packed: Packed | null, frame: number, blend: number): void {
+  #showPart(part: Part, packed: Packed | null, frame: number, blend: number, image: TextureImage | null): void {
     if (packed === null) {
       part.hide();
       return;
     }
-    part.show(this.#uploadOf(packed), frame, blend);
+    part.show(this.#uploadOf(packed), frame, blend, image);
     this.#triangles += triangleCount(packed, frame);
   }
 

@@ -107,6 +107,10 @@ out vec3 scenePosition;
 out vec3 sceneNormal;
 out vec3 ownColor;
 out vec3 toEye; // in the scene's own axes, any length
+#ifdef PLACES
+in vec2 place; // in PLACE_SCALEths of the texture's sides, more where it has none
+out vec2 texturePlace;
+#endif
 #ifdef EDGES
 out vec3 barycentric;
 #endif
@@ -118,6 +122,9 @@ void main() {
   vec4 seen = modelViewMatrix * vec4(scenePosition, 1.0);
   toEye = -(seen.xyz * mat3(modelViewMatrix));
   gl_Position = projectionMatrix * seen;
+#ifdef PLACES
+  texturePlace = place / float(PLACE_SCALE);
+#endif
 #ifdef EDGES
   int k = gl_VertexID % 3;
   barycentric = vec3(k == 0, k == 1, k == 2);
@@ -142,15 +149,20 @@ in vec3 scenePosition;
 in vec3 sceneNormal;
 in vec3 ownColor;
 in vec3 toEye;
+#ifdef PLACES
+uniform sampler2D image;
+uniform bool hasImage;
+in vec2 texturePlace;
+#endif
 #ifdef EDGES
 in vec3 barycentric;
 #endif
 out vec4 fragment;
 
-vec3 shaded(vec3 n) {
+vec3 shaded(vec3 n, vec3 own) {
   float head = max(dot(n, normalize(toEye)), 0.0);
   float sky = 0.5 + 0.5 * n.y;
-  return (hasColors ? ownColor : clay) * (0.22 + 0.2 * sky + 0.58 * head);
+  return own * (0.22 + 0.2 * sky + 0.58 * head);
 }
 
 #ifdef EDGES
@@ -167,11 +179,20 @@ void main() {
   vec3 facing = normalize(cross(dFdx(scenePosition), dFdy(scenePosition)));
   bool seenFromOutside = dot(facing, sceneNormal) >= 0.0;
   vec3 n = flatNormals ? (seenFromOutside ? facing : -facing) : normalize(sceneNormal);
+  bool isOwn = hasColors;
+  vec3 own = hasColors ? ownColor : clay;
+#ifdef PLACES
+  vec3 texel = texture(image, texturePlace).rgb; // of all fragments: its derivatives need their neighbours
+  if (hasImage && max(texturePlace.x, texturePlace.y) <= 1.0) {
+    isOwn = true;
+    own = texel;
+  }
+#endif
   vec3 result;
   if (mode == NORMAL_MODE) result = 0.5 * (n + 1.0);
   else if (mode == TRACKS_MODE) result = color;
-  else if (mode == COLOR_MODE && hasColors) result = ownColor;
-  else result = shaded(seenFromOutside ? n : -n);
+  else if (mode == COLOR_MODE && isOwn) result = own;
+  else result = shaded(seenFromOutside ? n : -n, own);
 #ifdef EDGES
   result = mix(result, edgeColor, edge());
 #endif

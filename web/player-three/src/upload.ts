@@ -7,28 +7,29 @@ import type { Box, Packed, PackedStatic } from "@meshreel/player-core/types";
 const TEXEL_BYTES = 8;
 const COLOR_BYTES = 4; // of a texel
 
-/** Triangles of three corners each: with an index, and where edges are wanted without one, each corner an attribute. */
+/** Triangles of three corners each: with an index, and where edges or textures are wanted without one, each corner an attribute. */
 interface Triangles {
   readonly corners: Uint32Array;
+  readonly places: Uint16Array | null; // of each corner, in a texture
   readonly indexed: BufferGeometry;
   unindexed: BufferGeometry | null;
 }
 
 export class Upload {
   readonly packed: Packed;
-  /** The vertices; a background has them only while edges are drawn. */
+  /** The vertices; a background has them only while its corners are drawn each for itself. */
   texture: DataTexture | null = null;
   /** Their colours, texel for texel; null where there are none. */
   colors: DataTexture | null = null;
   readonly #sphere: Sphere;
   readonly #faces: Triangles;
   readonly #extra: Triangles | null = null;
-  #hasEdges = false;
+  #hasCorners = false;
 
   constructor(packed: Packed) {
     this.packed = packed;
     this.#sphere = sphereAround(packed.box);
-    this.#faces = this.#triangles(packed.faces);
+    this.#faces = this.#triangles(packed.faces, packed.places?.faces ?? null);
     if (packed.kind === "static") {
       const texels = new BufferAttribute(packed.texels, 4);
       texels.gpuType = IntType;
@@ -36,7 +37,7 @@ export class Upload {
       if (packed.colors !== null) this.#faces.indexed.setAttribute("rgba", new BufferAttribute(packed.colors, 4, true));
     } else {
       this.#setTextures(packed, packed.textureWidth, packed.textureHeight);
-      if (packed.extra.length > 0) this.#extra = this.#triangles(packed.extra);
+      if (packed.extra.length > 0) this.#extra = this.#triangles(packed.extra, packed.places?.extra ?? null);
     }
   }
 
@@ -46,7 +47,19 @@ export class Upload {
     const corners = packed.faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength : 0);
     const attributes = packed.kind === "static" ? packed.texels.byteLength + (packed.colors?.byteLength ?? 0) : 0;
     const textures = texelsOf(this.texture) * TEXEL_BYTES + texelsOf(this.colors) * COLOR_BYTES;
-    return attributes + textures + corners * (this.#hasEdges ? 2 : 1);
+    const places = (packed.places?.faces.byteLength ?? 0) + (packed.places?.extra.byteLength ?? 0);
+    if (this.isTextured) return attributes + textures + corners + places;
+    return attributes + textures + corners * (this.#hasCorners ? 2 : 1);
+  }
+
+  /** Whether it has places in a texture: then each corner is drawn for itself, with edges or without. */
+  get isTextured(): boolean {
+    return this.packed.places !== null;
+  }
+
+  /** Triangles as they lie in the file, with an index: for what is not drawn, as positions that are read back. */
+  get indexed(): readonly BufferGeometry[] {
+    return this.#parts().map(({ indexed }) => indexed);
   }
 
   /** Triangles of every frame, to be drawn with edges or without. */
@@ -61,8 +74,18 @@ export class Upload {
 
   /** Frees what only edges need. */
   dropEdges(): void {
-    if (!this.#hasEdges) return;
-    this.#hasEdges = false;
+    if (!this.isTextured) this.#dropCorners();
+  }
+
+  dispose(): void {
+    this.#dropCorners();
+    for (const triangles of this.#parts()) triangles.indexed.dispose();
+    this.#dropTextures();
+  }
+
+  #dropCorners(): void {
+    if (!this.#hasCorners) return;
+    this.#hasCorners = false;
     for (const triangles of this.#parts()) {
       triangles.unindexed?.dispose();
       triangles.unindexed = null;
@@ -70,38 +93,33 @@ export class Upload {
     if (this.packed.kind === "static") this.#dropTextures();
   }
 
-  dispose(): void {
-    this.dropEdges();
-    for (const triangles of this.#parts()) triangles.indexed.dispose();
-    this.#dropTextures();
-  }
-
   #parts(): readonly Triangles[] {
     return this.#extra ? [this.#faces, this.#extra] : [this.#faces];
   }
 
-  #triangles(corners: Uint32Array): Triangles {
+  #triangles(corners: Uint32Array, places: Uint16Array | null): Triangles {
     const indexed = this.#geometry();
     indexed.setIndex(new BufferAttribute(corners, 1));
     indexed.setDrawRange(0, corners.length);
-    return { corners, indexed, unindexed: null };
+    return { corners, places, indexed, unindexed: null };
   }
 
   #pick(triangles: Triangles, edges: boolean): BufferGeometry {
-    if (!edges) return triangles.indexed;
-    if (!this.#hasEdges) this.#makeEdges();
+    if (!edges && !this.isTextured) return triangles.indexed;
+    if (!this.#hasCorners) this.#makeCorners();
     return triangles.unindexed!;
   }
 
   // WebGL lets no buffer be an index and an attribute too, so the corners are on the GPU a second time.
-  #makeEdges(): void {
+  #makeCorners(): void {
     for (const triangles of this.#parts()) {
       triangles.unindexed = this.#geometry();
       triangles.unindexed.setAttribute("corner", new BufferAttribute(triangles.corners, 1));
+      if (triangles.places !== null) triangles.unindexed.setAttribute("place", new BufferAttribute(triangles.places, 2));
       triangles.unindexed.setDrawRange(0, triangles.corners.length);
     }
     if (this.packed.kind === "static") this.#setTextures(padded(this.packed), PADDED_WIDTH, paddedHeight(this.packed));
-    this.#hasEdges = true;
+    this.#hasCorners = true;
   }
 
   #setTextures({ texels, colors }: Texels, width: number, height: number): void {

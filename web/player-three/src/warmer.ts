@@ -3,10 +3,9 @@
 import { BufferGeometry, Camera, Mesh, Scene, WebGLRenderTarget } from "three";
 import type { RawShaderMaterial, WebGLRenderer } from "three";
 import { BACKGROUND_CLAY, BACKGROUND_COLOR } from "./colors.ts";
-import { makeUniforms, surfaceMaterial } from "./materials.ts";
+import { Materials, makeUniforms } from "./materials.ts";
 import type { Look } from "./materials.ts";
 import { drawOffscreen } from "./offscreen.ts";
-import type { Feed } from "./shaders.ts";
 import type { Upload } from "./upload.ts";
 
 const PAINT = { clay: BACKGROUND_CLAY, color: BACKGROUND_COLOR };
@@ -14,24 +13,22 @@ const NOTHING = new BufferGeometry();
 
 export class Warmer {
   readonly #uniforms = makeUniforms();
-  readonly #materials: Readonly<Record<Feed, RawShaderMaterial>>;
+  readonly #materials: Readonly<Record<"group" | "static", Materials>>;
   readonly #mesh: Mesh<BufferGeometry, RawShaderMaterial>;
   readonly #scene = new Scene();
   readonly #camera = new Camera();
   readonly #target = new WebGLRenderTarget(1, 1, { depthBuffer: false });
 
   constructor(look: Look) {
-    const material = (feed: Feed) => surfaceMaterial(feed, look, this.#uniforms, PAINT);
-    this.#materials = { attribute: material("attribute"), texture: material("texture"), corner: material("corner") };
-    this.#mesh = new Mesh(NOTHING, this.#materials.texture);
+    this.#materials = { group: new Materials("texture", look, this.#uniforms, PAINT), static: new Materials("attribute", look, this.#uniforms, PAINT) };
+    this.#mesh = new Mesh(NOTHING, this.#materials.group.of({ edges: false, places: false }));
     this.#mesh.frustumCulled = false;
     this.#scene.add(this.#mesh);
   }
 
   /** Puts textures and buffers of an upload on the GPU, and compiles what draws them. */
   warm(upload: Upload, edges: boolean, renderer: WebGLRenderer): void {
-    const feed = upload.packed.kind === "group" ? "texture" : "attribute";
-    this.#mesh.material = this.#materials[edges ? "corner" : feed];
+    this.#mesh.material = this.#materials[upload.packed.kind].of({ edges, places: upload.isTextured });
     const geometries = [upload.faces(edges), upload.extra(edges)].filter((geometry) => geometry !== null);
     this.#uniforms.vertices.value = upload.texture; // which the geometries may have made, as the other one
     this.#uniforms.colors.value = upload.colors;
@@ -43,7 +40,7 @@ export class Warmer {
   }
 
   dispose(): void {
-    for (const material of Object.values(this.#materials)) material.dispose();
+    for (const materials of Object.values(this.#materials)) materials.dispose();
     this.#target.dispose();
   }
 

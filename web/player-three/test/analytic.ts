@@ -89,7 +89,7 @@ export function makeGroup(options: GroupOptions = {}): MadeGroup {
   const colors = options.isColored ? new Uint8Array(texels.length) : null;
   colors?.set(all.flatMap(({ positions }, k) => positions.flatMap(() => [...shown[k], 255])));
   const packed: PackedGroup = {
-    kind: "group", chunk: 1, track, firstFrame, frameCount, vertexCount, textureWidth, textureHeight, texels, colors, box,
+    kind: "group", chunk: 1, track, firstFrame, frameCount, vertexCount, textureWidth, textureHeight, texels, colors, box, places: null,
     faces: Uint32Array.from(frames[0].faces), extra, extraStarts, layers: 0, bytes: 1000, decodeMs: 1,
   };
   const positions = frames.map((frame, t) => [...frame.positions, ...(lone?.positions ?? []).map((p) => (t === squareFrame ? p : null))]);
@@ -112,7 +112,7 @@ export function makeFloor(cells = 6, isColored = false): { packed: PackedStatic;
   const texels = pack([{ positions, normals, faces }], box);
   const colors = isColored ? Uint8Array.from(positions.flatMap(() => [...FLOOR_COLOR, 255])) : null;
   const packed: PackedStatic = {
-    kind: "static", chunk: 0, vertexCount: positions.length, texels, colors, box, faces: Uint32Array.from(faces), bytes: 500, decodeMs: 1,
+    kind: "static", chunk: 0, vertexCount: positions.length, texels, colors, box, places: null, faces: Uint32Array.from(faces), bytes: 500, decodeMs: 1,
   };
   return { packed, positions };
 }

@@ -1,17 +1,21 @@
 // The inside of a decoding worker: jobs in, packed groups out. Keeps what groups that follow are predicted from.
 
+import { decodeAtlas, finerPlaces } from "./atlas.ts";
+import type { Layout } from "./atlas.ts";
 import { paintStatic } from "./colors.ts";
 import type { Tools } from "./group.ts";
 import { colorGroup, continueGroup, decodeStatic } from "./group.ts";
 import type { LayersState } from "./layers.ts";
-import { checkPayload } from "./decoder.ts";
 import type { Placement } from "../mesh.ts";
 import { FormatError } from "../errors.ts";
 import { led } from "../format/budget.ts";
 import type { Led } from "../format/budget.ts";
+import { checkPayload } from "../format/payload.ts";
 import { packGroup, packStatic } from "./pack.ts";
+import type { FineAtlas } from "./pack.ts";
 import type { Damage, DecodeJob } from "../protocol.ts";
 import { describe } from "../format/reader.ts";
+import type { ColoredMesh } from "../wasm/colors.ts";
 import type { CompanionKind, Packed } from "../types.ts";
 
 const MOST_STATES = 64; // of groups, of all tracks and files; the oldest goes first
@@ -78,9 +82,11 @@ export class ChunkDecoder {
     const made = continueGroup(this.tools, payload, { frameCount: job.frameCount, layers, previous, place });
     const colored = companion(job, "colors", damage, (data) => colorGroup(core, made, data, { layers, previous }));
     const [colors, state] = colored ?? [null, made.state];
-    if (state !== null) this.states.set(file, chunk, state);
+    const template = made.canvas[0];
+    const layout = companion(job, "atlas", damage, (data) => decodeAtlas(core, data, template.base)) ?? previous?.layout ?? null;
+    if (state !== null) this.states.set(file, chunk, { ...state, layout });
     if (job.stateOnly) return null;
-    const shape = packGroup(core, made.group, colors);
+    const shape = packGroup(core, made.group, colors, job.textured ? fineAtlas(layout, template) : null);
     return { kind: "group", chunk, track, firstFrame, ...shape, layers: Math.max(0, job.ranges.length - 1), bytes: bytesOf(job), decodeMs: 0 };
   }
 
@@ -91,7 +97,9 @@ export class ChunkDecoder {
     const mesh = companion(job, "colors", damage, (data) => paintStatic(core, made, data)) ?? made.mesh;
     this.statics.set(job.file, job.chunk, led(before, mesh, job.payload.length));
     if (job.stateOnly) return null;
-    return { kind: "static", chunk: job.chunk, ...packStatic(core, mesh), bytes: bytesOf(job), decodeMs: 0 };
+    const layout = companion(job, "atlas", damage, (data) => decodeAtlas(core, data, made.added.base));
+    const atlas = job.textured ? fineAtlas(layout, made.added, mesh) : null;
+    return { kind: "static", chunk: job.chunk, ...packStatic(core, mesh, atlas), bytes: bytesOf(job), decodeMs: 0 };
   }
 
   private needed<T>(kept: Kept<T>, job: DecodeJob): T | null {
@@ -117,6 +125,12 @@ function companion<T>(job: DecodeJob, kind: CompanionKind, damage: (damage: Dama
   }
 }
 
+/** The places of the finest faces of a mesh; null where it has no textures, or where they are those of another mesh. */
+function fineAtlas(layout: Layout | null, { base, levels }: ColoredMesh, shown = base): FineAtlas | null {
+  if (layout === null || layout.places.length !== 2 * base.faces.length || shown.faces.length !== base.faces.length) return null;
+  return { ...layout, places: finerPlaces(layout, levels) };
+}
+
 /** Bytes that a job's chunk is decoded from. */
 function bytesOf({ payload, companions }: DecodeJob): number {
   return companions.reduce((sum, other) => sum + other.payload.length, payload.length);
@@ -124,7 +138,8 @@ function bytesOf({ payload, companions }: DecodeJob): number {
 
 /** The buffers of a packed value, to be handed over with it. */
 export function buffersOf(packed: Packed): ArrayBufferLike[] {
-  const { texels, colors, faces } = packed;
-  const arrays = [texels, faces, ...(colors === null ? [] : [colors]), ...(packed.kind === "group" ? [packed.extra, packed.extraStarts] : [])];
+  const { texels, colors, faces, places } = packed;
+  const ofPlaces = places === null ? [] : [places.faces, places.extra];
+  const arrays = [texels, faces, ...ofPlaces, ...(colors === null ? [] : [colors]), ...(packed.kind === "group" ? [packed.extra, packed.extraStarts] : [])];
   return [...new Set(arrays.map((array) => array.buffer))];
 }

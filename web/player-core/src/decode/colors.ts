@@ -19,8 +19,8 @@ export interface DecodedColors {
 }
 
 /**
- * The colours of the vertices of meshes. `data` may go on behind the records of these where the last of them have fewer levels than were
- * coded, or are left out. FormatError where it is damaged, costs too much, or needs a group that is not at hand.
+ * The colours of the vertices of meshes, whose records `data` has and no more. FormatError where it is damaged, costs too much, or needs a group
+ * that is not at hand.
  */
 export function decodeColors(core: Core, data: Uint8Array, canvas: Canvas, before: Float64Array | null): DecodedColors {
   checkColors(canvas, data.length);
@@ -40,6 +40,7 @@ export function decodeColors(core: Core, data: Uint8Array, canvas: Canvas, befor
     found.push(colors);
     if (number === 0) last = values;
   });
+  if (offset !== data.length) throw new FormatError(`colours: ${data.length - offset} bytes too many`);
   return { colors: joined(found), last };
 }
 

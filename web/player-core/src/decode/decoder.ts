@@ -7,25 +7,13 @@ import { colorsOf, frameOf } from "./decoded.ts";
 import type { GroupColors } from "./decoded.ts";
 import { led } from "../format/budget.ts";
 import type { Led } from "../format/budget.ts";
-import { crc32 } from "../format/crc.ts";
 import { FormatError } from "../errors.ts";
 import { EMPTY, concatenate } from "../mesh.ts";
 import type { Mesh, Placement } from "../mesh.ts";
 import { Form } from "../format/layout.gen.ts";
+import { checkPayload } from "../format/payload.ts";
 import { Head, describe } from "../format/reader.ts";
 import type { Chunk } from "../format/reader.ts";
-
-/** FormatError where the checksum of a layer does not fit, or the payload is of another form than the index says. */
-export function checkPayload(name: string, form: number, payload: Uint8Array, layers: readonly { size: number; crc: number }[]): void {
-  let offset = 0;
-  layers.forEach((layer, number) => {
-    const part = payload.subarray(offset, offset + layer.size);
-    if (part.length !== layer.size) throw new FormatError(`${name}: truncated, ${payload.length} bytes`);
-    if (crc32(part) !== layer.crc) throw new FormatError(`${name}: layer ${number} is damaged, its checksum does not match`);
-    offset += layer.size;
-  });
-  if (payload[0] !== form) throw new FormatError(`${name}: its form is ${payload[0]}, the index says ${form}`);
-}
 
 /** A group with its colours, where it has some. */
 interface Colored extends Continued {

@@ -12,6 +12,7 @@ import type { Mesh, Placement } from "../mesh.ts";
 import { connectivity, decodeLastLevel, decodeLevel, decodeMotion, framesOfRows } from "../wasm/layers.ts";
 import type { Connectivity } from "../wasm/layers.ts";
 import type { Core } from "../wasm/memory.ts";
+import type { Layout } from "./atlas.ts";
 import { checkGrowth, checkStep, decodeMesh } from "./mesh.ts";
 
 const MOST_NUMBERS = 2 ** 29; // of decoded places: 4 GiB, as in Python
@@ -23,6 +24,7 @@ export interface LayersState {
   readonly scalars: readonly Float64Array[]; // of the last frame, for each level decoded
   readonly finer: readonly Connectivity[];
   readonly colors: Float64Array | null; // values of the colours of all decoded vertices (colors.ts)
+  readonly layout: Layout | null; // of the textures of its chain (atlas.ts)
 }
 
 /** The records of a payload, or those of its first levels. */
@@ -77,7 +79,7 @@ export function placeLayers(core: Core, draco: DecoderModule, records: LayersRec
     finer.push(near);
   });
   positions ??= framesOfRows(core, rows, vertices, place);
-  return { base, faces, positions, state: { faces: base.faces, base: last, scalars, finer, colors: null } };
+  return { base, faces, positions, state: { faces: base.faces, base: last, scalars, finer, colors: null, layout: null } };
 }
 
 function baseOf(core: Core, draco: DecoderModule, head: LayersGroup, previous: LayersState | null): Mesh {

@@ -3,9 +3,10 @@
 import { frameOf } from "./decoded.ts";
 import type { DecodedGroup, GroupColors } from "./decoded.ts";
 import { FormatError } from "../errors.ts";
-import { vertexCount } from "../mesh.ts";
+import { faceCount, vertexCount } from "../mesh.ts";
 import type { Mesh } from "../mesh.ts";
-import type { Box, PackedGroup, PackedStatic } from "../types.ts";
+import { NO_PLACE, PLACE_SCALE } from "../types.ts";
+import type { Box, PackedGroup, PackedPlaces, PackedStatic } from "../types.ts";
 import type { Core } from "../wasm/memory.ts";
 import { growBox, noBounds, packVertices } from "../wasm/packing.ts";
 import type { Bounds } from "../wasm/packing.ts";
@@ -13,13 +14,18 @@ import type { Bounds } from "../wasm/packing.ts";
 const TEXTURE_WIDTH = 2048; // that every WebGL 2 has
 const MOST_ROWS = 16384; // that nearly every one has; 33 million vertices
 
-/** A group without its texels. */
-export type GroupShape = Pick<
-  PackedGroup,
-  "frameCount" | "vertexCount" | "textureWidth" | "textureHeight" | "faces" | "extra" | "extraStarts" | "texels" | "colors" | "box"
->;
+/** A texture's size, and the places of all corners of finest faces in it, in texels (`finerPlaces`). */
+export interface FineAtlas {
+  readonly width: number;
+  readonly height: number;
+  readonly places: Float32Array;
+}
 
-export function packGroup(core: Core, group: DecodedGroup, colors: GroupColors | null): GroupShape {
+/** A group as it is in itself, wherever it comes from. */
+export type GroupShape = Omit<PackedGroup, "kind" | "chunk" | "track" | "firstFrame" | "layers" | "bytes" | "decodeMs">;
+
+/** `atlas`: of the shared faces, where they have textures. */
+export function packGroup(core: Core, group: DecodedGroup, colors: GroupColors | null, atlas: FineAtlas | null): GroupShape {
   const { frameCount, vertexCount: shared } = group;
   const frames = Array.from({ length: frameCount }, (_, t) => frameOf(group, t));
   const alone = frames.map((mesh) => vertexCount(mesh) - shared); // vertices that a frame has for itself
@@ -37,14 +43,17 @@ export function packGroup(core: Core, group: DecodedGroup, colors: GroupColors |
   });
   const box = boxOf(bounds);
   const packed = { texels, colors: colors && colorTexels(colors, TEXTURE_WIDTH * rows) };
-  return { frameCount, vertexCount: shared, textureWidth: TEXTURE_WIDTH, textureHeight: rows, ...corners(group), ...packed, box };
+  return { frameCount, vertexCount: shared, textureWidth: TEXTURE_WIDTH, textureHeight: rows, ...corners(group, atlas), ...packed, box };
 }
 
-export function packStatic(core: Core, mesh: Mesh): Pick<PackedStatic, "texels" | "colors" | "box" | "vertexCount" | "faces"> {
+/** `atlas`: of all faces, where they have textures. */
+export function packStatic(core: Core, mesh: Mesh, atlas: FineAtlas | null): Omit<PackedStatic, "kind" | "chunk" | "bytes" | "decodeMs"> {
   const bounds = growBox(core, mesh.vertices, noBounds());
   const texels = packVertices(core, mesh, bounds);
   const colors = mesh.colors ? colorTexels(mesh.colors, vertexCount(mesh)) : null;
-  return { texels, colors, box: boxOf(bounds), vertexCount: vertexCount(mesh), faces: Uint32Array.from(mesh.faces) };
+  const faces = Uint32Array.from(mesh.faces);
+  const places = atlas && placesOf(atlas, Array.from({ length: faceCount(mesh) }, (_, face) => face), []);
+  return { texels, colors, places, box: boxOf(bounds), vertexCount: vertexCount(mesh), faces };
 }
 
 /** Four bytes a colour, and room for `count`: their order is that of a group's texels. */
@@ -60,27 +69,46 @@ function colorTexels(colors: Uint8Array, count: number): Uint8Array {
 }
 
 /** The faces of all frames, and those of single ones: kept there though not everywhere, or of the frame's own mesh. */
-function corners(group: DecodedGroup): Pick<PackedGroup, "faces" | "extra" | "extraStarts"> {
+function corners(group: DecodedGroup, atlas: FineAtlas | null): Pick<PackedGroup, "faces" | "extra" | "extraStarts" | "places"> {
   const { frameCount, faces, dropped, patches, vertexCount: shared } = group;
   const count = faces.length / 3;
   const changing: number[] = [];
   const common: number[] = [];
   for (let face = 0; face < count; face++) (isEverDropped(dropped, face, count) ? changing : common).push(face);
   const extra: number[] = [];
+  const extraFaces: number[] = []; // -1: of a patch
   const extraStarts = new Uint32Array(frameCount + 1);
   let first = shared;
   for (let t = 0; t < frameCount; t++) {
     for (const face of changing) {
-      if (!dropped![t * count + face]) extra.push(faces[3 * face], faces[3 * face + 1], faces[3 * face + 2]);
+      if (dropped![t * count + face]) continue;
+      extra.push(faces[3 * face], faces[3 * face + 1], faces[3 * face + 2]);
+      extraFaces.push(face);
     }
     const patch = patches?.[t];
     if (patch) {
       for (const corner of patch.faces) extra.push(first + corner);
+      for (let face = 0; face < faceCount(patch); face++) extraFaces.push(-1);
       first += vertexCount(patch);
     }
     extraStarts[t + 1] = extra.length;
   }
-  return { faces: cornersOf(faces, common), extra: Uint32Array.from(extra), extraStarts };
+  const places = atlas && placesOf(atlas, common, extraFaces);
+  return { faces: cornersOf(faces, common), extra: Uint32Array.from(extra), extraStarts, places };
+}
+
+/** Places of the corners of some faces, one behind the other; a face -1 has none. */
+function placesOf(atlas: FineAtlas, faces: readonly number[], extra: readonly number[]): PackedPlaces {
+  const { width, height, places } = atlas;
+  const packed = (some: readonly number[]): Uint16Array => {
+    const found = new Uint16Array(6 * some.length).fill(NO_PLACE);
+    some.forEach((face, f) => {
+      if (face < 0 || Number.isNaN(places[6 * face])) return;
+      for (let k = 0; k < 6; k++) found[6 * f + k] = Math.round((PLACE_SCALE * places[6 * face + k]) / (k % 2 === 0 ? width : height));
+    });
+    return found;
+  };
+  return { width, height, faces: packed(faces), extra: packed(extra) };
 }
 
 function isEverDropped(dropped: Uint8Array | null, face: number, count: number): boolean {

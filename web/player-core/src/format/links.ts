@@ -58,14 +58,16 @@ export function sizeOfLayers(chunk: Chunk, layers: number): number {
   return size;
 }
 
-/** How many layers of a companion are wanted with the first `layers` of its chunk. */
+/** How many layers of a companion are wanted with the first `layers` of its chunk: textures are what goes first, where the first layer alone is. */
 export function companionLayers(chunk: Chunk, companion: Chunk, layers: number): number {
   const isScaled = chunk.form === Form.LAYERS && layers < chunk.layers.length;
+  if (isScaled && layers === 1 && companion.kind !== "colors") return 0;
   return isScaled ? Math.min(layers, companion.layers.length) : companion.layers.length;
 }
 
-/** Bytes of the first layers of a chunk, and of what is wanted of its companions with these. */
-export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number): number {
+/** Bytes of the first layers of a chunk, and of what is wanted of its companions with these, textures among them or not. */
+export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number, textures: boolean): number {
   const own = sizeOfLayers(chunk, layers);
-  return head.companionsOf(chunk).reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
+  const companions = head.companionsOf(chunk).filter(({ kind }) => textures || kind === "colors");
+  return companions.reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
 }

@@ -131,17 +131,17 @@ export class Head {
     return chunk.kind === "static" && chunk.dependsOn.length > 0 ? this.chunks[chunk.dependsOn[0]] : null;
   }
 
-  /** The chunks that add to one: its colours. */
+  /** The chunks that add to one: its colours, and its atlas and pictures. */
   companionsOf(chunk: Chunk): readonly CompanionChunk[] {
     return this.companions.get(chunk.number) ?? [];
   }
 
-  /** The companion of another chunk that one is predicted from, or that has the colours of what a change of the background keeps. */
+  /** The companion that one is predicted from, or that has the colours of what a change of the background keeps; of the first pictures, their atlas. */
   companionBefore(chunk: Chunk): Chunk | null {
     const of = this.chunks[chunk.dependsOn[0]];
     const changed = this.changedFrom(of);
     if (changed !== null) return this.companionsOf(changed).find(({ kind }) => kind === chunk.kind) ?? null;
-    return chunk.dependsOn.length > 1 ? this.chunks[chunk.dependsOn[1]] : null;
+    return chunk.dependsOn.length > 1 ? this.chunks[chunk.dependsOn[chunk.dependsOn.length - 1]] : null;
   }
 
   private checkFrame(frame: number): void {
@@ -159,7 +159,7 @@ export function isCompanion(chunk: Chunk): chunk is CompanionChunk {
 }
 
 function isCompanionKind(kind: Chunk["kind"]): kind is CompanionKind {
-  return kind === "colors";
+  return kind === "colors" || kind === "atlas" || kind === "pictures";
 }
 
 /** "chunk 3 (track 0, frames 10 to 19)", for messages. */
@@ -198,6 +198,10 @@ function kindOf(kind: number): Chunk["kind"] {
       return "group";
     case ChunkKind.COLORS:
       return "colors";
+    case ChunkKind.ATLAS:
+      return "atlas";
+    case ChunkKind.PICTURES:
+      return "pictures";
     default:
       return "unknown";
   }
@@ -232,7 +236,8 @@ function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, fr
     trackCount,
     mostLayers: scaled.reduce((most, chunk) => Math.max(most, chunk.layers.length - 1), 0),
     size: last.offset + last.size,
-    hasColors: chunks.some(({ kind }) => kind === "colors"),
+    hasColors: chunks.some(({ kind }) => kind === "colors" || kind === "pictures"),
+    hasTextures: chunks.some(({ kind }) => kind === "pictures"),
     metadata: metadataOf(header.metadata),
   };
 }

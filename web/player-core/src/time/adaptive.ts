@@ -31,6 +31,7 @@ export class Adaptive {
   readonly #timeline: Timeline;
   #rates: readonly number[] = [];
   #ratesAt = NaN; // s
+  #textures = true; // whether their bytes count
   readonly #loads: number[] = []; // of each level at normal speed, as measured last
   #changed = -Infinity; // ms
   #ceiling = Infinity; // level that decoding did not keep up with, less one
@@ -42,6 +43,11 @@ export class Adaptive {
     this.#head = head;
     this.#timeline = timeline;
     this.level = affordable(this.rates(0), bandwidth / speed, 0.6);
+  }
+
+  set textures(on: boolean) {
+    if (on !== this.#textures) this.#ratesAt = NaN;
+    this.#textures = on;
   }
 
   /** The level for the groups that are fetched next. */
@@ -69,7 +75,7 @@ export class Adaptive {
     const frames = groups.reduce((sum, group) => sum + group.frameCount, 0);
     const perByte = (8 * this.#head.tracks.length * frameCount) / (frames * duration);
     const most = groups.reduce((found, group) => Math.max(found, mostLayers(group)), 0);
-    return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeWithCompanions(this.#head, group, level + 1), 0));
+    return Array.from({ length: most + 1 }, (_, level) => perByte * groups.reduce((sum, group) => sum + sizeWithCompanions(this.#head, group, level + 1, this.#textures), 0));
   }
 
   #forNetwork(rates: readonly number[], { bandwidth, speed, fetched, isWaiting }: Conditions): number {

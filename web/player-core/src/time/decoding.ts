@@ -22,6 +22,7 @@ export interface DecodingEvents {
 
 interface State {
   readonly layers: number;
+  readonly textured: boolean; // with what textures of its chain need
   readonly worker: number;
 }
 
@@ -37,7 +38,7 @@ export class Decoding implements Holdings {
   readonly #fetcher: Fetcher;
   readonly #share: Share;
   readonly #events: DecodingEvents;
-  readonly #decoded = new Map<number, { packed: Packed; layers: number; bytes: number }>(); // by chunk, as all below
+  readonly #decoded = new Map<number, { packed: Packed; layers: number; bytes: number; textured: boolean }>(); // by chunk, as all below
   readonly #states = new Map<number, State>();
   readonly #running = new Map<number, Step>();
   readonly #submitted = new Map<number, Step>();
@@ -45,6 +46,7 @@ export class Decoding implements Holdings {
   #lost: readonly Chunk[] = []; // that the file ends before or within
   readonly #tries = new Map<number, number>();
   #keep: ReadonlySet<number> = new Set();
+  #texturesOn = true;
   #bytesPerFrame = 0; // of the last groups
   #stale = new Set<number>(); // chunks whose jobs had begun when timings were forgotten
   readonly #timings: { readonly ms: number; readonly frames: number }[] = []; // of the last groups
@@ -67,7 +69,9 @@ export class Decoding implements Holdings {
   }
 
   decodedAt(chunk: Chunk): number {
-    return this.#decoded.get(chunk.number)?.layers ?? -1;
+    const found = this.#decoded.get(chunk.number);
+    if (found === undefined || (this.picturesOf(chunk, found.layers) !== null && !found.textured)) return -1;
+    return found.layers;
   }
 
   stateAt(chunk: Chunk): number {
@@ -75,6 +79,7 @@ export class Decoding implements Holdings {
     const running = this.#running.get(number);
     if (running) return running.layers;
     const state = this.#states.get(number);
+    if (state && !state.textured && this.picturesOf(chunk, state.layers) !== null) return -1;
     return state && this.#share.isAt(this.#links.rootOf(chunk), state.worker) ? state.layers : -1;
   }
 
@@ -84,13 +89,31 @@ export class Decoding implements Holdings {
 
   /** What a chunk is decoded with, but for what can never be. */
   companionsOf(chunk: Chunk): readonly CompanionChunk[] {
-    return this.#head.companionsOf(chunk).filter((companion) => !this.isFailed(companion));
+    return this.#head.companionsOf(chunk).filter((companion) => !this.isFailed(companion) && (companion.kind === "colors" || this.#texturesOn));
+  }
+
+  /** The pictures that a chunk is shown with where it has so many layers beyond the first; null where it is shown without. */
+  picturesOf(chunk: Chunk, layers: number): CompanionChunk | null {
+    const found = this.companionsOf(chunk).find(({ kind }) => kind === "pictures");
+    return found !== undefined && companionLayers(chunk, found, layers + 1) > 0 ? found : null;
+  }
+
+  /** Whether textures are shown; those that are wanted again are decoded with the next plan. */
+  set textures(on: boolean) {
+    if (on !== this.#texturesOn) this.version++;
+    this.#texturesOn = on;
+  }
+
+  /** Gives up the pictures of a chunk and those that need them. */
+  failPictures(pictures: Chunk, message: string): void {
+    this.#fail(pictures, message);
+    this.#events.changed();
   }
 
   /** Whether the bytes of a step are at hand. */
   hasBytes({ chunk, layers }: Step): boolean {
     const has = (other: Chunk, count: number): boolean => this.#fetcher.layersOf(other) >= count;
-    return has(chunk, layers + 1) && this.companionsOf(chunk).every((companion) => has(companion, companionLayers(chunk, companion, layers + 1)));
+    return has(chunk, layers + 1) && this.companionsOf(chunk).every((companion) => companion.kind === "pictures" || has(companion, companionLayers(chunk, companion, layers + 1)));
   }
 
   bytesOf(chunk: Chunk): number {
@@ -205,39 +228,41 @@ export class Decoding implements Holdings {
       scale: this.#head.header.scale,
       stateOnly: !step.show,
     };
+    let textured = false;
     this.#share.submit({
       lane: this.#links.rootOf(chunk),
       start: () => {
         this.#submitted.delete(chunk.number);
         this.#running.set(chunk.number, step);
-        return { ...job, payload: this.#fetcher.payload(chunk, layers + 1), companions: this.#companionJobs(step) };
+        textured = this.picturesOf(chunk, layers) !== null;
+        return { ...job, payload: this.#fetcher.payload(chunk, layers + 1), companions: this.#companionJobs(step), textured };
       },
-      settle: (outcome) => this.#settle(step, outcome),
+      settle: (outcome) => this.#settle(step, outcome, textured),
     });
   }
 
   #companionJobs({ chunk, layers }: Step): Companion[] {
-    return this.companionsOf(chunk).map((companion) => {
-      const count = companionLayers(chunk, companion, layers + 1);
+    const counted = this.companionsOf(chunk).map((companion) => ({ companion, count: companionLayers(chunk, companion, layers + 1) }));
+    return counted.filter(({ companion, count }) => companion.kind !== "pictures" && count > 0).map(({ companion, count }) => {
       const { number, kind, form } = companion;
       return { chunk: number, kind, form, payload: this.#fetcher.payload(companion, count), ranges: rangesOf(companion, count) };
     });
   }
 
-  #settle(step: Step, outcome: Outcome): void {
+  #settle(step: Step, outcome: Outcome, textured: boolean): void {
     const { chunk, layers } = step;
     this.#running.delete(chunk.number);
     for (const { chunk: number, message } of outcome.damage) {
       if (!this.#failed.has(number)) this.#fail(this.#head.chunks[number], message); // or it was predicted from one that is damaged
     }
     if (outcome.kind === "decoded") {
-      this.#states.set(chunk.number, { layers, worker: outcome.worker });
+      this.#states.set(chunk.number, { layers, textured, worker: outcome.worker });
       this.#tries.delete(chunk.number);
       this.#time(chunk, outcome.ms);
       const { packed } = outcome;
       const crowd = packed === null ? null : this.#crowdOf(chunk, bytesOf(packed));
       if (crowd !== null) this.#fail(chunk, crowd);
-      else if (packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, packed, layers);
+      else if (packed !== null && this.#keep.has(chunk.number)) this.#add(chunk, packed, layers, textured);
     } else {
       this.#share.clear(); // what follows in the chain would fail, too: it is planned again
       this.#submitted.clear();
@@ -263,10 +288,10 @@ export class Decoding implements Holdings {
     return `with those of other tracks it takes ${bytes} bytes, over ${together(size)}`;
   }
 
-  #add(chunk: Chunk, packed: Packed, layers: number): void {
+  #add(chunk: Chunk, packed: Packed, layers: number, textured: boolean): void {
     const old = this.packedOf(chunk);
     const bytes = bytesOf(packed);
-    this.#decoded.set(chunk.number, { packed, layers, bytes });
+    this.#decoded.set(chunk.number, { packed, layers, bytes, textured });
     if (packed.kind === "group") {
       const perFrame = bytes / packed.frameCount;
       this.#bytesPerFrame = this.#bytesPerFrame === 0 ? perFrame : (this.#bytesPerFrame + perFrame) / 2;
@@ -310,6 +335,7 @@ function rangesOf(chunk: Chunk, layers: number): { size: number; crc: number }[]
 }
 
 function bytesOf(packed: Packed): number {
-  const { texels, colors, faces } = packed;
-  return texels.byteLength + (colors?.byteLength ?? 0) + faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength + packed.extraStarts.byteLength : 0);
+  const { texels, colors, faces, places } = packed;
+  const ofPlaces = places === null ? 0 : places.faces.byteLength + places.extra.byteLength;
+  return texels.byteLength + (colors?.byteLength ?? 0) + ofPlaces + faces.byteLength + (packed.kind === "group" ? packed.extra.byteLength + packed.extraStarts.byteLength : 0);
 }

@@ -3,7 +3,8 @@
 import type { Decoding } from "./decoding.ts";
 import { mostLayers } from "../format/links.ts";
 import type { Chunk, Head } from "../format/reader.ts";
-import type { Packed, PackedGroup, PackedStatic, Shown } from "../types.ts";
+import type { Textures } from "./textures.ts";
+import type { Packed, PackedGroup, PackedStatic, Shown, TextureImage } from "../types.ts";
 
 interface Mutable {
   frame: number;
@@ -11,19 +12,24 @@ interface Mutable {
   frames: number[];
   groups: (PackedGroup | null)[];
   background: PackedStatic | null;
+  images: (TextureImage | null)[];
+  backgroundImage: TextureImage | null;
 }
 
 export class Picture {
   readonly #head: Head;
   readonly #decoding: Decoding;
+  readonly #textures: Textures;
   #shown: Mutable;
   #spare: Mutable;
   #version = -1; // of what was at hand when it was made
 
-  constructor(head: Head, decoding: Decoding) {
+  constructor(head: Head, decoding: Decoding, textures: Textures) {
     this.#head = head;
     this.#decoding = decoding;
-    const empty = (): Mutable => ({ frame: -1, blend: 0, frames: head.tracks.map(() => -1), groups: head.tracks.map(() => null), background: null });
+    this.#textures = textures;
+    const none = (): null[] => head.tracks.map(() => null);
+    const empty = (): Mutable => ({ frame: -1, blend: 0, frames: head.tracks.map(() => -1), groups: none(), background: null, images: none(), backgroundImage: null });
     [this.#shown, this.#spare] = [empty(), empty()];
   }
 
@@ -38,20 +44,26 @@ export class Picture {
     return this.#shown.groups.reduce((most, group) => (group === null ? most : Math.max(most, mostLayers(chunks[group.chunk]))), 0);
   }
 
-  /** Whether all that a frame shows is at hand, but for what can never be. */
+  /** Whether all that a frame shows is at hand, but for what can never be; of textures, their bytes. */
   isReady(frame: number): boolean {
     const { tracks } = this.#head;
     for (let track = 0; track < tracks.length; track++) {
-      if (!this.#decoding.isSettled(this.#head.chunkOfFrame(frame, track))) return false;
+      if (!this.#isAtHand(this.#head.chunkOfFrame(frame, track))) return false;
     }
     const background = this.#head.staticOfFrame(frame);
-    return background === null || this.#decoding.isSettled(background);
+    return background === null || this.#isAtHand(background);
+  }
+
+  /** Whether a frame is ready, and its textures are decoded. */
+  canShow(frame: number): boolean {
+    return this.isReady(frame) && this.#textures.isReady(frame);
   }
 
   /** Makes it the picture of a frame, `blend` of the way to the next. False, and the frame before, where the frame is not ready. */
   show(frame: number, blend: number): boolean {
-    const isSame = frame === this.#shown.frame && this.#decoding.version === this.#version;
-    if (!isSame && !this.isReady(frame)) {
+    this.#textures.aim(frame, this.#isInUse);
+    const isSame = frame === this.#shown.frame && this.#currentVersion === this.#version;
+    if (!isSame && !this.canShow(frame)) {
       this.#renew();
       return false;
     }
@@ -72,10 +84,25 @@ export class Picture {
     if (background !== null) keep.add(background.chunk);
   }
 
+  /** Counts what changes in what can be shown. */
+  get #currentVersion(): number {
+    return this.#decoding.version + this.#textures.version;
+  }
+
+  /** Whether a picture is shown, or was the last before. */
+  #isInUse = (image: TextureImage): boolean => {
+    for (const { images, backgroundImage } of [this.#shown, this.#spare]) if (image === backgroundImage || images.includes(image)) return true;
+    return false;
+  };
+
+  #isAtHand(chunk: Chunk): boolean {
+    return this.#decoding.isSettled(chunk) && this.#textures.hasBytes(chunk);
+  }
+
   /** Takes what came in the place of what is shown, as with other layers: the old is released. */
   #renew(): void {
     const { frame, blend } = this.#shown;
-    if (frame < 0 || this.#decoding.version === this.#version) return;
+    if (frame < 0 || this.#currentVersion === this.#version) return;
     const next = this.#spare;
     this.#fill(next, frame);
     next.blend = blend;
@@ -85,12 +112,14 @@ export class Picture {
   }
 
   #copy(next: Mutable): void {
-    const { frame, frames, groups, background } = this.#shown;
+    const { frame, frames, groups, background, images, backgroundImage } = this.#shown;
     next.frame = frame;
     next.background = background;
+    next.backgroundImage = backgroundImage;
     for (let track = 0; track < groups.length; track++) {
       next.frames[track] = frames[track];
       next.groups[track] = groups[track];
+      next.images[track] = images[track];
     }
   }
 
@@ -102,11 +131,13 @@ export class Picture {
       const held = own === null ? this.#held(chunk, this.#shown.groups[track]) : null;
       next.groups[track] = (own ?? held) as PackedGroup | null;
       next.frames[track] = held === null ? frame : this.#shown.frames[track];
+      next.images[track] = held === null ? this.#textures.imageOf(frame, track) : this.#shown.images[track];
     }
     const background = this.#head.staticOfFrame(frame);
     const own = background && this.#decoding.packedOf(background);
     next.background = (own ?? (background && this.#held(background, this.#shown.background))) as PackedStatic | null;
-    this.#version = this.#decoding.version;
+    next.backgroundImage = this.#textures.imageOfBackground(background);
+    this.#version = this.#currentVersion;
   }
 
   /** What is shown in place of a damaged chunk: what was shown before, with the layers that it has now. */
@@ -114,11 +145,11 @@ export class Picture {
     return before !== null && this.#decoding.isFailed(chunk) ? this.#decoding.packedOf(this.#head.chunks[before.chunk]) : null;
   }
 
-  #differs({ frame, blend, frames, groups, background }: Mutable): boolean {
+  #differs({ frame, blend, frames, groups, background, images, backgroundImage }: Mutable): boolean {
     const shown = this.#shown;
-    if (frame !== shown.frame || blend !== shown.blend || background !== shown.background) return true;
+    if (frame !== shown.frame || blend !== shown.blend || background !== shown.background || backgroundImage !== shown.backgroundImage) return true;
     for (let track = 0; track < groups.length; track++) {
-      if (groups[track] !== shown.groups[track] || frames[track] !== shown.frames[track]) return true;
+      if (groups[track] !== shown.groups[track] || frames[track] !== shown.frames[track] || images[track] !== shown.images[track]) return true;
     }
     return false;
   }

@@ -40,6 +40,12 @@ export interface Step {
   ahead: number; // s of content until a frame needs it; 0 or less: that at the play head does
 }
 
+/** A chunk that will be shown. */
+export interface Coming {
+  readonly chunk: Chunk;
+  readonly ahead: number; // s, as of a step
+}
+
 /** Why a chunk is wanted. */
 interface Need {
   readonly ahead: number; // s
@@ -50,6 +56,7 @@ export interface Plan {
   readonly steps: readonly Step[]; // in order
   readonly keep: ReadonlySet<number>; // chunks that are shown, or soon will be
   readonly chainCount: number; // that can be decoded beside each other
+  readonly coming: readonly Coming[]; // groups and backgrounds that will be shown, decoded or not, in the order of time
 }
 
 const MOST_GROUPS = 4096; // of all tracks, ahead or behind: a hostile frame rate has a whole file within a second
@@ -109,6 +116,7 @@ class Planner {
   readonly #holdings: Holdings;
   readonly #steps = new Map<number, Step>(); // by chunk
   readonly #chains = new Set<number>();
+  readonly #coming = new Map<Chunk, number>();
   readonly #groupsOfTrack: number[];
   #bytes = 0; // decoded
 
@@ -123,6 +131,7 @@ class Planner {
   addGroup(group: Chunk, frame: number, ahead: number, isNear: boolean): void {
     const background = this.#head.staticOfFrame(frame);
     if (background !== null) this.#add(background, { ahead, decode: isNear });
+    for (const chunk of background === null ? [group] : [background, group]) if (!this.#coming.has(chunk)) this.#coming.set(chunk, ahead);
     if (group.form === Form.EMPTY) return;
     const isSure = ++this.#groupsOfTrack[group.track] <= SURE_GROUPS;
     this.#bytes += this.#holdings.bytesOf(group);
@@ -133,8 +142,9 @@ class Planner {
 
   plan(): Plan {
     const steps = [...this.#steps.values()];
+    const coming = Array.from(this.#coming, ([chunk, ahead]) => ({ chunk, ahead }));
     const urgent = steps.filter((step) => step.ahead <= 0).sort((a, b) => a.chunk.number - b.chunk.number);
-    return { steps: [...urgent, ...steps.filter((step) => step.ahead > 0)], keep: this.keep, chainCount: this.#chains.size };
+    return { steps: [...urgent, ...steps.filter((step) => step.ahead > 0)], keep: this.keep, chainCount: this.#chains.size, coming };
   }
 
   /** Wants a chunk to be shown, and before it what it is predicted from, as far as that is not at hand. */

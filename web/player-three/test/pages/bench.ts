@@ -31,7 +31,7 @@ const api = {
     const bench = new Bench();
     for (let k = 0; k < FIRST + MEASURED; k++) {
       const frame = Math.floor(k / 3) % FRAMES;
-      const shown: Shown = { frame, blend: (k % 3) / 3, frames: [frame], groups: [group], background };
+      const shown: Shown = { frame, blend: (k % 3) / 3, frames: [frame], groups: [group], background, images: [null], backgroundImage: null };
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits, so that no call does for the last picture's
       await new Promise(requestAnimationFrame);
       const began = performance.now();

@@ -42,7 +42,7 @@ const api = {
   show(frame: number, blend = 0, held = frame): void {
     const groups = prepared.filter((packed) => packed.kind === "group");
     const background = prepared.find((packed) => packed.kind === "static") ?? null;
-    const shown: Shown = { frame, blend, frames: groups.map(() => held), groups, background };
+    const shown: Shown = { frame, blend, frames: groups.map(() => held), groups, background, images: groups.map(() => null), backgroundImage: null };
     scene.show(shown);
   },
   look(mode: Mode, flat = false): void {

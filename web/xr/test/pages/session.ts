@@ -39,7 +39,7 @@ renderer.setAnimationLoop(() => pageFrames++);
 
 function frame(): void {
   pictures++;
-  reel.show({ frame: 2, blend: 0, frames: [2], groups: [group], background: floor });
+  reel.show({ frame: 2, blend: 0, frames: [2], groups: [group], background: floor, images: [null], backgroundImage: null });
   renderer.render(root, camera);
   wanted?.(renderer.domElement.toDataURL()); // only now: the next frame clears it
   wanted = null;
