@@ -149,6 +149,7 @@ def test_flags_default_to_the_defaults_of_the_options():
     assert replace(defaults["reading"].options(), weld=None) == SequenceOptions()
     coding = asdict(defaults["coding"])
     assert coding.pop("preset") == code.preset == "best" and coding.pop("effort") == "normal"
+    assert coding.pop("color") == "auto"
     assert set(coding.values()) == {None}  # chosen by the preset
     assert defaults["coding"].options(code.quality) == code
 
@@ -162,7 +163,7 @@ def test_what_is_dropped_or_welded_is_said_once(run, tmp_path):
     assert said.code == 0
     warnings = said.err.splitlines()
     assert all(line.startswith("meshreel: warning: ") for line in warnings)
-    assert sum("dropped: texture coordinates, vertex colors" in line for line in warnings) == 1
+    assert sum("not kept: texture coordinates" in line for line in warnings) == 1
     assert sum("welded 2 of 8 vertices" in line for line in warnings) == 1
     assert run("encode", tmp_path, "-o", tmp_path / "a.reel", "--quiet").err == ""
 
