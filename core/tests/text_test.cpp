@@ -58,6 +58,8 @@ TEST(what_follows_a_stop_is_no_number) {
     CHECK(numbers("1/2/3 /4 5//x inf/", '/', bad) ==
           std::vector<double>({1, 5, std::numeric_limits<double>::infinity()}));
     CHECK(numbers("1/2", 0, bad).empty() && bad == 0);
+    const std::vector<double> second = numbers("1/2/3 4//5 6 7/-8", '/', bad, 1);
+    CHECK(second.size() == 4 && second[0] == 2 && std::isnan(second[1]) && std::isnan(second[2]) && second[3] == -8);
 }
 
 TEST(words_that_are_no_numbers_are_pointed_at) {
