@@ -17,7 +17,7 @@ from meshreel.coding.background import decode_background, decode_change
 from meshreel.encoder.options import SceneOptions
 from meshreel.encoder.parts import take_apart
 from meshreel.encoder.progress import Stages
-from meshreel.encoder.scene import encode_static
+from meshreel.encoder.static import encode_static
 from meshreel.errors import InputError
 from meshreel.format.budget import CostlyError
 from meshreel.geometry.closest_points import Surface
