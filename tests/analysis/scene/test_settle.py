@@ -117,7 +117,7 @@ def test_a_change_that_costs_more_than_its_bytes_may_is_a_whole_background(scene
     def costly(payload: bytes, before: Mesh) -> Mesh:
         raise CostlyError(f"{len(payload)} bytes for {len(before.faces)} faces")
 
-    monkeypatch.setattr("meshreel.encoder.scene.decode_change", costly)
+    monkeypatch.setattr("meshreel.encoder.static.decode_change", costly)
     options = SceneOptions(OPTIONS)
     parts = take_apart(captured(scene), survey(scene), options, Stages(None, FRAMES))
     states = encode_static(parts, FRAMES, 4.0, options.background)
