@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from io import BytesIO
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ import pytest
 import meshreel
 from meshreel.container.reader import ReelReader
 from meshreel.container.sources import BytesSource
+from meshreel.container.writer import Companion, ReelWriter
 from meshreel.encoder import appearance
 from meshreel.encoder.appearance import as_installed
 from meshreel.encoder.concat import concat
@@ -46,8 +49,9 @@ def textured(mesh: Mesh) -> Mesh:
     return replace(mesh, uv=flat[mesh.faces].astype(np.float32), texture=Texture.of(CHECKS))
 
 
-def written(meshes: list[Mesh], path: Path, color: str = "auto", **others: object) -> bytes:
-    options = replace(quick(**others), appearance=appearance_options(50.0, color))  # type: ignore[arg-type]
+def written(meshes: list[Mesh], path: Path, color: str = "auto", compatible: bool = False, **others: object) -> bytes:
+    appearance = appearance_options(50.0, color, compatible=compatible)
+    options = replace(quick(**others), appearance=appearance)  # type: ignore[arg-type]
     Encoder(Welded(MeshList(tuple(meshes)))).encode(path, replace(options, scene=None))
     return path.read_bytes()
 
@@ -124,6 +128,37 @@ def test_a_chain_has_one_atlas_and_pictures_of_each_frame(files: dict[str, bytes
     assert len(coarse.uv) == len(coarse.faces)
 
 
+def without(data: bytes, kind: ChunkKind) -> bytes:
+    """The file without the chunks of a kind."""
+    reader, output, numbers = ReelReader(BytesSource(data)), BytesIO(), dict[int, int]()
+    with ReelWriter(output, reader.header) as writer:
+        for chunk in reader.chunks:
+            if chunk.kind == kind:
+                continue
+            payload, depends_on = reader.read_chunk(chunk.number), [numbers[n] for n in chunk.depends_on]
+            ends = tuple(accumulate(layer.size for layer in chunk.layers))
+            if chunk.kind == ChunkKind.GROUP:
+                frames = chunk.first_frame, chunk.frame_count
+                numbers[chunk.number] = writer.add_group(*frames, payload, ends, depends_on, chunk.track)
+            else:
+                numbers[chunk.number] = writer.add_companion(
+                    Companion(ChunkKind(chunk.kind), payload, ends), depends_on
+                )
+    return output.getvalue()
+
+
+def test_a_compatible_file_is_shown_with_either_video(files: dict[str, bytes], tmp_path: Path) -> None:
+    meshes = [textured(mesh) for mesh in BODY]
+    both = written(meshes, tmp_path / "both.reel", compatible=True, group_size=3)
+    found = kinds(both)
+    assert found.count(ChunkKind.COMPATIBLE) == found.count(ChunkKind.PICTURES) > 1
+    assert without(both, ChunkKind.COMPATIBLE) == files["texture"]
+    video, other = meshreel.open(both), meshreel.open(without(both, ChunkKind.PICTURES))
+    for number in (4, 0, 5):
+        one, two = video[number].texture.pixels, other[number].texture.pixels
+        assert 0 < np.abs(one.astype(int) - two).mean() < 10
+
+
 def test_the_same_frames_give_the_same_bytes(files: dict[str, bytes], tmp_path: Path) -> None:
     assert written(COLORED, tmp_path / "again.reel", group_size=3) == files["vertices"]
     again = written([textured(mesh) for mesh in BODY], tmp_path / "texture.reel", group_size=3)
@@ -158,6 +193,28 @@ def test_a_scene_has_colors_of_its_room_and_its_bodies(tmp_path: Path) -> None:
         assert video.background(0).colors is not None
 
 
+def lit(mesh: Mesh, light: float) -> Mesh:
+    return replace(mesh, colors=(light * (120 + 100 * np.tanh(mesh.vertices))).astype(np.uint8))
+
+
+def test_light_that_moves_over_a_room_is_in_its_slow_video(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("meshreel.encoder.videos.LAYER_PICTURES", 2)
+    monkeypatch.setattr("meshreel.decoder.pictures.LAYER_PICTURES", 2)
+    lights = np.linspace(0.6, 1, 10)
+    frames = [lit(mesh, light) for mesh, light in zip(scene(10, moving=True), lights, strict=True)]
+    options = replace(quick(), appearance=appearance_options(50.0, "texture", 128))
+    Encoder(Welded(MeshList(tuple(frames), 16.0))).encode(tmp_path / "scene.reel", options)
+    with meshreel.open(tmp_path / "scene.reel") as video:
+        [pictures] = [c for c in video.reader.chunks if c.kind == ChunkKind.PICTURES and c.frame_count == 0]
+        assert len(pictures.layers) == 3  # of 5 pictures, one for two frames
+        shown = [video.background(number) for number in range(10)]
+        assert shown[0] is not shown[2] and shown[0].vertices is shown[2].vertices
+        means = [np.nanmean(mesh.texture.pixels) for mesh in shown]
+        assert means[0] == means[1] and all(np.diff(means[::2]) > 3)
+        again = [np.nanmean(video.background(number).texture.pixels) for number in (9, 1, 5)]
+        assert again == [means[9], means[1], means[5]]
+
+
 def test_parts_of_a_sequence_are_joined_with_their_colors(tmp_path: Path) -> None:
     for number, mesh in enumerate(COLORED):
         write_mesh(mesh, tmp_path / f"frame_{number}.ply")
@@ -185,7 +242,8 @@ def test_missing_packages_leave_colors_of_vertices(monkeypatch: pytest.MonkeyPat
 
 
 def test_ways_of_colors_out_of_range_are_refused() -> None:
-    for wrong in ({"color": "red"}, {"color_quality": 101.0}, {"texture": 300}, {"color": "none", "texture": 512}):
+    none = {"color": "none", "texture": 512}, {"color": "none", "compatible": True}
+    for wrong in ({"color": "red"}, {"color_quality": 101.0}, {"texture": 300}, *none):
         with pytest.raises(InputError):
             preset_options(**wrong)  # type: ignore[arg-type]
     assert preset_options(color="none").appearance is None

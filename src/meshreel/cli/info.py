@@ -16,7 +16,12 @@ from ..errors import FormatError
 from ..format.layout import ChunkKind, Form
 from .console import Common
 
-COMPANION_NAMES = {ChunkKind.COLORS: "vertex colors", ChunkKind.ATLAS: "atlas", ChunkKind.PICTURES: "pictures"}
+COMPANION_NAMES = {
+    ChunkKind.COLORS: "vertex colors",
+    ChunkKind.ATLAS: "atlas",
+    ChunkKind.PICTURES: "pictures",
+    ChunkKind.COMPATIBLE: "pictures in H.264",
+}
 
 
 def command(file: Path, /, *, common: Common = Common()) -> None:

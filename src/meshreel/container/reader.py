@@ -80,6 +80,10 @@ class ReelReader:
             raise FormatError(f"{source.size - self.size} bytes behind the last chunk, copy the file again")
         self._companions = {(c.depends_on[0], c.kind): c for c in self.chunks if c.kind in COMPANIONS}
         self._first_frames = [[group.first_frame for group in groups] for groups in self.tracks]
+        self._shown_from = dict[int, int]()  # of each STATIC, the first frame of the first GROUP that names it
+        for group in self.groups:
+            for number in group.depends_on:
+                self._shown_from.setdefault(number, group.first_frame)
         self._times = list(accumulate(self.header.intervals, initial=self.header.first_time))
 
     @property
@@ -143,6 +147,10 @@ class ReelReader:
         named = [n for chunk in self.chunks_of_frame(frame) for n in chunk.depends_on if self._is_static(n)]
         return self.chunks[max(named)] if named else None
 
+    def shown_from(self, static: Chunk) -> int:
+        """Return the first frame that is shown with a STATIC chunk, from which its pictures are counted."""
+        return self._shown_from[static.number]
+
     def group_before(self, chunk: Chunk) -> Chunk | None:
         """Return the GROUP chunk that a chunk is predicted from, or None."""
         return next((self.chunks[n] for n in chunk.depends_on if not self._is_static(n)), None)
@@ -153,11 +161,19 @@ class ReelReader:
     def read_chunk(self, number: int, layers: int | None = None) -> bytes:
         """Read the payload of a chunk, or its first `layers` (at least one). A FormatError names chunk and frames."""
         chunk = self.chunks[number]
-        wanted = chunk.layers if layers is None else chunk.layers[: max(layers, 1)]
+        return self._read(chunk, chunk.offset, chunk.layers if layers is None else chunk.layers[: max(layers, 1)])
+
+    def read_layer(self, number: int, layer: int) -> bytes:
+        """Read one layer of a chunk whose layers are payloads of their own. Raises as `read_chunk` does."""
+        chunk = self.chunks[number]
+        offset = chunk.offset + sum(before.size for before in chunk.layers[:layer])
+        return self._read(chunk, offset, chunk.layers[layer : layer + 1])
+
+    def _read(self, chunk: Chunk, offset: int, wanted: tuple[Layer, ...]) -> bytes:
         size = sum(layer.size for layer in wanted)
-        if chunk.offset + size > self._source.size:
+        if offset + size > self._source.size:
             raise FormatError(f"{chunk}: truncated, the file ends at byte {self._source.size} of {self.size}")
-        payload = self._source.get_bytes(chunk.offset, size)
+        payload = self._source.get_bytes(offset, size)
         if len(payload) != size:
             raise FormatError(f"{chunk}: truncated, {len(payload)} of {size} bytes")
         _check_payload(chunk, payload, wanted)

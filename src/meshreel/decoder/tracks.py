@@ -185,7 +185,7 @@ class Background:
         if chunk is None:
             return None
         try:
-            return self._state(chunk)
+            return self._pictures.shown(chunk, self._state(chunk), frame)
         except FormatError as error:
             raise FormatError(f"the background of frame {frame}: {error}") from error
 

@@ -17,7 +17,6 @@ from ..analysis.appearance.bake import bake, picture, texels_of
 from ..analysis.appearance.unwrap import unwrap
 from ..analysis.appearance.vertices import vertex_colors
 from ..coding.appearance.atlas import encode_atlas
-from ..coding.appearance.pictures import VideoEncoder, encode_pictures, to_i420
 from ..coding.colored import Canvas, canvas_of, encode_group_colors, finest_faces
 from ..coding.group import continue_group
 from ..coding.layers.coder import LayersState
@@ -30,6 +29,7 @@ from ..types import GREY, Mesh
 from .forms import EncodedGroup
 from .interval import Interval
 from .options import TEXTURE_SIZES, AppearanceOptions, EncoderOptions, TextureOptions
+from .videos import Videos
 
 USED = 0.43  # of a texture is on the surface, as unwrapped; measured on basketball_player
 MOST_FITTING = 1024  # texels, unless a larger texture is asked for: 2 mm on a person
@@ -97,7 +97,6 @@ class _Chain:
     def __init__(self) -> None:
         self._groups = list[EncodedGroup]()
         self._pictured = list[bool]()  # whether each of the groups has pictures
-        self._packets = list[bytes]()
         self._video: _Video | None = None
 
     def pass_on(self, group: EncodedGroup) -> None:
@@ -128,22 +127,21 @@ class _Chain:
             companions.append(Companion(ChunkKind.ATLAS, self._video.atlas))
         if self._video is not None:
             for paint, mesh in zip(paints, meshes, strict=True):
-                self._packets += self._video.add(paint, mesh)
+                self._video.add(paint, mesh)
         self._groups.append(replace(group, companions=tuple(companions)))
         self._pictured.append(self._video is not None)
         return None if after is None else replace(after, colors=encoded.state)
 
     def done(self) -> list[EncodedGroup]:
         """Return the groups with their pictures."""
-        packets = self._packets + ([] if self._video is None else self._video.finish())
-        found, at = list[EncodedGroup](), 0
-        for group, pictured in zip(self._groups, self._pictured, strict=True):
-            if pictured:
-                own = Companion(ChunkKind.PICTURES, encode_pictures(packets[at : at + group.frame_count]))
-                at += group.frame_count
-                group = replace(group, companions=(*group.companions, own))
-            found.append(group)
-        return found
+        if self._video is None:
+            return self._groups
+        counts = [group.frame_count for group, own in zip(self._groups, self._pictured, strict=True) if own]
+        pictures = iter(self._video.videos.finish(counts))
+        return [
+            replace(group, companions=(*group.companions, *next(pictures))) if own else group
+            for group, own in zip(self._groups, self._pictured, strict=True)
+        ]
 
 
 class _Video:
@@ -159,10 +157,10 @@ class _Video:
         self._faces = finest_faces(template.base, template.levels)
         count = len(self._texels.pixels)
         self._colors, self._seen = np.full((count, 3), GREY, np.uint8), np.zeros(count, bool)  # so far
-        self._encoder = VideoEncoder(layout.width, layout.height, options.video)
+        self.videos = Videos(layout, options)
 
-    def add(self, paint: Paint | None, mesh: Mesh) -> list[bytes]:
-        """Add the picture of a frame, whose mesh begins with the template; return packets that are done.
+    def add(self, paint: Paint | None, mesh: Mesh) -> None:
+        """Add the picture of a frame, whose mesh begins with the template.
 
         What nobody sees keeps the colour that was seen last.
         """
@@ -170,11 +168,7 @@ class _Video:
             colors, seen = bake(paint, Mesh(mesh.vertices[: self._count], self._faces), self._texels)
             self._colors[seen] = colors[seen]
             self._seen |= seen
-        return self._encoder.add(to_i420(picture(self._texels, self._colors, self._seen)))
-
-    def finish(self) -> list[bytes]:
-        """Return the packets that were not done."""
-        return self._encoder.finish()
+        self.videos.add(picture(self._texels, self._colors, self._seen))
 
 
 def _vertex_colors(paint: Paint | None, mesh: Mesh) -> np.ndarray:

@@ -99,6 +99,7 @@ class TextureOptions:
     size: int | None = None  # width of a texture, and its height at most, texels; None: as the pictures have detail
     video: VideoOptions = VideoOptions()
     always: bool = False  # also where frames have colours of their vertices only
+    compatible: bool = False  # also as H.264, for devices that cannot play AV1
 
     def __post_init__(self) -> None:
         if self.size is not None and self.size not in TEXTURE_SIZES:

@@ -38,13 +38,14 @@ def preset_options(
     color: str = "auto",
     color_quality: float | None = None,
     texture: int | None = None,
+    compatible: bool = False,
 ) -> EncoderOptions:
     """Return the encoder's options for a preset at a quality; `basis_size` fixes the components of a group.
 
     `effort` is how long the preset `best` searches: see `EFFORTS`. `color` is one of `COLORS`: textures where the
     frames have pictures, textures always, colours of vertices only, or none; `color_quality` is that of colours, by
-    default `quality`; `texture` is the width of textures, texels. Raises InputError for an unknown preset or values out
-    of range.
+    default `quality`; `texture` is the width of textures, texels; `compatible` adds them as H.264. Raises InputError
+    for an unknown preset or values out of range.
     """
     if preset not in PRESETS:
         raise InputError(f"no preset is called {preset!r}; known: {', '.join(PRESETS)}")
@@ -67,7 +68,9 @@ def preset_options(
     )
     if group_size is not None:
         method = replace(method, group_size=group_size)
-    appearance = appearance_options(float(quality if color_quality is None else color_quality), color, texture)
+    appearance = appearance_options(
+        float(quality if color_quality is None else color_quality), color, texture, compatible
+    )
     options = EncoderOptions(method, appearance=appearance, quality=float(quality))
     return options if key_interval is None else replace(options, key_interval=key_interval)
 
@@ -125,21 +128,22 @@ def motion_step(quality: float) -> float:
 
 
 def appearance_options(
-    quality: float = 50.0, color: str = "auto", texture: int | None = None
+    quality: float = 50.0, color: str = "auto", texture: int | None = None, compatible: bool = False
 ) -> AppearanceOptions | None:
     """Return the options of colours at a quality; None for no colours. Raises InputError for values out of range."""
     if color not in COLORS:
         raise InputError(f"no way of colours is called {color!r}; known: {', '.join(COLORS)}")
     if not 0 <= quality <= 100:
         raise InputError(f"color quality must be in 0 to 100, got {quality:g}")
-    if texture is not None and color in ("vertices", "none"):
-        raise InputError(f"texture {texture} and color {color!r}: there are no textures; leave one of both out")
+    if (texture is not None or compatible) and color in ("vertices", "none"):
+        given = f"texture {texture}" if texture is not None else "compatible"
+        raise InputError(f"{given} and color {color!r}: there are no textures; leave one of both out")
     if color == "none":
         return None
     vertices, video = ColorCodingOptions(step=color_step(quality)), VideoOptions(crf=rate_factor(quality))
     if color == "vertices":
         return AppearanceOptions(vertices, None)
-    return AppearanceOptions(vertices, TextureOptions(texture, video, always=color == "texture"))
+    return AppearanceOptions(vertices, TextureOptions(texture, video, color == "texture", compatible))
 
 
 def rate_factor(quality: float) -> int:

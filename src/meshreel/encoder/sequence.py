@@ -47,7 +47,7 @@ from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
 from .scene import Tracks, encode_bodies, scene_intervals
-from .static import Static, colored_states, encode_static
+from .static import Static, colored_states
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
@@ -217,8 +217,7 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     sequence, options, seen = job.sequence, job.options, parts.seen
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
     job.note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
-    states = encode_static(parts, len(sequence), sequence.frame_rate, job.scene.background)
-    states = colored_states(states, sequence, parts, options.appearance)
+    states = colored_states(sequence, parts, job.scene.background, options.appearance)
     job.note("background, coded", *(state.payload for state in states))
     with _writer(job, file, seen) as writer:
         coded = encode_bodies(job, parts)
@@ -286,7 +285,7 @@ def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion]
     """Write what belongs to a chunk, which may be predicted from what belongs to the group before."""
     for companion in companions:
         depends_on, last = [of], writer.companion_of(before, companion.kind)
-        if companion.kind == ChunkKind.PICTURES:
+        if companion.kind in (ChunkKind.PICTURES, ChunkKind.COMPATIBLE):
             depends_on.append(writer.atlas_of(of, before))
         writer.add_companion(companion, depends_on if last is None else [*depends_on, last])
 

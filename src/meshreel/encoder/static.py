@@ -16,7 +16,6 @@ from ..analysis.appearance.unwrap import projected, unwrap
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.survey import Survey
 from ..coding.appearance.atlas import encode_atlas
-from ..coding.appearance.pictures import VideoEncoder, encode_pictures, to_i420
 from ..coding.background import changed, decode_background, decode_change, encode_background, encode_change
 from ..coding.colored import background_canvas, encode_group_colors
 from ..container.writer import Companion
@@ -33,12 +32,15 @@ from ..types import Mesh, Placement, evenly
 from .appearance import fitting_size
 from .options import AppearanceOptions, TextureOptions
 from .parts import Change, Parts
+from .videos import layered_pictures
 from .views import Views
 
 FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of the background's vertices (decision 19)
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
 LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
+PICTURES_A_SECOND = 8  # of a background: shadows move slowly (shared study of colour)
+FINER = 2  # of the rate factor of a background's pictures than of a body's: 38 dB of living_room at quality 50
 NEAR = 3.0  # times the noise, within which a frame shows a place of the background (guess)
 LEAST_NEAR = 0.01  # m, the same at least (guess)
 
@@ -56,17 +58,20 @@ class Static:
         return len(self.payload) + sum(map(len, self.companions))
 
 
-def encode_static(parts: Parts, count: int, frame_rate: float, options: BackgroundOptions) -> list[Static]:
+def encode_static(
+    parts: Parts, count: int, frame_rate: float, options: BackgroundOptions, pictured: bool = False
+) -> list[Static]:
     """Encode the states of the background: as few faces as stay about as near to it as the noise.
 
-    The first state is whole, as are those of a refresh; each change of the room is a patch of the state before.
+    The first state is whole, as are those of a refresh; each change of the room is a patch of the state before, but for
+    a background with pictures, whose atlas is of a whole state.
     """
     noise = max(parts.deviation / parts.seen.unit, LEAST_NOISE)
     step, most = options.lattice * noise, options.coarse * noise
     payload, state = _coded(_normalised(parts.background, parts.seen), most, step)
     found = [] if state.is_empty else [Static(0, payload, False)]
     chain, changes = Chain(0, len(payload)), {change.frame: change for change in parts.changes}
-    again = set(refreshes(count, frame_rate, options))
+    again = set(refreshes(count, frame_rate, options)) | (set(changes) if pictured else set())
     for frame in sorted({*changes, *again} - {0}):
         whole = state.is_empty or frame in again
         if change := changes.get(frame):
@@ -126,12 +131,14 @@ def _normalised(mesh: Mesh, seen: Survey) -> Mesh:
 
 
 def colored_states(
-    states: list[Static], sequence: CapturedSequence, parts: Parts, options: AppearanceOptions | None
+    sequence: CapturedSequence, parts: Parts, background: BackgroundOptions, options: AppearanceOptions | None
 ) -> list[Static]:
-    """Return the states of a background with the colours that still surface has from each state to the next."""
+    """Encode the states of the background with the colours that still surface has from each state to the next."""
     if options is None or not any(sequence[number].is_colored for number in evenly(len(sequence), 3)):
-        return states
+        return encode_static(parts, len(sequence), sequence.frame_rate, background)
     found, mesh, looks = list[Static](), Mesh.empty(), _Looks(sequence, parts)
+    texture = options.texture if options.texture and (options.texture.always or looks.has_pictures) else None
+    states = encode_static(parts, len(sequence), sequence.frame_rate, background, texture is not None)
     ends = [state.frame for state in states[1:]] + [len(sequence)]
     for state, end in zip(states, ends, strict=True):
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
@@ -142,21 +149,27 @@ def colored_states(
         shown = spread_colors(mesh, colors.astype(np.float64), seen)[len(mesh.vertices) - coded.vertices :]
         encoded = encode_group_colors(canvas, [shown], options.colors, None)
         companions = [Companion(ChunkKind.COLORS, encoded.payload)]
-        if not state.is_patch and options.texture is not None and (options.texture.always or looks.has_pictures):
-            companions += _pictured(mesh, frames, looks, options.texture)
+        if texture is not None and not state.is_patch:
+            companions += _pictured(mesh, frames, looks, texture)
         found.append(replace(state, companions=tuple(companions)))
     return found
 
 
 def _pictured(mesh: Mesh, frames: range, looks: _Looks, options: TextureOptions) -> list[Companion]:
-    """Return the atlas of a background and its one picture."""
+    """Return the atlas of a background, and a slow video of what it looks like: shadows move over it."""
+    finer = replace(options.video, crf=max(1, options.video.crf - FINER))
     layout = looks.layout(mesh, frames, options.size)
     texels = texels_of(layout, 0)
-    colors, seen = looks.colors(frames, texels.places(mesh), face_normals(mesh)[0][texels.faces])
-    encoder = VideoEncoder(layout.width, layout.height, options.video)
-    packets = encoder.add(to_i420(picture(texels, colors, seen))) + encoder.finish()
+    places, normals = texels.places(mesh), face_normals(mesh)[0][texels.faces]
+    usual, known = looks.colors(frames, places, normals)
+
+    def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
+        colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), places, normals)
+        return picture(texels, np.where(seen[:, None], colors, usual), known | seen)
+
+    some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
     atlas = Companion(ChunkKind.ATLAS, encode_atlas(mesh, layout))
-    return [atlas, Companion(ChunkKind.PICTURES, encode_pictures(packets))]
+    return [atlas, *layered_pictures(layout, some, picture_of, replace(options, video=finer))]
 
 
 class _Looks:
@@ -165,12 +178,21 @@ class _Looks:
     def __init__(self, sequence: CapturedSequence, parts: Parts) -> None:
         self._sequence, self._parts, self._views = sequence, parts, Views.of(sequence, parts.seen)
         self.has_pictures = self._views is not None or sequence[0].texture is not None
+        self.frame_rate = sequence.frame_rate
 
     def colors(
         self, frames: range, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
     ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
         """Return the usual colours of places over some frames, and which of them are known."""
         return median_colors(points, normals, map(self._paint, self._some(frames, STILL_FRAMES)))
+
+    def moment(
+        self, number: int, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
+    ) -> tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
+        """Return the colours of places in one frame, and which of them it shows, away from the border of what moves."""
+        paint = self._paint(number) if self._views is None else self._views.at(number, clear=True)
+        colors, seen = paint.at(points, normals)
+        return np.clip(np.rint(colors), 0, 255).astype(np.uint8), seen
 
     def layout(self, mesh: Mesh, frames: range, size: int | None) -> Layout:
         """Return the places of a background in a texture: as the cameras see it, where there are some."""

@@ -29,9 +29,9 @@ class Views:
         """Return the views of these frames, under the same numbers, to send to another process."""
         return replace(self, sequence=only(self.sequence, numbers))
 
-    def at(self, number: int) -> ColorViews:
-        """Return what the cameras saw in a frame."""
+    def at(self, number: int, clear: bool = False) -> ColorViews:
+        """Return what the cameras saw in a frame; if `clear`, only away from steps in depth."""
         place = self.place
         pictures = [picture.placed(place) for picture in self.colors[number] if picture is not None]
         mesh = self.sequence[number]
-        return ColorViews(pictures, mesh.at((mesh.vertices - place.origin) / place.scale), MARGIN / place.scale)
+        return ColorViews(pictures, mesh.at((mesh.vertices - place.origin) / place.scale), MARGIN / place.scale, clear)

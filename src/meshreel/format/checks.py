@@ -17,6 +17,7 @@ COMPANIONS = {
     ChunkKind.COLORS: Form.VERTEX_COLORS,
     ChunkKind.ATLAS: Form.PLACES,
     ChunkKind.PICTURES: Form.VIDEO,
+    ChunkKind.COMPATIBLE: Form.VIDEO,
 }
 GROUP_FORMS = (Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY)
 MOST_CHANGES = 255  # patches on one background: random access decodes all of them (guess)
@@ -126,7 +127,7 @@ class IndexChecks:
         if entry.depends_on[1:] not in self._needed(kind, of, before):
             raise FormatError(f"chunk {number}: {kind.name} of {of} that depend on {entry.depends_on[1:]}")
         self.companions[of, kind] = number
-        if kind == ChunkKind.PICTURES:
+        if entry.form == Form.VIDEO:
             self._atlases[of] = entry.depends_on[1]
 
     def _needed(self, kind: ChunkKind, of: int, before: int | None) -> tuple[tuple[int, ...], ...]:

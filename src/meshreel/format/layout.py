@@ -16,6 +16,7 @@ from .records import Nested
 
 MAGIC = b"REEL\r\n\x1a\n"  # the line ends reveal a transfer in text mode
 VERSION = 1
+LAYER_PICTURES = 64  # of a background, in each layer but the last: 8 s of the 8 a second that an encoder makes (guess)
 
 
 class ChunkKind(IntEnum):
@@ -25,7 +26,8 @@ class ChunkKind(IntEnum):
     GROUP = 2  # a group of consecutive frames of one track
     COLORS = 3  # the colours of the vertices of another chunk
     ATLAS = 4  # where the faces of a group, and of those predicted from it, are in a texture
-    PICTURES = 5  # the textures of a group's frames
+    PICTURES = 5  # the textures of a group's frames, or of a background
+    COMPATIBLE = 6  # the same in a coding that more devices know
 
 
 class Form(IntEnum):
@@ -105,7 +107,7 @@ class IndexEntry:
         "for a STATIC of form PATCH, the STATIC chunk that it changes; "
         "for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; "
         "for ATLAS, the GROUP whose base mesh it is of; "
-        "for PICTURES, the GROUP, the ATLAS, and but for the first of this, the PICTURES of the group before",
+        "for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before",
     ]
     layers: Annotated[tuple[Layer, ...], List(U16, Nested(Layer)), "at least one"]
 
@@ -261,6 +263,7 @@ class VideoCodec(IntEnum):
     """Coding of pictures."""
 
     AV1 = 1  # a temporal unit a picture, of the low-overhead format
+    H264 = 2  # an access unit a picture, with start codes (Annex B)
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,11 +283,12 @@ class Atlas:
 
 @dataclass(frozen=True, slots=True)
 class Pictures:
-    """The payload of a chunk of form VIDEO: the textures of a group's frames."""
+    """The payload of a chunk of form VIDEO: the textures of a group's frames; of a background, each of its layers."""
 
     form: Annotated[Form, Choice(U8, Form), "VIDEO"]
     codec: Annotated[VideoCodec, Choice(U8, VideoCodec), "coding of the pictures"]
-    packets: Annotated[tuple[bytes, ...], List(U16, Blob(Varint())), "one a frame, in their order"]
+    interval: Annotated[int, Varint(), "frames from one picture to the next, above 0; 1 of a GROUP"]
+    packets: Annotated[tuple[bytes, ...], List(U16, Blob(Varint())), "one a picture, in their order"]
 
 
 @dataclass(frozen=True, slots=True)

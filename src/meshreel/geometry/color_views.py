@@ -22,6 +22,7 @@ from .topology import face_normals
 MOST_SIDE = 512  # pixels, of the pictures of what hides a place: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind what is seen (guess)
 FEATHER = 4.0  # pixels from a step in depth within which a colour counts less: it mixes both sides (guess)
+NEAR_STEP = 0.05  # of the weight of a colour, which is left at a step (guess)
 STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 
@@ -70,10 +71,15 @@ class ColorFrames(Protocol):
 class ColorViews:
     """The pictures of one moment, prepared for repeated queries."""
 
-    def __init__(self, pictures: Sequence[ColorPicture], hides: Mesh, margin: float = MARGIN) -> None:
-        """Take pictures, and all surface that may hide a place; `margin` is in the unit of its vertices."""
+    def __init__(
+        self, pictures: Sequence[ColorPicture], hides: Mesh, margin: float = MARGIN, clear: bool = False
+    ) -> None:
+        """Take pictures, and all surface that may hide a place; `margin` is in the unit of its vertices.
+
+        If `clear`, a place near a step in depth is not seen, as pictures mix both sides there.
+        """
         rays = Rays(hides)
-        self.views = [View(picture, rays, margin) for picture in pictures]
+        self.views = [View(picture, rays, margin, clear) for picture in pictures]
 
     def at(
         self, points: Float64[np.ndarray, "N 3"], normals: Float64[np.ndarray, "N 3"]
@@ -104,10 +110,10 @@ class ColorViews:
 class View:
     """A picture, and the depth that it sees at each of its pixels, coarser where it is large."""
 
-    def __init__(self, picture: ColorPicture, rays: Rays, margin: float) -> None:
+    def __init__(self, picture: ColorPicture, rays: Rays, margin: float, clear: bool = False) -> None:
         from scipy.ndimage import distance_transform_edt
 
-        self.picture, self._margin, camera = picture, margin, picture.camera
+        self.picture, self._margin, self._clear, camera = picture, margin, clear, picture.camera
         self._shrink = max(1, -(-max(camera.width, camera.height) // MOST_SIDE))
         width, height = -(-camera.width // self._shrink), -(-camera.height // self._shrink)
         intrinsic = camera.intrinsic.copy()
@@ -129,7 +135,9 @@ class View:
         cells = np.minimum(positions[rows] / self._shrink, np.array(self._depth.shape[::-1]) - 1e-9).astype(np.int64)
         at = (cells[:, 1], cells[:, 0])
         hidden = depth[rows] > self._depth[at] + np.maximum(self._margin, MARGIN * depth[rows])
-        near = np.clip(self._from_step[at] / FEATHER, 0.05, 1.0)
+        near = np.clip(self._from_step[at] / FEATHER, NEAR_STEP, 1.0)
+        if self._clear:
+            near = np.floor(near)
         weights = np.zeros(len(points))
         weights[rows] = np.where(hidden, 0.0, cosine[rows] ** 3 * near)
         return weights

@@ -1,4 +1,4 @@
-"""Encode pictures that change little from frame to frame: as AV1 by SVT, decoded by dav1d (PyAV, extra `color`).
+"""Encode pictures that change little from frame to frame: as AV1 by SVT, or H.264 by x264 (PyAV, extra `color`).
 
 In -> out: pictures in sRGB <-> packets, one for each picture, in their order. Both sides know I420 planes of limited
 range (ITU-R BT.709), which decoders agree on to the bit; their colours are a matter of who shows them.
@@ -7,6 +7,7 @@ range (ITU-R BT.709), which decoders agree on to the bit; their colours are a ma
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,11 +16,21 @@ from typing import Any, Literal
 import numpy as np
 
 from ...errors import FormatError, InputError
-from ...format.layout import Form, Pictures, VideoCodec
+from ...format.layout import LAYER_PICTURES, Form, Pictures, VideoCodec
 from ...format.records import pack, unpack_all
 from ...shapes import UInt8
 
 PRESET = 6  # of SVT: 4 takes 2.5 times as long for 3 % fewer bytes
+ENCODERS = {VideoCodec.AV1: "libsvtav1", VideoCodec.H264: "libx264"}
+DECODERS = {VideoCodec.AV1: "libdav1d", VideoCodec.H264: "h264"}
+X264 = (  # no picture waits for another; one key picture; BT.709, limited range; start codes
+    "threads=1:keyint=infinite:scenecut=0:bframes=0:rc-lookahead=0:sync-lookahead=0:repeat-headers=1:annexb=1"
+    ":colorprim=bt709:transfer=bt709:colormatrix=bt709:fullrange=off"
+)
+H264_SCALE, H264_OFFSET = 0.375, 7.75  # from SVT's rate factor to that of x264 with about the same PSNR; measured
+COMMENT = 6  # type of a NAL unit: supplemental enhancement information
+H264_BORDER = 128  # pixels that FFmpeg's decoder counts beside a picture, at most
+LOW_DELAY = 0x80000  # FFmpeg's flag AV_CODEC_FLAG_LOW_DELAY: a picture is shown when its packet is decoded
 LUMA = (0.2126, 0.7152, 0.0722)  # of red, green and blue
 BLUE, RED = 1.8556, 1.5748  # what a full colour difference is of blue and of red
 
@@ -39,15 +50,17 @@ class VideoOptions:
 class VideoEncoder:
     """Encoder of the pictures of one chain: the first is a key picture, no other is."""
 
-    def __init__(self, width: int, height: int, options: VideoOptions) -> None:
-        """Open the encoder. Raises InputError where PyAV or its SVT-AV1 is missing."""
-        self._context = _context("libsvtav1", "w")
-        context, fixed = self._context, "lp=1:keyint=-1:color-primaries=1:transfer-characteristics=1"
+    def __init__(self, width: int, height: int, options: VideoOptions, codec: VideoCodec = VideoCodec.AV1) -> None:
+        """Open the encoder. Raises InputError where PyAV or its encoder is missing."""
+        self._context = context = _context(ENCODERS[codec], "w")
         context.width, context.height, context.pix_fmt = width, height, "yuv420p"
         context.time_base, context.framerate = Fraction(1, 30), Fraction(30)
-        params = f"{fixed}:matrix-coefficients=1:color-range=0"
-        context.options = {"crf": str(options.crf), "preset": str(options.preset), "svtav1-params": params}
-        self._count = 0
+        if codec == VideoCodec.AV1:
+            params = "lp=1:keyint=-1:color-primaries=1:transfer-characteristics=1:matrix-coefficients=1:color-range=0"
+            context.options = {"crf": str(options.crf), "preset": str(options.preset), "svtav1-params": params}
+        else:
+            context.options = {"crf": f"{H264_SCALE * options.crf + H264_OFFSET:.1f}", "x264-params": X264}
+        self._codec, self._count = codec, 0
 
     def add(self, planes: UInt8[np.ndarray, "R W"]) -> list[bytes]:
         """Encode a picture, as `to_i420` makes it; return the packets that are done."""
@@ -56,21 +69,29 @@ class VideoEncoder:
         frame = av.VideoFrame.from_ndarray(planes, "yuv420p")
         frame.pts = self._count
         self._count += 1
-        return [bytes(packet) for packet in self._context.encode(frame)]
+        return self._packets(frame)
 
     def finish(self) -> list[bytes]:
         """Return the packets that were not done."""
-        return [bytes(packet) for packet in self._context.encode(None)]
+        return self._packets(None)
+
+    def _packets(self, frame: Any) -> list[bytes]:
+        found = [bytes(packet) for packet in self._context.encode(frame)]
+        return found if self._codec == VideoCodec.AV1 else [_without_comments(packet) for packet in found]
 
 
 class VideoDecoder:
     """Decoder of the pictures of one chain, from its first on."""
 
-    def __init__(self, width: int, height: int) -> None:
+    def __init__(self, width: int, height: int, codec: VideoCodec = VideoCodec.AV1) -> None:
         """Open the decoder of pictures of this size. Raises InputError where PyAV is missing."""
-        self._context = _context("libdav1d", "r")
-        # `max_pixels`: what dav1d takes memory for before it shows anything.
-        self._context.options = {"max_pixels": str(width * height), "max_frame_delay": "1"}
+        self._context = _context(DECODERS[codec], "r")
+        # `max_pixels`: what a decoder takes memory for before it shows anything.
+        if codec == VideoCodec.AV1:
+            self._context.options = {"max_pixels": str(width * height), "max_frame_delay": "1"}
+        else:
+            self._context.options = {"max_pixels": str((width + H264_BORDER) * (height + H264_BORDER))}
+            self._context.flags |= LOW_DELAY
         self._context.thread_count = 1
         self._size = width, height
 
@@ -90,17 +111,22 @@ class VideoDecoder:
         return np.asarray(frame.to_ndarray())
 
 
-def encode_pictures(packets: Sequence[bytes]) -> bytes:
-    """Pack the packets of a group's pictures."""
-    return pack(Pictures(Form.VIDEO, VideoCodec.AV1, tuple(packets)))
+def encode_pictures(packets: Sequence[bytes], codec: VideoCodec = VideoCodec.AV1, interval: int = 1) -> bytes:
+    """Pack the packets of a group's pictures, or a layer of those of a background, each shown for `interval` frames."""
+    return pack(Pictures(Form.VIDEO, codec, interval, tuple(packets)))
 
 
-def decode_pictures(data: bytes, frames: int) -> tuple[bytes, ...]:
-    """Return the packets of a group's pictures. Raises FormatError where there is not one for each frame."""
+def decode_pictures(data: bytes, frames: int) -> Pictures:
+    """Return the packets of a group's pictures, or of a layer of those of a background, which has 0 frames.
+
+    Raises FormatError where a group has not one for each frame, or the layer none, or more than it may.
+    """
     record = unpack_all(Pictures, data)
-    if record.form != Form.VIDEO or len(record.packets) != frames or not all(record.packets):
-        raise FormatError(f"{len(record.packets)} pictures for {frames} frames")
-    return record.packets
+    count, interval = len(record.packets), record.interval
+    right = (count, interval) == (frames, 1) if frames else interval > 0 and 0 < count <= LAYER_PICTURES
+    if record.form != Form.VIDEO or not right or not all(record.packets):
+        raise FormatError(f"{count} pictures, one each {interval} frames, for {frames} frames")
+    return record
 
 
 def to_i420(pixels: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "R W"]:
@@ -125,6 +151,12 @@ def from_i420(planes: UInt8[np.ndarray, "R W"]) -> UInt8[np.ndarray, "H W 3"]:
     )
     shown = [luma + RED * red, luma - (LUMA[2] * BLUE * blue + LUMA[0] * RED * red) / LUMA[1], luma + BLUE * blue]
     return np.clip(np.rint(np.stack(shown, axis=2)), 0, 255).astype(np.uint8)
+
+
+def _without_comments(packet: bytes) -> bytes:
+    """Return an access unit of H.264 without its comments, which x264 fills with 600 bytes about itself."""
+    units = [unit for unit in re.split(b"\0{2,3}\1", packet) if unit and unit[0] & 31 != COMMENT]
+    return b"".join(b"\0\0\0\1" + unit for unit in units)
 
 
 def _halved(plane: np.ndarray) -> np.ndarray:

@@ -35,6 +35,7 @@ export const ChunkKind = {
   COLORS: 3,
   ATLAS: 4,
   PICTURES: 5,
+  COMPATIBLE: 6,
 } as const;
 
 export const Form = {
@@ -65,6 +66,7 @@ export const Presence = {
 
 export const VideoCodec = {
   AV1: 1,
+  H264: 2,
 } as const;
 
 /** The first bytes of a file: its signature, and the size of the head. */
@@ -119,7 +121,7 @@ export interface IndexEntry {
   readonly form: number; // coding; equal to the first byte of the chunk
   readonly frames: number; // number of frames; 0 if and only if STATIC, or COLORS of a STATIC
   readonly track: number; // number of the moving body, from 0; 0 if STATIC
-  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; for ATLAS, the GROUP whose base mesh it is of; for PICTURES, the GROUP, the ATLAS, and but for the first of this, the PICTURES of the group before
+  readonly dependsOn: readonly number[]; // numbers of the earlier chunks that it needs: for a GROUP, the STATIC chunk it is shown with and the GROUP right before it in its track; for a STATIC of form PATCH, the STATIC chunk that it changes; for COLORS, the chunk whose vertices have them and, where they are predicted, the COLORS of the group before; for ATLAS, the GROUP whose base mesh it is of; for PICTURES and COMPATIBLE, the GROUP, the ATLAS, and but for the first of this, that of the group before
   readonly layers: readonly Layer[]; // at least one
 }
 export const IndexEntry: Kind<IndexEntry> = record("IndexEntry", {
@@ -347,14 +349,16 @@ export const Atlas: Kind<Atlas> = record("Atlas", {
   rests: blob(varint),
 });
 
-/** The payload of a chunk of form VIDEO: the textures of a group's frames. */
+/** The payload of a chunk of form VIDEO: the textures of a group's frames; of a background, each of its layers. */
 export interface Pictures {
   readonly form: number; // VIDEO
   readonly codec: number; // coding of the pictures
-  readonly packets: readonly Uint8Array[]; // one a frame, in their order
+  readonly interval: number; // frames from one picture to the next, above 0; 1 of a GROUP
+  readonly packets: readonly Uint8Array[]; // one a picture, in their order
 }
 export const Pictures: Kind<Pictures> = record("Pictures", {
   form: choice(u8, Form),
   codec: choice(u8, VideoCodec),
+  interval: varint,
   packets: list(u16, blob(varint)),
 });
