@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
-from meshreel.types import Mesh
+from meshreel.io.color import from_linear
+from meshreel.types import Mesh, Texture
 
 _TYPES = {5126: "<f4", 5125: "<u4", 5123: "<u2"}
-_WIDTHS = {"SCALAR": 1, "VEC3": 3}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 
 
 class PlayedGlb:
@@ -43,7 +47,11 @@ class PlayedGlb:
         accessor = self.tree["accessors"][number]
         view = self.tree["bufferViews"][accessor["bufferView"]]
         dtype, width = np.dtype(_TYPES[accessor["componentType"]]), _WIDTHS[accessor["type"]]
-        assert view.get("byteStride", 12) == 12 and accessor["byteOffset"] % 4 == 0 and view["byteOffset"] % 4 == 0
+        assert (
+            view.get("byteStride", 4 * width) == 4 * width
+            and accessor["byteOffset"] % 4 == 0
+            and view["byteOffset"] % 4 == 0
+        )
         assert accessor["byteOffset"] + accessor["count"] * width * dtype.itemsize <= view["byteLength"]
         start = view["byteOffset"] + accessor["byteOffset"]
         found = np.frombuffer(self.binary, dtype, accessor["count"] * width, start).reshape(-1, width)
@@ -71,7 +79,21 @@ class PlayedGlb:
         assert set(scale.tolist()) in ({0.0}, {1.0})
         if not scale.any():
             return None
-        (primitive,) = self.tree["meshes"][node["mesh"]]["primitives"]
+        parts = [
+            self._primitive(number, each, matrix, time) for each in self.tree["meshes"][node["mesh"]]["primitives"]
+        ]
+        (mesh, normals), *others = parts
+        for other, same in others:  # faces of the same vertices, with another material
+            np.testing.assert_array_equal(mesh.vertices, other.vertices)
+            np.testing.assert_array_equal(normals, same)
+            uv = np.concatenate([mesh.uv, np.full((len(other.faces), 3, 2), np.nan, np.float32)])
+            faces = np.concatenate([mesh.faces, other.faces])
+            mesh = Mesh(mesh.vertices, faces, other.colors, uv, mesh.texture)
+        return mesh, normals
+
+    def _primitive(
+        self, number: int, primitive: dict[str, Any], matrix: np.ndarray, time: float | None
+    ) -> tuple[Mesh, np.ndarray]:
         targets = primitive.get("targets", [])
         weights = self._animated(number, "weights", time, np.zeros(len(targets), np.float32))
         assert np.count_nonzero(weights) <= 2  # old viewers take no more than some
@@ -82,7 +104,23 @@ class PlayedGlb:
         vertices = attributes["POSITION"] @ matrix[:3, :3].T + matrix[:3, 3]
         faces = self.values(primitive["indices"]).reshape(-1, 3)
         assert primitive.get("mode", 4) == 4
-        return Mesh.of(vertices, faces), attributes["NORMAL"] @ matrix[:3, :3].T
+        mesh = Mesh.of(vertices, faces)
+        material = self.tree["materials"][primitive["material"]]
+        colored = "COLOR_0" in attributes or "TEXCOORD_0" in attributes
+        assert ("KHR_materials_unlit" in material.get("extensions", {})) == colored
+        if "COLOR_0" in attributes:
+            mesh = replace(mesh, colors=from_linear(attributes["COLOR_0"]))
+        if "TEXCOORD_0" in attributes:
+            texture = self.tree["textures"][material["pbrMetallicRoughness"]["baseColorTexture"]["index"]]
+            uv = attributes["TEXCOORD_0"][mesh.faces] * np.float32([1, -1]) + np.float32([0, 1])
+            mesh = replace(mesh, uv=uv, texture=Texture.of(self._picture(self.tree["images"][texture["source"]])))
+        return mesh, attributes["NORMAL"] @ matrix[:3, :3].T
+
+    def _picture(self, image: dict[str, Any]) -> np.ndarray:
+        view = self.tree["bufferViews"][image["bufferView"]]
+        assert image["mimeType"] == "image/png" and view["byteOffset"] % 4 == 0
+        data = self.binary[view["byteOffset"] :][: view["byteLength"]]
+        return np.asarray(Image.open(io.BytesIO(data)))
 
     def _animated(self, node: int, path: str, time: float | None, still: np.ndarray) -> np.ndarray:
         """The value of a channel at a time, or `still` where there is none."""

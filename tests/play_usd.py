@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdValidation
+from PIL import Image
+from pxr import Ar, Usd, UsdGeom, UsdShade, UsdValidation
 
-from meshreel.types import Mesh
+from meshreel.io.color import from_linear
+from meshreel.types import Mesh, Texture
 
 _ROUNDED = 1.001e-6  # s: a time of whole microseconds may be that of the frame rate, rounded
 
@@ -55,4 +59,28 @@ def _mesh(prim: UsdGeom.Mesh, code: Usd.TimeCode) -> tuple[Mesh, np.ndarray]:
     assert (extent[0] <= points.min(axis=0) + 1e-6).all() and (extent[1] >= points.max(axis=0) - 1e-6).all()
     matrix = np.array(prim.ComputeLocalToWorldTransform(code))
     vertices = points.astype(np.float64) @ matrix[:3, :3] + matrix[3, :3]
-    return Mesh.of(vertices, np.array(prim.GetFaceVertexIndicesAttr().Get())), normals @ matrix[:3, :3]
+    mesh = Mesh.of(vertices, np.array(prim.GetFaceVertexIndicesAttr().Get()))
+    display = prim.GetDisplayColorPrimvar()
+    if display.GetInterpolation() == UsdGeom.Tokens.vertex:
+        mesh = replace(mesh, colors=from_linear(np.array(display.Get(code))))
+    return _textured(mesh, prim, code), normals @ matrix[:3, :3]
+
+
+def _textured(mesh: Mesh, prim: UsdGeom.Mesh, code: Usd.TimeCode) -> Mesh:
+    """The mesh with the picture that its material has at a time, if it has one."""
+    subsets = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()
+    bound = subsets[0].GetPrim() if subsets else prim.GetPrim()
+    material, _ = UsdShade.MaterialBindingAPI(bound).ComputeBoundMaterial()
+    if not material:
+        return mesh
+    surface = material.ComputeSurfaceSource()[0]
+    picture = UsdShade.Shader(surface.GetInput("diffuseColor").GetConnectedSources()[0][0].source)
+    reader = UsdShade.Shader(picture.GetInput("st").GetConnectedSources()[0][0].source)
+    places = UsdGeom.PrimvarsAPI(prim).GetPrimvar(reader.GetInput("varname").Get())
+    assert places.GetInterpolation() == UsdGeom.Tokens.faceVarying
+    uv = np.array(places.Get(), np.float32).reshape(-1, 3, 2)
+    if subsets:
+        uv[np.setdiff1d(np.arange(len(uv)), np.array(subsets[0].GetIndicesAttr().Get()))] = np.nan
+    resolved = picture.GetInput("file").Get(code).resolvedPath
+    data = bytes(Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved)).GetBuffer())
+    return replace(mesh, uv=uv, texture=Texture.of(np.asarray(Image.open(io.BytesIO(data)))))

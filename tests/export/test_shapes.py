@@ -89,11 +89,11 @@ def test_a_glb_that_would_be_too_long_is_reported_before_it_is(tmp_path, monkeyp
     with animated_glb(tmp_path / "a.glb", animation()) as writer:
         writer.add(shape())
     size = (tmp_path / "a.glb").stat().st_size
-    monkeypatch.setattr("meshreel.export.animated_glb.MOST_BYTES", size)
+    monkeypatch.setattr("meshreel.io.glb_file.MOST_BYTES", size)
     with animated_glb(tmp_path / "a.glb", animation()) as writer:
         writer.add(shape())
     for most, what in ((size - 1, "description"), (100, "part, name")):
-        monkeypatch.setattr("meshreel.export.animated_glb.MOST_BYTES", most)
+        monkeypatch.setattr("meshreel.io.glb_file.MOST_BYTES", most)
         told = pytest.raises(InputError, match=f"{what}.*{most} bytes.*fewer frames")
         with told, animated_glb(tmp_path / "b.glb", animation()) as writer:
             writer.add(shape())

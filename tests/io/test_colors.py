@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import json
+from base64 import b64encode
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,12 +14,15 @@ import trimesh
 from PIL import Image
 
 from meshreel.errors import InputError
+from meshreel.geometry.painted import Painted
 from meshreel.geometry.topology import clean, concatenate, part_of, weld
 from meshreel.io.color import from_linear, to_linear
 from meshreel.io.meshes import read_mesh
-from meshreel.io.pictures import read_picture
+from meshreel.io.pictures import pack_picture, read_picture
+from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
 from meshreel.types import GREY, Mesh, Texture
+from tests.gltf_validator import validate
 
 RNG = np.random.default_rng(5)
 BALL = trimesh.creation.icosphere(2)
@@ -38,14 +43,70 @@ def put(folder: Path, obj: str = QUAD, mtl: str = SKIN, picture: bytes | None = 
     return folder / "m.obj"
 
 
-@pytest.mark.parametrize("extension", ["ply", "obj", "glb"])
+@pytest.mark.parametrize("extension", ["ply", "obj", "glb", "npz"])
 def test_colors_of_vertices_come_back(tmp_path: Path, extension: str) -> None:
     write_mesh(PAINTED, tmp_path / f"m.{extension}")
-    loaded = read_mesh(tmp_path / f"m.{extension}")
-    assert loaded.mesh.colors is not None and loaded.dropped == frozenset()
-    np.testing.assert_array_equal(loaded.mesh.colors, PAINTED.colors)
+    sequence = open_sequence(tmp_path / f"m.{extension}")
+    np.testing.assert_array_equal(sequence[0].colors, PAINTED.colors)
+    assert sequence.warnings == ()
     write_mesh(replace(PAINTED, colors=None), tmp_path / f"n.{extension}")
-    assert read_mesh(tmp_path / f"n.{extension}").mesh.colors is None
+    assert open_sequence(tmp_path / f"n.{extension}")[0].colors is None
+
+
+def patched(mesh: Mesh = PAINTED) -> Mesh:
+    """The ball with a texture, which some of its faces have no place in, and others have one outside of 0 to 1."""
+    uv = RNG.random((len(mesh.faces), 3, 2)).astype(np.float32)
+    uv[:5], uv[5] = np.nan, [[-0.5, 2], [1.5, 3.25], [0, 0]]
+    uv[10:20] = 0.25  # many corners of a vertex at one place
+    return replace(mesh, uv=uv, texture=Texture.of(PICTURE))
+
+
+@pytest.mark.parametrize("extension", ["obj", "glb", "npz"])
+@pytest.mark.parametrize("colored", [True, False])
+def test_a_texture_comes_back_with_faces_that_have_no_place_in_it(
+    tmp_path: Path, extension: str, colored: bool
+) -> None:
+    mesh = patched() if colored else replace(patched(), colors=None)
+    write_mesh(mesh, tmp_path / f"m.{extension}")
+    sequence = open_sequence(tmp_path / f"m.{extension}")
+    again = sequence[0]
+    assert sequence.warnings == ()
+    np.testing.assert_array_equal(again.texture.pixels, PICTURE)
+    wanted, found = sorted_faces(mesh), sorted_faces(again)
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+    assert (again.colors is None) != colored
+
+
+def sorted_faces(mesh: Mesh) -> np.ndarray:
+    """All that is known of each corner of each face, in the order of their places in space."""
+    colors = mesh.vertices * 0 if mesh.colors is None else mesh.colors.astype(np.float64)
+    rows = np.concatenate([mesh.vertices[mesh.faces], mesh.uv, colors[mesh.faces]], axis=2)
+    return rows[np.lexsort(np.rint(rows[:, :, :3].sum(axis=1) * 1e4).T)]
+
+
+def test_a_textured_obj_has_its_picture_beside_it_and_ply_has_none(tmp_path: Path) -> None:
+    write_mesh(patched(), tmp_path / "my m.obj")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my m.mtl", "my m.obj", "my m.png"]
+    assert (tmp_path / "my m.mtl").read_text() == "newmtl surface\nKd 1 1 1\nmap_Kd my m.png\n"
+    np.testing.assert_array_equal(read_mesh(tmp_path / "my m.obj").mesh.texture.pixels, PICTURE)
+    write_mesh(patched(), tmp_path / "m.ply")
+    assert read_mesh(tmp_path / "m.ply").mesh.texture is None
+
+
+def test_others_read_the_texture_that_we_write(tmp_path: Path) -> None:
+    mesh = replace(PAINTED, colors=None, uv=RNG.random((len(PAINTED.faces), 3, 2)).astype(np.float32))
+    for extension in ("obj", "glb"):
+        write_mesh(replace(mesh, texture=Texture.of(PICTURE)), tmp_path / f"m.{extension}")
+        other = trimesh.load_mesh(tmp_path / f"m.{extension}", process=False)
+        np.testing.assert_allclose(other.visual.uv[other.faces], mesh.uv, atol=1e-6)
+        material = other.visual.material
+        shown = material.image if extension == "obj" else material.baseColorTexture
+        np.testing.assert_array_equal(np.asarray(shown.convert("RGB")), PICTURE)
+
+
+def test_khronos_finds_nothing_wrong_with_a_texture(tmp_path: Path) -> None:
+    write_mesh(patched(), tmp_path / "m.glb")
+    assert validate(tmp_path / "m.glb")[0]["messages"] == []
 
 
 @pytest.mark.parametrize("kind, one", [("uchar", "255"), ("ushort", "65535"), ("float", "1.0"), ("float", "255.0")])
@@ -147,6 +208,80 @@ def test_a_glb_has_its_texture(tmp_path: Path) -> None:
     np.testing.assert_array_equal(mesh.texture.pixels, PICTURE)
     np.testing.assert_allclose(mesh.vertices[mesh.faces], obj.vertices[obj.faces])
     np.testing.assert_allclose(mesh.uv, obj.visual.uv[obj.faces], atol=1e-6)
+
+
+@pytest.mark.parametrize("uri", ["data", "file"])
+def test_the_texture_of_a_glb_may_be_text_but_not_another_file(tmp_path: Path, uri: str) -> None:
+    write_mesh(patched(), tmp_path / "m.glb")
+    data = (tmp_path / "m.glb").read_bytes()
+    size = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + size])
+    inline = f"data:image/png;base64,{b64encode(pack_picture(PICTURE)).decode()}"
+    tree["images"] = [{"uri": inline if uri == "data" else "skin.png"}]
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = len(text).to_bytes(4, "little") + b"JSON" + text + data[20 + size :]
+    (tmp_path / "m.glb").write_bytes(b"glTF\2\0\0\0" + (12 + len(chunks)).to_bytes(4, "little") + chunks)
+    loaded = read_mesh(tmp_path / "m.glb")
+    if uri == "data":
+        np.testing.assert_array_equal(loaded.mesh.texture.pixels, PICTURE)
+    else:
+        assert loaded.mesh.texture is None and loaded.dropped == {"a texture (it is in another file)"}
+
+
+def test_places_that_are_no_numbers_are_none(tmp_path: Path) -> None:
+    mesh = read_mesh(put(tmp_path, QUAD.replace("vt 1 1", "vt nan inf").replace("vt 0 1", "vt 1e99 0"))).mesh
+    assert np.isnan(mesh.uv[0, 2]).all() and np.isfinite(mesh.uv[0, :2]).all()
+    known = Painted(replace(mesh, colors=np.zeros((4, 3), np.uint8)))
+    assert known.on(np.array([0], np.int32), np.ones((1, 3)) / 3).tolist() == [[0, 0, 0]]
+
+
+ARRAYS = {
+    "vertices": np.stack([PAINTED.vertices, PAINTED.vertices + 1]),
+    "faces": PAINTED.faces,
+    "colors": np.stack([PAINTED.colors, 255 - PAINTED.colors]),
+    "uv": patched().uv,
+    "texture": np.stack([PICTURE, PICTURE[::-1]]),
+}
+
+
+def test_an_npz_has_colors_and_textures_of_all_frames_or_of_each(tmp_path: Path) -> None:
+    np.savez_compressed(tmp_path / "each.npz", **ARRAYS)
+    one = {name: array[0] for name, array in ARRAYS.items() if name in ("colors", "texture")}
+    np.savez(tmp_path / "all.npz", **ARRAYS | one)
+    for frame in (1, 0):
+        each, same = open_sequence(tmp_path / "each.npz")[frame], open_sequence(tmp_path / "all.npz")[frame]
+        np.testing.assert_array_equal(each.colors, ARRAYS["colors"][frame])
+        np.testing.assert_array_equal(each.uv, ARRAYS["uv"])
+        np.testing.assert_array_equal(each.texture.pixels, ARRAYS["texture"][frame])
+        np.testing.assert_array_equal(same.colors, PAINTED.colors)
+        np.testing.assert_array_equal(same.texture.pixels, PICTURE)
+    np.savez(tmp_path / "no_places.npz", **{name: array for name, array in ARRAYS.items() if name != "uv"})
+    loose = open_sequence(tmp_path / "no_places.npz")
+    assert loose[0].texture is None and loose.warnings == ("not kept: a texture (without uv) (first in frame 0)",)
+
+
+@pytest.mark.parametrize(
+    ("name", "array", "message"),
+    [
+        ("colors", PAINTED.colors[:-1], "V x 3"),
+        ("colors", np.stack([PAINTED.colors] * 3), "T x V x 3"),
+        ("colors", np.full(PAINTED.colors.shape, "red"), "must be numbers"),
+        ("uv", patched().uv[:, :2], "two for each corner"),
+        ("uv", patched().uv[:-1], "two for each corner"),
+        ("texture", PICTURE.astype(np.uint16), "must be uint8"),
+        ("texture", PICTURE[..., 0], "H x W x 3"),
+        ("texture", PICTURE[:0], "H x W x 3"),
+        ("texture", np.stack([PICTURE] * 3), "T x H x W x 3"),
+        ("texture", np.zeros((8192, 8193, 3), np.uint8), "8192 x 8192"),
+    ],
+)
+def test_arrays_of_an_npz_that_do_not_fit_its_frames_are_refused(
+    tmp_path: Path, name: str, array: np.ndarray, message: str
+) -> None:
+    np.savez_compressed(tmp_path / "m.npz", **ARRAYS | {name: array})
+    with pytest.raises(InputError, match=rf"m.npz: '{name}' is .*{message}"):
+        open_sequence(tmp_path / "m.npz")
 
 
 def test_cleaning_welding_and_cutting_keep_colors_and_places() -> None:

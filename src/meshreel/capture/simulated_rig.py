@@ -20,8 +20,7 @@ from ..geometry.closest_points import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import concatenate, face_normals
 from ..io.depth_pictures import write_depth
-from ..io.pictures import write_picture
-from ..io.write import make_folder, replacing, write_mesh
+from ..io.write import make_folder, replacing, write_mesh, write_picture
 from ..types import Mesh
 from .rig import RIG, DepthCamera, make_folders, write_rig
 from .simulated_color import ColorSensorOptions, Painter, SimulatedColor

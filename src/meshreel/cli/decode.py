@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from ..decoder.video import BACKGROUND, Video
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
-from ..export.frames import Part, check_part, write_frames
+from ..export.frames import Part, check_part, joined, write_frames
+from ..format.layout import ChunkKind
 from ..io.write import frame_names, left_over, make_folder
 from ..types import Mesh
 from .console import Common
@@ -21,7 +25,7 @@ def command(
     /,
     *,
     output: Annotated[Path, Parameter(name=["--output", "-o"])],
-    format: Literal["ply", "obj", "glb"] = "ply",
+    format: Literal["ply", "obj", "glb", "npz"] = "ply",
     layers: int | None = None,
     only: Part = "all",
     common: Common = Common(),
@@ -35,7 +39,7 @@ def command(
     output
         The directory for frame_00000.ply and so on; created if needed.
     format
-        Format of the mesh files.
+        Format of the mesh files. All keep colours of vertices; OBJ (with .mtl and .png), GLB and npz keep textures.
     layers
         Largest number of layers (subdivisions, or KLT components) to decode of each group beyond its first: fewer
         give coarser, valid meshes from fewer bytes.
@@ -46,16 +50,34 @@ def command(
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
     check_part(file, video.reader, only)
-    decode: dict[Part, Callable[[int], Mesh]]
-    decode = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
+    decode, lost = _decoder(video, only, format)
+    common.warn(lost)
     make_folder(output)
     names = frame_names(len(video), format)
     common.warn(left_over(output, names, f"frame_*.{format}"))
     with common.stages(len(video)) as progress:
         paths = [output / name for name in names]
-        failed = write_frames(decode[only], paths, lambda done: progress("decode", done, len(video)))
+        failed = write_frames(decode, paths, lambda done: progress("decode", done, len(video)))
     if failed:
         text = f"{file}: {failed[0]}; {len(failed)} of {len(video)} frames are lost, the others are written"
         raise FormatError(f"{text}; copy the file again")
     row = {"output": str(output), "frames": len(video), "format": format, "frame_rate": video.frame_rate}
     common.result(row, f"{output}: {len(video)} {format} files")
+
+
+def _decoder(video: Video, only: Part, format: str) -> tuple[Callable[[int], Mesh], tuple[str, ...]]:
+    """Return the function that decodes a frame for files of a format, and a warning of what these do not keep."""
+    decode: dict[Part, Callable[[int], Mesh]]
+    decode = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
+    if all(chunk.kind != ChunkKind.PICTURES for chunk in video.reader.chunks):
+        return decode[only], ()
+    lost = (
+        "" if find_spec("av") and find_spec("PIL") else "textures need the extra color: pip install 'meshreel[color]'"
+    )
+    lost = "PLY has no textures: give --format obj or glb for them" if format == "ply" else lost
+    if lost:
+        bare = decode[only]
+        return lambda frame: replace(bare(frame), uv=None, texture=None), (f"{lost}; colours of vertices are kept",)
+    decode["all"] = lambda frame: joined([*video.parts(frame).values()])
+    decode["moving"] = lambda frame: joined([part for name, part in video.parts(frame).items() if name != BACKGROUND])
+    return decode[only], ()

@@ -28,6 +28,7 @@ def command(
     frames: str = ":",
     only: Part = "all",
     up: Annotated[Up | None, Parameter(allow_leading_hyphen=True)] = None,
+    texture: Annotated[bool, Parameter(negative="")] = False,
     common: Common = Common(),
 ) -> None:
     """Write a .reel file as one animated file: GLB for viewers and engines, USD for film tools.
@@ -52,8 +53,12 @@ def command(
         Of a scene, only the background or only the moving bodies; by default whole frames.
     up
         Axis of the meshes that points up; by default the one that the .reel file names. In the written file it is +y.
+    texture
+        Write textures, too, which take far more space than colours of vertices: in USD one of each frame, PNG files in
+        the folder NAME_textures (.usdz: inside); in GLB, which cannot change a picture in time, one for each mesh.
+        Needs the extra `color`.
     """
-    options = ExportOptions(layers, only, up)
+    options = ExportOptions(layers, only, up, texture)
     target = _target(file, output, glb, usd)
     wanted = SequenceOptions(frames=frames)
     with open_video(file) as video:

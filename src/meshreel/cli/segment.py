@@ -20,8 +20,8 @@ from ..encoder.options import EncoderOptions, SceneOptions
 from ..encoder.presets import preset_options
 from ..errors import InputError
 from ..geometry.cameras import pack_cameras
-from ..io.mask_pictures import is_mask, write_picture
-from ..io.write import frame_names, left_over, make_folder, replacing, write_colored
+from ..io.mask_pictures import is_mask
+from ..io.write import frame_names, left_over, make_folder, replacing, write_colored, write_picture
 from ..types import MeshSequence, evenly
 from .console import Common
 from .flags import Reading

@@ -13,6 +13,7 @@ from itertools import accumulate, pairwise
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float32
 
 from ..container.reader import Chunk, ReelReader
 from ..decoder.tracks import Background, Track
@@ -40,6 +41,7 @@ class ExportOptions:
     up: Up | None = (
         None  # axis of the meshes that points up, None: as the .reel file names it; in the exported file it is +y
     )
+    texture: bool = False  # of each frame in USD, of each shape's first in GLB: glTF cannot change a picture in time
 
     def __post_init__(self) -> None:
         if self.layers is not None and self.layers < 0:
@@ -54,6 +56,7 @@ class _Source:
     tracks: tuple[Track, ...]
     background: Background
     frames: range
+    textured: bool
 
 
 def export(
@@ -70,7 +73,7 @@ def export(
     """
     frames = range(reader.frame_count) if frames is None else frames
     tracks = tuple(Track(reader, number, options.layers) for number in range(len(reader.tracks)))
-    source = _Source(reader, tracks, Background(reader), frames)
+    source = _Source(reader, tracks, Background(reader), frames, options.texture)
     written = 0
     with _writer(path, _animation(reader, frames, options.up or reader.up)) as writer:
         if options.only != "moving":
@@ -121,7 +124,8 @@ def _states(source: _Source) -> Iterator[Shape]:
         mesh = source.background.of_frame(own[0][0])
         if mesh is not None and not mesh.is_empty:
             shown = tuple((first - frames.start, end - frames.start) for first, end in own)
-            yield Shape("background", f"state_{number}", mesh.faces, shown[0][0], 1, map(_points, [mesh]), shown)
+            points, uv = map(_points, [mesh]), _uv(source, mesh)
+            yield Shape("background", f"state_{number}", mesh.faces, shown[0][0], 1, points, shown, uv)
 
 
 def _moving(source: _Source, progress: Progress | None) -> Iterator[Shape]:
@@ -149,8 +153,8 @@ def _group_shapes(source: _Source, group: Chunk, own: range) -> Iterator[Shape]:
             moving = [*meshes[a:b], *_ahead(source, group, meshes[:b], own[b - 1] + 1)]
             first, name = own[a] - source.frames.start, f"frames_{own[a]}_to_{own[b - 1]}"
             span = (first, first + b - a)
-            part = f"track_{group.track}"
-            yield Shape(part, name, meshes[a].faces, first, len(moving), map(_points, moving), (span,))
+            part, uv, points = f"track_{group.track}", _uv(source, meshes[a]), map(_points, moving)
+            yield Shape(part, name, meshes[a].faces, first, len(moving), points, (span,), uv)
 
 
 def _shape_ranges(meshes: Sequence[Mesh]) -> Iterator[tuple[int, int]]:
@@ -191,4 +195,8 @@ def _is_moved(before: Mesh, after: Mesh) -> bool:
 
 
 def _points(mesh: Mesh) -> Points:
-    return Points(mesh.vertices, vertex_normals(mesh))
+    return Points(mesh.vertices, vertex_normals(mesh), mesh.colors, mesh.texture)
+
+
+def _uv(source: _Source, mesh: Mesh) -> Float32[np.ndarray, "F 3 2"] | None:
+    return mesh.uv if source.textured and mesh.texture is not None else None

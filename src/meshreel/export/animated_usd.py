@@ -17,10 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Float32, Float64, UInt8
 
 from ..errors import InputError
 from ..io.file_names import is_text
+from ..io.glb_file import light
+from ..io.pictures import pack_picture
 from .shapes import Animation, Shape, changes, unit_normals
 
 EXTENSIONS = (".usdc", ".usda", ".usdz", ".usd")
@@ -44,14 +46,19 @@ def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
         raise InputError(f"{path}: USD takes no path that is not Unicode text; choose another folder, or .glb")
     try:
         with tempfile.TemporaryDirectory(".part", ".", path.parent, ignore_cleanup_errors=True) as folder:
-            crate = Path(folder) / "scene.usdc"
-            writer = UsdWriter(crate, animation)
+            crate, textures = Path(folder) / "scene.usdc", Path(folder) / f"{path.stem}_textures"
+            writer = UsdWriter(crate, textures, animation)
             try:
                 yield writer
                 writer.save()
             finally:
                 writer.close()
-            _converted(crate, path).replace(path)
+            whole = _converted(crate, path)
+            if textures.exists() and path.suffix.lower() != ".usdz":
+                (path.parent / textures.name).mkdir(exist_ok=True)
+                for picture in textures.iterdir():
+                    picture.replace(path.parent / textures.name / picture.name)
+            whole.replace(path)
     except (OSError, Tf.ErrorException) as error:
         remedy = "free space, or choose another folder"
         raise InputError(f"{path}: cannot be written ({_reason(error)}); {remedy}") from None
@@ -60,11 +67,12 @@ def animated_usd(path: Path, animation: Animation) -> Iterator[UsdWriter]:
 class UsdWriter:
     """Writer that adds prims to a stage in a new crate file."""
 
-    def __init__(self, crate: Path, animation: Animation) -> None:
+    def __init__(self, crate: Path, textures: Path, animation: Animation) -> None:
+        """Write to a new `crate`, and pictures to a folder `textures` beside it, which need not exist."""
         from pxr import Gf, Kind, Usd, UsdGeom
 
         stage = Usd.Stage.CreateNew(str(crate))
-        self._stage, self._animation = stage, animation
+        self._stage, self._textures, self._animation = stage, textures, animation
         self._codes = _codes(animation)
         self._unsaved = 0
         stage.SetTimeCodesPerSecond(animation.frame_rate)
@@ -89,7 +97,6 @@ class UsdWriter:
         mesh = UsdGeom.Mesh.Define(self._stage, part.GetPath().AppendChild(_identifier(shape.name)))
         mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
         mesh.CreateDoubleSidedAttr(True)  # surfaces may be open
-        mesh.CreateDisplayColorAttr([_GREY])
         mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(shape.faces), 3, np.int32)))
         mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(shape.faces.reshape(-1))))
         mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
@@ -123,10 +130,14 @@ class UsdWriter:
 
     def _move(self, mesh: Any, shape: Shape) -> int:
         """Write points and normals, which USD interpolates linearly between samples; return their bytes."""
-        from pxr import Usd, Vt
+        from pxr import Usd, UsdGeom, Vt
 
         size = 0
         points, normals, extent = mesh.CreatePointsAttr(), mesh.CreateNormalsAttr(), mesh.CreateExtentAttr()
+        shown, picture = (
+            mesh.CreateDisplayColorPrimvar(),
+            None if shape.uv is None else self._picture(mesh, shape, shape.uv),
+        )
         for number, frame in enumerate(shape.frames):
             code = Usd.TimeCode.Default() if shape.count == 1 else Usd.TimeCode(self._codes[shape.first + number])
             local = self._animation.local(shape, frame.vertices)
@@ -134,7 +145,56 @@ class UsdWriter:
             normals.Set(Vt.Vec3fArray.FromNumpy(unit_normals(frame)), code)
             extent.Set(Vt.Vec3fArray.FromNumpy(np.stack([local.min(axis=0), local.max(axis=0)])), code)
             size += 2 * local.nbytes
+            if frame.colors is not None:
+                shown.Set(Vt.Vec3fArray.FromNumpy(light(frame.colors)), code)
+            if picture is not None and frame.texture is not None and shape.first + number < shape.shown[0][1]:
+                picture.Set(self._put_picture(f"{shape.part}_{shape.first + number:05}", frame.texture.pixels), code)
+        if frame.colors is None:
+            shown.Set([_GREY])
+        else:
+            shown.SetInterpolation(UsdGeom.Tokens.vertex)
         return size
+
+    def _picture(self, mesh: Any, shape: Shape, uv: Float32[np.ndarray, "F 3 2"]) -> Any:
+        """Give faces with a place in the textures a material; return the attribute for the file of its picture."""
+        from pxr import Sdf, UsdGeom, UsdShade, Vt
+
+        types, path = Sdf.ValueTypeNames, mesh.GetPath().AppendChild("material")
+        places = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", types.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
+        places.Set(Vt.Vec2fArray.FromNumpy(np.nan_to_num(uv).reshape(-1, 2)))
+        material = UsdShade.Material.Define(self._stage, path)
+        surface, picture, reader = (
+            UsdShade.Shader.Define(self._stage, path.AppendChild(name)) for name in ("surface", "picture", "places")
+        )
+        for shader, kind in (
+            (surface, "UsdPreviewSurface"),
+            (picture, "UsdUVTexture"),
+            (reader, "UsdPrimvarReader_float2"),
+        ):
+            shader.CreateIdAttr(kind)
+        reader.CreateInput("varname", types.String).Set("st")
+        picture.CreateInput("sourceColorSpace", types.Token).Set("sRGB")
+        st = reader.CreateOutput("result", types.Float2)
+        picture.CreateInput("st", types.Float2).ConnectToSource(st)
+        rgb = picture.CreateOutput("rgb", types.Float3)
+        surface.CreateInput("diffuseColor", types.Color3f).ConnectToSource(rgb)
+        surface.CreateInput("roughness", types.Float).Set(0.9)
+        material.CreateSurfaceOutput().ConnectToSource(surface.CreateOutput("surface", types.Token))
+        bound = UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim())
+        if not shape.pictured.all():
+            faces = Vt.IntArray.FromNumpy(np.flatnonzero(shape.pictured).astype(np.int32))
+            subset = bound.CreateMaterialBindSubset("pictured", faces)
+            bound = UsdShade.MaterialBindingAPI.Apply(subset.GetPrim())
+        bound.Bind(material)
+        return picture.CreateInput("file", types.Asset)
+
+    def _put_picture(self, name: str, pixels: UInt8[np.ndarray, "H W 3"]) -> Any:
+        """Write a picture and return its place, relative to the stage."""
+        from pxr import Sdf
+
+        self._textures.mkdir(exist_ok=True)
+        (self._textures / f"{_identifier(name)}.png").write_bytes(pack_picture(pixels))
+        return Sdf.AssetPath(f"./{self._textures.name}/{_identifier(name)}.png")
 
 
 def _codes(animation: Animation) -> list[float]:

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int32
+from jaxtyping import Bool, Float32, Float64, Int32, UInt8
 
 from ..errors import InputError
-from ..types import Up
+from ..types import Texture, Up
 
 _TURNS: dict[Up, list[list[int]]] = {  # rotations that turn an axis to +y
     "y": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -31,6 +31,8 @@ class Points:
 
     vertices: Float64[np.ndarray, "V 3"]  # m
     normals: Float64[np.ndarray, "V 3"]  # of length 1, or 0 at vertices without a normal
+    colors: UInt8[np.ndarray, "V 3"] | None = None  # sRGB; all frames of a shape have colours, or none has
+    texture: Texture | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +46,16 @@ class Shape:
     count: int  # number of its frames, which are consecutive
     frames: Iterable[Points]  # `count` of them
     shown: tuple[tuple[int, int], ...]  # ranges of frames that show it: end excluded, in order, with gaps between
+    # Places of the faces' corners in the textures of the frames, as `Mesh.uv`: all of a face's are NaN, or none is.
+    uv: Float32[np.ndarray, "F 3 2"] | None = None
 
     def __str__(self) -> str:
         return f"{self.part}, {self.name}"
+
+    @property
+    def pictured(self) -> Bool[np.ndarray, " F"]:
+        """Which faces have a place in the textures."""
+        return np.zeros(len(self.faces), bool) if self.uv is None else np.isfinite(self.uv[:, 0, 0])
 
 
 @dataclass(frozen=True, slots=True)

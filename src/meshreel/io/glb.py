@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from base64 import b64decode
 from functools import partial
 from typing import Any
 
@@ -12,6 +13,7 @@ from jaxtyping import Float32, UInt8
 
 from ..types import GREY, Texture
 from .color import from_linear
+from .glb_file import PASSED_OVER
 from .pictures import parse_picture
 from .polygons import Dropped, Polygons, Unreadable
 
@@ -38,8 +40,9 @@ def parse_glb(data: bytes) -> Polygons:
         # A scale of 0 hides a node until an animation shows it.
         parts = [part for part in placed if isinstance(part[1], trimesh.Trimesh) and part[0][:3, :3].any()]
         pictures = _pictures(tree)
-        lost = frozenset({"several materials"} if len(pictures) > 1 else ())
-        picture = _picture(data, tree, pictures.pop()) if len(pictures) == 1 else None
+        picture = _picture(data, tree, min(pictures)) if len(pictures) == 1 else None
+        why = "several materials" if len(pictures) > 1 else "a texture (it is in another file)"
+        lost = frozenset({why} if pictures and picture is None else ())
         return _joined(parts, _dropped(tree) | lost, picture)
     except Exception as error:  # a foreign parser may raise anything for a damaged file
         raise Unreadable(f"GLB cannot be read ({type(error).__name__}: {error})") from None
@@ -99,8 +102,10 @@ def _pictures(tree: dict[str, Any]) -> set[int]:
 
 
 def _picture(data: bytes, tree: dict[str, Any], image: int) -> Texture | None:
-    """Return the texture of an image that is in the file."""
-    view = tree["images"][image].get("bufferView")
+    """Return the texture of an image that is in the file, None for one that is not."""
+    view, uri = tree["images"][image].get("bufferView"), tree["images"][image].get("uri", "")
+    if uri.startswith("data:"):
+        return Texture(partial(parse_picture, b64decode(uri.split(",", 1)[1]), "the texture of a GLB"))
     if view is None:
         return None
     where = tree["bufferViews"][view]
@@ -135,7 +140,8 @@ def _places(part: Any) -> Float32[np.ndarray, "V 2"]:
 
 def _colors(parts: list[Any]) -> UInt8[np.ndarray, "V 3"] | None:
     """Return the colours of all vertices, grey for parts without; None where no part has any."""
-    found = [part.vertex_attributes.get(_HIDDEN.decode().strip('"')) for part in parts]
+    names = (_HIDDEN.decode().strip('"'), PASSED_OVER)
+    found = [next((part.vertex_attributes[n] for n in names if n in part.vertex_attributes), None) for part in parts]
     if all(values is None for values in found):
         return None
     colors = [

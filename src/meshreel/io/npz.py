@@ -1,6 +1,7 @@
 """Reader of .npz files with `vertices` (T x V x 3) and `faces` (F x 3), one frame at a time.
 
-In: a path. Out: frames by number. The stream is read forward, with one frame in memory; going back restarts it.
+They may have `colors` (V x 3, or T x V x 3), and `uv` (F x 3 x 2) with `texture` (H x W x 3, or T x H x W x 3).
+In: a path. Out: frames by number. A stream is read forward, with one frame in memory; going back restarts it.
 """
 
 from __future__ import annotations
@@ -10,16 +11,18 @@ import tokenize
 import zipfile
 import zlib
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Int64, UInt8
 
 from ..errors import InputError
+from ..types import Texture
 from .meshes import Loaded, checked
-from .polygons import Polygons, Unreadable
+from .pictures import MOST_PIXELS
+from .polygons import Polygons, Unreadable, eight_bits
 
 _DAMAGED = (  # errors of NumPy and zipfile for damaged files; RuntimeError for encrypted ones
     *(OSError, ValueError, EOFError, SyntaxError, tokenize.TokenError, RecursionError),
@@ -27,27 +30,65 @@ _DAMAGED = (  # errors of NumPy and zipfile for damaged files; RuntimeError for 
 )
 
 
+class _Stream:
+    """An array in an archive with a row for each frame, or one row for all, which are read one after the other."""
+
+    def __init__(self, path: Path, archive: zipfile.ZipFile, name: str, dimensions: int) -> None:
+        """Open the array `name`, whose rows have so many dimensions."""
+        shape, self.dtype, self._begin = _head(archive, name)
+        self._path, self._name, self._whole = path, name, shape
+        self.rows = shape[0] if len(shape) > dimensions else None  # None: one for all frames
+        self.shape = shape[-dimensions:] if len(shape) <= dimensions + 1 else ()
+        self._stream: IO[bytes] | None = None
+        self._lock = threading.Lock()  # of the stream, which has one place
+
+    def __str__(self) -> str:
+        return f"'{self._name}' is {self.dtype} {self._whole}"
+
+    def row(self, frame: int) -> np.ndarray:
+        """Read the row of a frame. Raises Unreadable where the file ends before."""
+        size = int(np.prod(self.shape)) * self.dtype.itemsize
+        with self._lock:
+            if self._stream is None:  # while the sequence lives
+                self._stream = zipfile.ZipFile(self._path).open(f"{self._name}.npy")  # noqa: SIM115
+            self._stream.seek(self._begin + (0 if self.rows is None else frame) * size)
+            data = self._stream.read(size)
+        if len(data) < size:
+            raise Unreadable(f"'{self._name}' has {len(data)} of {size} bytes (truncated?)")
+        return np.frombuffer(data, dtype=self.dtype).reshape(self.shape)
+
+
 class Archive:
     """Frames of an .npz file."""
 
     def __init__(self, path: Path) -> None:
         self.path, self.paths = path, (path,)
-        self._stream: IO[bytes] | None = None
-        self._lock = threading.Lock()  # of the stream, which has one place
+        self._last: tuple[int, np.ndarray] | None = None  # the picture that was read last, and its frame
         try:
             with zipfile.ZipFile(path) as archive:
-                names = sorted(name.removesuffix(".npy") for name in archive.namelist())
-                if not {"vertices.npy", "faces.npy"} <= set(archive.namelist()):
-                    raise InputError(f"{path}: has {', '.join(names) or 'nothing'}; save it as 'vertices' and 'faces'")
-                self._shape, self._dtype, self._begin = _head(archive, "vertices")
-                _head(archive, "faces")  # refuses an array larger than the file before it is allocated
-                faces = np.load(path, allow_pickle=False)["faces"]
+                names = {name.removesuffix(".npy") for name in archive.namelist()}
+                if not {"vertices", "faces"} <= names:
+                    found = ", ".join(sorted(names)) or "nothing"
+                    raise InputError(f"{path}: has {found}; save it as 'vertices' and 'faces'")
+                self._vertices = _Stream(path, archive, "vertices", 2)
+                self._colors = _Stream(path, archive, "colors", 2) if "colors" in names else None
+                self._texture = _Stream(path, archive, "texture", 3) if "texture" in names else None
+                for name in {"faces", "uv"} & names:
+                    _head(archive, name)  # refuses an array larger than the file before it is allocated
+                arrays = np.load(path, allow_pickle=False)
+                faces, uv = arrays["faces"], arrays["uv"] if "uv" in names else None
         except _DAMAGED as error:
             raise InputError(f"{path}: cannot be read as .npz ({error}); write it again with numpy.savez") from None
-        if len(self._shape) != 3 or self._shape[2] != 3 or self._dtype.kind not in "fiu":
-            raise InputError(f"{path}: 'vertices' is {self._dtype} {self._shape}; it must be numbers T x V x 3")
+        if self._vertices.rows is None or self._vertices.shape[1:] != (3,) or self._vertices.dtype.kind not in "fiu":
+            raise InputError(f"{path}: {self._vertices}; it must be numbers T x V x 3")
         if faces.ndim != 2 or (faces.shape[1] < 3 and len(faces)) or faces.dtype.kind not in "iu":
             raise InputError(f"{path}: 'faces' is {faces.dtype} {faces.shape}; it must be integers F x 3")
+        if uv is not None and (uv.shape != (*faces.shape, 2) or uv.dtype.kind != "f"):
+            raise InputError(
+                f"{path}: 'uv' is {uv.dtype} {uv.shape}; it must be fractions, two for each corner of a face"
+            )
+        self._check_colors()
+        self._uv = None if uv is None else uv.astype(np.float32).reshape(-1, 2)
         self._corners: Int64[np.ndarray, " C"] = faces.astype(np.int64).reshape(-1)
         self._sizes: Int64[np.ndarray, " P"] = np.full(len(faces), faces.shape[1], dtype=np.int64)
 
@@ -62,7 +103,7 @@ class Archive:
         return self
 
     def __len__(self) -> int:
-        return int(self._shape[0])
+        return self._vertices.rows or 0
 
     def name(self, index: int) -> str:
         """Return the name of a frame in error messages."""
@@ -71,22 +112,44 @@ class Archive:
     def load(self, index: int, where: str) -> Loaded:
         """Read and check one frame."""
         try:
-            return checked(Polygons(self._vertices(index), self._corners, self._sizes))
+            return checked(self._polygons(index))
         except Unreadable as error:
             raise InputError(f"{where}: {error}; mend the .npz, or leave the frame out with --frames") from None
         except _DAMAGED as error:
             raise InputError(f"{where}: cannot be read ({error}); write it again with numpy.savez") from None
 
-    def _vertices(self, index: int) -> Float64[np.ndarray, "V 3"]:
-        size = self._shape[1] * 3 * self._dtype.itemsize
-        with self._lock:
-            if self._stream is None:
-                self._stream = zipfile.ZipFile(self.path).open("vertices.npy")  # noqa: SIM115 (while the sequence lives)
-            self._stream.seek(self._begin + index * size)
-            data = self._stream.read(size)
-        if len(data) < size:
-            raise Unreadable(f"'vertices' has {len(data)} of {size} bytes (truncated?)")
-        return np.frombuffer(data, dtype=self._dtype).astype(np.float64).reshape(-1, 3)
+    def _check_colors(self) -> None:
+        """Raise InputError where colours or pictures are not those of the vertices and frames."""
+        colors, texture, rows = self._colors, self._texture, (None, self._vertices.rows)
+        if colors is not None and (
+            colors.shape != self._vertices.shape or colors.rows not in rows or colors.dtype.kind not in "fiu"
+        ):
+            raise InputError(f"{self.path}: {colors}; it must be numbers V x 3, or T x V x 3 as 'vertices'")
+        if texture is not None and (
+            texture.shape[2:] != (3,) or 0 in texture.shape or texture.rows not in rows or texture.dtype != np.uint8
+        ):
+            raise InputError(f"{self.path}: {texture}; it must be uint8 H x W x 3, or T x H x W x 3")
+        if texture is not None and texture.shape[0] * texture.shape[1] > MOST_PIXELS:
+            raise InputError(f"{self.path}: {texture}, more than 8192 x 8192 pixels; make it smaller")
+
+    def _polygons(self, index: int) -> Polygons:
+        vertices = self._vertices.row(index).astype(np.float64)
+        colors = None if self._colors is None else eight_bits(self._colors.row(index))
+        texture = None if self._texture is None else Texture(partial(self._picture, index))
+        dropped = frozenset({"a texture (without uv)"} if self._uv is None and texture is not None else ())
+        return Polygons(vertices, self._corners, self._sizes, dropped, colors, self._uv, texture)
+
+    def _picture(self, index: int) -> UInt8[np.ndarray, "H W 3"]:
+        assert self._texture is not None
+        index = 0 if self._texture.rows is None else index
+        if self._last is None or self._last[0] != index:
+            try:
+                self._last = index, self._texture.row(index)
+            except (Unreadable, *_DAMAGED) as error:
+                raise InputError(
+                    f"{self.name(index)}: cannot be read ({error}); write it again with numpy.savez"
+                ) from None
+        return self._last[1]
 
 
 @lru_cache(maxsize=4)  # archives at a time (guess)

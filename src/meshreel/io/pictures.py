@@ -17,7 +17,6 @@ from ..types import Texture
 from .polygons import Dropped
 from .read import read_file
 from .remote import Place
-from .write import replacing
 
 MOST_PIXELS = 1 << 26  # of a picture: 8192 x 8192, 200 MB in memory (guess)
 _DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits of grey
@@ -70,14 +69,15 @@ def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
     return pixels
 
 
-def write_picture(pixels: UInt8[np.ndarray, "H W 3"], path: Path) -> None:
-    """Write a picture as PNG."""
-    from PIL import Image
-
+def pack_picture(pixels: UInt8[np.ndarray, "H W *C"]) -> bytes:
+    """Return the bytes of a PNG file, grey or in colour. Raises InputError where Pillow is missing."""
+    try:
+        from PIL import Image
+    except ImportError:
+        raise InputError("pictures need the extra `color`: pip install 'meshreel[color]'") from None
     packed = io.BytesIO()
     Image.fromarray(pixels).save(packed, format="PNG", compress_level=1)  # a quarter of the time for a tenth more
-    with replacing(path) as file:
-        file.write(packed.getvalue())
+    return packed.getvalue()
 
 
 def texture_of_materials(mesh: Place, files: tuple[str, ...], used: tuple[str, ...]) -> tuple[Texture | None, Dropped]:

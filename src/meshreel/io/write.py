@@ -1,26 +1,28 @@
-"""Writer of PLY, OBJ and GLB files, which appear complete or not at all.
+"""Writer of PLY, OBJ, GLB and NPZ files, which appear complete or not at all.
 
 In: a mesh and a path, whose extension selects the format. Out: a file that `open_sequence` can read.
 """
 
 from __future__ import annotations
 
-import json
+import io
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 from jaxtyping import UInt8
 
 from ..errors import InputError
 from ..types import Mesh
-from .color import to_linear
+from .glb_file import COLORS, PLACES, Faces, GlbFile, cut_at_seams, distinct_places
+from .pictures import pack_picture
 from .unfinished import cannot_be_written, unfinished
 
 _WAIT = 10.0  # s, for another process that writes the same file: a mesh takes less (guess)
+_MATERIAL = "surface"  # its name in the .mtl beside an .obj
 _TOLERANCE = 1e-6  # of the diagonal: largest rounding error of a float32 coordinate (guess)
 
 
@@ -54,12 +56,21 @@ def check_apart(output: Path, inputs: Iterable[Path]) -> None:
 
 
 def write_mesh(mesh: Mesh, path: Path) -> None:
-    """Write a mesh to a .ply, .obj or .glb file, which appears when it is complete."""
-    pack = _FORMATS.get(path.suffix.lower())
+    """Write a mesh to a .ply, .obj, .glb or .npz file, which appears when it is complete.
+
+    A .ply has no texture; that of an .obj is in a .mtl and a .png of its name.
+    """
+    extension = path.suffix.lower()
+    pack = _FORMATS.get(extension)
     if pack is None:
         raise InputError(f"{path}: {path.suffix or 'no'} extension is not one of {', '.join(_FORMATS)}; choose one")
+    if extension == ".obj" and mesh.uv is not None and mesh.texture is not None:
+        write_picture(mesh.texture.pixels, path.with_suffix(".png"))
+        with replacing(path.with_suffix(".mtl")) as file:
+            file.write(f"newmtl {_MATERIAL}\nKd 1 1 1\nmap_Kd {path.stem}.png\n".encode())
+    data = pack(mesh, path)
     with replacing(path) as file:
-        file.write(pack(mesh))
+        file.write(data)
 
 
 def write_colored(mesh: Mesh, colors: UInt8[np.ndarray, "F 3"], path: Path) -> None:
@@ -84,7 +95,14 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         yield file
 
 
-def _pack_ply(mesh: Mesh) -> bytes:
+def write_picture(pixels: UInt8[np.ndarray, "H W *C"], path: Path) -> None:
+    """Write a picture as PNG, grey or in colour."""
+    data = pack_picture(pixels)
+    with replacing(path) as file:
+        file.write(data)
+
+
+def _pack_ply(mesh: Mesh, _: Path) -> bytes:
     colors = mesh.colors
     kind, dtype = ("float", "<f4") if _fits_float32(mesh) else ("double", "<f8")
     colored = "" if colors is None else "property uchar red\nproperty uchar green\nproperty uchar blue\n"
@@ -101,64 +119,62 @@ def _pack_ply(mesh: Mesh) -> bytes:
     return header.encode() + points.tobytes() + rows.tobytes()
 
 
-def _pack_obj(mesh: Mesh) -> bytes:
+def _pack_obj(mesh: Mesh, path: Path) -> bytes:
     vertex = "v %.9g %.9g %.9g\n" if _fits_float32(mesh) else "v %.17g %.17g %.17g\n"
     rows = mesh.vertices if mesh.colors is None else np.concatenate([mesh.vertices, mesh.colors / 255], axis=1)
     vertex = vertex if mesh.colors is None else vertex.replace("\n", " %.4f %.4f %.4f\n")
     vertices = "".join(vertex % tuple(row) for row in rows.tolist())
-    faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + 1).tolist())
+    if mesh.uv is None or mesh.texture is None:
+        faces = "".join(f"f {a} {b} {c}\n" for a, b, c in (mesh.faces + 1).tolist())
+    else:
+        places, numbers = distinct_places(mesh.uv)
+        known = np.isfinite(places).all(axis=1)
+        rows = np.stack([mesh.faces + 1, np.cumsum(known)[numbers]], axis=2).reshape(-1, 6)
+        forms, has_place = ("f %d %d %d\n", "f %d/%d %d/%d %d/%d\n"), known[numbers].all(axis=1).tolist()
+        vertices += f"mtllib {path.stem}.mtl\nusemtl {_MATERIAL}\n"
+        vertices += "".join(f"vt {u:.9g} {v:.9g}\n" for u, v in places[known].tolist())
+        faces = "".join(
+            forms[has] % tuple(row if has else row[::2]) for has, row in zip(has_place, rows.tolist(), strict=True)
+        )
     return ("# meshreel\n" + vertices + faces).encode()  # a comment, because readers take an empty file for damage
 
 
-def _pack_glb(mesh: Mesh) -> bytes:
+def _pack_npz(mesh: Mesh, _: Path) -> bytes:
+    arrays = {"vertices": mesh.vertices[None], "faces": mesh.faces}
+    arrays |= {} if mesh.colors is None else {"colors": mesh.colors[None]}
+    if mesh.uv is not None and mesh.texture is not None:
+        arrays |= {"uv": mesh.uv, "texture": mesh.texture.pixels}
+    packed = io.BytesIO()
+    np.savez_compressed(packed, allow_pickle=False, **arrays)
+    return packed.getvalue()
+
+
+def _pack_glb(mesh: Mesh, path: Path) -> bytes:
     """Pack vertices as float32 relative to the translation of the node, so that far coordinates keep their digits."""
-    if mesh.is_empty:
-        return _glb({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{}]}, b"")
-    origin = np.zeros(3) if _fits_float32(mesh) else np.round(mesh.vertices.mean(axis=0))
-    local = (mesh.vertices - origin).astype("<f4")
-    points, corners = local.tobytes(), mesh.faces.astype("<u4").tobytes()
-    low, high = local.min(axis=0).tolist(), local.max(axis=0).tolist()
-    attributes, accessors, views, colors = {"POSITION": 0}, list[dict[str, object]](), list[dict[str, object]](), b""
-    if mesh.colors is not None:  # rows of four bytes' multiples: a fourth number beside red, green and blue
-        light = np.pad(to_linear(mesh.colors), ((0, 0), (0, 1)), constant_values=65535)
-        colors, attributes["COLOR_0"] = light.astype("<u2").tobytes(), 2
-        accessors = [{"bufferView": 2, "componentType": 5123, "normalized": True, "count": len(local), "type": "VEC4"}]
-        views = [{"buffer": 0, "byteOffset": len(points) + len(corners), "byteLength": len(colors), "target": 34962}]
-    tree = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "translation": origin.tolist()}],
-        "meshes": [{"primitives": [{"attributes": attributes, "indices": 1, "mode": 4}]}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": len(local), "type": "VEC3", "min": low, "max": high},
-            {"bufferView": 1, "componentType": 5125, "count": mesh.faces.size, "type": "SCALAR"},
-            *accessors,
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": len(points), "target": 34962},
-            {"buffer": 0, "byteOffset": len(points), "byteLength": len(corners), "target": 34963},
-            *views,
-        ],
-        "buffers": [{"byteLength": len(points) + len(corners) + len(colors)}],
-    }
-    return _glb(tree, points + corners + colors)
+    file, scene = GlbFile(io.BytesIO(), str(path)), {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{}]}
+    if not mesh.is_empty:
+        scene["scenes"] = [{"nodes": [0]}]
+        origin = np.zeros(3) if _fits_float32(mesh) else np.round(mesh.vertices.mean(axis=0))
+        file.add("nodes", {"mesh": 0, "translation": origin.tolist()})
+        file.add("meshes", {"primitives": _primitives(file, mesh.at(mesh.vertices - origin))})
+    packed = io.BytesIO()
+    file.finish(packed, scene)
+    return packed.getvalue()
 
 
-def _glb(tree: dict[str, object], binary: bytes) -> bytes:
-    """Return the container: header, JSON chunk, binary chunk; chunks are padded to 4 bytes."""
-    text = json.dumps(tree, separators=(",", ":")).encode()
-    chunks = _chunk(b"JSON", text + b" " * (-len(text) % 4))
-    chunks += _chunk(b"BIN\0", binary) if binary else b""
-    return b"glTF" + _words(2, 12 + len(chunks)) + chunks
-
-
-def _chunk(kind: bytes, data: bytes) -> bytes:
-    return _words(len(data)) + kind + data
-
-
-def _words(*values: int) -> bytes:
-    return np.array(values, dtype="<u4").tobytes()
+def _primitives(file: GlbFile, mesh: Mesh) -> list[dict[str, Any]]:
+    pictured, uv, texture = np.zeros(len(mesh.faces), bool), mesh.uv, mesh.texture
+    colors, picture, frame = mesh.colors, None, dict[str, int]()
+    if uv is not None and texture is not None:
+        origins, corners, places = cut_at_seams(mesh.faces, uv)
+        mesh, colors = Mesh(mesh.vertices[origins], corners), None if colors is None else colors[origins]
+        pictured, picture = np.isfinite(uv).all(axis=(1, 2)), file.put_picture(texture.pixels)
+        frame[PLACES] = file.put_places(places)
+    file.open_vertices()
+    frame["POSITION"] = file.put(mesh.vertices.astype("<f4"), "VEC3", bounded=True)
+    frame |= {} if colors is None else {COLORS: file.put_colors(colors)}
+    material = None if colors is None else file.unlit({})
+    return file.put_faces(Faces(mesh.faces, pictured, picture, material), [frame])
 
 
 def _fits_float32(mesh: Mesh) -> bool:
@@ -168,4 +184,9 @@ def _fits_float32(mesh: Mesh) -> bool:
     return bool(lost.max() <= _TOLERANCE * mesh.diagonal)
 
 
-_FORMATS: dict[str, Callable[[Mesh], bytes]] = {".ply": _pack_ply, ".obj": _pack_obj, ".glb": _pack_glb}
+_FORMATS: dict[str, Callable[[Mesh, Path], bytes]] = {
+    ".ply": _pack_ply,
+    ".obj": _pack_obj,
+    ".glb": _pack_glb,
+    ".npz": _pack_npz,
+}

@@ -1,0 +1,184 @@
+"""Writer of GLB files (binary glTF 2.0): arrays and pictures one after the other, and the scene that refers to them.
+
+In: arrays. Out: numbers of accessors and materials, then the file, whose binary chunk is never in memory as a whole.
+A picture or colours of vertices show as they are, without light (KHR_materials_unlit); a face has the one or the other,
+for glTF multiplies them: what has a place in the picture keeps its colours under a name that viewers pass over.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import dataclass
+from io import BytesIO
+from typing import IO, Any, BinaryIO
+
+import numpy as np
+from jaxtyping import Bool, Float32, Int32, Int64, UInt8
+
+from ..errors import InputError
+from .color import to_linear
+from .pictures import pack_picture
+
+MOST_BYTES = (1 << 32) - 1  # of a GLB file, whose header has 32 bits for its length (glTF 2.0, "GLB File Format")
+COLORS, PLACES = "COLOR_0", "TEXCOORD_0"
+PASSED_OVER = "_COLOR_0"  # a name that begins with _ is an application's own (glTF 2.0)
+_FLOAT, _U16, _U32 = 5126, 5123, 5125
+_VERTICES, _INDICES = 34962, 34963  # targets of a buffer view (glTF 2.0)
+_RESTART = 65535  # largest value of 16 bits: restarts a primitive, so it is no index (glTF 2.0)
+_UNLIT = "KHR_materials_unlit"
+_MATT = {"metallicFactor": 0.0, "roughnessFactor": 0.9}  # for viewers without the extension
+
+
+@dataclass(frozen=True, slots=True)
+class Faces:
+    """Faces of a mesh, which of them have a place in a picture, and the materials of those and of the others."""
+
+    corners: Int32[np.ndarray, "F 3"]
+    pictured: Bool[np.ndarray, " F"]
+    picture: int | None
+    material: int | None
+
+
+class GlbFile:
+    """A GLB file in the making."""
+
+    def __init__(self, spool: IO[bytes] | BytesIO, name: str, remedy: str = "write fewer") -> None:
+        """Write arrays to an empty `spool` first; `name` begins error messages, `remedy` ends that of its length."""
+        self._spool, self._name, self._remedy = spool, name, remedy
+        self._size = 0
+        self._tree: dict[str, list[Any]] = {}
+
+    def add(self, kind: str, item: dict[str, Any]) -> int:
+        """Append an item to a list of the description, as "meshes", and return its number."""
+        self._tree.setdefault(kind, []).append(item)
+        return len(self._tree[kind]) - 1
+
+    def open_vertices(self, stride: int = 12) -> None:
+        """Begin a buffer view of attributes of vertices, so many bytes for each; each `put` extends it."""
+        self.open_view(byteStride=stride, target=_VERTICES)
+
+    def open_view(self, **others: int) -> None:
+        """Begin a buffer view."""
+        self.add("bufferViews", {"buffer": 0, "byteOffset": self._size, "byteLength": 0, **others})
+
+    def put(self, values: np.ndarray, kind: str, what: object = "its arrays", bounded: bool = False) -> int:
+        """Append values to the newest view and return the number of their accessor."""
+        accessor: dict[str, Any] = {
+            "bufferView": len(self._tree["bufferViews"]) - 1,
+            "byteOffset": self._tree["bufferViews"][-1]["byteLength"],
+            "componentType": {"f4": _FLOAT, "u2": _U16, "u4": _U32}[values.dtype.str[1:]],
+            "count": len(values),
+            "type": kind,
+        }
+        if bounded:
+            low, high = values.min(axis=0), values.max(axis=0)
+            accessor |= {"min": np.atleast_1d(low).tolist(), "max": np.atleast_1d(high).tolist()}
+        self._append(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes(), what)
+        return self.add("accessors", accessor)
+
+    def put_colors(self, colors: UInt8[np.ndarray, "V 3"], what: object = "its arrays") -> int:
+        """Append colours to the newest view of vertices."""
+        return self.put(light(colors), "VEC3", what)
+
+    def put_places(self, uv: Float32[np.ndarray, "V 2"], what: object = "its arrays") -> int:
+        """Append places in a texture, as `Mesh.uv` has them; glTF counts from the upper row, and has no NaN."""
+        self.open_vertices(8)
+        return self.put(np.nan_to_num(np.stack([uv[:, 0], 1 - uv[:, 1]], axis=1)), "VEC2", what)
+
+    def put_picture(self, pixels: UInt8[np.ndarray, "H W 3"], what: object = "its picture") -> int:
+        """Append a picture and return the number of the material that shows it."""
+        data = pack_picture(pixels)
+        self.open_view()
+        self._append(data, what)
+        self._tree["bufferViews"][-1]["byteLength"] = len(data)
+        image = self.add("images", {"bufferView": len(self._tree["bufferViews"]) - 1, "mimeType": "image/png"})
+        return self.unlit({"baseColorTexture": {"index": self.add("textures", {"source": image})}})
+
+    def unlit(self, surface: dict[str, Any]) -> int:
+        """Add a material that shows colours as they are, and return its number."""
+        self._tree["extensionsUsed"] = [_UNLIT]
+        extensions: dict[str, Any] = {_UNLIT: {}}
+        return self.add(
+            "materials", {"doubleSided": True, "pbrMetallicRoughness": surface | _MATT, "extensions": extensions}
+        )
+
+    def put_faces(self, faces: Faces, frames: list[dict[str, int]], what: object = "its faces") -> list[dict[str, Any]]:
+        """Append faces and return their primitives: those with a place in a picture, and the others.
+
+        `frames` are the accessors of the first frame, and of the differences of each other one from it.
+        """
+        found = []
+        shown = (faces.pictured, faces.picture, COLORS), (~faces.pictured, faces.material, PLACES)
+        for chosen, material, hidden in shown:
+            if not chosen.any():
+                continue
+            first, *targets = [{name: at for name, at in frame.items() if name != hidden} for frame in frames]
+            if hidden == COLORS and COLORS in frames[0]:
+                first[PASSED_OVER] = frames[0][COLORS]
+            primitive = {"attributes": first, "indices": self._put_corners(faces.corners[chosen], what), "mode": 4}
+            primitive |= {} if material is None else {"material": material}
+            found.append(primitive | ({"targets": targets} if targets else {}))
+        return found
+
+    def _put_corners(self, corners: Int32[np.ndarray, "F 3"], what: object) -> int:
+        self.open_view(target=_INDICES)
+        short = int(corners.max()) < _RESTART
+        return self.put(corners.reshape(-1).astype("<u2" if short else "<u4"), "SCALAR", what)
+
+    def finish(self, file: BinaryIO | BytesIO, scene: dict[str, Any]) -> None:
+        """Write the complete file: header, description, and the spooled arrays."""
+        buffers = {"buffers": [{"byteLength": self._size}]} if self._size else {}
+        text = json.dumps(scene | self._tree | buffers, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = [(b"JSON", len(text)), *([(b"BIN\0", self._size)] if self._size else [])]
+        total = 12 + sum(8 + size for _, size in chunks)
+        self._check(total, "the description of the scene")
+        file.write(b"glTF" + _words(2, total) + _words(len(text)) + b"JSON" + text)
+        if self._size:
+            file.write(_words(self._size) + b"BIN\0")
+            self._spool.seek(0)
+            shutil.copyfileobj(self._spool, file, 1 << 20)
+
+    def _append(self, data: bytes, what: object) -> None:
+        data += bytes(-len(data) % 4)
+        self._check(self._size + len(data), what)
+        self._spool.write(data)
+        self._size += len(data)
+        self._tree["bufferViews"][-1]["byteLength"] += len(data)
+
+    def _check(self, size: int, what: object) -> None:
+        if size > MOST_BYTES:
+            text = f"{self._name}: at {what} it has more than the {MOST_BYTES} bytes of a GLB file"
+            raise InputError(f"{text}; {self._remedy}")
+
+
+def distinct_places(
+    uv: Float32[np.ndarray, "F 3 2"],
+) -> tuple[Float32[np.ndarray, "P 2"], Int64[np.ndarray, "F 3"]]:
+    """Return the places in a texture without repetition, and the number of each corner's; NaN is a place, too."""
+    pairs = np.ascontiguousarray(uv).reshape(-1, 2).view(np.int64)  # places with equal bits are equal
+    places, numbers = np.unique(pairs, return_inverse=True)
+    return places.view(np.float32).reshape(-1, 2), numbers.reshape(-1, 3).astype(np.int64)
+
+
+def cut_at_seams(
+    faces: Int32[np.ndarray, "F 3"], uv: Float32[np.ndarray, "F 3 2"]
+) -> tuple[Int64[np.ndarray, " W"], Int32[np.ndarray, "F 3"], Float32[np.ndarray, "W 2"]]:
+    """Return vertices by their numbers, faces, and places in the texture, one for each vertex, as GPUs need them.
+
+    A vertex is repeated for each place that a corner of it has; one without a face is left out.
+    """
+    places, numbers = distinct_places(uv)
+    codes, corners = np.unique(faces * np.int64(len(places)) + numbers, return_inverse=True)
+    origins, place = np.divmod(codes, max(len(places), 1))
+    return origins, corners.reshape(-1, 3).astype(np.int32), places[place]
+
+
+def light(colors: UInt8[np.ndarray, "V 3"]) -> Float32[np.ndarray, "V 3"]:
+    """Return colours as shares of linear light, which glTF and USD have."""
+    return (to_linear(colors) / np.float32(65535)).astype(np.float32)
+
+
+def _words(*values: int) -> bytes:
+    return np.array(values, dtype="<u4").tobytes()
