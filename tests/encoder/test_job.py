@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from meshreel_bench.codecs.meshreel import shared_options
 from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
 from meshreel.encoder import job, paper
 from meshreel.encoder import sequence as encoding
 from meshreel.encoder.interval import Interval
-from meshreel.encoder.job import GroupStore, shared_options
+from meshreel.encoder.job import GroupStore
 from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.target import Fidelity

@@ -71,17 +71,6 @@ class Job:
         return self.options.scene
 
 
-def shared_options(options: EncoderOptions) -> EncoderOptions:
-    """Return the options with defaults for all that encodes at several rates need not share.
-
-    The paper's recipe shares all but the coding of displacements; that of layers only how a scene is taken apart.
-    """
-    if isinstance(options.method, PaperOptions):
-        plain = EncoderOptions()
-        return replace(options, method=_shared(options.method), quality=plain.quality)
-    return EncoderOptions(scene=options.scene)
-
-
 def _shared(options: PaperOptions) -> PaperOptions:
     return replace(options, displacements=PaperOptions().displacements)
 

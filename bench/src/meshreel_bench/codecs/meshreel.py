@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from meshreel.encoder.job import shared_options
-from meshreel.encoder.options import EncoderOptions
+from meshreel.encoder.options import EncoderOptions, PaperOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import Encoder
 from meshreel.types import MeshSequence
@@ -15,6 +14,17 @@ from meshreel.types import MeshSequence
 from ..codec import Progress
 from .base import TwoSteps
 from .variants import find_variant
+
+
+def shared_options(options: EncoderOptions) -> EncoderOptions:
+    """Return the options with defaults for all that encodes at several rates need not share.
+
+    The paper's recipe shares all but the coding of displacements; that of layers only how a scene is taken apart.
+    """
+    if isinstance(options.method, PaperOptions):
+        method = replace(options.method, displacements=PaperOptions().displacements)
+        return replace(options, method=method, quality=EncoderOptions().quality)
+    return EncoderOptions(scene=options.scene)
 
 
 class Prepared(TwoSteps):
