@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from meshreel.encoder.options import EncoderOptions, PaperOptions
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import Encoder
 from meshreel.types import MeshSequence
 
 from ..codec import Progress
 from .base import TwoSteps
+from .groups import prepare, shared_options
 from .variants import find_variant
-
-
-def shared_options(options: EncoderOptions) -> EncoderOptions:
-    """Return the options with defaults for all that encodes at several rates need not share.
-
-    The paper's recipe shares all but the coding of displacements; that of layers only how a scene is taken apart.
-    """
-    if isinstance(options.method, PaperOptions):
-        method = replace(options.method, displacements=PaperOptions().displacements)
-        return replace(options, method=method, quality=EncoderOptions().quality)
-    return EncoderOptions(scene=options.scene)
 
 
 class Prepared(TwoSteps):
@@ -39,13 +29,13 @@ class Prepared(TwoSteps):
 
     @property
     def analysis_key(self) -> str:
-        """Equal for options with which `Encoder.prepare` finds the same."""
+        """Equal for options with which `prepare` finds the same."""
         return repr(shared_options(self.encoder_options))
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
         """Return an encoder that has found what operating points share. Raises InputError for unusable frames."""
         encoder = Encoder(sequence, progress=progress)
-        encoder.prepare(self.encoder_options)
+        prepare(encoder, self.encoder_options)
         return encoder
 
 
