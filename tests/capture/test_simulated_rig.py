@@ -12,6 +12,7 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.rig import read_rig
 from meshreel.capture.simulated_rig import TRUTH, SceneFrame, SensorOptions, corner_cameras, simulate_rig
 from meshreel.errors import InputError
+from meshreel.geometry.closest_points import Surface, carried_labels
 from meshreel.io.depth_pictures import read_depth
 from meshreel.io.sequence import open_sequence
 from meshreel.types import Mesh
@@ -87,10 +88,10 @@ def test_the_truth_has_clean_meshes_and_labels_that_fused_faces_take(tmp_path):
         found = np.unpackbits(labels["frame_00000"])[: len(SCENE.dynamic)].astype(bool)
     assert np.array_equal(found, SCENE.dynamic) and found.sum() == len(BALL.faces)
     fused = fuse_depths(read_rig(tmp_path).depths(0), FusionOptions())
-    dynamic = SCENE.labels_for(fused)
+    dynamic = carried_labels(Surface(SCENE.mesh), SCENE.dynamic, fused)
     middles = fused.vertices[fused.faces].mean(axis=1)
     assert np.array_equal(dynamic, np.linalg.norm(middles, axis=1) < RADIUS + 0.2) and 0 < dynamic.mean() < 1
-    assert not SceneFrame.of([], []).labels_for(fused).any() and len(SCENE.labels_for(Mesh.empty())) == 0
+    assert len(carried_labels(Surface(SCENE.mesh), SCENE.dynamic, Mesh.empty())) == 0
 
 
 @pytest.mark.parametrize("up", [1, 2])

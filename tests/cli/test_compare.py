@@ -15,9 +15,9 @@ from meshreel.capture.procedural import sliding_sphere
 from meshreel.capture.rig import read_rig
 from meshreel.capture.simulated_rig import SceneFrame, simulate_rig
 from meshreel.container.writer import ReelWriter
+from meshreel.geometry.cameras import pack_cameras
 from meshreel.io.sequence import open_sequence
 from meshreel.io.write import write_mesh
-from meshreel.metrics.viewpoints import write_cameras
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import camera
 from tests.cli.conftest import FILE, failed
@@ -176,7 +176,7 @@ def test_a_sheet_of_a_rig_is_what_its_cameras_see_of_the_chosen_frames(run, rig,
 
 def test_cameras_of_several_sizes_are_refused_before_anything_is_measured(run, rig, tmp_path):
     views = [camera.view for camera in read_rig(rig).cameras]
-    write_cameras(tmp_path / "views.json", [views[0], replace(views[1], width=32, height=32)])
+    (tmp_path / "views.json").write_bytes(pack_cameras([views[0], replace(views[1], width=32, height=32)]))
     command = ("compare", rig, rig / "truth", "--no-ssim", "--sheet", tmp_path / "a.png")
     said = run(*command, "--cameras", tmp_path / "views.json")
     assert failed(said, "several sizes") and not (tmp_path / "a.png").exists()

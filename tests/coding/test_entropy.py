@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from meshreel import _core
 from meshreel.coding import entropy
 from meshreel.errors import FormatError
 
@@ -80,7 +81,7 @@ def test_the_rate_is_near_that_of_an_ideal_coder_with_the_same_contexts(body: Bo
     """constriction's ANS with each context's empirical distribution is the oracle of the bound above."""
     pytest.importorskip("constriction", reason="no wheel for this platform")
     symbols, neighbours, streams = body
-    sizes, signs = entropy.contexts(symbols, neighbours)
+    sizes, signs = _contexts(symbols, neighbours)
     bits = 0
     for c in range(symbols.shape[1]):
         column, moves = symbols[:, c], symbols[:, c] != 0
@@ -207,7 +208,7 @@ def _entropy(values: np.ndarray, context: np.ndarray) -> float:
 
 
 def _context_entropy(symbols: np.ndarray, neighbours: entropy.Neighbours) -> float:
-    sizes, signs = entropy.contexts(symbols, neighbours)
+    sizes, signs = _contexts(symbols, neighbours)
     bits = 0.0
     for c in range(symbols.shape[1]):
         moves = symbols[:, c] != 0
@@ -233,3 +234,11 @@ def _assert_refused_or_other(stream: bytes, symbols: np.ndarray, neighbours: ent
     except FormatError:
         return
     assert not np.array_equal(decoded, symbols)  # streams are canonical
+
+
+def _contexts(symbols: np.ndarray, neighbours: entropy.Neighbours) -> tuple[np.ndarray, np.ndarray]:
+    """The contexts in which the coder codes each symbol's magnitude (< 15) and sign (< 48; 0 for a zero)."""
+    columns = np.array(symbols.T, dtype=np.int32, order="C")
+    sizes, signs = np.zeros(columns.shape, np.uint8), np.zeros(columns.shape, np.uint8)
+    _core.weight_contexts(columns, neighbours.indptr, neighbours.indices, sizes, signs)
+    return sizes.T, signs.T

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from meshreel.analysis.follow.template import base_mesh
-from meshreel.coding.layers.coder import decode_layers
 from meshreel.encoder.interval import Interval
 from meshreel.encoder.layers import encode_interval
 from meshreel.encoder.options import LayersOptions
 from meshreel.encoder.target import target_of
 from meshreel.format.layout import Form
 from meshreel.types import Mesh
+from tests.coding.decoded_layers import decode_layers
 
 from ..analysis.follow.test_fused_template import SIDE, gaps, noisy, sheet, with_hole
 

@@ -17,14 +17,14 @@ from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import weld
 from meshreel.io.sequence import SequenceOptions, open_sequence
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
-from meshreel.metrics.viewpoints import ParallelViewOptions
+from meshreel.metrics.viewpoints import ViewOptions
 from meshreel.types import MeshList
 from tests.shared_data import performer
 
 QUALITIES = (0, 50, 100)  # few: every encode is one from the start
 BETTER = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "ssim_masked")
 WORSE = ("normal_error_deg", "normal_error_at_vertices_deg")
-LOOK = ComparisonOptions(views=ParallelViewOptions())  # of 128 x 128 pixels, SSIM is noise above .99
+LOOK = ComparisonOptions(views=ViewOptions(512, 512))  # of 128 x 128 pixels, SSIM is noise above .99
 
 
 def quicker(options: EncoderOptions) -> EncoderOptions:

@@ -14,7 +14,7 @@ from meshreel.coding import entropy
 from meshreel.coding.appearance.atlas import decode_atlas, encode_atlas
 from meshreel.coding.appearance.colors import ColorCodingOptions, ColoredMesh, decode_colors, encode_colors
 from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
-from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, decode_layers, encode_layers
+from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
 from meshreel.coding.layers.patches import encode_patches
 from meshreel.coding.mesh import decode_mesh
 from meshreel.coding.paper import laplacian
@@ -38,6 +38,7 @@ from meshreel.format.records import pack
 from meshreel.geometry.atlas import Layout
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
+from tests.coding.decoded_layers import decode_layers
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "FORMAT.md"
 

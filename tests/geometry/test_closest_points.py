@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from meshreel.geometry.closest_points import Outline, Surface, distances
+from meshreel.geometry.closest_points import Surface, distances
 from tests.metrics.shapes import brute_force_distances, moved, plane, sphere
 
 
@@ -37,8 +37,8 @@ def test_queries_past_the_border_differ_from_queries_above_the_surface():
     assert not round_.past_border(round_.closest(points)).any()  # it has none
 
 
-def test_an_outline_separates_points_past_the_border_at_any_offset():
+def test_the_border_separates_points_past_the_border_at_any_offset():
     place, points = np.array([4e6, -1e6, 2e6]), np.array([[0.5, 0.5, 0.3], [1.1, 0.4, 0.2], [0.4, 1.3, 0.0]])
-    outline = Outline(moved(plane(1.0, 4), place))
-    assert outline.leaves_out(points + place).tolist() == [False, True, True]
-    assert len(outline.leaves_out(np.zeros((0, 3)))) == 0
+    surface = Surface(moved(plane(1.0, 4), place))
+    assert surface.past_border(surface.closest(points + place)).tolist() == [False, True, True]
+    assert len(surface.past_border(surface.closest(np.zeros((0, 3))))) == 0

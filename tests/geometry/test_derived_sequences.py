@@ -1,4 +1,4 @@
-"""Derived sequences: chosen frames, and all frames forth and back."""
+"""Derived sequences: chosen frames, and what they know of their source."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
 from meshreel.geometry import derived_sequences
-from meshreel.geometry.derived_sequences import Chosen, Recent, Unchanging, Upright, captured, forth_and_back
+from meshreel.geometry.derived_sequences import Chosen, Recent, Unchanging, Upright, captured
 from meshreel.types import Mesh, MeshList
 
 
@@ -21,14 +21,6 @@ def test_chosen_frames_are_those_of_the_source():
     some = Chosen(source, (4, 0))
     assert len(some) == 2 and some.frame_rate == source.frame_rate
     assert [mesh.vertices[0, 0] for mesh in some] == [source[4].vertices[0, 0], source[0].vertices[0, 0]]
-
-
-def test_forth_and_back_moves_by_one_frame_at_a_time():
-    source = sliding_sphere(4, levels=1)
-    places = [source[i].vertices[0, 0] for i in range(4)]
-    played = [mesh.vertices[0, 0] for mesh in forth_and_back(source, 9)]
-    assert played == [places[i] for i in (0, 1, 2, 3, 2, 1, 0, 1, 2)]
-    assert len(forth_and_back(source, 2)) == 2 and len(forth_and_back(sliding_sphere(1, levels=1), 3)) == 3
 
 
 def test_a_sequence_that_names_no_up_axis_is_refused():

@@ -7,17 +7,11 @@ import numpy as np
 import pytest
 
 from meshreel.errors import InputError
+from meshreel.geometry.cameras import pack_cameras
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.distance import PSNR_CEILING, surface_errors
 from meshreel.metrics.ssim import ssim_normals
-from meshreel.metrics.viewpoints import (
-    Box,
-    ParallelViewOptions,
-    ViewOptions,
-    parallel_views_around,
-    views_around,
-    write_cameras,
-)
+from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, MeshList
 
 from .shapes import noisy, sphere
@@ -42,17 +36,6 @@ def test_aggregates_are_the_mean_and_the_worst_of_the_frames():
     assert row["frames_compared"] == 3 and "ssim" not in row
 
 
-def test_parallel_views_are_used_and_recorded_on_request():
-    comparison = compare_sequences(ORIGINALS, DECODED, ComparisonOptions(views=ParallelViewOptions(64)))
-    cameras = parallel_views_around(Box.of(ORIGINALS), 64)
-    expected = np.mean([ssim_normals(a, b, cameras).masked for a, b in zip(ORIGINALS, DECODED, strict=True)])
-    row = json.loads(json.dumps(comparison.to_row()))
-    assert row["ssim_masked"] == pytest.approx(expected)
-    assert [camera["size"] for camera in row["cameras"]] == [[64, 64]] * 4 and row["cameras"][0]["pixel_m"] > 0
-    with pytest.raises(InputError, match="8 x 8"):
-        ParallelViewOptions(4)
-
-
 def test_ssim_uses_views_around_the_whole_sequence_and_prints_them():
     options = ComparisonOptions(views=SMALL)
     comparison = compare_sequences(ORIGINALS, DECODED, options)
@@ -67,7 +50,7 @@ def test_ssim_uses_views_around_the_whole_sequence_and_prints_them():
 
 def test_a_camera_file_decides_the_views(tmp_path: Path):
     path = tmp_path / "views.json"
-    write_cameras(path, views_around(Box.of(ORIGINALS), SMALL)[:1])
+    path.write_bytes(pack_cameras(views_around(Box.of(ORIGINALS), SMALL)[:1]))
     comparison = compare_sequences(ORIGINALS, DECODED, ComparisonOptions(cameras=path))
     assert len(comparison.cameras) == 1 and comparison.cameras[0].width == 160
 

@@ -1,13 +1,19 @@
 import numpy as np
 import pytest
 
-from meshreel.metrics.render import Crop, crop_of, look, render_normals
-from meshreel.metrics.viewpoints import Box, ViewOptions, parallel_views_around, views_around
+from meshreel.geometry.cameras import PinholeCamera
+from meshreel.metrics.render import Crop, crop_of, look
+from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh
 
 from .shapes import moved, noisy, plane, sphere
 
 SMALL = ViewOptions(160, 120)
+FAR = ViewOptions(64, 64, fov=1.0)  # rays are nearly parallel
+
+
+def render_normals(mesh: Mesh, camera: PinholeCamera) -> np.ndarray:
+    return look(mesh, camera, Crop(0, camera.height, 0, camera.width)).colors
 
 
 def test_a_sphere_seen_from_the_front_shows_its_analytic_normals():
@@ -23,7 +29,7 @@ def test_a_sphere_seen_from_the_front_shows_its_analytic_normals():
 
 def test_colors_are_normals_in_world_axes_and_the_background_is_white():
     wall = moved(plane(2), (-1, -1, 0))  # faces +z, the front
-    camera = parallel_views_around(Box(np.full(3, -1.0), np.full(3, 1.0)), 64)[0]
+    camera = views_around(Box(np.full(3, -1.0), np.full(3, 1.0)), FAR)[0]
     image = render_normals(wall, camera)
     assert image.shape == (64, 64, 3)
     assert np.allclose(image[32, 32], [0.5, 0.5, 1])
@@ -39,7 +45,7 @@ def test_the_nearest_surface_is_seen_and_the_picture_is_not_mirrored():
             np.concatenate([red.vertices, red.vertices * [2, 1, 1] + [1, 0, -2]]),
             np.concatenate([red.faces, red.faces[:, ::-1] + 4]),
         ),
-        parallel_views_around(Box(np.full(3, -1.0), np.full(3, 1.0)), 64)[0],
+        views_around(Box(np.full(3, -1.0), np.full(3, 1.0)), FAR)[0],
     )
     assert np.allclose(image[32, 16], [0.5, 0.5, 1])
     assert np.allclose(image[32, 48], [0.5, 0.5, 0])

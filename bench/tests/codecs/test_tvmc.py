@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from meshreel_bench.codecs import make_codec
 from meshreel_bench.codecs.tvmc import TvmcCodec
+from meshreel_bench.codecs.tvmc.codec import quality_of_vertices
 from meshreel_bench.codecs.tvmc.layout import Kind, unpack_stream
 from meshreel_bench.codecs.tvmc.tracked import decode_tracked, encode_tracked
 from meshreel_bench.codecs.tvmc.tracking import Tracked, track_sequence
 from meshreel_bench.codecs.tvmc.video import TvmcVideo
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
-from meshreel.encoder.presets import quality_of_vertices, reference_vertices
+from meshreel.encoder.presets import reference_vertices
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import FormatError, InputError, NoReferenceError
 from meshreel.geometry.closest_points import distances

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums
+from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums, forth_and_back
 from meshreel_bench.datasets.scenes import PROCEDURAL
 from meshreel_bench.datasets.side_by_side import SideBySide
 
@@ -152,3 +152,11 @@ def test_a_sequence_of_ones_own_has_a_digest_and_those_of_the_benchmark_have_non
     first = store.digest("own")
     np.savez(planted / "own.npz", vertices=[BALLS[1].vertices], faces=BALLS[0].faces)
     assert first is not None and store.digest("own") not in (None, first)
+
+
+def test_forth_and_back_moves_by_one_frame_at_a_time():
+    source = sliding_sphere(4, levels=1)
+    places = [source[i].vertices[0, 0] for i in range(4)]
+    played = [mesh.vertices[0, 0] for mesh in forth_and_back(source, 9)]
+    assert played == [places[i] for i in (0, 1, 2, 3, 2, 1, 0, 1, 2)]
+    assert len(forth_and_back(source, 2)) == 2 and len(forth_and_back(sliding_sphere(1, levels=1), 3)) == 3

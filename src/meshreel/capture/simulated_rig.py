@@ -16,7 +16,6 @@ import numpy as np
 from jaxtyping import Bool, Float64, UInt16
 
 from ..errors import InputError
-from ..geometry.closest_points import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import concatenate, face_normals
 from ..io.depth_pictures import write_depth
@@ -67,12 +66,6 @@ class SceneFrame:
         parts = [*still, *moving]
         faces = [len(part.faces) for part in parts]
         return SceneFrame(concatenate(parts), np.repeat(np.arange(len(parts)) >= len(still), faces))
-
-    def labels_for(self, fused: Mesh) -> Bool[np.ndarray, " F"]:
-        """Label the faces of a fused mesh that move: each takes the label of the clean face nearest to its middle."""
-        if self.mesh.is_empty:
-            return np.zeros(len(fused.faces), bool)
-        return carried_labels(Surface(self.mesh), self.dynamic, fused)
 
 
 def corner_cameras(

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import FormatError
-from ..shapes import Float64, Int32, Int64, UInt8
+from ..shapes import Float64, Int32, Int64
 
 SYMBOLS_PER_BYTE = 22_800  # no stream says more: a coded bit costs at least 1 / 2840 bit
 
@@ -61,16 +61,6 @@ def decode_weights(streams: Sequence[bytes], count: int, neighbours: Neighbours)
 def weights_cost(symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours) -> Float64[np.ndarray, " M"]:
     """Return the rate of each column in bits (whole bytes: the columns are coded and measured)."""
     return np.array([8.0 * len(stream) for stream in encode_weights(symbols, neighbours)], dtype=np.float64)
-
-
-def contexts(
-    symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours
-) -> tuple[UInt8[np.ndarray, "N M"], UInt8[np.ndarray, "N M"]]:
-    """Return the contexts in which the coder codes each symbol's magnitude (< 15) and sign (< 48; 0 for a zero)."""
-    columns = _columns(symbols)
-    sizes, signs = np.zeros(columns.shape, np.uint8), np.zeros(columns.shape, np.uint8)
-    _core.weight_contexts(columns, neighbours.indptr, neighbours.indices, sizes, signs)
-    return sizes.T, signs.T
 
 
 def encode_integers(values: Int32[np.ndarray, " N"]) -> bytes:

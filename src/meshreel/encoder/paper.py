@@ -55,7 +55,7 @@ def encode_interval(
 ) -> list[EncodedGroup]:
     """Encode an interval as one group, or as several where one reference cannot follow.
 
-    `find` replaces `find_groups`; pass a store's `find` to reuse the references of an earlier encode.
+    `find` replaces `find_groups`, to reuse the references of an earlier encode.
     """
     count = len(interval.frames)
     stages = stages or Stages(None, count)

@@ -21,7 +21,7 @@ from ..analysis.scene.masks import Masker
 from ..analysis.scene.segmentation import segment, segment_by
 from ..analysis.survey import Survey, check_one_unit
 from ..errors import InputError
-from ..geometry.closest_points import Outline, Surface
+from ..geometry.closest_points import Surface
 from ..geometry.derived_sequences import CapturedSequence, ChosenParts
 from ..geometry.topology import components, concatenate, face_normals, part_of
 from ..types import Mesh, MeshSequence, evenly
@@ -61,9 +61,9 @@ class Parts:
         return min(self.noise / self.seen.unit, MOST_NOISE)
 
     @cached_property
-    def outline(self) -> Outline | None:
-        """The borders of the background; None where there is none."""
-        return None if self.background.is_empty else Outline(self.background)
+    def surface(self) -> Surface | None:
+        """The background, prepared for queries; None where there is none."""
+        return None if self.background.is_empty else Surface(self.background)
 
 
 def take_apart(

@@ -6,7 +6,6 @@ In -> out: what a user chooses -> EncoderOptions. The curves were fitted to rate
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 from ..analysis.follow.embedded import Stage
@@ -164,8 +163,3 @@ def displacement_step(quality: float) -> float:
 def reference_vertices(quality: float) -> int:
     """Number of vertices of the reference mesh: 800 at 0, 2000 at 50, 5000 at 100."""
     return round(2000 * 2.5 ** ((quality - 50) / 50))
-
-
-def quality_of_vertices(vertices: int) -> float:
-    """Return the quality, 0 to 100, whose reference mesh is nearest to this number of vertices."""
-    return min(max(50 + 50 * math.log(max(vertices, 1) / 2000, 2.5), 0.0), 100.0)

@@ -50,7 +50,7 @@ def _one_by_one(job: Job, intervals: Iterable[Interval]) -> Iterator[_Done]:
             yield known, ""
             continue
         with heard(stages.hear):
-            groups = list(encode_interval(interval, job.options.method, stages, job.store.find, job.options.appearance))
+            groups = list(encode_interval(interval, job.options.method, stages, job.find, job.options.appearance))
         yield _kept(job, interval, groups)
 
 
@@ -121,7 +121,7 @@ def encode_interval(
 ) -> Iterator[EncodedGroup]:
     """Encode an interval as groups, in order, by the recipe whose options are given; with colours by `appearance`.
 
-    `find` finds the groups of the paper's recipe; pass a store's `find` to reuse an earlier analysis.
+    `find` finds the groups of the paper's recipe; pass another to reuse an earlier analysis.
     """
     options = replace(options, target=options.target.scaled(interval.larger))
     if isinstance(options, LayersOptions):
@@ -145,7 +145,7 @@ def encode_sent(interval: Interval, options: EncoderOptions, number: int) -> tup
     stages = IntervalStages(Stages(partial(tell, number), count), count, options.method.group_size)
     with threadpool_limits(1), heard(stages.hear):
         before = so_far()
-        *others, last = encode_interval(interval, options.method, stages, None, options.appearance)
+        *others, last = encode_interval(interval, options.method, stages, appearance=options.appearance)
         return [*others, replace(last, work=since(before))], interval.observed
 
 

@@ -148,4 +148,4 @@ class Tracks:
 
 
 def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
-    return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell, parts.outline)
+    return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell, parts.surface)

@@ -39,10 +39,11 @@ from .appearance import as_installed
 from .digests import WriteLines
 from .excerpt import Excerpt, write_survey
 from .interval import Interval
-from .job import GroupStore, Job
+from .job import Job
 from .journal import Journal, made_of, opened
 from .metadata import metadata_of, rounded, upright
-from .options import EncoderOptions, PaperOptions
+from .options import EncoderOptions
+from .paper import FindGroups, find_groups
 from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
@@ -109,12 +110,12 @@ class Encoder:
     ) -> None:
         """Take executor and progress as `encode` does; with a `masker`, whose masks mark moving pixels, it is a scene.
 
-        `digests` takes lines of JSON, one for each stage. Of an `excerpt`, only its frames are encoded. The attribute
-        `progress` may be replaced between encodes.
+        `digests` takes lines of JSON, one for each stage. Of an `excerpt`, only its frames are encoded. The attributes
+        `progress` and `find`, which finds the groups of the paper's recipe, may be replaced between encodes.
         """
         self.sequence, self._executor, self._masker = Unchanging(captured(sequence)), executor, masker
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
-        self.store = GroupStore()  # groups that `prepare` found
+        self.find: FindGroups = find_groups
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
 
@@ -122,19 +123,6 @@ class Encoder:
     def frame_rate(self) -> float:
         """Frames per second of the sequence, 1/s."""
         return self.sequence.frame_rate
-
-    @threadpool_limits.wrap(limits=1)
-    def prepare(self, options: EncoderOptions) -> None:
-        """Find in advance what `encode` finds before a rate is chosen; raises what `encode` raises.
-
-        These are the parts of a scene and, for the paper's recipe without an executor, its groups for any size of the
-        basis. They take a few hundred kB a frame, as long as this object lives.
-        """
-        job, parts = self._job(options), self.parts(options)
-        if isinstance(options.method, PaperOptions) and self._executor is None:
-            for interval in _intervals(job, parts):
-                self.store.keep(interval, options.method, job.stages if parts is None else None)
-                job.stages.reach("fit", interval.stop / len(job.sequence))
 
     def intervals(self, options: EncoderOptions) -> Iterator[Interval]:
         """Yield the intervals that `encode` encodes, of all tracks of a scene."""
@@ -177,7 +165,7 @@ class Encoder:
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
-        job = Job(self.sequence, options, self._executor, stages, self.store, digests=self.digests)
+        job = Job(self.sequence, options, self._executor, stages, self.find, digests=self.digests)
         return replace(job, excerpt=self._excerpt)
 
     def _is_scene(self, options: EncoderOptions) -> bool:

@@ -56,27 +56,26 @@ class PinholeCamera:
         depth = np.where(points[:, 2:] > 0, points[:, 2:], np.nan)
         return products(points, self.intrinsic.T)[:, :2] / depth
 
-
-def pinhole_record(camera: PinholeCamera) -> dict[str, Any]:
-    """Return the camera as a record of Open3D's JSON, in which matrices are stored column by column."""
-    return {
-        "class_name": "PinholeCameraParameters",
-        "extrinsic": camera.extrinsic.T.reshape(-1).tolist(),
-        "intrinsic": {
-            "height": camera.height,
-            "intrinsic_matrix": camera.intrinsic.T.reshape(-1).tolist(),
-            "width": camera.width,
-        },
-        "version_major": 1,
-        "version_minor": 0,
-    }
+    def record(self) -> dict[str, Any]:
+        """Return the camera as a record of Open3D's JSON, in which matrices are stored column by column."""
+        return {
+            "class_name": "PinholeCameraParameters",
+            "extrinsic": self.extrinsic.T.reshape(-1).tolist(),
+            "intrinsic": {
+                "height": self.height,
+                "intrinsic_matrix": self.intrinsic.T.reshape(-1).tolist(),
+                "width": self.width,
+            },
+            "version_major": 1,
+            "version_minor": 0,
+        }
 
 
 def pack_cameras(cameras: Sequence[PinholeCamera]) -> bytes:
     """Pack cameras into the JSON of an Open3D PinholeCameraTrajectory."""
     record = {
         "class_name": "PinholeCameraTrajectory",
-        "parameters": [pinhole_record(camera) for camera in cameras],
+        "parameters": [camera.record() for camera in cameras],
         "version_major": 1,
         "version_minor": 0,
     }

@@ -98,17 +98,6 @@ def area_samples(mesh: Mesh, count: int) -> Int64[np.ndarray, " S"]:
     return np.unique(np.minimum(np.searchsorted(reached, at), len(share) - 1))
 
 
-class Outline:
-    """Border of a mesh that has faces, prepared for repeated queries."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._surface = Surface(mesh)
-
-    def leaves_out(self, points: Float64[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
-        """Return which points lie past the border."""
-        return self._surface.past_border(self._surface.closest(points))
-
-
 def distances(points: Float64[np.ndarray, "N 3"], mesh: Mesh) -> Float64[np.ndarray, " N"]:
     """Return the distance of each point from a mesh that has faces."""
     return Surface(mesh).distances(points)

@@ -326,12 +326,6 @@ class ChosenParts(Chosen):
         return part_of(mesh, self._choose(self._numbers[index], mesh))
 
 
-def forth_and_back(source: MeshSequence, count: int) -> Chosen:
-    """Return `count` frames of a sequence that is played forth and back, over and over; ends are not repeated."""
-    once = [*range(len(source)), *range(len(source) - 2, 0, -1)]
-    return Chosen(source, [once[number % len(once)] for number in range(count)])
-
-
 @dataclass(frozen=True, slots=True)
 class _ChosenPictures:
     """The depth or colour pictures of some frames, by their numbers."""

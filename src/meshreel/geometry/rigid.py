@@ -67,11 +67,6 @@ def rotate(motions: Float64[np.ndarray, "N 8"], vectors: Float64[np.ndarray, "N 
     return vectors + 2 * np.cross(axis, np.cross(axis, vectors) + w * vectors)
 
 
-def inverse(motions: Float64[np.ndarray, "N 8"]) -> Float64[np.ndarray, "N 8"]:
-    """Invert motions by conjugating their unit dual quaternions."""
-    return motions * np.array([1.0, -1, -1, -1, 1, -1, -1, -1])
-
-
 def multiply(a: Float64[np.ndarray, "N 4"], b: Float64[np.ndarray, "N 4"]) -> Float64[np.ndarray, "N 4"]:
     """Multiply quaternions (w, x, y, z) row by row (Hamilton product)."""
     scalar = a[:, 0] * b[:, 0] - np.sum(a[:, 1:] * b[:, 1:], axis=1)

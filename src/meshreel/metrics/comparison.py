@@ -8,7 +8,7 @@ value counts as `PSNR_CEILING`) and the worst frame; frames without surface on b
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,25 +16,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera
 from ..types import Mesh
 from .color import color_errors
 from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
-from .render import Looked, Visible
 from .ssim import ssim_normals
-from .viewpoints import (
-    Box,
-    OrthographicCamera,
-    ParallelViewOptions,
-    ViewOptions,
-    camera_record,
-    parallel_views_around,
-    read_cameras,
-    views_around,
-)
+from .viewpoints import Box, Camera, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
-Cameras = Sequence[PinholeCamera] | Sequence[OrthographicCamera]
 _PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "y_psnr", "u_psnr", "v_psnr", "yuv_psnr")
 _LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked")
 
@@ -43,8 +31,8 @@ _LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked")
 class ComparisonOptions:
     """Options of a comparison."""
 
-    cameras: Path | Sequence[PinholeCamera] | None = None  # Open3D pinhole JSON; None: four views around the originals
-    views: ViewOptions | ParallelViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
+    cameras: Path | Sequence[Camera] | None = None  # Open3D pinhole JSON; None: four views around the originals
+    views: ViewOptions = field(default_factory=ViewOptions)  # used where no cameras are given
     ssim: bool = True  # rendering and SSIM take about 2 s per frame at 1920 x 1080
     keys: Sequence[int] = ()  # key frames, without which aggregates are also computed
 
@@ -59,7 +47,7 @@ class Comparison:
 
     frames: tuple[Row, ...]  # metrics of each frame; inf and nan are kept here
     empty: tuple[bool, ...]  # frames without surface on both sides
-    cameras: tuple[PinholeCamera | OrthographicCamera, ...]
+    cameras: tuple[Camera, ...]
     keys: tuple[int, ...]
 
     def to_row(self) -> Row:
@@ -77,24 +65,20 @@ class Comparison:
             "frames_empty": sum(self.empty),
             "frames_missing": sum(math.isinf(frame["rms_forward_m"]) for frame in self.frames),
             "key_frames": list(self.keys),
-            "per_frame": [_finite(frame) for frame in self.frames],
-            "cameras": [camera_record(camera) for camera in self.cameras],
+            "per_frame": [finite(frame) for frame in self.frames],
+            "cameras": [camera.record() for camera in self.cameras],
         }
-        return _finite(row)
+        return finite(row)
 
 
 def compare_sequences(
     originals: Iterable[Mesh],
     decoded: Iterable[Mesh],
     options: ComparisonOptions | None = None,
-    seen: Callable[[Mesh], Looked] = Visible,
 ) -> Comparison:
-    """Measure `decoded` against `originals`, frame by frame (two MeshSequences of equal length).
-
-    `seen` prepares an original for rendering; pass a caching function to render the same originals only once.
-    """
+    """Measure `decoded` against `originals`, frame by frame (two MeshSequences of equal length)."""
     options = options or ComparisonOptions()
-    cameras: Cameras = _cameras(originals, options) if options.ssim else []
+    cameras = _cameras(originals, options) if options.ssim else ()
     rows: list[Row] = []
     empty: list[bool] = []
     others = iter(decoded)
@@ -102,7 +86,7 @@ def compare_sequences(
         other = next(others, None)
         if other is None:
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
-        rows.append(frame_row(mesh, other, cameras, seen))
+        rows.append(frame_row(mesh, other, cameras))
         empty.append(_is_nothing(rows[-1]))
     if next(others, None) is not None:
         raise InputError(f"the original sequence ends after {len(rows)} frames and the decoded one does not")
@@ -111,14 +95,14 @@ def compare_sequences(
     return Comparison(tuple(rows), tuple(empty), tuple(cameras), tuple(options.keys))
 
 
-def frame_row(original: Mesh, decoded: Mesh, cameras: Cameras, seen: Callable[[Mesh], Looked] = Visible) -> Row:
+def frame_row(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
     """Return the metrics of one frame by name; SSIM only with cameras."""
     row = _distance_row(surface_errors(original, decoded))
     if original.is_colored and decoded.is_colored:
         colors = color_errors(original, decoded)
         row |= {"y_psnr": colors.y, "u_psnr": colors.u, "v_psnr": colors.v, "yuv_psnr": colors.yuv}
     if cameras:
-        ssim = ssim_normals(original, decoded, cameras, seen)
+        ssim = ssim_normals(original, decoded, cameras)
         row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}
     return row
 
@@ -160,13 +144,12 @@ def _distance_row(errors: SurfaceErrors) -> Row:
     return row
 
 
-def _cameras(originals: Iterable[Mesh], options: ComparisonOptions) -> Cameras:
+def _cameras(originals: Iterable[Mesh], options: ComparisonOptions) -> Sequence[Camera]:
     if options.cameras is not None:
         return read_cameras(options.cameras) if isinstance(options.cameras, Path) else options.cameras
-    if isinstance(options.views, ParallelViewOptions):
-        return parallel_views_around(Box.of(originals), options.views.size, options.views.up)
     return views_around(Box.of(originals), options.views)
 
 
-def _finite(row: Row) -> Row:
+def finite(row: Row) -> Row:
+    """Return the row with None for numbers that JSON cannot hold."""
     return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in row.items()}

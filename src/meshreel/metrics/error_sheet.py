@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float64
@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..geometry.closest_points import Surface
 from ..io.write import replacing
-from ..types import UP_AXES, Mesh, check_up
+from ..types import UP_AXES, Frames, Mesh, check_up
 from .distance import surface_errors
 from .render import Crop, View, look
 from .surface_samples import used_surface
@@ -30,15 +30,6 @@ _LEFT, _RIGHT, _TOP, _GAP = 64, 100, 32, 8  # pixels around and between the pict
 _DPI = 100
 _INVENTED = (1.0, 0.0, 1.0)  # magenta
 _LEAST_LIMIT = 1e-3  # % or mm; below it the color bar would show rounding (guess)
-
-
-@runtime_checkable
-class Frames(Protocol):
-    """Frames by number, the part of a MeshSequence that a sheet uses."""
-
-    def __len__(self) -> int: ...
-
-    def __getitem__(self, index: int) -> Mesh: ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
@@ -63,15 +62,6 @@ class View:
         return image
 
 
-def render_normals(mesh: Mesh, camera: Camera) -> Float32[np.ndarray, "H W 3"]:
-    """Render the whole normal-colored picture, RGB 0 to 1."""
-    image = np.full((camera.height, camera.width, 3), BACKGROUND, dtype=np.float32)
-    view = look(mesh, camera, crop_of([mesh], camera))
-    crop = view.crop
-    image[crop.top : crop.bottom, crop.left : crop.right] = view.colors
-    return image
-
-
 def crop_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Crop:
     """Return the crop of all pixels that can see a mesh, widened by `border` pixels and clipped to the image."""
     full = Crop(0, camera.height, 0, camera.width)
@@ -90,30 +80,6 @@ def crop_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Crop:
 def look(mesh: Mesh, camera: Camera, crop: Crop) -> View:
     """Return the camera's view of the mesh in the crop."""
     return Visible(mesh).look(Pixels(camera, crop))
-
-
-@runtime_checkable
-class Picture(Protocol):
-    """Normals as colors in a crop."""
-
-    @property
-    def covered(self) -> Bool[np.ndarray, "H W"]:
-        """Where a mesh is seen."""
-        ...
-
-    @property
-    def colors(self) -> Float32[np.ndarray, "H W 3"]:
-        """Colors, 0 to 1."""
-        ...
-
-
-@runtime_checkable
-class Looked(Protocol):
-    """A mesh that can be rendered repeatedly."""
-
-    def look(self, pixels: Pixels) -> Picture:
-        """Render the mesh in a crop of a camera's image."""
-        ...
 
 
 class Pixels:

@@ -6,9 +6,8 @@ defines the numbers.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool
@@ -16,9 +15,8 @@ from jaxtyping import Bool
 from ..errors import InputError
 from ..geometry.cameras import PinholeCamera
 from ..types import Frames, Mesh
+from .comparison import Row, finite
 from .scene_accuracy import Scene, Sight, SightOptions, scene_means, scene_row
-
-Row = dict[str, Any]
 
 
 @runtime_checkable
@@ -99,8 +97,3 @@ def compare_with_truth(
     means = {name: finite(scene_means([frame[name] for frame in frames])) for name in ("noise_floor", "decoded")}
     rows = [{name: finite(row) for name, row in frame.items()} for frame in frames]
     return {"frames": list(numbers)} | means | {"per_frame": rows}
-
-
-def finite(row: Row) -> Row:
-    """Return the row with None for numbers that JSON cannot hold."""
-    return {name: None if isinstance(v, float) and not math.isfinite(v) else v for name, v in row.items()}

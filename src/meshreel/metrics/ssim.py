@@ -7,14 +7,14 @@ pixels that either mesh covers. Only the crop around the meshes is rendered: out
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64
 
 from ..types import Mesh
-from .render import Looked, Pixels, Visible, crop_of
+from .render import Pixels, Visible, crop_of
 from .viewpoints import Camera
 
 _SIDE = 7  # pixels, side of the SSIM window: scikit-image's default
@@ -27,27 +27,18 @@ class NormalSsim:
 
     whole: float  # over the whole picture
     masked: float  # over pixels that either mesh covers, views that see neither left out
-    whole_by_view: tuple[float, ...]
-    masked_by_view: tuple[float | None, ...]  # None where a view sees neither mesh
 
 
-def ssim_normals(
-    original: Mesh, decoded: Mesh, cameras: Sequence[Camera], seen: Callable[[Mesh], Looked] = Visible
-) -> NormalSsim:
-    """Compute SSIM between the normal-colored renderings of two meshes (paper, section 4: four views).
-
-    `seen` prepares the original for rendering; pass a caching function to render the same original only once.
-    """
-    pair = seen(original), Visible(decoded)
+def ssim_normals(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> NormalSsim:
+    """Compute SSIM between the normal-colored renderings of two meshes (paper, section 4: four views)."""
+    pair = Visible(original), Visible(decoded)
     crops = [crop_of([original, decoded], camera, border=2 * _SIDE) for camera in cameras]
     scores = [_ssim_view(*pair, Pixels(camera, crop)) for camera, crop in zip(cameras, crops, strict=True)]
-    whole = tuple(score[0] for score in scores)
-    masked = tuple(score[1] for score in scores)
-    counted = [value for value in masked if value is not None]
-    return NormalSsim(float(np.mean(whole)), float(np.mean(counted)) if counted else 1.0, whole, masked)
+    counted = [masked for _, masked in scores if masked is not None]
+    return NormalSsim(float(np.mean([whole for whole, _ in scores])), float(np.mean(counted)) if counted else 1.0)
 
 
-def _ssim_view(original: Looked, decoded: Looked, pixels: Pixels) -> tuple[float, float | None]:
+def _ssim_view(original: Visible, decoded: Visible, pixels: Pixels) -> tuple[float, float | None]:
     camera, crop = pixels.camera, pixels.crop
     a, b = original.look(pixels), decoded.look(pixels)
     interior = np.zeros((camera.height, camera.width), dtype=bool)

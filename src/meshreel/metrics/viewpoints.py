@@ -6,7 +6,7 @@ A bounding box -> four cameras around it. Axes and pixels are those of `geometry
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
@@ -15,11 +15,10 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..errors import InputError
-from ..geometry.cameras import PinholeCamera, pack_cameras, pinhole_record, unpack_cameras
-from ..io.write import replacing
+from ..geometry.cameras import PinholeCamera, unpack_cameras
 from ..types import UP_AXES, Mesh, check_up
 
-_MARGIN = 1.05  # times the box, so that nothing touches the border (guess)
+MARGIN = 1.05  # times the box, so that nothing touches the border (guess)
 
 
 @runtime_checkable
@@ -49,26 +48,9 @@ class Camera(Protocol):
         """Return image positions of points in the camera frame; not finite for points that are not in front of it."""
         ...
 
-
-@dataclass(frozen=True, slots=True)
-class OrthographicCamera:
-    """Camera with parallel rays, which may start behind its plane."""
-
-    width: int
-    height: int
-    pixel: float  # m, side of a pixel
-    extrinsic: Float64[np.ndarray, "4 4"]
-    back: float = 0.0  # m, how far behind the camera's plane rays start
-
-    def rays(self, pixels: Float64[np.ndarray, "N 2"]) -> tuple[np.ndarray, np.ndarray]:
-        """Return parallel rays along +z through image positions."""
-        plane = (pixels - np.array([self.width, self.height]) / 2) * self.pixel
-        origins = np.column_stack([plane, np.full(len(pixels), -self.back)])
-        return origins, np.broadcast_to(np.array([0.0, 0.0, 1.0]), origins.shape)
-
-    def project(self, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, "N 2"]:
-        """Project points of the camera frame to image positions in parallel."""
-        return points[:, :2] / self.pixel + np.array([self.width, self.height]) / 2
+    def record(self) -> dict[str, Any]:
+        """Return the camera for JSON."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,17 +68,6 @@ class ViewOptions:
         if not 1 <= self.fov <= 170:
             raise InputError(f"field of view {self.fov}: give 1 to 170 degrees")
         check_up(self.up)
-
-
-@dataclass(frozen=True, slots=True)
-class ParallelViewOptions:
-    """Size and orientation of four small parallel views around a bounding box, which are quick to draw."""
-
-    size: int = 512  # pixels, width and height
-    up: str = "y"  # the axis that points up: y, z, -y or -z
-
-    def __post_init__(self) -> None:
-        ViewOptions(self.size, self.size, up=self.up)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,25 +106,14 @@ def views_around(box: Box, options: ViewOptions = ViewOptions()) -> list[Pinhole
     The viewer of the front is at +z if y is up and at -y if z is up; at -z and +y if -y and -z are up. The distance
     lets the box fit in every view.
     """
-    across, height = _extent(box, options.up)
+    across, height = extent(box, options.up)
     tangent = math.tan(math.radians(options.fov) / 2)
-    distance = across / 2 + _MARGIN * max(height, across * options.height / options.width) / 2 / tangent
+    distance = across / 2 + MARGIN * max(height, across * options.height / options.width) / 2 / tangent
     focal = options.height / 2 / tangent
     intrinsic = np.array([[focal, 0, options.width / 2], [0, focal, options.height / 2], [0, 0, 1]])
     return [
-        PinholeCamera(options.width, options.height, intrinsic, _looking(box.center, axes, distance))
-        for axes in _axes(options.up)
-    ]
-
-
-def parallel_views_around(box: Box, size: int = 512, up: str = "y") -> list[OrthographicCamera]:
-    """Return orthographic views of the box from the sides of `views_around`, size x size pixels."""
-    ViewOptions(size, size, up=up)
-    across, height = _extent(box, up)
-    pixel = _MARGIN * max(across, height) / size
-    return [
-        OrthographicCamera(size, size, pixel, _looking(box.center, axes, 0.0), back=2 * (across + height))
-        for axes in _axes(up)
+        PinholeCamera(options.width, options.height, intrinsic, looking(box.center, axes, distance))
+        for axes in sides(options.up)
     ]
 
 
@@ -166,32 +126,14 @@ def read_cameras(path: Path) -> list[PinholeCamera]:
     return unpack_cameras(data, str(path))
 
 
-def write_cameras(path: Path, cameras: Sequence[PinholeCamera]) -> None:
-    """Write cameras as an Open3D PinholeCameraTrajectory JSON file."""
-    with replacing(path) as file:
-        file.write(pack_cameras(cameras))
-
-
-def camera_record(camera: PinholeCamera | OrthographicCamera) -> dict[str, Any]:
-    """Return the camera as Open3D's JSON record; a parallel camera has the side of a pixel instead of intrinsics."""
-    if isinstance(camera, OrthographicCamera):
-        return {
-            "class_name": "OrthographicCamera",
-            "extrinsic": camera.extrinsic.T.reshape(-1).tolist(),
-            "size": [camera.width, camera.height],
-            "pixel_m": camera.pixel,
-        }
-    return pinhole_record(camera)
-
-
-def _extent(box: Box, up: str) -> tuple[float, float]:
+def extent(box: Box, up: str) -> tuple[float, float]:
     """Return the larger horizontal side and the height of the box, both above 0."""
     vertical = int(np.abs(UP_AXES[up]).argmax())
     least = float(box.size.max()) * 1e-3 or 1.0
     return max(float(np.delete(box.size, vertical).max()), least), max(float(box.size[vertical]), least)
 
 
-def _axes(up: str) -> list[np.ndarray]:
+def sides(up: str) -> list[np.ndarray]:
     """Return the rows right, down and forward of each view."""
     above = np.array(UP_AXES[up])
     front = np.array([0.0, -above[2], above[1]])
@@ -199,7 +141,8 @@ def _axes(up: str) -> list[np.ndarray]:
     return [np.stack([np.cross(-to, above), -above, -to]) for to in (front, side, -front, -side)]
 
 
-def _looking(target: np.ndarray, axes: np.ndarray, distance: float) -> Float64[np.ndarray, "4 4"]:
+def looking(target: np.ndarray, axes: np.ndarray, distance: float) -> Float64[np.ndarray, "4 4"]:
+    """Return the pose, world to camera, that looks at a target from a distance along the last of these axes."""
     extrinsic = np.eye(4)
     extrinsic[:3, :3] = axes
     extrinsic[:3, 3] = -axes @ (target - distance * axes[2])

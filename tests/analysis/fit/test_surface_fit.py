@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.fit.border import border_sides
-from meshreel.analysis.fit.shape import strongest_components
-from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames
+from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames, strongest_components
 from meshreel.errors import InputError
 from meshreel.geometry.topology import drop_unreferenced, face_normals, subdivide_midpoint
 from meshreel.types import Mesh

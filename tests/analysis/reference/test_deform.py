@@ -8,9 +8,10 @@ import pytest
 from meshreel.analysis.reference.centers import ReferenceCenterOptions, affinity, largest_distances
 from meshreel.analysis.reference.deform import (
     DeformOptions,
+    Neighbours,
     bind,
     center_motions,
-    deform,
+    move,
     move_normals,
     neighbours,
 )
@@ -19,6 +20,11 @@ from meshreel.geometry.topology import subdivide_midpoint, vertex_normals
 from meshreel.types import Centers, Mesh
 
 OPTIONS = DeformOptions()
+
+
+def deform(mesh: Mesh, source: np.ndarray, target: np.ndarray, near: Neighbours, options: DeformOptions) -> np.ndarray:
+    binding = bind(mesh, source, near, options)
+    return move(mesh.vertices, binding, center_motions(source, target, near), near)
 
 
 def rotation(angle: float) -> np.ndarray:

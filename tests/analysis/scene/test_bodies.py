@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from meshreel.analysis.scene.bodies import BodyOptions, at_most, find_bodies, ring, same_bodies, with_ring
 from meshreel.errors import InputError
-from meshreel.geometry.closest_points import Outline
+from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import concatenate, part_of
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, plane, sphere
@@ -164,9 +164,9 @@ def test_a_ring_goes_on_to_where_the_background_begins_but_not_without_end():
     moves = np.abs(middles).max(axis=1) < 0.05
     for hole, side in ((0.1, 0.2), (0.15, 0.3), (0.25, 0.5), (0.45, 0.5)):
         rest = part_of(floor, np.abs(middles).max(axis=1) > hole)
-        found = with_ring(floor, moves, cell, Outline(rest))
+        found = with_ring(floor, moves, cell, Surface(rest))
         assert np.ptp(found.vertices, axis=0)[:2] == pytest.approx(side), hole
     narrow = part_of(floor, moves | ring(floor, moves, cell))
-    for background in (Outline(floor), None):
+    for background in (Surface(floor), None):
         assert len(with_ring(floor, moves, cell, background).faces) == len(narrow.faces)
-    assert with_ring(floor, np.zeros_like(moves), cell, Outline(rest)).is_empty
+    assert with_ring(floor, np.zeros_like(moves), cell, Surface(rest)).is_empty

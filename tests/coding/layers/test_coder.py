@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from meshreel.coding.group import continue_group, decode_group, payload_bytes_by_purpose
 from meshreel.coding.layers import coder
-from meshreel.coding.layers.coder import EncodedLayers, LayerCodingOptions, decode_layers, encode_layers
+from meshreel.coding.layers.coder import EncodedLayers, LayerCodingOptions, encode_layers
 from meshreel.coding.reference_mesh import CodedReference, code_reference
 from meshreel.errors import FormatError, InputError
 from meshreel.format.layout import LayersGroup, LayersLevel, Origin
@@ -20,6 +20,7 @@ from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
 from ..bodies import ball, moving, sheet
+from ..decoded_layers import decode_layers
 
 BALL = ball()
 WANTED = moving(BALL, 4)

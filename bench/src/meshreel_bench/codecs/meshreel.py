@@ -6,7 +6,6 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from meshreel.encoder.job import shared_options
 from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import preset_options
 from meshreel.encoder.sequence import Encoder
@@ -14,6 +13,7 @@ from meshreel.types import MeshSequence
 
 from ..codec import Progress
 from .base import TwoSteps
+from .groups import prepare, shared_options
 from .variants import find_variant
 
 
@@ -29,13 +29,13 @@ class Prepared(TwoSteps):
 
     @property
     def analysis_key(self) -> str:
-        """Equal for options with which `Encoder.prepare` finds the same."""
+        """Equal for options with which `prepare` finds the same."""
         return repr(shared_options(self.encoder_options))
 
     def analyse(self, sequence: MeshSequence, progress: Progress | None = None) -> Encoder:
         """Return an encoder that has found what operating points share. Raises InputError for unusable frames."""
         encoder = Encoder(sequence, progress=progress)
-        encoder.prepare(self.encoder_options)
+        prepare(encoder, self.encoder_options)
         return encoder
 
 

@@ -17,7 +17,7 @@ from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.capture.recording import open_recording
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
-from meshreel.geometry.derived_sequences import Chosen, forth_and_back
+from meshreel.geometry.derived_sequences import Chosen
 from meshreel.geometry.topology import weld
 from meshreel.io.file_names import is_pattern
 from meshreel.io.sequence import FileSequence, SequenceOptions, open_sequence
@@ -53,7 +53,7 @@ NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, PROCEDURAL, *RECORDINGS, *REMESHED)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
     "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
-    "-forth-and-back": forth_and_back,
+    "-forth-and-back": lambda sequence, count: forth_and_back(sequence, count),
 }
 
 
@@ -116,6 +116,12 @@ class Store:
         files = [path] if path.exists() else open_sequence(path).files
         read = (*map(checksum, files), self.own.frame_rate, self.own.frames, self.own.scale)
         return hashlib.sha256(repr(read).encode()).hexdigest()
+
+
+def forth_and_back(source: MeshSequence, count: int) -> Chosen:
+    """Return `count` frames of a sequence that is played forth and back, over and over; ends are not repeated."""
+    once = [*range(len(source)), *range(len(source) - 2, 0, -1)]
+    return Chosen(source, [once[number % len(once)] for number in range(count)])
 
 
 def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:

@@ -25,8 +25,9 @@ from meshreel.capture import demo_room
 from meshreel.capture.fusion import FusionOptions
 from meshreel.capture.recording import open_recording
 from meshreel.capture.rig import RIG
-from meshreel.capture.simulated_rig import TRUTH
+from meshreel.capture.simulated_rig import TRUTH, SceneFrame
 from meshreel.capture.truth import Truth, read_truth
+from meshreel.geometry.closest_points import Surface, carried_labels
 from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.derived_sequences import Chosen
 from meshreel.io.meshes import read_mesh
@@ -56,7 +57,7 @@ class SceneData:
         """Which faces of a frame move: those nearest to clean ones that do (`TRUE`), or what the encoder finds."""
         if source == TRUE:
             path = self.folder / "labels" / f"{TRUE}-{number:05}.npy"
-            return _kept_array(path, lambda: self.truth[number].labels_for(self.meshes[number]))
+            return _kept_array(path, lambda: _nearest_labels(self.truth[number], self.meshes[number]))
         path = self.folder / "labels" / f"{_kept_as(source)}.npz"
         if not path.exists():
             _find_labels(self.meshes, path)
@@ -132,6 +133,13 @@ def _find_labels(meshes: MeshSequence, path: Path) -> None:
     make_folder(path.parent)
     with replacing(path) as file:
         np.savez_compressed(file, allow_pickle=False, **labels)
+
+
+def _nearest_labels(clean: SceneFrame, fused: Mesh) -> Bool[np.ndarray, " F"]:
+    """Label the faces of a fused mesh that move: each takes the label of the clean face nearest to its middle."""
+    if clean.mesh.is_empty:
+        return np.zeros(len(fused.faces), bool)
+    return carried_labels(Surface(clean.mesh), clean.dynamic, fused)
 
 
 def _kept_mesh(path: Path, make: Callable[[], Mesh]) -> Mesh:

@@ -19,8 +19,10 @@ from PIL import Image
 
 from meshreel.geometry.closest_points import Surface
 from meshreel.metrics.render import Crop, look
-from meshreel.metrics.viewpoints import Box, OrthographicCamera, parallel_views_around
+from meshreel.metrics.viewpoints import Box
 from meshreel.types import Mesh
+
+from ..parallel_views import OrthographicCamera, parallel_views_around
 
 DPI = 100
 TOP, GAP, RIGHT = 26, 6, 80  # pixels over, between and, for a color bar, right of the panels

@@ -20,14 +20,15 @@ from meshreel.encoder.presets import layers_options
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.topology import face_normals, part_of
-from meshreel.metrics.bd_rate import Curve, bd_rate
 from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.ssim import ssim_normals
-from meshreel.metrics.viewpoints import Box, OrthographicCamera, parallel_views_around
+from meshreel.metrics.viewpoints import Box
 from meshreel.types import Mesh
 
+from ..bd_rate import Curve, bd_rate
 from ..datasets.rooms import PEOPLE
 from ..datasets.scenes import SceneData, open_scene
+from ..parallel_views import OrthographicCamera, parallel_views_around
 from .rows import PERFORMERS, Row, Sources, decoded, mbps_of
 
 FRAMES, EVERY = 24, 4  # frames that are coded; of these each fourth is measured

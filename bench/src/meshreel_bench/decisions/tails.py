@@ -23,9 +23,10 @@ from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.metrics.distance import surface_errors
 from meshreel.metrics.ssim import ssim_normals
-from meshreel.metrics.viewpoints import Box, parallel_views_around
+from meshreel.metrics.viewpoints import Box
 from meshreel.types import Mesh
 
+from ..parallel_views import parallel_views_around
 from .rows import Case, Row, Sources, decoded, mbps_of
 
 VIEW = 512  # pixels a side of a view

@@ -18,14 +18,15 @@ from meshreel.geometry.derived_sequences import Chosen
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
 from meshreel.metrics.scene_accuracy import Scene, scene_means, scene_row
 from meshreel.metrics.scene_comparison import finite, true_scene
-from meshreel.metrics.seams import measure_seam, seam_row
-from meshreel.metrics.viewpoints import ParallelViewOptions, ViewOptions
+from meshreel.metrics.viewpoints import Box, Camera
 from meshreel.types import Mesh
 
 from ..datasets import Dataset
 from ..datasets.scenes import SceneData
+from ..parallel_views import parallel_views_around
 from ..rows import Metrics
 from .bridges import count_bridges, count_degenerate
+from .seams import measure_seam, seam_row
 
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
 NO_METRICS = ("frames_compared", "frames_missing", "key_frames", "per_frame", "cameras")  # of a comparison's record
@@ -55,8 +56,10 @@ def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame
 
 def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     originals = Chosen(frames.known.sequence, frames.numbers)
-    views = ParallelViewOptions() if metrics == "parallel views" else ViewOptions()
-    options = ComparisonOptions(frames.known.cameras or None, views, ssim=metrics != "distances")
+    cameras: Sequence[Camera] | None = frames.known.cameras or None
+    if cameras is None and metrics == "parallel views":
+        cameras = parallel_views_around(Box.of(originals))
+    options = ComparisonOptions(cameras, ssim=metrics != "distances")
     row: dict[str, Any] = compare_sequences(originals, frames.decoded, options).to_row()
     if row.pop("frames_empty") == row["frames_compared"]:
         raise InputError("no frame has a face with an area; give a sequence with surface")

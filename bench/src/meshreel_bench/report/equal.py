@@ -10,8 +10,7 @@ from statistics import median
 
 import pandas as pd
 
-from meshreel.metrics.bd_rate import rate_at, reach
-
+from ..bd_rate import rate_at, reach
 from ..experiments.study import Measure
 from ..rows import Row
 from .looks import in_order

@@ -11,8 +11,7 @@ from math import log
 
 import pandas as pd
 
-from meshreel.metrics.bd_rate import bd_rate
-
+from ..bd_rate import bd_rate
 from ..experiments.study import Measure
 from ..rows import Options, Row
 from .looks import arrow, direction, in_order

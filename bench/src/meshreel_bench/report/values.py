@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from meshreel.encoder.surveying import SLICE
-from meshreel.metrics.bd_rate import Curve, hull
 
+from ..bd_rate import Curve, hull
 from ..experiments.study import FLOOR, Measure
 from ..names import USUAL
 from ..rows import Group, Row

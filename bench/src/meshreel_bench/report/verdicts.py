@@ -8,8 +8,7 @@ from functools import singledispatch
 from itertools import pairwise
 from math import inf
 
-from meshreel.metrics.bd_rate import BdRate, bd_bound, beats, gain_end
-
+from ..bd_rate import BdRate, bd_bound, beats, gain_end
 from ..experiments.study import Always, Bound, Flat, Gains, LeastRate, NoMore, Promise, Reaches, Rises, Study, Which
 from ..rows import Row
 from .values import curve, curve_of, floors, hull_of, rated, sequences, value

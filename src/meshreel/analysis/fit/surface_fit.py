@@ -18,10 +18,10 @@ from jaxtyping import Float64, Int32
 from ... import _core
 from ...errors import InputError
 from ...geometry import work
+from ...geometry.strict import eigen, products
 from ...types import Mesh
 from .frame import FrameSurface
 from .residual import NOTHING, Residual, residual_of
-from .shape import strongest_components
 
 FOLLOWED = 6e-4  # RMS noise from which the second fit trusts the coherent positions more than the frames (decision 16)
 NOISY_ROUNDS = slice(1, 3)  # of the first fit: motion is smooth under noise, and tighter rounds fit it (decision 16)
@@ -173,6 +173,18 @@ def fit_surfaces(
             if not (at == key and options.restart):
                 positions[at] = fitting.second(surfaces[at], coherent[at], positions[at])
     return positions
+
+
+def strongest_components(positions: Float64[np.ndarray, "T V 3"], key: int, count: int) -> Float64[np.ndarray, "T V 3"]:
+    """Rebuild the trajectories relative to the key frame from their `count` strongest components (eqs. 8-9)."""
+    frames, vertices, _ = positions.shape
+    field = (positions - positions[key]).transpose(1, 0, 2).reshape(vertices, 3 * frames)
+    mean = field.mean(axis=0)
+    centered = field - mean
+    _, vectors = eigen(products(centered.T, centered))
+    basis = vectors[:, ::-1][:, :count]
+    kept = products(products(centered, basis), basis.T) + mean
+    return positions[key] + kept.reshape(vertices, frames, 3).transpose(1, 0, 2)
 
 
 def _key(surfaces: Sequence[FrameSurface | None], key: int | None) -> int:

@@ -58,18 +58,6 @@ class Binding:
     weights: Float64[np.ndarray, "V n"]  # of the neighbours of k1; rows sum to 1
 
 
-def deform(
-    mesh: Mesh,
-    source: Float64[np.ndarray, "K 3"],
-    target: Float64[np.ndarray, "K 3"],
-    neighbours: Neighbours,
-    options: DeformOptions,
-) -> Float64[np.ndarray, "V 3"]:
-    """Move the vertices of a mesh from the source pose to the target pose (eq. 7)."""
-    binding = bind(mesh, source, neighbours, options)
-    return move(mesh.vertices, binding, center_motions(source, target, neighbours), neighbours)
-
-
 def neighbours(affinity: Float32[np.ndarray, "K K"], options: DeformOptions) -> Neighbours:
     """Return the K_nbr centers with the largest affinity to each center, itself first, then in decreasing order."""
     count = min(options.neighbours, len(affinity))

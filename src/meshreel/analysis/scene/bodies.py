@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64
 
 from ...errors import InputError
-from ...geometry.closest_points import Outline
+from ...geometry.closest_points import Surface
 from ...geometry.connected import connected_faces
 from ...geometry.topology import concatenate, face_normals, part_of, with_neighbours
 from ...geometry.voxels import Lattice, around, distinct, spread
@@ -72,7 +72,7 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
     return found
 
 
-def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Outline | None = None) -> Mesh:
+def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background: Surface | None = None) -> Mesh:
     """Cut the moving faces out of a frame together with the `ring` around them, as bodies are coded.
 
     Where the background has a gap there, more rings are added: a background fused from depth pictures lacks some pixels
@@ -83,7 +83,7 @@ def with_ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float, background
         return part_of(mesh, found)
     for _ in range(MOST_RINGS - 1):
         more = np.flatnonzero(ring(mesh, found, cell))
-        more = more[background.leaves_out(mesh.vertices[mesh.faces[more]].mean(axis=1))]
+        more = more[background.past_border(background.closest(mesh.vertices[mesh.faces[more]].mean(axis=1)))]
         if not len(more):
             break
         found[more] = True

@@ -171,20 +171,6 @@ def read_layers(data: bytes, levels: int | None = None) -> LayersRecords:
     return LayersRecords(head, tuple(data[start:end] for start, end in pairwise(ends)), ends[-1])
 
 
-def decode_layers(
-    data: bytes, levels: int | None = None, previous: LayersState | None = None
-) -> tuple[Int32[np.ndarray, "F 3"], Float64[np.ndarray, "T V 3"], LayersState]:
-    """Decode a group; return its faces, its positions in every frame, and the state that predicts the next group.
-
-    With `levels`, decode at most that many subdivisions; `data` may then end after them.
-    """
-    records = read_layers(data, levels)
-    if levels is None and records.end != len(data):
-        raise FormatError(f"layers: {len(data) - records.end} bytes too many")
-    decoded = place_layers(records, previous)
-    return decoded.faces, decoded.positions, decoded.state
-
-
 @dataclass(frozen=True, slots=True)
 class DecodedLayers:
     """Decoded group, with spare memory behind its positions."""

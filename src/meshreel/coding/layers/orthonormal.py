@@ -38,8 +38,3 @@ def inverse(symbols: Int32[np.ndarray, " N"], count: int, width: int) -> Float64
         return _core.orthonormal_inverse(symbols, count, width)
     except ValueError as error:
         raise FormatError("a basis vector without a direction") from error
-
-
-def symbol_count(count: int, width: int) -> int:
-    """Return the number of integers for `count` vectors."""
-    return count * width - count * (count - 1) // 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -10,7 +11,7 @@ import numpy as np
 
 from meshreel.coding.layers.patches import run_lengths
 from meshreel.encoder.options import EncoderOptions, PaperOptions
-from meshreel.encoder.presets import preset_options, quality_of_vertices
+from meshreel.encoder.presets import preset_options
 from meshreel.encoder.progress import Stages
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import InputError
@@ -24,6 +25,11 @@ from .tracking import Tracked, Tracking, Untracked, track_sequence
 from .video import TvmcVideo
 
 LEAST_QP, MOST_QP = 2, 16  # bits; guesses
+
+
+def quality_of_vertices(vertices: int) -> float:
+    """Return the quality, 0 to 100, whose reference mesh is nearest to this number of vertices."""
+    return min(max(50 + 50 * math.log(max(vertices, 1) / 2000, 2.5), 0.0), 100.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,7 @@ def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
     assert isinstance(options.method, PaperOptions), "references are those of the paper's recipe"
     for interval in encoder.intervals(options):
         if not interval.frames[0].is_empty:
-            groups += _groups(interval, encoder.store.find(interval, options.method), options.method)
+            groups += _groups(interval, encoder.find(interval, options.method, None), options.method)
     seen, states = survey(sequence) if parts is None else parts.seen, list[Static]()
     if parts is not None and options.scene is not None:
         states = encode_static(parts, len(sequence), sequence.frame_rate, options.scene.background)

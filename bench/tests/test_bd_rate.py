@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from meshreel_bench.bd_rate import Curve, RateAt, bd_bound, bd_rate, beats, gain_end, hull, rate_at, reach
 
 from meshreel.errors import InputError
-from meshreel.metrics.bd_rate import Curve, RateAt, bd_bound, bd_rate, beats, gain_end, hull, rate_at, reach
 
 # The points of VCEG-M33's often reprinted example, and those in the README of FAU's `bjontegaard` package.
 VCEG = (

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from meshreel_bench.codecs import groups as stored
+from meshreel_bench.codecs.groups import GroupStore, prepare, shared_options
 from meshreel_bench.codecs.tvmc.tracking import track_sequence
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, soft_bodies
-from meshreel.encoder import job, paper
-from meshreel.encoder import sequence as encoding
+from meshreel.encoder import paper
 from meshreel.encoder.interval import Interval
-from meshreel.encoder.job import GroupStore, shared_options
 from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.sequence import Encoder, encode
 from meshreel.encoder.target import Fidelity
@@ -31,14 +31,17 @@ def with_basis(size: int) -> EncoderOptions:
 def analysed(monkeypatch):
     """Numbers of frames of the intervals that were analysed, in order."""
     seen, find = list[int](), paper.find_groups
-    monkeypatch.setattr(job, "find_groups", lambda some, *rest: seen.append(len(some.frames)) or find(some, *rest))
+    for module in (stored, paper):
+        monkeypatch.setattr(
+            module, "find_groups", lambda some, *rest: seen.append(len(some.frames)) or find(some, *rest)
+        )
     return seen
 
 
 def test_a_prepared_encoder_analyses_each_interval_once_and_writes_the_bytes_of_an_unprepared_one(analysed, tmp_path):
     sequence = MeshList((*BODY, Mesh.empty()))
     prepared = Encoder(sequence)
-    prepared.prepare(with_basis(1))
+    prepare(prepared, with_basis(1))
     assert analysed == [2, 2]  # the empty frame is not analysed
     for size in (1, 2):
         prepared.encode(tmp_path / "prepared.reel", with_basis(size))
@@ -50,7 +53,7 @@ def test_a_prepared_encoder_analyses_each_interval_once_and_writes_the_bytes_of_
 
 def test_an_encoder_that_was_prepared_for_other_options_analyses_again(analysed, tmp_path):
     prepared = Encoder(MeshList(BODY))
-    prepared.prepare(PAPER)
+    prepare(prepared, PAPER)
     prepared.encode(tmp_path / "a.reel", with_method(PAPER, group_size=4))
     assert analysed == [2, 2, 4]
 
@@ -60,11 +63,11 @@ def test_bodies_of_a_noisy_scene_are_analysed_once_with_their_noise(codec, monke
     """`encode` and the tracking of TVMC reuse the analyses that `prepare` kept."""
     noises, find = list[float](), paper.find_groups
     monkeypatch.setattr(
-        job, "find_groups", lambda interval, *rest: noises.append(interval.noise) or find(interval, *rest)
+        stored, "find_groups", lambda interval, *rest: noises.append(interval.noise) or find(interval, *rest)
     )
     options, rolling = quick_scene("paper", group_size=2), with_room([ball(0.5 + 0.35 * t) for t in range(4)])
     prepared = Encoder(MeshList(tuple(rolling)))
-    prepared.prepare(options)
+    prepare(prepared, options)
     analysed = len(noises)
     assert analysed >= 2 and min(noises) > 0
     for _ in range(2):
@@ -73,14 +76,6 @@ def test_bodies_of_a_noisy_scene_are_analysed_once_with_their_noise(codec, monke
         else:
             assert track_sequence(prepared, options).groups
     assert len(noises) == analysed
-
-
-def test_with_workers_nothing_is_analysed_ahead(analysed):
-    class Elsewhere(encoding.Executor):
-        pass
-
-    Encoder(MeshList(BODY), Elsewhere()).prepare(PAPER)
-    assert analysed == []
 
 
 def test_kept_groups_are_those_that_find_groups_returns():

@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float64
 
-from ..errors import InputError
-from ..geometry.closest_points import Surface
-from ..geometry.topology import border_edges, edge_lengths, face_normals, part_of
-from ..geometry.voxels import spread
-from ..types import Mesh
-from .distance import quantile
+from meshreel.errors import InputError
+from meshreel.geometry.closest_points import Surface
+from meshreel.geometry.topology import border_edges, edge_lengths, face_normals, part_of
+from meshreel.geometry.voxels import spread
+from meshreel.metrics.distance import quantile
+from meshreel.types import Mesh
 
 Row = dict[str, Any]
 MM = 1000.0

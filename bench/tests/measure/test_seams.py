@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from meshreel_bench.measure.seams import SeamOptions, measure_seam, seam_row
 
 from meshreel.errors import InputError
 from meshreel.geometry.topology import concatenate
-from meshreel.metrics.seams import SeamOptions, measure_seam, seam_row
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, noisy, sphere
 

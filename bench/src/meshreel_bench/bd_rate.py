@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from ..errors import InputError
+from meshreel.errors import InputError
 
 _GRID = 2001  # qualities at which two curves are compared (guess)
 
