@@ -27,6 +27,8 @@ from ..codecs import codec_version, make_codec
 from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, SceneFrames
+from ..experiments.study import FLOOR
+from ..experiments.study import FOUND as SEGMENTATION
 from ..rows import Encoding, Group, Point, Row, Stream
 from .clock import StageTimer, cost_of
 from .decode import decoded_apart
@@ -34,7 +36,6 @@ from .maker import maker
 from .metrics import Measured, measure_frames
 from .segmentation import score_labels
 
-TRUTH, SEGMENTATION = "captured", "segmentation"  # in a codec's place
 TRUTH_NAME = "the truth itself"
 SOME = 10  # frames of a scene that a sampled point has; of all other points every second of these is measured
 KEYS = "key_frames"  # of a file's metadata: numbers of the frames that others are predicted from
@@ -56,7 +57,7 @@ def measure_point(point: Point, store: Store) -> Row:
     row = empty_row(point, store, frames=count, frame_rate=known.sequence.frame_rate, measured_frames=numbers)
     if point.codec == SEGMENTATION:
         return msgspec.structs.replace(row, metrics=_segmentation(known))
-    if point.codec == TRUTH:
+    if point.codec == FLOOR:
         if known.scene is None:
             raise InputError("the truth itself is known of simulated scenes only")
         clean = [known.scene.truth[number].mesh for number in numbers]
