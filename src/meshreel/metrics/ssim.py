@@ -14,11 +14,12 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..types import Mesh
-from .render import Looked, Pixels, Visible, crop_of
+from .render import Looked, Picture, Pixels, Visible, crop_of
 from .viewpoints import Camera
 
 _SIDE = 7  # pixels, side of the SSIM window: scikit-image's default
 BORDER = _SIDE // 2
+MARGIN = 2 * _SIDE  # pixels of a crop around what is seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,17 +40,18 @@ def ssim_normals(
     `seen` prepares the original for rendering; pass a caching function to render the same original only once.
     """
     pair = seen(original), Visible(decoded)
-    crops = [crop_of([original, decoded], camera, border=2 * _SIDE) for camera in cameras]
-    scores = [_ssim_view(*pair, Pixels(camera, crop)) for camera, crop in zip(cameras, crops, strict=True)]
+    crops = [crop_of([original, decoded], camera, MARGIN) for camera in cameras]
+    views = [Pixels(camera, crop) for camera, crop in zip(cameras, crops, strict=True)]
+    scores = [ssim_view(pair[0].look(pixels), pair[1].look(pixels), pixels) for pixels in views]
     whole = tuple(score[0] for score in scores)
     masked = tuple(score[1] for score in scores)
     counted = [value for value in masked if value is not None]
     return NormalSsim(float(np.mean(whole)), float(np.mean(counted)) if counted else 1.0, whole, masked)
 
 
-def _ssim_view(original: Looked, decoded: Looked, pixels: Pixels) -> tuple[float, float | None]:
+def ssim_view(a: Picture, b: Picture, pixels: Pixels) -> tuple[float, float | None]:
+    """Return SSIM of two pictures over the whole image, and over pixels that either covers; None without such."""
     camera, crop = pixels.camera, pixels.crop
-    a, b = original.look(pixels), decoded.look(pixels)
     interior = np.zeros((camera.height, camera.width), dtype=bool)
     interior[BORDER:-BORDER, BORDER:-BORDER] = True
     inside = interior[crop.top : crop.bottom, crop.left : crop.right]

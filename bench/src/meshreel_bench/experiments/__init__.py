@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, figure6, layers, scenes, speed, targets
+from . import ablations, color, figure6, layers, scenes, speed, targets
 from .study import Study
 
 # In the order of the report.
@@ -20,6 +20,7 @@ EXPERIMENTS: dict[str, Study] = {
     "layers": layers.STUDY,
     "targets": targets.STUDY,
     "speed": speed.STUDY,
+    "color": color.STUDY,
 }
 
 
