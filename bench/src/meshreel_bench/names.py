@@ -7,6 +7,7 @@ are not `USUAL` follow (`report.values.curve_of`).
 from __future__ import annotations
 
 BEST = "meshreel best"
+TEXTURED, PAINTED = f"{BEST}, texture", f"{BEST}, vertices"  # in colour
 TSMC = "meshreel paper m, quality 50"  # as the paper has it: the number of basis vectors is varied
 TUNED = "meshreel paper"  # the same system, the quality varied and the basis chosen by it: spares what m alone cannot
 TVMC, DRACO, KLT, NECGS = "tvmc", "draco", "klt_tsdf", "necgs"

@@ -13,7 +13,7 @@ from meshreel.errors import InputError
 
 Option = str | int | float | bool | None
 Options = dict[str, Option]
-Metrics = Literal["distances", "views", "parallel views", "regions"]
+Metrics = Literal["distances", "views", "parallel views", "regions", "colors"]
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -25,7 +25,8 @@ class Point(msgspec.Struct, frozen=True):
     frames: int | None = None  # the first frames of the sequence; None: all
     sampled: bool = False  # the codec is given some frames of a scene only: it is slow, or codes every frame alone
     # distances alone; also pictures, from where the cameras stood or from four sides (perspective, or parallel); or
-    # people and background of a simulated scene, each against the truth and against the input
+    # people and background of a simulated scene, each against the truth and against the input; or also colours, of
+    # surface, of parallel views, and beside the pictures of cameras
     metrics: Metrics = "views"
 
     @property
@@ -55,6 +56,22 @@ class Group(msgspec.Struct, frozen=True, omit_defaults=True):
     key: int | None = None  # frame that the others are predicted from, where the file names it
 
 
+class ColorBytes(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Bytes of a stream's colours; of its geometry, what a chain of groups begins with."""
+
+    vertices: int = 0  # colours of moving bodies' vertices
+    atlas: int = 0  # places in textures
+    pictures: list[int] = []  # of each texture
+    background: int = 0  # all colours of what stands still
+    base: int = 0  # base meshes of groups that need no other: no colours
+    chains: int = 1
+
+    @property
+    def all(self) -> int:
+        """All bytes of colours."""
+        return self.vertices + self.atlas + self.background + sum(self.pictures)
+
+
 class Stream(msgspec.Struct, frozen=True, omit_defaults=True):
     """Encoded sequence."""
 
@@ -62,6 +79,7 @@ class Stream(msgspec.Struct, frozen=True, omit_defaults=True):
     coded_frames: int
     background_bytes: int = 0  # share of `bytes` that is sent once
     groups: list[Group] = []
+    colors: ColorBytes | None = None
 
 
 class Encoding(msgspec.Struct, frozen=True, omit_defaults=True):

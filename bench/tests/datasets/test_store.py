@@ -71,14 +71,6 @@ def test_a_file_more_or_one_by_another_name_is_other_data(planted):
     assert len({first, second, checksums.checksum(folder)}) == 3
 
 
-def test_color_pictures_of_a_recording_leave_its_checksum_as_it_is(planted):
-    folder = planted / "performers" / "walker"
-    before = checksums.checksum(folder)
-    (folder / "color").mkdir()
-    (folder / "color" / "00000.png").write_text("")
-    assert checksums.checksum(folder) == before
-
-
 def test_a_table_of_checksums_is_rewritten_from_the_data(planted):
     table = planted / "checksums.json"
     table.write_text(json.dumps(dict.fromkeys(["performers/walker", "performers/ball.npz"], "")))

@@ -61,9 +61,10 @@ class MeshreelCodec(Prepared):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots; points with a fixed m or a variant make another curve."""
+        """The name in rows and plots; points with colours, a fixed m or a variant make another curve."""
+        colored = "" if self.color == "none" else f", {self.color}"
         changed = "" if self.variant is None else f", {self.variant}"
-        return f"meshreel {self.preset}{changed}" + ("" if self.basis_size is None else " m")
+        return f"meshreel {self.preset}{colored}{changed}" + ("" if self.basis_size is None else " m")
 
     @property
     def encoder_options(self) -> EncoderOptions:

@@ -14,7 +14,6 @@ from pathlib import Path
 from meshreel.errors import InputError
 
 TABLE = "checksums.json"  # package data: by path below the benchmark data
-UNREAD = "color"  # folder of a recording whose pictures no measurement reads
 
 
 def check_source(path: Path, known_as: Path) -> None:
@@ -47,12 +46,10 @@ def write_checksums(data: Path, table: Path) -> None:
 def checksum(path: Path) -> str:
     """Return the SHA-256 of a file, or of names and contents of a folder's files in the order of their names.
 
-    The color pictures of a recording are left out. Files are read again where their sizes or times have changed.
-    Raises InputError where one cannot be read.
+    Files are read again where their sizes or times have changed. Raises InputError where one cannot be read.
     """
     try:
-        below = (p for p in path.rglob("*") if p.is_file() and path / UNREAD not in p.parents)
-        listed = sorted(below) if path.is_dir() else [path]
+        listed = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
         stamps = [(file, file.stat()) for file in listed]
         return _checksum(path, tuple((file, stat.st_size, stat.st_mtime_ns) for file, stat in stamps))
     except OSError as error:

@@ -26,6 +26,7 @@ from ..datasets.scenes import SceneData
 from ..parallel_views import parallel_views_around
 from ..rows import Metrics
 from .bridges import count_bridges, count_degenerate
+from .color import picture_psnrs, picture_squares, swimming
 from .seams import measure_seam, seam_row
 
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
@@ -49,6 +50,8 @@ def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame
     if metrics == "regions":
         return _regions(frames), {}
     values, per_frame = _to_input(frames, metrics)
+    if metrics == "colors":
+        return values | finite(_colors(frames)), per_frame
     if frames.known.scene is not None:
         values |= _means("truth", [(_true(frames.known.scene, number)) for number in frames.numbers], frames.decoded)
     return values, per_frame
@@ -57,7 +60,7 @@ def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame
 def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     originals = Chosen(frames.known.sequence, frames.numbers)
     cameras: Sequence[Camera] | None = frames.known.cameras or None
-    if cameras is None and metrics == "parallel views":
+    if cameras is None and metrics in ("parallel views", "colors"):
         cameras = parallel_views_around(Box.of(originals))
     options = ComparisonOptions(cameras, ssim=metrics != "distances")
     row: dict[str, Any] = compare_sequences(originals, frames.decoded, options).to_row()
@@ -69,6 +72,19 @@ def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
         values["bridges"] = sum(count_bridges(a, b) for a, b in zip(originals, frames.decoded, strict=True))
         values["degenerate_faces"] = sum(map(count_degenerate, frames.decoded))
     return values, per_frame
+
+
+def _colors(frames: Measured) -> dict[str, float]:
+    """Return PSNRs beside the pictures of cameras, where there are any, and of a file's successive textures."""
+    video = open_video(frames.data) if frames.data.startswith(MAGIC) else None
+    pictures, originals = frames.known.pictures, frames.known.sequence
+    found = picture_psnrs(
+        picture_squares(picture, originals[k], mesh, 0 if video is None else len(video.background(k).faces))
+        for k, mesh in zip(frames.numbers, frames.decoded, strict=True)
+        for picture in (pictures[k] if pictures else ())
+        if picture is not None
+    )
+    return found if video is None else found | swimming(video)
 
 
 def _regions(frames: Measured) -> Values:

@@ -14,7 +14,7 @@ from meshreel.encoder.surveying import SLICE
 from ..bd_rate import Curve, hull
 from ..experiments.study import FLOOR, Measure
 from ..names import USUAL
-from ..rows import Group, Row
+from ..rows import ColorBytes, Group, Row
 
 SECONDS = 10.0  # in which a background is sent once, for `mbps_background_10s`
 HALF = 30  # frames of each half of a long sequence
@@ -30,8 +30,9 @@ def value(row: Row, key: str) -> float | None:
     for prefix, found in (("encode_s.", row.encoding.stages_s), ("work.", row.encoding.work)) if row.encoding else ():
         if key.startswith(prefix):
             return found.get(key.removeprefix(prefix))
-    if key.startswith("efficiency."):
-        return _efficiency(row, *map(int, key.split(".")[1:]))
+    name, *numbers = key.split(".")
+    if name in WITH_NUMBERS and numbers:
+        return WITH_NUMBERS[name](row, *map(int, numbers))
     return DERIVED[key](row) if key in DERIVED else row.metrics.get(key)
 
 
@@ -108,9 +109,45 @@ def _end(times: np.ndarray, workers: int) -> float:
     return max(free)
 
 
+def _of_key(row: Row, what: str, frames: int) -> float | None:
+    """Return a rate, Mbps, where a chain of so many frames begins with its base mesh, colours, atlas and first picture.
+
+    The others' pictures and motion are the mean of what was coded. None for what is no single chain, but for all bytes.
+    """
+    known = None if row.stream is None else row.stream.colors
+    if row.stream is None or known is None or known.chains > 1:
+        return row.mbps if row.stream and what == "all" else None
+    first, *others = known.pictures or [0]
+    sizes = {
+        "vertices": known.vertices,
+        "texture": known.atlas + first + (frames - 1) * sum(others) / max(len(others), 1),
+    }
+    rest = row.stream.bytes - known.all - known.base
+    sizes["all"] = sum(sizes.values()) + known.base + rest * frames / row.stream.coded_frames
+    return 8 * sizes[what] * row.frame_rate / frames / 1e6
+
+
+WITH_NUMBERS: dict[str, Callable[..., float | None]] = {
+    "efficiency": _efficiency,
+    "mbps": lambda row, frames: _of_key(row, "all", frames),
+    "texture_mbps": lambda row, frames: _of_key(row, "texture", frames),
+    "vertices_mbps": lambda row, frames: _of_key(row, "vertices", frames),
+}
+
+
+def _color_mbps(row: Row, share: Callable[[ColorBytes], int]) -> float | None:
+    """Return the rate of some bytes of colours over the whole sequence."""
+    if row.stream is None or row.stream.colors is None:
+        return None
+    return row.mbps * share(row.stream.colors) / row.stream.bytes
+
+
 DERIVED: dict[str, Callable[[Row], float | None]] = {
     "mbps": lambda row: row.mbps if row.stream else None,
     "mbps_background_10s": _mbps_background_10s,
+    "color_mbps": lambda row: _color_mbps(row, lambda known: known.all),
+    "background_color_mbps": lambda row: _color_mbps(row, lambda known: known.background),
+    "color_share": lambda row: found / row.mbps if (found := _color_mbps(row, lambda known: known.all)) else None,
     "background_bytes": lambda row: row.stream.background_bytes if row.stream else None,
     "encode_s": lambda row: row.encoding.s if row.encoding else None,
     "encode_s_at_rest": lambda row: _at_rest(row.encoding.s, row.encoding.reference_s) if row.encoding else None,

@@ -1,4 +1,4 @@
-"""The KLT of a block's distances, in integers: a mean and principal components, learned offline (`train`).
+"""The KLT of a block's distances, in integers: a mean and principal components, learned offline.
 
 A vector is a sum of products of discrete Legendre (Gram) polynomials of total degree 8 at most. Blocks were learned
 under all 48 symmetries of the cube, so each vector is even or odd along each axis and takes about twenty small
@@ -25,7 +25,7 @@ ONE = 1 << 12  # what a value of 1 is in a basis; a vector's root mean square is
 COEFFICIENT = 1 << 9  # what a coefficient of 1 is
 MOST = 64  # components that were learned
 ENERGY = 1 << 20  # what a mean square of 1 is in the package data
-FILE = "basis.bin"  # package data: energies, mean and components, as `pack_learned` writes them
+FILE = "basis.bin"  # package data: energies, mean and components; its trainer is in this repository, commit 4ca03122
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +98,3 @@ def learned(count: int) -> tuple[BasisSymbols, Float64[np.ndarray, " M"]]:
     energies = decode_integers(first, MOST) / ENERGY
     symbols = decode_basis(second, MOST)
     return BasisSymbols(symbols.classes[:count], symbols.coefficients[: count + 1]), energies[:count]
-
-
-def pack_learned(symbols: BasisSymbols, energies: Float64[np.ndarray, " M"]) -> bytes:
-    """The package data that `learned` reads."""
-    integers = np.maximum(np.rint(energies * ENERGY), 1).astype(np.int32)
-    return join([encode_integers(integers), encode_basis(symbols)])
