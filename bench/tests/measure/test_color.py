@@ -50,8 +50,8 @@ def test_what_stands_and_what_moves_are_told_apart_by_their_faces():
 def test_pixels_that_only_one_frame_covers_do_not_count():
     half = BALL.with_faces(BALL.vertices[BALL.faces].mean(axis=1)[:, 0] > 0)
     squares = picture_squares(picture(painted(100)), half, painted(100), 0)
-    assert squares["seen"][0] < 1e-6
-    assert 0 < squares["seen"][1] < 0.5 * picture_squares(picture(BALL), BALL, BALL, 0)["seen"][1]
+    assert squares[0, 0] < 1e-6
+    assert 0 < squares[0, 1] < 0.5 * picture_squares(picture(BALL), BALL, BALL, 0)[0, 1]
     assert picture_psnrs([]) == {}
 
 

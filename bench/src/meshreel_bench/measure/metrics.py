@@ -1,7 +1,6 @@
 """Metrics of decoded frames: against the input, and where a scene is simulated, against the truth.
 
-In: the frames that are measured, original and decoded. Out: values by name, over the frames and for each. Names that
-begin with `truth_` or `input_` are of whole scenes, people and background; `seam_` is where these meet.
+Names that begin with `truth_` or `input_` are of whole scenes, people and background; `seam_` is where these meet.
 """
 
 from __future__ import annotations

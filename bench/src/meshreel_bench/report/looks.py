@@ -1,7 +1,4 @@
-"""Look of each curve in plots, order of curves in tables, and the direction in which a metric is better.
-
-In -> out: names of curves -> a color, a marker and a line for each; the name of a metric -> a sign.
-"""
+"""Look of each curve in plots, order of curves in tables, and the direction in which a metric is better."""
 
 from __future__ import annotations
 

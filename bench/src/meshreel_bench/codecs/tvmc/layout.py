@@ -1,7 +1,4 @@
-"""The bytes of a TVMC* stream: one record, then its checksum. In -> out: Stream <-> bytes.
-
-Only the process that measures a stream decodes it: the checksum tells damage, and no law behind it is checked.
-"""
+"""The bytes of a TVMC* stream: a record, then a checksum. Only what measures it decodes it: no law is checked."""
 
 from __future__ import annotations
 
