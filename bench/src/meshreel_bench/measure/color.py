@@ -13,10 +13,13 @@ from meshreel.decoder.video import Video
 from meshreel.format.layout import ChunkKind, Form, Pictures
 from meshreel.format.records import unpack_all
 from meshreel.geometry.color_views import ColorPicture
-from meshreel.metrics.color import PEAK, TO_YUV, psnr
+from meshreel.geometry.painted import Painted
+from meshreel.geometry.topology import blend
+from meshreel.metrics.color import PEAK, POINTS, TO_YUV, psnr
 from meshreel.metrics.color_render import Colored
+from meshreel.metrics.even_points import scatter
 from meshreel.metrics.render import Crop, Pixels
-from meshreel.types import Mesh
+from meshreel.types import Mesh, MeshSequence
 
 from ..rows import ColorBytes
 
@@ -63,16 +66,25 @@ def color_bytes(reader: ReelReader) -> ColorBytes | None:
     return ColorBytes(**sizes, pictures=pictures, base=base, chains=len(first))
 
 
-def swimming(video: Video) -> dict[str, float]:
-    """Return the mean PSNR of successive textures of one atlas, red, green and blue; nothing where there are none."""
-    found, reader = list[float](), video.reader
+def swimming(video: Video, originals: MeshSequence) -> dict[str, float]:
+    """Return mean PSNRs of red, green and blue from one frame to the next of a chain of groups.
+
+    `swimming_psnr`: what coloured originals show at the same places of the tracked surface; `texture_psnr`: textures as
+    decoded, which a coarse quantiser keeps from changing.
+    """
+    found, reader = {"swimming_psnr": list[float](), "texture_psnr": list[float]()}, video.reader
+    is_colored = len(originals) > 0 and originals[0].is_colored
     for number, track in enumerate(video.tracks):
-        before: np.ndarray | None = None
         for frame, mesh in enumerate(track):
-            chunk = reader.chunk_of_frame(frame, number)
-            is_new = frame == chunk.first_frame and reader.group_before(chunk) is None
-            pixels = None if mesh.texture is None else mesh.texture.pixels.astype(np.float32)
-            if not is_new and before is not None and pixels is not None:
-                found.append(psnr(float(np.mean(np.square(pixels - before)))))
-            before = pixels
-    return {"swimming_psnr": float(np.mean(found))} if found else {}
+            chunk, now = reader.chunk_of_frame(frame, number), dict[str, np.ndarray]()
+            if frame == chunk.first_frame and reader.group_before(chunk) is None:
+                first, before, places = mesh, dict(now), scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
+            if mesh.texture is not None:
+                now["texture_psnr"] = mesh.texture.pixels.astype(np.float32)
+            if is_colored and not mesh.is_empty and np.array_equal(mesh.faces, first.faces):
+                points = blend(mesh.vertices, mesh.faces[places.faces], places.barycentric)
+                now["swimming_psnr"] = Painted(originals[frame]).at(points, points)[0]
+            for name in now.keys() & before.keys():
+                found[name].append(psnr(float(np.mean(np.square(now[name] - before[name])))))
+            before = now
+    return {name: float(np.mean(values)) for name, values in found.items() if values}

@@ -80,7 +80,7 @@ def _colors(frames: Measured) -> dict[str, float]:
         for picture in (pictures[k] if pictures else ())
         if picture is not None
     )
-    return found if video is None else found | swimming(video)
+    return found if video is None else found | swimming(video, originals)
 
 
 def _regions(frames: Measured) -> Values:

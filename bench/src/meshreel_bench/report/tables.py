@@ -12,13 +12,13 @@ from meshreel.metrics.bd_rate import bd_rate
 
 from ..experiments.study import Measure
 from ..rows import Options, Row
-from .looks import arrow, direction, in_order
+from .looks import direction, in_order
 from .values import curve, curve_of, rated, sequences, value
 from .verdicts import Verdict
 
 NEAR = 1.25  # factor of a rate within which points are compared
 NEAR_DB = 1.0  # of a PSNR
-DAGGER = "†"
+DAGGER, ARROWS = "†", {1: " ↑", -1: " ↓"}
 
 
 def text(found: object) -> str:
@@ -52,7 +52,7 @@ def ranked(table: pd.DataFrame, signs: Mapping[str, int], groups: Sequence[Hasha
             mark = {1.0: "**", 2.0: "*"}.get(rank, "") if counts[index] > 1 else ""
             if mark:
                 marked.loc[index, name] = f"{mark}{_cell(table.loc[index, name])}{mark}"
-    return marked.rename(columns={name: f"{name}{arrow(sign)}" for name, sign in signs.items()})
+    return marked.rename(columns={name: name + ARROWS.get(sign, "") for name, sign in signs.items()})
 
 
 def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from meshreel.errors import FormatError
 from meshreel.format.kinds import F64, U8, U32, Array, Blob, Bytes, Choice, List, Varint
-from meshreel.format.layout import Checksum, Form
+from meshreel.format.layout import Checksum
 from meshreel.format.records import Nested, least_size, pack, unpack_all
 
 MAGIC = b"TVMC"
@@ -84,11 +84,6 @@ def unpack_stream(data: bytes) -> Stream:
     if unpack_all(Checksum, data[size:]).crc != zlib.crc32(data[:size]):
         raise FormatError(f"a TVMC* stream of {len(data)} bytes whose checksum is wrong; damaged or truncated")
     return unpack_all(Stream, data[:size])
-
-
-def is_patch(state: State) -> bool:
-    """Return whether a state is a patch of the previous one."""
-    return state.payload[:1] == bytes([Form.PATCH])
 
 
 def is_bare(stream: Stream, frame: int) -> bool:
