@@ -10,12 +10,12 @@ import pytest
 
 from meshreel.metrics.color_render import render_colors, render_errors
 from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
-from meshreel.metrics.viewpoints import Box, ParallelViewOptions, parallel_views_around
+from meshreel.metrics.viewpoints import Box, ViewOptions, views_around
 from meshreel.types import Mesh, Texture
 from tests.metrics.shapes import sphere
 
 BALL = sphere(levels=4)
-VIEWS = parallel_views_around(Box.of([BALL]), 96)
+VIEWS = views_around(Box.of([BALL]), ViewOptions(96, 96))
 
 
 def painted(grey: int, mesh: Mesh = BALL) -> Mesh:
@@ -62,7 +62,7 @@ def test_silhouettes_count_in_the_union_alone() -> None:
 
 
 def test_a_comparison_with_views_has_them_where_both_have_colours() -> None:
-    options = ComparisonOptions(views=ParallelViewOptions(96))
+    options = ComparisonOptions(views=ViewOptions(96, 96))
     row = compare_sequences([painted(100)], [painted(110)], options).to_row()
     assert row["view_y_psnr"] == row["view_y_psnr_inside"] == pytest.approx(20 * math.log10(25.5))
     assert row["view_ssim"] == row["view_ssim_worst"] < 1

@@ -1,8 +1,4 @@
-"""Names of curves, as rows have them and as papers write them.
-
-In -> out: the name of a curve -> its title. A curve is named by its codec; where a basis is fixed, other options that
-are not `USUAL` follow (`report.values.curve_of`).
-"""
+"""Names of curves as rows have them (`report.values.curve_of`), and as papers write them."""
 
 from __future__ import annotations
 

@@ -24,9 +24,8 @@ class Point(msgspec.Struct, frozen=True):
     options: Options = {}
     frames: int | None = None  # the first frames of the sequence; None: all
     sampled: bool = False  # the codec is given some frames of a scene only: it is slow, or codes every frame alone
-    # distances alone; also pictures, from where the cameras stood or from four sides (perspective, or parallel); or
-    # people and background of a simulated scene, each against the truth and against the input; or also colours, of
-    # surface, of parallel views, and beside the pictures of cameras
+    # distances alone; also pictures, from where the cameras stood or from four sides (perspective, or parallel); people
+    # and background of a simulated scene against truth and input; or colours of parallel views and cameras' pictures
     metrics: Metrics = "views"
 
     @property
@@ -129,10 +128,7 @@ class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Return the rows of a file; of several rows of a point the last that was measured counts.
-
-    A last line that was not written to its end is left out. Raises InputError where a line is no row.
-    """
+    """Return the rows of a file, each point's last; a last line cut short is left out. InputError for no row."""
     try:
         lines = path.read_bytes().split(b"\n")
     except OSError as error:

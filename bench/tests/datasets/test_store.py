@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums, forth_and_back
+from meshreel_bench.datasets.remesh import SideBySide
 from meshreel_bench.datasets.scenes import PROCEDURAL
-from meshreel_bench.datasets.side_by_side import SideBySide
 
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError

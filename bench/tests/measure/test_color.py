@@ -50,23 +50,34 @@ def test_what_stands_and_what_moves_are_told_apart_by_their_faces():
 def test_pixels_that_only_one_frame_covers_do_not_count():
     half = BALL.with_faces(BALL.vertices[BALL.faces].mean(axis=1)[:, 0] > 0)
     squares = picture_squares(picture(painted(100)), half, painted(100), 0)
-    assert squares["seen"][0] < 1e-6
-    assert 0 < squares["seen"][1] < 0.5 * picture_squares(picture(BALL), BALL, BALL, 0)["seen"][1]
+    assert squares[0, 0] < 1e-6
+    assert 0 < squares[0, 1] < 0.5 * picture_squares(picture(BALL), BALL, BALL, 0)[0, 1]
     assert picture_psnrs([]) == {}
 
 
 @pytest.fixture(scope="module")
-def video():
-    """A ball with a dark half that slides, with a texture."""
+def frames():
+    """A ball with a dark half that slides."""
     colors = np.where(BALL.vertices[:, :1] > 0, 40, 200).astype(np.uint8).repeat(3, axis=1)
-    frames = tuple(replace(mesh, colors=colors) for mesh in sliding_sphere(3, levels=4))
-    return open_video(MeshreelCodec("best", color="texture", texture=512).encode(MeshList(frames)))
+    return MeshList(tuple(replace(mesh, colors=colors) for mesh in sliding_sphere(3, levels=4)))
 
 
-def test_the_texture_of_a_surface_that_only_slides_hardly_swims(video):
-    assert swimming(video)["swimming_psnr"] > 36
+@pytest.fixture(scope="module")
+def video(frames):
+    return open_video(MeshreelCodec("best", color="texture", texture=512).encode(frames))
+
+
+def test_a_surface_that_only_slides_hardly_swims_and_one_whose_colours_turn_does(video, frames):
+    found = swimming(video, frames)
+    assert found["swimming_psnr"] > 30 and found["texture_psnr"] > 36
+    turned = [replace(mesh, colors=np.roll(mesh.colors, 40 * k, axis=0)) for k, mesh in enumerate(frames)]
+    other = swimming(video, MeshList(tuple(turned)))
+    assert other["swimming_psnr"] < found["swimming_psnr"] - 6 and other["texture_psnr"] == found["texture_psnr"]
+
+
+def test_what_has_no_colours_has_no_swimming():
     plain = open_video(MeshreelCodec("best").encode(sliding_sphere(2, levels=2)))
-    assert swimming(plain) == {} and color_bytes(plain.reader) is None
+    assert swimming(plain, sliding_sphere(2, levels=2)) == {} and color_bytes(plain.reader) is None
 
 
 def test_the_bytes_of_colours_are_those_of_their_chunks(video):

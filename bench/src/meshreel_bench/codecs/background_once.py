@@ -1,8 +1,4 @@
-"""Background once, then decimated Draco per frame: the strongest anchor without tracking. A sequence <-> .reel.
-
-The background is found and coded as meshreel does; what moves in each frame is decimated and coded by Draco. A sequence
-that is no scene is decimated Draco per frame.
-"""
+"""Background once, as meshreel codes it, then what moves as decimated Draco per frame: an anchor without tracking."""
 
 from __future__ import annotations
 

@@ -1,13 +1,10 @@
-"""Draco per frame with colours: of vertices, or places in a texture beside its pictures. A sequence <-> bytes.
-
-Pictures are the input's own, made smaller: an AVIF image a frame, or one AV1 video of all, coded as the product's.
-"""
+"""Draco per frame with colours: of vertices, or of the input's textures, as AVIF images or one AV1 video. <-> bytes."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import DracoPy
@@ -40,9 +37,9 @@ class Frames(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class ColoredDracoCodec(Options):
-    """Draco with colours in one of `WAYS`."""
+    """Draco with colours."""
 
-    color: str = "vertices"
+    color: str = "vertices"  # one of `WAYS`
     qp: int = 10  # bits along each frame's longest side
     bits: int = 8  # of a vertex' red, green and blue each, or of a place along the side of a texture
     size: int = 1024  # pixels, width and height of a texture
@@ -53,50 +50,43 @@ class ColoredDracoCodec(Options):
         if self.color not in WAYS or not 1 <= self.bits <= (8 if self.color == WAYS[0] else 20):
             raise InputError(f"color {self.color!r}, bits {self.bits}: give one of {WAYS}, and 1 to 8, or 20 of places")
         if not (16 <= self.size <= 4096 and self.size % 2 == 0 and 1 <= self.quality <= 100):
-            raise InputError(
-                f"size {self.size}, quality {self.quality}: give even pixels from 16 to 4096, and 1 to 100"
-            )
+            raise InputError(f"size {self.size}, quality {self.quality}: give even pixels, 16 to 4096, and 1 to 100")
 
     @property
     def name(self) -> str:
         """The name in rows and plots."""
         return f"Draco with colours, {self.color}"
 
-    def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
+    def encode(self, sequence: MeshSequence, _progress: Progress | None = None) -> bytes:
         """Return the stream. Raises InputError for frames without what is to be coded."""
         meshes, pictures = list[bytes](), list[np.ndarray]()
         for number, mesh in enumerate(sequence):
+            points, faces, colors = mesh.vertices, mesh.faces, dict[str, Any](colors=None)
             if self.color == "vertices":
-                meshes.append(self._draco(mesh.vertices, mesh.faces, colors=self._vertices(mesh)))
+                colors["colors"] = self._vertices(mesh)
             else:
                 points, faces, places, picture = self._textured(mesh, number)
-                meshes.append(self._draco(points, faces, tex_coord=places, tex_coord_quantization_bits=self.bits))
+                colors |= {"tex_coord": places, "tex_coord_quantization_bits": self.bits}
                 pictures.append(picture)
-            if progress is not None:
-                progress("code", number + 1, len(sequence))
+            how = {"quantization_bits": self.qp, "compression_level": COMPRESSION_LEVEL}
+            meshes.append(bytes(DracoPy.encode(points, faces, **how, **colors)))
         return msgspec.msgpack.encode(Frames(meshes, self._pictures(pictures)))
 
     def decode(self, data: bytes) -> Sequence[Mesh]:
         """Return the frames, from the bytes alone."""
         stream = msgspec.msgpack.decode(data, type=Frames)
-        found = [DracoPy.decode(mesh) for mesh in stream.meshes]
-        meshes = [Mesh.of(mesh.points, mesh.faces) for mesh in found]
+        found = [(mesh, Mesh.of(mesh.points, mesh.faces)) for mesh in map(DracoPy.decode, stream.meshes)]
         if self.color == "vertices":
             scale = 255 / (2**self.bits - 1)
-            colors = [np.rint(mesh.colors[:, :3] * scale).astype(np.uint8) for mesh in found]
-            return [Mesh(mesh.vertices, mesh.faces, own) for mesh, own in zip(meshes, colors, strict=True)]
-        places = [mesh.tex_coord.astype(np.float32)[own.faces] for mesh, own in zip(found, meshes, strict=True)]
-        triples = zip(meshes, places, self._shown(stream.pictures), strict=True)
-        return [Mesh(mesh.vertices, mesh.faces, None, uv, Texture.of(pixels)) for mesh, uv, pixels in triples]
+            return [replace(own, colors=np.rint(mesh.colors[:, :3] * scale).astype(np.uint8)) for mesh, own in found]
+        textures, uvs = map(Texture.of, self._shown(stream.pictures)), (m.tex_coord[own.faces] for m, own in found)
+        shown = zip((own for _, own in found), uvs, textures, strict=True)
+        return [replace(own, uv=uv.astype(np.float32), texture=texture) for own, uv, texture in shown]
 
     def color_bytes(self, data: bytes) -> ColorBytes | None:
         """Return the sizes of the pictures; None where there are none."""
         sizes = [len(picture) for picture in msgspec.msgpack.decode(data, type=Frames).pictures]
         return ColorBytes(pictures=sizes) if sizes else None
-
-    def _draco(self, points: np.ndarray, faces: np.ndarray, **colors: Any) -> bytes:
-        how = {"quantization_bits": self.qp, "compression_level": COMPRESSION_LEVEL}
-        return bytes(DracoPy.encode(points, faces, **how, **colors))
 
     def _vertices(self, mesh: Mesh) -> UInt8[np.ndarray, "V 3"]:
         """Return the colours of vertices in so many bits, those of a texture as it is seen best."""

@@ -41,10 +41,7 @@ class Prepared(TwoSteps):
 
 @dataclass(frozen=True, slots=True)
 class MeshreelCodec(Prepared):
-    """A preset at a quality; options that are None keep the preset's values.
-
-    `basis_size` fixes the number of components m; a `variant` (`.variants`) changes one thing of the preset.
-    """
+    """A preset at a quality; options that are None keep the preset's values; `basis_size` is m; see `.variants`."""
 
     preset: str = "paper"
     quality: float = 50.0  # 0 to 100

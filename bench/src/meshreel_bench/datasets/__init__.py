@@ -27,11 +27,10 @@ from meshreel.types import MeshSequence
 from .captured import Captured
 from .checksums import check_source, checksum, known_checksums
 from .child import CAMERAS, FRAMES, Child, Clean
-from .remesh import RemeshedSequence, RemeshOptions
+from .remesh import Place, RemeshedSequence, RemeshOptions, SideBySide
 from .rooms import PEOPLE, ROOM
 from .scenes import PROCEDURAL, SCENES, SceneData, open_scene
 from .shapes import gears, prism
-from .side_by_side import Place, SideBySide
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
 SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism}  # neither do these
@@ -79,10 +78,7 @@ class Store:
     own: SequenceOptions = SequenceOptions()  # how files that are not the benchmark's become a sequence
 
     def open(self, name: str, frames: int | None = None) -> Dataset:
-        """Return the sequence of that name or path; its first `frames` frames where that is asked for.
-
-        Raises InputError where data are missing or are not those of the benchmark.
-        """
+        """Return the first frames of a sequence by name or path. InputError where data are missing or others."""
         for ending, played in PLAYED.items():
             if name.endswith(ending):
                 known = self.open(name.removesuffix(ending), None)
@@ -109,10 +105,7 @@ class Store:
         return Dataset(_open_files(name, self.data, frames, self.own))
 
     def digest(self, name: str) -> str | None:
-        """Return a digest of a user's sequence and its options of reading; None for benchmark data.
-
-        Raises InputError where it is missing.
-        """
+        """Return a digest of a user's sequence and its options of reading; None for benchmark data."""
         for ending in PLAYED:
             name = name.removesuffix(ending)
         if name in NAMES:

@@ -1,8 +1,4 @@
-"""The child of the demo alone, seen by six simulated colour cameras that err in exposure and pose.
-
-In: a number of frames, a folder to keep the rig in. Out: clean meshes without colours, the pictures that the cameras
-took with the poses that their file has, and pictures that they would take without errors.
-"""
+"""The child of the demo alone, seen by six simulated colour cameras that err in exposure and pose, and by others."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Decision 11: tracked centers against embedded deformation, both followed by the same surface fit.
-
-In: the benchmark data. Out: two rows for each case, with distances before and after the fit, motion bits and time.
-"""
+"""Decision 11: tracked centers against embedded deformation, both followed by the same surface fit."""
 
 from __future__ import annotations
 
@@ -103,10 +100,7 @@ def distances(stage: str, frames: Sequence[Mesh], positions: Positions, template
 
 
 def motion_bits(positions: Positions, base: Mesh, key: int) -> tuple[float, float]:
-    """Return bits per vertex of the base's trajectories: sum over KLT columns of log2(1 + energy / step^2) / 2.
-
-    First those of the trajectories, then those of the difference from the mean of a vertex's neighbours.
-    """
+    """Return bits per vertex of trajectories, log2(1 + energy / step^2) / 2; and of differences from neighbours."""
     field = np.moveaxis(positions - positions[key], 0, 1)
     basis = klt.fit(field)
     edges = unique_edges(base.faces)[0]

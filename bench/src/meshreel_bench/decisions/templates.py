@@ -1,7 +1,4 @@
-"""Decision 14: the template and the steps of `layers`; base meshes, levels, midpoints and ratios of steps.
-
-In: the frames of the dancer. Out: a row for each template, choice of the coder and step.
-"""
+"""Decision 14: the template and the steps of `layers`; base meshes, levels, midpoints and ratios of steps."""
 
 from __future__ import annotations
 

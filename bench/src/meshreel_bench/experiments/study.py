@@ -1,7 +1,4 @@
-"""Declarations of experiments: sweeps of codecs over sequences, measures to compare by, and promises.
-
-Declarations are data: `measure` runs their points, `report` judges their promises and renders their rows.
-"""
+"""Declarations of experiments: sweeps over sequences, measures to compare by, promises. `report` judges and renders."""
 
 from __future__ import annotations
 

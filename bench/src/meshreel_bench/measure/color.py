@@ -1,14 +1,11 @@
-"""Colours of decoded frames beside pictures of the same moments, and how much textures swim.
-
-In: pictures that cameras took, original and decoded frames; a .reel file. Out: PSNRs in dB. What stands still and what
-moves are told apart by the faces of the file's background.
-"""
+"""Colours of decoded frames beside pictures of the same moments, how much textures swim, and the bytes of colours."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 import numpy as np
+from jaxtyping import Float64
 
 from meshreel.coding.group import payload_bytes_by_purpose
 from meshreel.container.reader import ReelReader
@@ -16,21 +13,24 @@ from meshreel.decoder.video import Video
 from meshreel.format.layout import ChunkKind, Form, Pictures
 from meshreel.format.records import unpack_all
 from meshreel.geometry.color_views import ColorPicture
-from meshreel.metrics.color import PEAK, TO_YUV, psnr
+from meshreel.geometry.painted import Painted
+from meshreel.geometry.topology import blend
+from meshreel.metrics.color import PEAK, POINTS, TO_YUV, psnr
 from meshreel.metrics.color_render import Colored
+from meshreel.metrics.even_points import scatter
 from meshreel.metrics.render import Crop, Pixels
-from meshreel.types import Mesh
+from meshreel.types import Mesh, MeshSequence
 
 from ..rows import ColorBytes
 
 EDGE = 2  # pixels from silhouettes that do not count: pictures are registered to depth within as many (living_room)
-Squares = dict[str, np.ndarray]  # sums of squared differences of luma and numbers of pixels, by what is seen
+PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # all that is seen, what stands, what moves
 
 
-def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still: int) -> Squares:
-    """Return how far what a camera shows of a decoded frame, whose first `still` faces stand still, is from a picture.
+def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still: int) -> Float64[np.ndarray, "3 2"]:
+    """Return squared differences of luma and pixels, summed for each of `PARTS`, where a camera sees both frames.
 
-    Pixels count where both frames are seen. The camera's lens must not bend.
+    The first `still` faces of the decoded frame stand still. The camera's lens must not bend.
     """
     from scipy.ndimage import binary_erosion
 
@@ -38,19 +38,15 @@ def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still:
     pixels = Pixels(camera, Crop(0, camera.height, 0, camera.width))
     shown, both = Colored(decoded).look(pixels), Colored(original).look(pixels).covered
     apart = np.square(PEAK * shown.colors.astype(np.float64) @ TO_YUV[0] - picture.pixels @ TO_YUV[0])
-    parts = {"still": shown.covered & (shown.faces < still), "moving": shown.faces >= still}
-    inside = {part: binary_erosion(mask & both, iterations=EDGE) for part, mask in parts.items()}
-    inside["seen"] = inside["still"] | inside["moving"]
-    return {part: np.array([apart[mask].sum(), mask.sum()]) for part, mask in inside.items()}
+    parts = (shown.covered & (shown.faces < still), shown.faces >= still)
+    stands, moves = (binary_erosion(mask & both, iterations=EDGE) for mask in parts)
+    return np.array([[apart[mask].sum(), mask.sum()] for mask in (stands | moves, stands, moves)])
 
 
-def picture_psnrs(found: Iterable[Squares]) -> dict[str, float]:
-    """Return PSNRs of luma over all pixels of all pictures: `picture_y_psnr`, and that of each part that is seen."""
-    total: Squares = {}
-    for squares in found:
-        total = {part: total.get(part, np.zeros(2)) + square for part, square in squares.items()}
-    names = {"seen": "picture_y_psnr", "still": "picture_still_y_psnr", "moving": "picture_moving_y_psnr"}
-    return {names[part]: psnr(square / count) for part, (square, count) in total.items() if count}
+def picture_psnrs(found: Iterable[Float64[np.ndarray, "3 2"]]) -> dict[str, float]:
+    """Return the PSNR of luma of each part that is seen, over all pixels of all pictures."""
+    total = sum(found, np.zeros((3, 2))).tolist()
+    return {name: psnr(square / count) for name, (square, count) in zip(PARTS, total, strict=True) if count}
 
 
 def color_bytes(reader: ReelReader) -> ColorBytes | None:
@@ -70,16 +66,25 @@ def color_bytes(reader: ReelReader) -> ColorBytes | None:
     return ColorBytes(**sizes, pictures=pictures, base=base, chains=len(first))
 
 
-def swimming(video: Video) -> dict[str, float]:
-    """Return the mean PSNR of successive textures of one atlas, red, green and blue; nothing where there are none."""
-    found, reader = list[float](), video.reader
+def swimming(video: Video, originals: MeshSequence) -> dict[str, float]:
+    """Return mean PSNRs of red, green and blue from one frame to the next of a chain of groups.
+
+    `swimming_psnr`: what coloured originals show at the same places of the tracked surface; `texture_psnr`: textures as
+    decoded, which a coarse quantiser keeps from changing.
+    """
+    found, reader = {"swimming_psnr": list[float](), "texture_psnr": list[float]()}, video.reader
+    is_colored = len(originals) > 0 and originals[0].is_colored
     for number, track in enumerate(video.tracks):
-        before: np.ndarray | None = None
         for frame, mesh in enumerate(track):
-            chunk = reader.chunk_of_frame(frame, number)
-            is_new = frame == chunk.first_frame and reader.group_before(chunk) is None
-            pixels = None if mesh.texture is None else mesh.texture.pixels.astype(np.float32)
-            if not is_new and before is not None and pixels is not None:
-                found.append(psnr(float(np.mean(np.square(pixels - before)))))
-            before = pixels
-    return {"swimming_psnr": float(np.mean(found))} if found else {}
+            chunk, now = reader.chunk_of_frame(frame, number), dict[str, np.ndarray]()
+            if frame == chunk.first_frame and reader.group_before(chunk) is None:
+                first, before, places = mesh, dict(now), scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
+            if mesh.texture is not None:
+                now["texture_psnr"] = mesh.texture.pixels.astype(np.float32)
+            if is_colored and not mesh.is_empty and np.array_equal(mesh.faces, first.faces):
+                points = blend(mesh.vertices, mesh.faces[places.faces], places.barycentric)
+                now["swimming_psnr"] = Painted(originals[frame]).at(points, points)[0]
+            for name in now.keys() & before.keys():
+                found[name].append(psnr(float(np.mean(np.square(now[name] - before[name])))))
+            before = now
+    return {name: float(np.mean(values)) for name, values in found.items() if values}

@@ -1,7 +1,6 @@
-"""Decoding as it is timed: from bytes, in a fresh process. In: a pickled codec and bytes. Out: times and meshes.
+"""Decoding as it is timed: from bytes, in a fresh process, the best of three passes over all frames.
 
-The steady state is the best of three passes over all frames. The meshes that are measured are those of the fresh
-process: nothing but the bytes decides them.
+The meshes that are measured are those of the fresh process: nothing but the bytes decides them.
 """
 
 from __future__ import annotations

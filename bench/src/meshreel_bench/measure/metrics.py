@@ -1,7 +1,6 @@
 """Metrics of decoded frames: against the input, and where a scene is simulated, against the truth.
 
-In: the frames that are measured, original and decoded. Out: values by name, over the frames and for each. Names that
-begin with `truth_` or `input_` are of whole scenes, people and background; `seam_` is where these meet.
+Names that begin with `truth_` or `input_` are of whole scenes, people and background; `seam_` is where these meet.
 """
 
 from __future__ import annotations
@@ -84,7 +83,7 @@ def _colors(frames: Measured) -> dict[str, float]:
         for picture in (pictures[k] if pictures else ())
         if picture is not None
     )
-    return found if video is None else found | swimming(video)
+    return found if video is None else found | swimming(video, originals)
 
 
 def _regions(frames: Measured) -> Values:

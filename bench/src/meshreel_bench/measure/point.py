@@ -1,8 +1,7 @@
 """Measurement of a point: rate of all bytes, metrics of decoded frames, times of both directions.
 
-In: a point, and where its sequence is. Out: its row. Bodies are judged by all frames, scenes by some. A codec is given
-all frames, or those of a sampled point alone; the rate is then theirs. Two names stand in a codec's place: `captured`
-is the truth itself, beyond which noise is coded, and `segmentation` is the encoder's labels of what moves.
+Bodies are judged by all frames, scenes by some. A codec is given all, or those of a sampled point; the rate is then
+theirs. In a codec's place `captured` is the truth itself, `segmentation` the encoder's labels of what moves.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Rate-distortion plots as PNG, 17 cm wide: the width of a page of a paper.
+"""Rate-distortion plots as PNG, 17 cm wide as a page, a line of panels for each sequence, a panel a measure.
 
-In -> out: rows of one study -> a file with a line of panels for each sequence, a panel a measure. Same rows, same
-picture, whatever settings of matplotlib the user has.
+Same rows, same picture, whatever settings of matplotlib the user has.
 """
 
 from __future__ import annotations
@@ -27,14 +26,11 @@ _HEIGHT = 2.3  # inches, of a line of panels
 _LINE = 0.155  # inches, of the legend, from one to the next
 _LEGEND_COLUMNS = 3
 _SETTINGS: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib
-    "font.size": 7.0,
-    "axes.linewidth": 0.6,
-    "axes.titlesize": 7.0,
-    "axes.labelsize": 7.0,
-    "legend.fontsize": 7.0,
+    **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize", "legend.fontsize"), 7.0),
     "xtick.labelsize": 6.5,
     "ytick.labelsize": 6.5,
+    "axes.linewidth": 0.6,
+    "font.family": "DejaVu Sans",  # comes with matplotlib
     "text.parse_math": False,  # a name may have dollars
 }
 _BETTER = {1: "↑ higher is better", -1: "↓ lower is better", 0: ""}
@@ -43,10 +39,7 @@ _BETTER = {1: "↑ higher is better", -1: "↓ lower is better", 0: ""}
 def plot_curves(
     rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], path: Path, rate: str = "mbps"
 ) -> Path:
-    """Write quality against rate of every curve; return the path.
-
-    `looks` has every curve, `rate` is the name of a row's value. A dotted line is what the truth itself reaches.
-    """
+    """Write quality against rate of every curve of `looks`; a dotted line is what the truth reaches."""
     with _settings():
         figure = curves_figure(rows, measures, looks, rate)
         with replacing(path) as file:
@@ -54,9 +47,7 @@ def plot_curves(
     return path
 
 
-def curves_figure(
-    rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], rate: str = "mbps"
-) -> Any:
+def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], rate: str) -> Any:
     """Return the figure of `plot_curves`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

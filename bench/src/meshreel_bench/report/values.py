@@ -45,10 +45,7 @@ def _mbps_background_10s(row: Row) -> float | None:
 
 
 def _without_keys(row: Row) -> float | None:
-    """Return the mean of masked SSIM over the frames that are no key frames; over all where every frame is one.
-
-    A key frame that the file does not name is taken to be the best frame of its group.
-    """
+    """Return the mean of masked SSIM over frames that are no keys, which the file names, or the best of groups."""
     found = row.per_frame.get("ssim_masked")
     if row.stream is None or not row.stream.groups or not found or len(found) != row.frames:
         return None
@@ -87,10 +84,7 @@ def _at_rest(seconds: float | None, reference_s: float | None) -> float | None:
 
 
 def _efficiency(row: Row, workers: int, interval: int) -> float | None:
-    """Return what share of their time workers are busy with an hour of frames, by a model with a row's times.
-
-    Slices are surveyed, then intervals coded, in any order and by whoever is free; what their parent does is left out.
-    """
+    """Return what share of their time workers are busy with an hour of frames, by a row's times and without parent."""
     stages = row.encoding.stages_s if row.encoding else {}
     if "survey" not in stages:
         return None
@@ -110,10 +104,7 @@ def _end(times: np.ndarray, workers: int) -> float:
 
 
 def _of_key(row: Row, what: str, frames: int) -> float | None:
-    """Return a rate, Mbps, where a chain of so many frames begins with its base mesh, colours, atlas and first picture.
-
-    The others' pictures and motion are the mean of what was coded. None for what is no single chain, but for all bytes.
-    """
+    """Return a rate, Mbps, of so many frames, if a chain went on: its beginning once, the mean of what follows."""
     known = None if row.stream is None else row.stream.colors
     if row.stream is None or known is None or known.chains > 1:
         return row.mbps if row.stream and what == "all" else None
@@ -200,10 +191,7 @@ def hull_of(rows: Sequence[Row], names: Sequence[str], measure: Measure) -> Curv
 
 
 def floors(rows: Iterable[Row]) -> dict[str, float]:
-    """Return what the truth itself reaches, by metric, from the rows of one sequence; empty where it is not measured.
-
-    Against the input it is worth what the input is worth against the truth.
-    """
+    """Return what the truth itself reaches by metric; against the input what the input reaches against the truth."""
     found = [row for row in rows if row.point.codec == FLOOR and not row.failed]
     known: dict[str, Any] = dict(found[0].metrics) if found else {}
     if found and found[0].point.metrics == "regions":

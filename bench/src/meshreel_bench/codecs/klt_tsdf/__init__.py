@@ -10,12 +10,10 @@ are in each stream, about 20 bytes per component.
 Differs from the publication:
 - Blocks share a layer of voxels, so that each holds whole cells; the decoder averages their values there. Deblocking,
   which moves weights within their step until blocks agree, is left out: with the quantisation below it cost 0.7 dB.
-- Weights are fitted by weighted least squares in closed form, and quantised one after the other (`weights`).
-- The basis is described by discrete Legendre polynomials, under the symmetries of the cube, because its bytes count.
-- Distances come from meshes, not from depth (`grid`). Decoded surface past the border of an open mesh, or far from the
-  mesh, is left out by a bit for each crossed cell (`frames`).
-- Contexts come from neighbouring blocks and, for the blocks' positions, from the frame before; `group` frames share
-  adaptive models. Nothing else crosses frames. Geometry alone: no texture.
+- Weights are fitted by weighted least squares (`weights`). The basis is made of discrete Legendre polynomials.
+- Distances come from meshes, not from depth (`grid`). Decoded surface past borders is left out by bits (`frames`).
+- Contexts come from neighbouring blocks and, for positions, from the frame before; `group` frames share adaptive
+  models. Nothing else crosses frames. Geometry alone: no texture.
 """
 
 from .codec import KltTsdfCodec

@@ -1,19 +1,20 @@
-"""Decision 19: the background of room2 from depth and from meshes, as fused, against the truth of a frame.
-
-In: the captured scene and the labels that the encoder found. Out: a row for each kind of background.
-"""
+"""Decisions 17 and 19: how much of room2 the placed views see, and its background from depth and from meshes."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
-from meshreel.geometry.topology import drop_unreferenced
+from meshreel.analysis.scene.views import ViewsOptions, place_views
+from meshreel.analysis.scene.votes import primitive_ids
+from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.raycast import Rays
+from meshreel.geometry.topology import drop_unreferenced, face_normals
 from meshreel.metrics.scene_accuracy import Scene, scene_row
 from meshreel.metrics.scene_comparison import true_scene
 from meshreel.types import Mesh, evenly
@@ -21,6 +22,10 @@ from meshreel.types import Mesh, evenly
 from ..datasets.scenes import FOUND, SceneData, open_scene
 from .rows import Row, Sources
 
+SIZES = ((320, 240), (480, 360), (640, 480))  # pixels
+COUNTS = (4, 7, 10, 14, 20, 28, 56)  # views of the smallest size
+CHOSEN = 14  # views of the other sizes
+POINTS = 20_000  # of the surface, by which the area in sight is estimated
 VOXEL, FRAME = 0.02, 30  # m, as scenes are fused; the frame whose truth is compared
 BASE = BackgroundOptions()
 MESHES = replace(BASE, depth=False)
@@ -36,7 +41,44 @@ KINDS = {
 SHOWN = ("median_m", "covered", "d2_psnr_backward", "normal_error_deg")
 
 
-def measure(sources: Sources) -> Iterator[Row]:
+def measure_views(sources: Sources) -> Iterator[Row]:
+    """Yield a row for each number and size."""
+    frames = open_scene("room2", sources.data, sources.cache).meshes
+    mesh = frames[len(frames) // 2 + 1]
+    areas, rays = face_normals(mesh)[1], Rays(mesh)
+    for count, (width, height) in [*((count, SIZES[0]) for count in COUNTS), *((CHOSEN, size) for size in SIZES[1:])]:
+        start = time.process_time()
+        views = place_views(frames, ViewsOptions(count=count, width=width, height=height))
+        placed = time.process_time()
+        ids = primitive_ids(rays, views)
+        seen = np.unique(ids[ids >= 0])
+        yield {
+            "views": count,
+            "width": width,
+            "height": height,
+            "faces": len(seen) / len(mesh.faces),
+            "area": float(areas[seen].sum() / areas.sum()),
+            "in_sight": _in_sight(mesh, rays, views),
+            "placing_cpu_s": placed - start,
+        }
+
+
+def _in_sight(mesh: Mesh, rays: Rays, views: Sequence[PinholeCamera]) -> float:
+    areas = face_normals(mesh)[1]
+    faces = np.random.default_rng(0).choice(len(areas), POINTS, p=areas / areas.sum())
+    points = mesh.vertices[mesh.faces[faces]].mean(axis=1)
+    found = np.zeros(POINTS, bool)
+    for view in views:
+        local = points @ view.extrinsic[:3, :3].T + view.extrinsic[:3, 3]
+        image = view.project(local)
+        with np.errstate(invalid="ignore"):
+            within = ((image >= 0) & (image < (view.width, view.height))).all(axis=1)
+        hit = rays.cast(np.broadcast_to(view.eye, points.shape), points - view.eye)
+        found |= within & ((hit.faces == faces) | (hit.distances > 0.999))
+    return float(found.mean())
+
+
+def measure_backgrounds(sources: Sources) -> Iterator[Row]:
     """Yield a row for each kind."""
     scene = open_scene("room2", sources.data, sources.cache)
     numbers = {*evenly(len(scene.meshes), BASE.frames), *evenly(len(scene.meshes), 10)}
