@@ -15,7 +15,7 @@ from meshreel.analysis.scene.views import place_views
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.cli import main
 from meshreel.geometry.raycast import Rays
-from meshreel.io.mask_pictures import write_picture
+from meshreel.io.pictures import write_picture
 from meshreel.io.write import write_mesh
 from tests.capture.depth_scenes import camera, record
 from tests.golden import GOLDEN

@@ -153,7 +153,8 @@ def record_room(
 
 def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:
     """Return depth cameras in the corners that look down at the middle; pictures of `width` x 0.9 `width` pixels."""
-    return tuple(_resized(camera, width) for camera in corner_cameras(np.array(_LOW), np.array(_HIGH), count))
+    cameras = corner_cameras(np.array(_LOW), np.array(_HIGH), count)
+    return tuple(camera.resized(width, round(width * camera.height / camera.width)) for camera in cameras)
 
 
 def _walker(seconds: float) -> Pose:
@@ -173,15 +174,6 @@ def _child(seconds: float) -> Pose:
     out = np.array([math.cos(heading), 0.0, -math.sin(heading)])  # to its left
     wrists = tuple(place + side * (0.2 + sway) * out + [0.0, 1.2, 0.0] for side in (1.0, -1.0))
     return Pose(place, heading, wrists=(wrists[0], wrists[1]), reach=(1.0, 1.0), size=0.68, girth=1.05)
-
-
-def _resized(camera: DepthCamera, width: int) -> DepthCamera:
-    """Return the camera with pictures of another width; the middle of pixel i is at i."""
-    height = round(width * camera.height / camera.width)
-    ratios = (width / camera.width, height / camera.height)
-    focal = (camera.focal[0] * ratios[0], camera.focal[1] * ratios[1])
-    center = ((camera.center[0] + 0.5) * ratios[0] - 0.5, (camera.center[1] + 0.5) * ratios[1] - 0.5)
-    return replace(camera, width=width, height=height, focal=focal, center=center)
 
 
 def _box(box: Box) -> Mesh:

@@ -218,8 +218,8 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
-    still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
-    texts = (*warnings_of(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
+    moves = any(group.form != Form.EMPTY for group in groups)
+    texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped))
     return Summary(writer.size, tuple(groups), texts, scene, _continued(job))
 
 
@@ -305,27 +305,18 @@ def warnings_of(seen: Survey) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _lost(faces: int) -> tuple[str, ...]:
-    """Return a warning of moving pieces of a scene that belong to no body."""
-    if not faces:
-        return ()
-    return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
-
-
-def _still(least: float) -> tuple[str, ...]:
-    """Return a warning of a scene in which nothing moves by more than `least`, m."""
-    text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
-    return (f"{text}; if something does, encode with --dynamic-only",)
-
-
-def _astray(share: float) -> tuple[str, ...]:
-    """Return a warning of still surface that the file lacks, by its share of all surface."""
-    if share <= ASTRAY:
-        return ()
-    text = f"{100 * share:.1f} % of the surface stands still, but is far from the background that frames share"
-    return (
-        f"{text}, and is not kept: it flies, or is there for a while only; to keep all, encode with --dynamic-only",
-    )
+def _warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
+    """Yield warnings of still surface, of all moving surface or of `dropped` faces of it that the file lacks."""
+    if parts.astray > ASTRAY:
+        text = f"{100 * parts.astray:.1f} % of the surface stands still, but is far from the background that frames"
+        why = "it flies, or is there for a while only"
+        yield f"{text} share, and is not kept: {why}; to keep all, encode with --dynamic-only"
+    if not moves:
+        least = 2 * parts.segmentation.cell
+        text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
+        yield f"{text}; if something does, encode with --dynamic-only"
+    if dropped:
+        yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:

@@ -16,7 +16,6 @@ from jaxtyping import UInt8
 from ..errors import InputError
 from .file_names import last_number
 from .read import read_file
-from .write import replacing
 
 _MODES = ("L", "P", "1")  # of Pillow: gray, palette, black and white
 _LIKE = "name folders view00, view01 ... and files frame_00000.png ..."
@@ -47,16 +46,6 @@ def is_mask(path: Path) -> bool:
             return image.mode in _MODES
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
         return False
-
-
-def write_picture(picture: UInt8[np.ndarray, "H W *C"], path: Path) -> None:
-    """Write a gray (H x W) or color (H x W x 3) picture as PNG."""
-    from PIL import Image
-
-    packed = io.BytesIO()
-    Image.fromarray(picture).save(packed, format="PNG")
-    with replacing(path) as file:
-        file.write(packed.getvalue())
 
 
 def find_masks(folder: Path, views: int, frames: int) -> list[list[Path]]:

@@ -16,10 +16,9 @@ simulated rigs. The noisy input may take the place of the truth.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64
@@ -29,14 +28,14 @@ from ..geometry.cameras import PinholeCamera
 from ..geometry.closest_points import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import face_normals
-from ..types import Mesh
+from ..types import Frames, Mesh
+from .comparison import Row, finite
 from .distance import PSNR_CEILING, psnr, quantile
 from .even_points import Scatter, scatter
 from .normals import WORST_ANGLE, angles, interpolate, welded_normals
 from .render import BACKGROUND
 from .ssim import BORDER, ssim_map
 
-Row = dict[str, Any]
 PARTS = ("all", "people", "background")
 
 
@@ -177,6 +176,32 @@ def scene_means(rows: Sequence[Row]) -> Row:
             values = [min(value, PSNR_CEILING) for value in values]
         means[name] = float(np.mean(values)) if values else None
     return means
+
+
+def compare_with_truth(
+    originals: Frames,
+    decoded: Frames,
+    truth: Callable[[int], Scene],
+    numbers: Sequence[int],
+    progress: Callable[[int], None] = lambda _done: None,
+) -> Row:
+    """Measure the decoded meshes and the originals (noise floor) against the truth, in the frames `numbers`.
+
+    Returns a JSON-ready row of means, and of each frame under `per_frame`; numbers that are not finite, or of a missing
+    part, are None. `progress` gets the number of finished frames. Raises InputError for a clean frame without faces,
+    since then it cannot label other meshes.
+    """
+    frames: list[Row] = []
+    for done, number in enumerate(numbers, 1):
+        clean = truth(number)
+        if clean.mesh.is_empty:
+            raise InputError(f"frame {number} of the truth has no faces; simulate the rig again")
+        floor = scene_row(clean, clean.labelled(originals[number]))
+        frames.append({"noise_floor": floor, "decoded": scene_row(clean, clean.labelled(decoded[number]))})
+        progress(done)
+    means = {name: finite(scene_means([frame[name] for frame in frames])) for name in ("noise_floor", "decoded")}
+    rows = [{name: finite(row) for name, row in frame.items()} for frame in frames]
+    return {"frames": list(numbers)} | means | {"per_frame": rows}
 
 
 @dataclass(frozen=True, slots=True)

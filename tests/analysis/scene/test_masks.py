@@ -16,7 +16,7 @@ from meshreel.analysis.scene.votes import Votes
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import pack_cameras
 from meshreel.geometry.raycast import Rays
-from meshreel.io.mask_pictures import write_picture
+from meshreel.io.pictures import write_picture
 from meshreel.types import Mesh, MeshList
 from tests.analysis.scene.test_views import ROOM
 from tests.metrics.shapes import sphere

@@ -15,10 +15,9 @@ from meshreel.analysis.scene.background import BackgroundOptions, fuse_backgroun
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
 from meshreel.geometry.topology import drop_unreferenced
 from meshreel.metrics.scene_accuracy import Scene, scene_row
-from meshreel.metrics.scene_comparison import true_scene
 from meshreel.types import Mesh, evenly
 
-from ..datasets.scenes import FOUND, SceneData, open_scene
+from ..datasets.scenes import FOUND, SceneData, open_scene, true_scene
 from .rows import Row, Sources
 
 VOXEL, FRAME = 0.02, 30  # m, as scenes are fused; the frame whose truth is compared

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float32
 
-from ...geometry.connected import without_fragments
 from ...geometry.depth import DepthPicture
 from ...geometry.raycast import Rays, pixels_near
-from ...geometry.topology import face_normals, part_of
+from ...geometry.topology import face_normals, part_of, without_fragments
 from ...geometry.tsdf import SEEN, TRUNCATION, extract, integrate
 from ...types import Mesh
 from .background import BackgroundOptions

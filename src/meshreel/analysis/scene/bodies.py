@@ -15,8 +15,7 @@ from jaxtyping import Bool, Float64, Int64
 
 from ...errors import InputError
 from ...geometry.closest_points import Surface
-from ...geometry.connected import connected_faces
-from ...geometry.topology import concatenate, face_normals, part_of, with_neighbours
+from ...geometry.topology import concatenate, connected_faces, face_normals, longest_edges, part_of, with_neighbours
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
@@ -66,9 +65,7 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
     other frames have only the floor there. Without these faces bodies would hover by a cell.
     """
     found = with_neighbours(mesh.faces, moves) & ~moves
-    corners = mesh.vertices[mesh.faces[found]]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-    found[found] = longest <= RING * cell
+    found[found] = longest_edges(mesh.vertices, mesh.faces[found]) <= RING * cell
     return found
 
 

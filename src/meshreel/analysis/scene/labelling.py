@@ -14,9 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
 
 from ...geometry.cameras import PinholeCamera
-from ...geometry.connected import connected_faces
 from ...geometry.raycast import Rays, Seen
-from ...geometry.topology import face_normals, unique_edges
+from ...geometry.topology import connected_faces, face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
 from ...types import Mesh
 from .masks import Masker
@@ -181,9 +180,7 @@ class ByMasks:
         """Raise ValueError: `changes` is empty, so there is no valid argument."""
         raise ValueError(f"change {change} of a mesh of {len(mesh.faces)} faces: masks know of no changes")
 
-    def gone(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Raise ValueError: `changes` is empty, so there is no valid argument."""
-        raise ValueError(f"change {change} of a mesh of {len(mesh.faces)} faces: masks know of no changes")
+    gone = came  # nor does anything leave the room
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return True for each face that the votes of the pixels call moving; the masks of a frame are made once.

@@ -15,7 +15,7 @@ from jaxtyping import Float64, UInt8
 from ...geometry.cameras import PinholeCamera, pack_cameras
 from ...geometry.raycast import Rays, Seen
 from ...geometry.strict import inverse
-from ...io.mask_pictures import write_picture
+from ...io.pictures import write_picture
 from ...io.write import frame_names, make_folder, replacing
 from ...types import Frames
 from .masks import CAMERAS, one_size
