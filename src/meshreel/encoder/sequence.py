@@ -256,18 +256,9 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     _add_companions(writer, number, group.companions, before[0] if before else None)
     key = None if group.key is None else each.first_frame + group.key
     fidelity = group.fidelity.scaled(unit)
-    size, share = len(payload), each.share
-    return GroupSummary(
-        group.form,
-        group.frame_count,
-        size,
-        fidelity,
-        group.predicted,
-        key,
-        track,
-        share,
-        sum(map(len, group.companions)),
-    )
+    colors = sum(map(len, group.companions))
+    facts = (group.form, group.frame_count, len(payload), fidelity, group.predicted)
+    return GroupSummary(*facts, key, track, each.share, colors)
 
 
 def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:

@@ -33,7 +33,7 @@ from .comparison import Row, finite
 from .distance import PSNR_CEILING, psnr, quantile
 from .even_points import Scatter, scatter
 from .normals import WORST_ANGLE, angles, interpolate, welded_normals
-from .render import BACKGROUND
+from .render import BACKGROUND, Crop, Pixels
 from .ssim import BORDER, ssim_map
 
 PARTS = ("all", "people", "background")
@@ -272,8 +272,7 @@ def _picture(scene: Scene, camera: PinholeCamera) -> Picture:
     colors = np.full((*shape, 3), BACKGROUND, np.float32)
     covered, dynamic = np.zeros(shape, bool), np.zeros(shape, bool)
     if not scene.mesh.is_empty:
-        rows, columns = np.mgrid[: camera.height, : camera.width]
-        _, ahead = camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
+        _, ahead = Pixels(camera, Crop(0, camera.height, 0, camera.width)).rays
         eye = np.broadcast_to(camera.eye - scene.origin, ahead.shape)
         hit = scene.rays.cast(eye, ahead @ np.linalg.inv(camera.extrinsic[:3, :3]).T)
         covered = (hit.faces >= 0).reshape(shape)
