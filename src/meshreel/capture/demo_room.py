@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import overload
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -69,7 +68,6 @@ class RoomOptions:
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
-        """Raise InputError for options that cannot be met."""
         if self.frames < 1:
             raise InputError(f"frames {self.frames} is below 1; ask for at least one")
         if not 0.008 <= self.spacing <= 0.1:
@@ -79,7 +77,7 @@ class RoomOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Room(Sequence[SceneFrame]):
+class Room:
     """Clean frames of `furnished_room`."""
 
     options: RoomOptions
@@ -88,13 +86,10 @@ class Room(Sequence[SceneFrame]):
     def __len__(self) -> int:
         return self.options.frames
 
-    @overload
-    def __getitem__(self, index: int) -> SceneFrame: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[SceneFrame]: ...
-    def __getitem__(self, index: int | slice) -> SceneFrame | list[SceneFrame]:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
+    def __iter__(self) -> Iterator[SceneFrame]:
+        return (self[number] for number in range(len(self)))
+
+    def __getitem__(self, index: int) -> SceneFrame:
         number = range(len(self))[operator.index(index)]
         people = self.people(number)
         parts = np.repeat(np.arange(1 + len(people)), [len(mesh.faces) for mesh in (self.still, *people)])

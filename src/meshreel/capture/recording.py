@@ -50,7 +50,6 @@ class Recording(MeshSequence):
 
     @property
     def frame_rate(self) -> float:
-        """Frames per second, 1/s."""
         return self.rig.frame_rate
 
     def __len__(self) -> int:

@@ -126,7 +126,11 @@ class Encoder:
 
     def intervals(self, options: EncoderOptions) -> Iterator[Interval]:
         """Yield the intervals that `encode` encodes, of all tracks of a scene."""
-        return _intervals(self._job(options), self.parts(options))
+        job, parts = self._job(options), self.parts(options)
+        if parts is None:
+            seen = surveyed(job)
+            return intervals_of(job, seen, tracked_bodies(job, seen))
+        return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))
 
     def parts(self, options: EncoderOptions) -> Parts | None:
         """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
@@ -321,11 +325,3 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
         maximum=tuple(map(float, high)),
         metadata=json.dumps(metadata, separators=(",", ":")),
     )
-
-
-def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
-    """Yield the intervals of a sequence, of a scene where there are parts."""
-    if parts is None:
-        seen = surveyed(job)
-        return intervals_of(job, seen, tracked_bodies(job, seen))
-    return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64
+from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..types import Mesh
@@ -57,7 +58,6 @@ def reconstruct(
     Runs in one thread, so that the same points give the same bits.
     """
     import open3d as o3d
-    from scipy.spatial import cKDTree
 
     if len(points) < 10:
         return Mesh.empty()
@@ -126,8 +126,6 @@ def thin_out(
 
 def _dense(mesh: Mesh, whole: Mesh, levels: Float64[np.ndarray, " W"], trim: float) -> Bool[np.ndarray, " V"]:
     """Return which vertices of the decimated mesh lie where the points are not much sparser than in the median."""
-    from scipy.spatial import cKDTree
-
     return levels[cKDTree(whole.vertices).query(mesh.vertices)[1]] >= np.median(levels) - trim
 
 

@@ -152,6 +152,11 @@ def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray,
     return _core.components(faces, count).astype(np.int64)
 
 
+def linked(pairs: Int64[np.ndarray, "L 2"], count: int) -> Int64[np.ndarray, " N"]:
+    """Label each of `count` things with what it is connected to by pairs of them, as `components` does."""
+    return components(pairs[:, [0, 1, 1]].astype(np.int32), count)
+
+
 def connected_faces(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " F"]:
     """Label each face with its connected component; labels of vertices without faces do not occur."""
     return components(faces, count)[faces[:, 0]]

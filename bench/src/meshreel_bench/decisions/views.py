@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from meshreel.analysis.scene.views import ViewsOptions, place_views
-from meshreel.analysis.scene.votes import primitive_ids
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.topology import face_normals
@@ -36,7 +35,7 @@ def measure(sources: Sources) -> Iterator[Row]:
         start = time.process_time()
         views = place_views(frames, ViewsOptions(count=count, width=width, height=height))
         placed = time.process_time()
-        ids = primitive_ids(rays, views)
+        ids = np.stack([rays.look(view).faces for view in views])
         seen = np.unique(ids[ids >= 0])
         yield {
             "views": count,

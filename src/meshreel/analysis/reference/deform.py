@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
+from scipy.spatial import cKDTree
 
 from ...errors import InputError
 from ...geometry.rigid import apply, blend, fit_rigid, from_rigid
@@ -77,8 +78,6 @@ def center_motions(
 
 def bind(mesh: Mesh, source: Float64[np.ndarray, "K 3"], neighbours: Neighbours, options: DeformOptions) -> Binding:
     """Choose the centers that move each vertex of a mesh in the source pose, with their weights."""
-    from scipy.spatial import cKDTree
-
     choices = min(options.guard_choices, len(source))
     reach, near = cKDTree(source).query(mesh.vertices, k=choices)
     reach, near = reach.reshape(-1, choices), near.reshape(-1, choices).astype(np.int64)

@@ -12,6 +12,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
+from scipy.spatial import cKDTree
 
 from ...geometry.cameras import PinholeCamera
 from ...geometry.raycast import Rays, Seen
@@ -146,8 +147,6 @@ class ByPlace:
     @cached_property
     def _tree(self) -> Any:
         """The middles of the places as a tree, which takes a tenth of a second to make."""
-        from scipy.spatial import cKDTree
-
         return cKDTree(self.lattice.centers(self.keys))
 
 
