@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import UInt8, UInt16
 
 from ..errors import InputError
 from ..types import Mesh
@@ -95,7 +95,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         yield file
 
 
-def write_picture(pixels: UInt8[np.ndarray, "H W *C"], path: Path) -> None:
+def write_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"], path: Path) -> None:
     """Write a picture as PNG, grey or in colour."""
     data = pack_picture(pixels)
     with replacing(path) as file:

@@ -50,9 +50,9 @@ class BackgroundOnceDracoCodec(TwoSteps):
         """Return the background and what moves. Raises InputError for frames that cannot be used."""
         stages, options = Stages(progress, len(sequence)), SceneOptions()
         if not (len(sequence) and is_scene(sequence)):
-            seen = survey(sequence, stages)
+            seen = survey(sequence, stages.add)
             return Still((), Frames(sequence.frame_rate, seen, [seen.normalise(mesh) for mesh in sequence]))
-        parts = take_apart(captured(sequence), survey(sequence, stages, cleaned=False), options, stages)
+        parts = take_apart(captured(sequence), survey(sequence, stages.add, cleaned=False), options, stages)
         states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
         moving = list[Mesh]()
         for number, mesh in enumerate(sequence):

@@ -31,6 +31,7 @@ from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.derived_sequences import Chosen
 from meshreel.io.meshes import read_mesh
 from meshreel.io.write import make_folder, replacing, write_mesh
+from meshreel.metrics.scene_accuracy import Scene, Sight
 from meshreel.types import Mesh, MeshSequence, evenly
 
 from .captured import Captured
@@ -129,6 +130,12 @@ def _find_labels(meshes: MeshSequence, path: Path) -> None:
     make_folder(path.parent)
     with replacing(path) as file:
         np.savez_compressed(file, allow_pickle=False, **labels)
+
+
+def true_scene(truth: Truth, number: int) -> Scene:
+    """Prepare a clean frame for measurements of other meshes."""
+    frame, sights = truth[number], [Sight(camera.view, *camera.depth_range) for camera in truth.cameras]
+    return Scene(frame.mesh, frame.dynamic, sights, complete=True)
 
 
 def _nearest_labels(clean: SceneFrame, fused: Mesh) -> Bool[np.ndarray, " F"]:

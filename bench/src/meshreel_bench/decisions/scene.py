@@ -16,10 +16,9 @@ from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.topology import drop_unreferenced, face_normals
 from meshreel.metrics.scene_accuracy import Scene, scene_row
-from meshreel.metrics.scene_comparison import true_scene
 from meshreel.types import Mesh, evenly
 
-from ..datasets.scenes import FOUND, SceneData, open_scene
+from ..datasets.scenes import FOUND, SceneData, open_scene, true_scene
 from .rows import Row, Sources
 
 SIZES = ((320, 240), (480, 360), (640, 480))  # pixels

@@ -14,14 +14,13 @@ from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC
 from meshreel.geometry.derived_sequences import Chosen
-from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences, finite
 from meshreel.metrics.scene_accuracy import Scene, scene_means, scene_row
-from meshreel.metrics.scene_comparison import finite, true_scene
 from meshreel.metrics.viewpoints import Box, Camera
 from meshreel.types import Mesh
 
 from ..datasets import Dataset
-from ..datasets.scenes import SceneData
+from ..datasets.scenes import SceneData, true_scene
 from ..parallel_views import parallel_views_around
 from ..rows import Metrics
 from .bridges import count_bridges, count_degenerate
