@@ -11,7 +11,6 @@ import numpy as np
 from meshreel.analysis.scene.background import BackgroundOptions, fuse_background
 from meshreel.analysis.scene.background_depth import Moment, fuse_still_depth
 from meshreel.analysis.scene.views import ViewsOptions, place_views
-from meshreel.analysis.scene.votes import primitive_ids
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.geometry.raycast import Rays
 from meshreel.geometry.topology import drop_unreferenced, face_normals
@@ -49,7 +48,7 @@ def measure_views(sources: Sources) -> Iterator[Row]:
         start = time.process_time()
         views = place_views(frames, ViewsOptions(count=count, width=width, height=height))
         placed = time.process_time()
-        ids = primitive_ids(rays, views)
+        ids = np.stack([rays.look(view).faces for view in views])
         seen = np.unique(ids[ids >= 0])
         yield {
             "views": count,
