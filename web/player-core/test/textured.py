@@ -1,7 +1,8 @@
-"""Writes a small body with a moving texture, for tests: `textured.py FRAMES GROUP_SIZE`.
+"""Writes a small body with a moving texture, for tests: `textured.py FRAMES GROUP_SIZE`, or `textured.py room FRAMES`.
 
-Writes a JSON object to standard output: the file; of each group the SHA-256 of the places of its faces' corners, with
-all layers and with one beyond the first; and of each frame the mean colour of its texture as Python decodes it.
+Writes a JSON object to standard output: the file, with both videos; of each group the SHA-256 of the places of its
+faces' corners, with all layers and with one beyond the first; and of each frame the mean colour of its texture as
+Python decodes it. Of a room, in which the light grows: the file, and the mean of its background's texture.
 """
 
 from __future__ import annotations
@@ -20,12 +21,14 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
+from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import appearance_options
 from meshreel.encoder.sequence import Encoder
 from meshreel.geometry.derived_sequences import Welded
-from meshreel.types import Mesh, MeshList, Texture
+from meshreel.types import Mesh, MeshList, MeshSequence, Texture
 from tests.small_bodies import body
 from tests.small_options import quick
+from tests.small_scene import scene
 
 SIDE = 64  # texels of the texture that is given
 
@@ -43,7 +46,22 @@ def written(frames: int, group_size: int) -> bytes:
     """The file."""
     meshes = body(1, frames)
     sequence = Welded(MeshList(tuple(textured(mesh, meshes[0], t, frames) for t, mesh in enumerate(meshes))))
-    options = replace(quick(group_size=group_size), appearance=appearance_options(50.0, "auto"), scene=None)
+    appearance = appearance_options(50.0, "auto", compatible=True)
+    return encoded(sequence, replace(quick(group_size=group_size), appearance=appearance, scene=None))
+
+
+def room(frames: int) -> bytes:
+    """The file of a room that grows bright, with one picture for two frames."""
+    lights = np.linspace(0.5, 1, frames)
+    colors = [120 + 100 * np.tanh(mesh.vertices) for mesh in scene(frames, moving=True)]
+    pairs = zip(scene(frames, moving=True), colors, lights, strict=True)
+    meshes = tuple(replace(mesh, colors=(light * color).astype(np.uint8)) for mesh, color, light in pairs)
+    options = replace(quick(), appearance=appearance_options(50.0, "texture", 128))
+    return encoded(Welded(MeshList(meshes, 16.0)), options)
+
+
+def encoded(sequence: MeshSequence, options: EncoderOptions) -> bytes:
+    """The bytes of a sequence's file."""
     with tempfile.TemporaryDirectory() as folder:
         Encoder(sequence).encode(Path(folder) / "textured.reel", options)
         return (Path(folder) / "textured.reel").read_bytes()
@@ -54,8 +72,16 @@ def places(video: Video) -> list[str]:
     return [hashlib.sha256(np.ascontiguousarray(mesh.uv, "<f4").tobytes()).hexdigest() for mesh in video]
 
 
+def main_room(frames: int) -> None:
+    """Writes the object of a room."""
+    file = room(frames)
+    with open_video(file) as video:
+        means = [float(video.background(t).texture.pixels.mean()) for t in range(frames)]  # type: ignore[union-attr]
+    json.dump({"file": base64.b64encode(file).decode(), "means": means}, sys.stdout)
+
+
 def main(frames: int, group_size: int) -> None:
-    """Writes the object."""
+    """Writes the object of a body."""
     file = written(frames, group_size)
     with open_video(file) as video:
         means = [mesh.texture.pixels.reshape(-1, 3).mean(axis=0).tolist() for mesh in video]  # type: ignore[union-attr]
@@ -64,4 +90,4 @@ def main(frames: int, group_size: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]))
+    main_room(int(sys.argv[2])) if sys.argv[1] == "room" else main(int(sys.argv[1]), int(sys.argv[2]))
