@@ -1,8 +1,9 @@
 """Writes a small body with a moving texture, for tests: `textured.py FRAMES GROUP_SIZE`, or `textured.py room FRAMES`.
 
 Writes a JSON object to standard output: the file, with both videos; of each group the SHA-256 of the places of its
-faces' corners, with all layers and with one beyond the first; and of each frame the mean colour of its texture as
-Python decodes it. Of a room, in which the light grows: the file, and the mean of its background's texture.
+faces' corners, with all layers and with one beyond the first; of each frame the mean colour of its texture as Python
+decodes it; and of each video a packet with a picture larger than a texture may be. Of a room, in which the light grows:
+the file, and the mean of its background's texture.
 """
 
 from __future__ import annotations
@@ -19,11 +20,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
 
+from meshreel.coding.appearance.pictures import VideoEncoder, VideoOptions, to_i420
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
 from meshreel.encoder.options import EncoderOptions
 from meshreel.encoder.presets import appearance_options
 from meshreel.encoder.sequence import Encoder
+from meshreel.format.layout import VideoCodec
+from meshreel.geometry.atlas import MOST_SIDE
 from meshreel.geometry.derived_sequences import Welded
 from meshreel.types import Mesh, MeshList, MeshSequence, Texture
 from tests.small_bodies import body
@@ -72,6 +76,14 @@ def places(video: Video) -> list[str]:
     return [hashlib.sha256(np.ascontiguousarray(mesh.uv, "<f4").tobytes()).hexdigest() for mesh in video]
 
 
+def too_large(codec: VideoCodec) -> str:
+    """The packet of a picture that is larger than a texture may be."""
+    width, height = MOST_SIDE + 16, 64
+    encoder = VideoEncoder(width, height, VideoOptions(), codec)
+    [packet] = encoder.add(to_i420(np.zeros((height, width, 3), np.uint8))) + encoder.finish()
+    return base64.b64encode(packet).decode()
+
+
 def main_room(frames: int) -> None:
     """Writes the object of a room."""
     file = room(frames)
@@ -86,7 +98,9 @@ def main(frames: int, group_size: int) -> None:
     with open_video(file) as video:
         means = [mesh.texture.pixels.reshape(-1, 3).mean(axis=0).tolist() for mesh in video]  # type: ignore[union-attr]
         one = [places(video.at(layers)) for layers in (1, None)]
-    json.dump({"file": base64.b64encode(file).decode(), "oneLayer": one[0], "all": one[1], "means": means}, sys.stdout)
+    large = {"pictures": too_large(VideoCodec.AV1), "compatible": too_large(VideoCodec.H264)}
+    made = {"file": base64.b64encode(file).decode(), "oneLayer": one[0], "all": one[1], "means": means, "large": large}
+    json.dump(made, sys.stdout)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,10 @@ import { ChunkDecoder } from "../src/decode/chunk_decoder.ts";
 import { readLayers } from "../src/decode/layers.ts";
 import { decodeMesh } from "../src/decode/mesh.ts";
 import { FormatError } from "../src/errors.ts";
-import { Form } from "../src/format/layout.gen.ts";
+import { checkSize } from "../src/decode/renditions.ts";
+import { headersOf } from "../src/decode/video_headers.ts";
+import { Atlas, Form, Pictures } from "../src/format/layout.gen.ts";
+import { unpackAll } from "../src/format/records.ts";
 import { Head } from "../src/format/reader.ts";
 import { Fetcher } from "../src/net/fetcher.ts";
 import { NO_PLACE, PLACE_SCALE } from "../src/types.ts";
@@ -27,10 +30,19 @@ const LAYERS = [400, 800];
 const WIDTH = 64; // of what the stand-ins for workers tell
 const HEIGHT = 32;
 
+interface Made {
+  readonly file: string;
+  readonly all: readonly string[];
+  readonly oneLayer: readonly string[];
+  readonly large: Readonly<Record<Rendition, string>>;
+}
+
+const made = hasPython ? (JSON.parse(runPython(new URL("textured.py", import.meta.url), 8, 4).toString()) as Made) : null;
+const bytesIn = (text: string): Uint8Array => Uint8Array.from(Buffer.from(text, "base64"));
+
 describe.skipIf(!hasPython)("an atlas", async () => {
   const tools = await nodeTools();
-  const made = hasPython ? (JSON.parse(runPython(new URL("textured.py", import.meta.url), 8, 4).toString()) as { file: string; all: string[]; oneLayer: string[] }) : null;
-  const data = Uint8Array.from(Buffer.from(made?.file ?? "", "base64"));
+  const data = bytesIn(made?.file ?? "");
   const head = Head.parse(data);
   const atlas = head.chunks.find(({ kind }) => kind === "atlas")!;
   const bytesOf = ({ offset, size }: { offset: number; size: number }): Uint8Array => data.slice(offset, offset + size);
@@ -72,6 +84,43 @@ describe.skipIf(!hasPython)("an atlas", async () => {
     }
     expect(() => decodeAtlas(tools.core, payload, { ...base, faces: base.faces.slice(3) })).toThrow(FormatError);
     expect(() => decodeAtlas(tools.core, Uint8Array.of(Form.PLACES, 1, 0, 2, 0, 0, 0, 0, 0, 0, 0), base)).toThrow(/1 x 2 texels/);
+  });
+});
+
+describe.skipIf(!hasPython).each(["pictures", "compatible"] as const)("the headers of a video (%s)", (kind) => {
+  const data = bytesIn(made?.file ?? "");
+  const first = (): Uint8Array => {
+    const { offset, size } = Head.parse(data).chunks.find((chunk) => chunk.kind === kind)!;
+    return unpackAll(Pictures, data.slice(offset, offset + size)).packets[0];
+  };
+
+  test("tell codec and size, in the first packet alone", () => {
+    const [header, ...others] = headersOf(kind, first());
+    expect(others).toEqual([]);
+    expect(header.codec).toMatch(kind === "pictures" ? /^av01\.0\.\d\dM\.08$/ : /^avc1\.[0-9a-f]{6}$/);
+    const { offset, size } = Head.parse(data).chunks.find((chunk) => chunk.kind === "atlas")!;
+    const { width, height } = unpackAll(Atlas, data.slice(offset, offset + size));
+    expect([header.width, header.height]).toEqual(kind === "pictures" ? [width, height] : [16 * Math.ceil(width / 16), 16 * Math.ceil(height / 16)]);
+    expect(() => checkSize(kind, first())).not.toThrow();
+  });
+
+  test("of pictures that are larger than a texture may be are refused", () => {
+    expect(() => checkSize(kind, bytesIn(made!.large[kind]))).toThrow(/2064 x 64, over 2048/);
+  });
+
+  test("that are damaged or break off are read or refused in words", () => {
+    const packet = first().subarray(0, 80);
+    const attempt = (bytes: Uint8Array): void => {
+      try {
+        headersOf(kind, bytes);
+      } catch (error) {
+        expect(error).toBeInstanceOf(FormatError);
+      }
+    };
+    for (let at = 0; at < packet.length; at++) {
+      attempt(packet.subarray(0, at));
+      for (let bit = 0; bit < 8; bit++) attempt(packet.map((byte, k) => (k === at ? byte ^ (1 << bit) : byte)));
+    }
   });
 });
 
@@ -147,7 +196,7 @@ describe("pictures", () => {
 
   /** A record of pictures. */
   function video(codec: number, interval: number, packets: readonly number[][]): Uint8Array {
-    return Uint8Array.of(Form.VIDEO, codec, interval, packets.length, 0, ...packets.flatMap((packet) => [packet.length, ...packet]));
+    return Uint8Array.of(Form.VIDEO, codec, interval, packets.length, 0, ...packets.flatMap((packet) => [...(packet.length > 127 ? [(packet.length & 127) | 128] : []), packet.length > 127 ? packet.length >> 7 : packet.length, ...packet]));
   }
 
   /** Chains of `chain` groups with textures; the packet of a damaged frame says so. */
@@ -277,6 +326,18 @@ describe("pictures", () => {
     await Promise.all([rig.player.play(), pass(3)]);
     expect(rig.viewer.frames.at(-1)).toBe(19);
     expect(rig.player.stats).toMatchObject({ textures: "unsupported", textureReason: "this browser decodes no H.264 of that size" });
+    vi.restoreAllMocks();
+  });
+
+  test.skipIf(!hasPython)("that say they are larger than a texture may be are given to no decoder", async () => {
+    const packets = Array.from({ length: FRAMES }, () => [...bytesIn(made!.large.pictures)]);
+    const body = video(1, 1, packets);
+    const chunks = [group(FRAMES, LAYERS), colors([0], [20], { kind: "atlas", form: Form.PLACES }), colors([0, 1], [body.length], { kind: "pictures", form: Form.VIDEO, body })];
+    const configured = vi.spyOn(FakeDecoder.prototype, "configure");
+    rig.begin(makeReel(chunks, { frameRate: 25 }), FAST);
+    await Promise.all([rig.player.play(), pass(2)]);
+    expect([rig.viewer.frames.at(-1), rig.player.stats.textures, configured.mock.calls]).toEqual([FRAMES - 1, "damaged", []]);
+    expect(rig.viewer.warnings).toEqual([expect.stringMatching(/^chunk 2 .*a picture of 2064 x 64, over 2048/)]);
     vi.restoreAllMocks();
   });
 

@@ -3,6 +3,9 @@
 import type { Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 
+import { Head } from "@meshreel/player-core/format/reader";
+import { resealed } from "../../player-core/test/resealed.ts";
+import { noise } from "../../player-core/test/server.ts";
 import { describeInBrowser } from "../../test/browser.ts";
 import { hasPython, runPython } from "../../test/python.ts";
 import { Site } from "./product.ts";
@@ -19,13 +22,15 @@ const WITHOUT_WEBCODECS = (): void => void Reflect.deleteProperty(globalThis, "V
 
 describeInBrowser("the player and textures", () => {
   const site = new Site();
+  let file: Uint8Array;
   let light: readonly number[]; // means of the room's texture
   beforeAll(async () => {
     await site.open();
     if (!hasPython) return;
     const make = (...values: readonly (string | number)[]): { file: string; means: readonly number[] } =>
       JSON.parse(runPython(new URL("../../player-core/test/textured.py", import.meta.url), ...values).toString());
-    site.write("textured.reel", Buffer.from(make(FRAMES, 4).file, "base64"));
+    file = Uint8Array.from(Buffer.from(make(FRAMES, 4).file, "base64"));
+    site.write("textured.reel", file);
     const room = make("room", ROOM_FRAMES);
     site.write("room.reel", Buffer.from(room.file, "base64"));
     light = room.means;
@@ -71,6 +76,21 @@ describeInBrowser("the player and textures", () => {
     }
     const { textures, textureCodec, textureReason } = (await page.evaluate(() => document.querySelector("meshreel-player")!.statistics))!;
     expect([textures, textureCodec, textureReason]).toEqual(["shown", codec, codec === "AV1" ? "" : "this browser decodes no AV1"]);
+    expect(errors).toEqual([]);
+    await page.close();
+  });
+
+  test.skipIf(!hasPython).each([
+    ["AV1", []],
+    ["H.264", [WITHOUT_AV1]],
+  ] as const)("goes on behind a packet of %s that is nonsense", async (codec, scripts) => {
+    const kind = codec === "AV1" ? "pictures" : "compatible";
+    const chunks = Head.parse(file).chunks.filter((chunk) => chunk.kind === kind);
+    site.write("hostile.reel", resealed(file, chunks.slice(0, 1), (payload) => noise(payload.length >> 1, 7).forEach((byte, k) => (payload[payload.length - 1 - k] ^= byte))));
+    const { page, errors } = await open("", scripts, "hostile");
+    const [red] = await lookAt(page, FRAMES - 1);
+    expect(Math.abs(red - 240)).toBeLessThan(60); // by its vertices or by what the decoder made of it
+    expect(await page.evaluate(() => document.querySelector("meshreel-player")!.error)).toBeNull();
     expect(errors).toEqual([]);
     await page.close();
   });
