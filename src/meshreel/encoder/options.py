@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ..analysis.appearance.calibrate import CalibrationOptions
 from ..analysis.fit.surface_fit import FitOptions
 from ..analysis.follow.embedded import EmbeddedOptions
 from ..analysis.follow.fused_template import FusedOptions
@@ -111,6 +112,7 @@ class AppearanceOptions:
 
     colors: ColorCodingOptions = ColorCodingOptions()  # of the vertices, which every coloured group has
     texture: TextureOptions | None = TextureOptions()  # None: no textures
+    calibration: CalibrationOptions | None = CalibrationOptions()  # of colour cameras; None: they are as they are said
 
 
 @dataclass(frozen=True, slots=True)
