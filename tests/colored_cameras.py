@@ -9,6 +9,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from meshreel.analysis.appearance.calibrate import halved
 from meshreel.capture.figure import Pose, figure
 from meshreel.capture.implicit import polygonize
 from meshreel.capture.procedural import grid_of_frame
@@ -32,6 +33,7 @@ class Shown(MeshSequence):
     paint: Callable[[int], Painter]
     cameras: list[tuple[SimulatedColor, DepthCamera]]  # as they are, and as they are said to be
     count: int
+    halvings: int = 0  # of the pictures as they are rendered: each pixel sees its whole area
     frame_rate: float = 30.0
 
     def __len__(self) -> int:
@@ -55,13 +57,17 @@ class Shown(MeshSequence):
             for k, (eye, said) in enumerate(self.of.cameras):
                 random = np.random.default_rng([index, k])
                 pixels = eye.picture(self.of.shape(index), self.of.paint(index), index, random)
-                found.append(ColorPicture(said.view, pixels))
+                picture = ColorPicture(said.view, pixels)
+                for _ in range(self.of.halvings):
+                    picture = halved(picture)
+                found.append(picture)
             return found
 
 
-def person(cameras: list[tuple[SimulatedColor, DepthCamera]], count: int) -> Shown:
-    """A person who walks on the spot, in stripes and cloth."""
-    return Shown(_walker, lambda index: partial(_cloth, index), cameras, count)
+def person(sensor: ColorSensorOptions, count: int) -> Shown:
+    """A person who walks on the spot, in stripes and cloth, before six cameras of 1024 x 1280 pixels."""
+    fine = replace(sensor, scale=2 * sensor.scale, blur=2 * sensor.blur, noise=2 * sensor.noise)
+    return Shown(_walker, lambda index: partial(_cloth, index), around(fine), count, 1)
 
 
 def ball(cameras: list[tuple[SimulatedColor, DepthCamera]], count: int = 4, detail: float = 60.0) -> Shown:

@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 
 from meshreel.analysis.appearance.calibrate import CalibrationOptions, Correction, Moment, calibrate, fit_gains
+from meshreel.capture.simulated_color import shade_of
 from meshreel.errors import InputError
+from meshreel.geometry.color_views import ColorPicture, ColorViews
+from meshreel.geometry.topology import face_normals
+from meshreel.metrics.color import TO_YUV
+from meshreel.metrics.even_points import scatter
 from meshreel.types import Mesh, evenly
-from tests.colored_cameras import TRUE, WRONG, Shown, around, ball
+from tests.colored_cameras import TRUE, WRONG, Shown, around, ball, person
 
 QUICK = CalibrationOptions(frames=4, places=1500)
 STRONG = replace(WRONG, pose_error=0.4)
@@ -106,3 +111,37 @@ def test_one_camera_and_no_surface_need_no_correction(wrong: Shown) -> None:
 def test_options_out_of_range_are_refused(wrong: dict) -> None:
     with pytest.raises(InputError, match="calibration with"):
         CalibrationOptions(**wrong)
+
+
+TEXEL = 0.002  # m, of a texture of 1024 texels on a person
+
+
+def luma_psnr(shown: Shown, number: int, pictures: list[ColorPicture | None]) -> float:
+    """PSNR of what cameras show of texels that some camera sees, against the true texture in its light, dB.
+
+    How bright all cameras are together cannot be known: the truth is as bright as the mean camera has it.
+    """
+    mesh, random = shown[number], np.random.default_rng(0)
+    some = scatter(mesh, np.ones(len(mesh.faces), bool), 30_000)
+    faces, normals = some.faces.astype(np.int64), face_normals(mesh)[0][some.faces]
+    colors, seen = ColorViews([one for one in pictures if one is not None], mesh).at(some.points, normals)
+    along = np.cross(normals, [0.3, 0.5, 0.8])
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    ways, wanted = (along, np.cross(normals, along)), np.zeros(colors.shape)
+    for _ in range(12):  # places all over the texel
+        shares = TEXEL * (random.random((2, len(faces), 1)) - 0.5)
+        wanted += shown.paint(number)(some.points + shares[0] * ways[0] + shares[1] * ways[1], faces) / 12
+    gains = np.exp(np.log([eye.gains for eye, _ in shown.cameras]).mean(axis=0))
+    wanted *= shade_of(mesh, faces, number)[:, None] * gains
+    return float(10 * np.log10(255**2 / np.square(((colors - wanted) @ TO_YUV[0])[seen]).mean()))
+
+
+@pytest.mark.slow
+def test_a_person_has_the_true_texture_in_spite_of_wrong_cameras() -> None:
+    wrong = person(WRONG, 30)
+    given, number = moments(wrong, 3), evenly(30, 3)[1]
+    corrections, pictures = calibrate(given, CalibrationOptions()), given[1][1]  # of the frame that is held out
+    mended = [one.of(picture) for one, picture in zip(corrections, pictures, strict=True)]
+    before, after = luma_psnr(wrong, number, pictures), luma_psnr(wrong, number, mended)
+    print(f"luma of texels that are seen: {before:.2f} dB with wrong cameras, {after:.2f} dB with calibrated ones")  # noqa: T201
+    assert after >= 32 > 18 > before  # measured: 32.46 and 17.00

@@ -132,7 +132,7 @@ class _Look:
         """Look at a moment through cameras in these poses, whose pictures are halved some times."""
         mesh, pictures = moment
         for _ in range(halvings):
-            pictures = [one and _halved(one) for one in pictures]
+            pictures = [one and halved(one) for one in pictures]
         points, normals = _places(mesh, places)
         empty = [np.zeros((len(pictures), len(points), *more)) for more in ((), (2, 2), (2, 6))]
         found, along = _Look(pictures, points, *empty), np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
@@ -206,11 +206,11 @@ def _moved(picture: ColorPicture, pose: Float64[np.ndarray, " 6"]) -> ColorPictu
 def _small(picture: ColorPicture, most_side: int) -> ColorPicture:
     """Return a picture with at most so many pixels a side."""
     while max(picture.pixels.shape) > most_side:
-        picture = _halved(picture)
+        picture = halved(picture)
     return picture
 
 
-def _halved(picture: ColorPicture) -> ColorPicture:
+def halved(picture: ColorPicture) -> ColorPicture:
     """Return a picture with half as many pixels a side, the means of two by two."""
     camera = picture.camera
     width, height = camera.width // 2, camera.height // 2
