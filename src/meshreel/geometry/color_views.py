@@ -21,8 +21,7 @@ from .topology import face_normals
 
 MOST_SIDE = 512  # pixels, of the pictures of what hides a place: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind what is seen (guess)
-FEATHER = 4.0  # pixels from a step in depth within which a colour counts less: it mixes both sides (guess)
-NEAR_STEP = 0.05  # of the weight of a colour, which is left at a step (guess)
+FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, beside it nothing: it mixes both sides (guess)
 STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 
@@ -136,7 +135,7 @@ class View:
         cells = np.minimum(positions[rows] / self._shrink, np.array(self._depth.shape[::-1]) - 1e-9).astype(np.int64)
         at = (cells[:, 1], cells[:, 0])
         hidden = depth[rows] > self._depth[at] + np.maximum(self._margin, MARGIN * depth[rows])
-        near = np.clip(self._from_step[at] / FEATHER, NEAR_STEP, 1.0)
+        near = np.minimum(self._from_step[at] / FEATHER, 1.0)
         if self._clear:
             near = np.floor(near)
         weights = np.zeros(len(points))

@@ -144,4 +144,4 @@ def test_a_person_has_the_true_texture_in_spite_of_wrong_cameras() -> None:
     mended = [one.of(picture) for one, picture in zip(corrections, pictures, strict=True)]
     before, after = luma_psnr(wrong, number, pictures), luma_psnr(wrong, number, mended)
     print(f"luma of texels that are seen: {before:.2f} dB with wrong cameras, {after:.2f} dB with calibrated ones")  # noqa: T201
-    assert after >= 32 > 18 > before  # measured: 32.46 and 17.00
+    assert after >= 33 > 18 > before  # measured: 34.06 and 17.00
