@@ -21,7 +21,7 @@ from .topology import face_normals
 
 MOST_SIDE = 512  # pixels, of the pictures of what hides a place: a third of the time of whole ones (guess)
 MARGIN = 0.01  # of the depth, and at least as many metres: how far a place may lie behind what is seen (guess)
-FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, beside it nothing: it mixes both sides (guess)
+FEATHER = 4.0  # pixels from a step in depth within which a colour counts less, and none at it: both sides mix (guess)
 STEP = 0.03  # of the depth between neighbours: a step (guess)
 
 
