@@ -48,7 +48,7 @@ from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
 from .scene import Tracks, encode_bodies, scene_intervals
-from .static import Static, colored_states
+from .static import Static, colored_states, is_colored
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
@@ -197,7 +197,7 @@ def _encode_tracked(job: Job, file: BinaryIO, seen: Survey) -> Summary:
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), texts, continued=_continued(job))
+    return Summary(writer.size, tuple(groups), texts + _bare(job, groups), continued=_continued(job))
 
 
 def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
@@ -218,7 +218,7 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
-    texts = (*warnings_of(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
+    texts = (*warnings_of(seen), *_astray(parts.astray), *still, *_lost(coded.dropped), *_bare(job, groups, states))
     return Summary(writer.size, tuple(groups), texts, scene, _continued(job))
 
 
@@ -309,6 +309,18 @@ def _lost(faces: int) -> tuple[str, ...]:
     if not faces:
         return ()
     return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
+
+
+def _bare(job: Job, groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> tuple[str, ...]:
+    """Return a warning of what the file has without colours, though the sequence has some."""
+    frames = sum(group.frame_count for group in groups if group.form != Form.EMPTY and not group.colors)
+    bare = [
+        *([f"{frames} frames"] if frames else []),
+        *["the background" for state in states if not state.companions][:1],
+    ]
+    if job.options.appearance is None or not bare or not is_colored(job.sequence):
+        return ()
+    return (f"no colours of {' and of '.join(bare)}: there are none, or they would cost a reader too much",)
 
 
 def _still(least: float) -> tuple[str, ...]:
