@@ -55,11 +55,7 @@ class SimulatedColor:
     @staticmethod
     def beside(depth: DepthCamera, sensor: ColorSensorOptions, random: np.random.Generator) -> SimulatedColor:
         """Return a camera in the place of a depth camera, with errors of its own."""
-        width, height = round(depth.width * sensor.scale), round(depth.height * sensor.scale)
-        ratios = (width / depth.width, height / depth.height)
-        focal = (depth.focal[0] * ratios[0], depth.focal[1] * ratios[1])
-        center = ((depth.center[0] + 0.5) * ratios[0] - 0.5, (depth.center[1] + 0.5) * ratios[1] - 0.5)
-        camera = replace(depth, width=width, height=height, focal=focal, center=center)
+        camera = depth.resized(round(depth.width * sensor.scale), round(depth.height * sensor.scale))
         gains = np.exp(sensor.gain * random.standard_normal() + sensor.balance * random.standard_normal(3))
         return SimulatedColor(camera, gains, sensor)
 

@@ -126,7 +126,11 @@ class Encoder:
 
     def intervals(self, options: EncoderOptions) -> Iterator[Interval]:
         """Yield the intervals that `encode` encodes, of all tracks of a scene."""
-        return _intervals(self._job(options), self.parts(options))
+        job, parts = self._job(options), self.parts(options)
+        if parts is None:
+            seen = surveyed(job)
+            return intervals_of(job, seen, tracked_bodies(job, seen))
+        return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))
 
     def parts(self, options: EncoderOptions) -> Parts | None:
         """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
@@ -197,7 +201,7 @@ def _encode_tracked(job: Job, file: BinaryIO, seen: Survey) -> Summary:
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), texts + _bare(job, groups), continued=_continued(job))
+    return Summary(writer.size, tuple(groups), (*texts, *_bare(job, groups)), continued=_continued(job))
 
 
 def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
@@ -217,8 +221,8 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
-    still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
-    texts = (*warnings_of(seen), *_astray(parts.astray), *still, *_lost(coded.dropped), *_bare(job, groups, states))
+    moves = any(group.form != Form.EMPTY for group in groups)
+    texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped), *_bare(job, groups, states))
     return Summary(writer.size, tuple(groups), texts, scene, _continued(job))
 
 
@@ -255,18 +259,9 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     _add_companions(writer, number, group.companions, before[0] if before else None)
     key = None if group.key is None else each.first_frame + group.key
     fidelity = group.fidelity.scaled(unit)
-    size, share = len(payload), each.share
-    return GroupSummary(
-        group.form,
-        group.frame_count,
-        size,
-        fidelity,
-        group.predicted,
-        key,
-        track,
-        share,
-        sum(map(len, group.companions)),
-    )
+    colors = sum(map(len, group.companions))
+    facts = (group.form, group.frame_count, len(payload), fidelity, group.predicted)
+    return GroupSummary(*facts, key, track, each.share, colors)
 
 
 def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:
@@ -304,39 +299,26 @@ def warnings_of(seen: Survey) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _lost(faces: int) -> tuple[str, ...]:
-    """Return a warning of moving pieces of a scene that belong to no body."""
-    if not faces:
-        return ()
-    return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
+def _warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
+    """Yield warnings of still surface, of all moving surface or of `dropped` faces of it that the file lacks."""
+    if parts.astray > ASTRAY:
+        text = f"{100 * parts.astray:.1f} % of the surface stands still, but is far from the background that frames"
+        why = "it flies, or is there for a while only"
+        yield f"{text} share, and is not kept: {why}; to keep all, encode with --dynamic-only"
+    if not moves:
+        least = 2 * parts.segmentation.cell
+        text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
+        yield f"{text}; if something does, encode with --dynamic-only"
+    if dropped:
+        yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
 
 
-def _bare(job: Job, groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> tuple[str, ...]:
-    """Return a warning of what the file has without colours, though the sequence has some."""
+def _bare(job: Job, groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:
+    """Yield a warning of what the file has without colours, though the sequence has some."""
     frames = sum(group.frame_count for group in groups if group.form != Form.EMPTY and not group.colors)
-    bare = [
-        *([f"{frames} frames"] if frames else []),
-        *["the background" for state in states if not state.companions][:1],
-    ]
-    if job.options.appearance is None or not bare or not is_colored(job.sequence):
-        return ()
-    return (f"no colours of {' and of '.join(bare)}: there are none, or they would cost a reader too much",)
-
-
-def _still(least: float) -> tuple[str, ...]:
-    """Return a warning of a scene in which nothing moves by more than `least`, m."""
-    text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
-    return (f"{text}; if something does, encode with --dynamic-only",)
-
-
-def _astray(share: float) -> tuple[str, ...]:
-    """Return a warning of still surface that the file lacks, by its share of all surface."""
-    if share <= ASTRAY:
-        return ()
-    text = f"{100 * share:.1f} % of the surface stands still, but is far from the background that frames share"
-    return (
-        f"{text}, and is not kept: it flies, or is there for a while only; to keep all, encode with --dynamic-only",
-    )
+    bare = [f"{frames} frames"] * (frames > 0) + ["the background"] * any(not state.companions for state in states)
+    if job.options.appearance is not None and bare and is_colored(job.sequence):
+        yield f"no colours of {' and of '.join(bare)}: there are none, or they would cost a reader too much"
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
@@ -350,11 +332,3 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
         maximum=tuple(map(float, high)),
         metadata=json.dumps(metadata, separators=(",", ":")),
     )
-
-
-def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
-    """Yield the intervals of a sequence, of a scene where there are parts."""
-    if parts is None:
-        seen = surveyed(job)
-        return intervals_of(job, seen, tracked_bodies(job, seen))
-    return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))

@@ -11,6 +11,7 @@ import { Links, companionLayers, sizeWithCompanions } from "./format/links.ts";
 import type { Opened } from "./net/opening.ts";
 import { Picture } from "./time/picture.ts";
 import type { Share } from "./time/pool.ts";
+import { isVideo } from "./format/reader.ts";
 import type { Chunk, Head } from "./format/reader.ts";
 import { plan } from "./time/scheduler.ts";
 import type { Plan, Step } from "./time/scheduler.ts";
@@ -49,7 +50,8 @@ type SessionStats = Omit<Stats, "bandwidthMbps" | "fetchedBytes" | "stalls">;
 
 /** Before there is one. */
 export const NO_STATS: SessionStats = {
-  mbps: 0, decodeMs: 0, decodeLoad: 0, bufferedSeconds: 0, layers: 0, wholeLayers: 0, skippedGroups: 0, textures: "none",
+  mbps: 0, decodeMs: 0, decodeLoad: 0, bufferedSeconds: 0, layers: 0, wholeLayers: 0, skippedGroups: 0,
+  textures: "none", textureCodec: null, textureReason: "", backgroundLate: false,
 };
 
 export class Session {
@@ -71,7 +73,7 @@ export class Session {
   #size: number | null = null; // of the file, as the source had it last
   #speed = 1;
 
-  constructor({ head, first }: Opened, source: Source, share: Share, limits: Limits, events: SessionEvents, textures: boolean) {
+  constructor({ head, first, decodable }: Opened, source: Source, share: Share, limits: Limits, events: SessionEvents, textures: boolean) {
     this.head = head;
     this.#source = source;
     this.#share = share;
@@ -83,9 +85,9 @@ export class Session {
     this.fetcher = new Fetcher(head, source, { arrived: events.changed, failed: events.failed }, COMPRESSED);
     this.fetcher.put(first, 0);
     this.decoding = new Decoding(head, this.#links, this.fetcher, share, events);
-    this.textures = new Textures(head, this.fetcher, this.decoding, { warn: events.warn, changed: events.textured }, textures);
+    this.textures = new Textures(head, this.fetcher, this.decoding, { warn: events.warn, changed: events.textured }, { on: textures, decodable });
     this.picture = new Picture(head, this.decoding, this.textures);
-    this.#adaptive = new Adaptive(head, this.timeline, this.#bandwidth, 1);
+    this.#adaptive = new Adaptive(head, this.timeline, this.#bandwidth, this.textures.rendition);
   }
 
   /** Layers beyond the first that "auto" chooses now. */
@@ -117,7 +119,10 @@ export class Session {
     this.decoding.run(this.#plan);
     this.decoding.release(STATICS * memory);
     const whenOf = (ahead: number): When => (ahead <= 0 ? "now" : ahead < LATER * outlook.fetchSeconds ? "soon" : "later");
-    this.fetcher.want([...this.#pictureWishes(made, whenOf), ...made.steps.flatMap((step) => this.#wishesOf(step, whenOf(step.ahead)))]);
+    const wishesOf = (steps: readonly Step[]): Wish[] => steps.flatMap((step) => this.#wishesOf(step, whenOf(step.ahead)));
+    const urgent = wishesOf(made.steps.filter(({ ahead }) => ahead <= 0));
+    const later = wishesOf(made.steps.filter(({ ahead }) => ahead > 0));
+    this.fetcher.want([...this.#pictureWishes(made, whenOf), ...urgent, ...this.#slowWishes(made, aim.time, aim.time + outlook.fetchSeconds), ...later]);
     if (aim.layers === "auto") this.#adapt(aim);
   }
 
@@ -161,13 +166,13 @@ export class Session {
       layers,
       wholeLayers,
       skippedGroups: this.decoding.failedGroups,
-      textures: this.textures.stateOf(shown),
+      ...this.textures.statsOf(shown),
     };
   }
 
   /** Bits a second of content of the whole stream, with `layers` layers beyond the first. */
   rateAt(layers: number): number {
-    const textures = this.textures.isOn;
+    const textures = this.textures.rendition;
     const key = `${layers} ${textures}`;
     let rate = this.#rates.get(key);
     if (rate === undefined) {
@@ -195,7 +200,8 @@ export class Session {
   /** A chunk's layers, and behind them what comes with these. */
   #wishesOf({ chunk, layers }: Step, when: When): Wish[] {
     const count = layers + 1;
-    const companions = this.decoding.companionsOf(chunk).map((other) => ({ chunk: other, count: companionLayers(chunk, other, count), when }));
+    const others = this.decoding.companionsOf(chunk).filter((other) => chunk.kind === "group" || !isVideo(other));
+    const companions = others.map((other) => ({ chunk: other, count: companionLayers(chunk, other, count), when }));
     return [{ chunk, count, when }, ...companions];
   }
 
@@ -203,6 +209,7 @@ export class Session {
   #pictureWishes({ coming, steps }: Plan, whenOf: (ahead: number) => When): Wish[] {
     const layers = new Map(steps.map((step) => [step.chunk, step.layers]));
     return coming.flatMap(({ chunk, ahead }) => {
+      if (chunk.kind === "static") return [];
       const pictures = this.decoding.picturesOf(chunk, layers.get(chunk) ?? this.decoding.decodedAt(chunk));
       if (pictures === null || (ahead > 0 && layers.has(chunk))) return [];
       const lead = ahead > 0 ? [pictures] : this.textures.leadTo(pictures);
@@ -210,8 +217,14 @@ export class Session {
     });
   }
 
+  /** Layers of the backgrounds' videos, behind all that the frame at the play head waits for. */
+  #slowWishes({ coming }: Plan, from: number, to: number): Wish[] {
+    const [first, last] = [this.timeline.frameAt(from), this.timeline.frameAt(to)];
+    return coming.flatMap(({ chunk }) => (chunk.kind === "static" ? this.textures.layersOf(chunk, first, last) : [])).map((layer) => ({ chunk: layer, count: 1, when: "soon" }));
+  }
+
   #adapt(aim: Aim): void {
-    this.#adaptive.textures = this.textures.isOn;
+    this.#adaptive.textures = this.textures.rendition;
     const before = this.#adaptive.level;
     const level = this.#adaptive.decide({
       now: performance.now(),

@@ -99,12 +99,22 @@ export interface TextureImage {
 
 /**
  * Whether textures are shown, and if not, why: the file has none, they are switched off, the browser cannot decode them or not in time, they are
- * damaged, or left out with layers.
+ * damaged, left out with layers, or not decoded yet.
  */
-export type TextureState = "shown" | "none" | "off" | "unsupported" | "slow" | "damaged" | "left out";
+export type TextureState = "shown" | "none" | "off" | "unsupported" | "slow" | "damaged" | "left out" | "late";
+
+export interface TextureStats {
+  readonly textures: TextureState;
+  readonly textureCodec: "AV1" | "H.264" | null; // that they are decoded from; null where they are not
+  readonly textureReason: string; // why it is not AV1 or there are none, where browser or machine is the cause
+  readonly backgroundLate: boolean; // whether the background is shown in a picture of before, or without
+}
 
 /** What a chunk may add to another one, which is shown without it where it is damaged. */
-export type CompanionKind = "colors" | "atlas" | "pictures";
+export type CompanionKind = "colors" | "atlas" | Rendition;
+
+/** Which video textures are decoded from: AV1, or the same pictures in H.264. */
+export type Rendition = "pictures" | "compatible";
 
 /** What is known from the head, before any chunk is there. */
 export interface Info {
@@ -128,7 +138,7 @@ export type Layers = number | "auto";
 export const PLAYBACK_RATES = { least: 0.1, most: 4 } as const;
 
 /** Numbers for the overlay. */
-export interface Stats {
+export interface Stats extends TextureStats {
   readonly mbps: number; // of the stream with the layers that play, over its own time
   readonly bandwidthMbps: number; // as measured while fetching; 0 before the first chunk
   readonly decodeMs: number; // of the last group
@@ -139,7 +149,6 @@ export interface Stats {
   readonly wholeLayers: number; // those that these groups have in the file, where it may have fewer than `Info.mostLayers`
   readonly stalls: number;
   readonly skippedGroups: number; // damaged ones
-  readonly textures: TextureState;
 }
 
 /** Events of a `Playback`, as a media element has them; those that are its own carry a `detail`. */

@@ -12,8 +12,8 @@ const TIMELINE = new Timeline(1500, (frame) => frame / 25);
 const GOOD: Conditions = { now: 0, time: 0, speed: 1, bandwidth: 1e9, fetched: 10, decoded: 3, load: 0.1, isWaiting: false };
 const bits = (bytes: number): number => 8 * bytes;
 
-function make(bandwidth: number, speed = 1): Adaptive {
-  return new Adaptive(HEAD, TIMELINE, bandwidth, speed);
+function make(bandwidth: number): Adaptive {
+  return new Adaptive(HEAD, TIMELINE, bandwidth, null);
 }
 
 test("rates are those of the file's own bytes", () => {
@@ -25,8 +25,6 @@ describe("the start", () => {
     const levels = [0, 1, 12_000, 51_000, 120_000, 251_000].map((bytes) => make(bits(bytes)).level);
     expect(levels).toEqual([3, 0, 0, 1, 2, 3]);
   });
-
-  test("counts the speed", () => expect(make(bits(251_000), 2).level).toBe(2));
 });
 
 describe("the network", () => {

@@ -146,6 +146,7 @@ describe("the index", () => {
     ["colours predicted from none", [...two, colors([1, 0], [9])], /depends on 0$/],
     ["colours predicted from others than those before", [two[0], colors([0], [9]), group(10, FULL, { dependsOn: [] }), colors([2, 1], [9])], /depends on 1$/],
     ["an atlas of a predicted group", [...two, { ...atlas, dependsOn: [1] }], /of 1, that depends on $/],
+    ["pictures predicted from those of the other rendition", [two[0], atlas, { ...pictures, kind: "compatible", dependsOn: [0, 1] }, two[1], { ...pictures, dependsOn: [3, 1, 2] }], /of 3, that depends on 1,2$/],
     ["pictures without an atlas", [...two, { ...pictures, dependsOn: [1] }], /of 1, that depends on $/],
     ["a group of the form of colours", [group(10, FULL, { form: Form.VERTEX_COLORS })], /of kind 2 and form 6/],
     ["a background of the form of colours", [{ ...background(10), form: Form.VERTEX_COLORS }, ...two], /of kind 1 and form 6/],
@@ -160,6 +161,8 @@ describe("the index", () => {
     const chunks = [two[0], colors([0], [9]), atlas, { ...pictures, dependsOn: [0, 2] }];
     const next = [group(10, FULL, { dependsOn: [0] }), colors([4, 1], [9]), { ...pictures, dependsOn: [4, 2, 3] }, group(10, FULL, { dependsOn: [4] }), colors([7], [9])];
     const head = Head.parse(makeReel([...chunks, ...next], RATE));
+    const others = [...chunks, ...next].map((chunk) => (chunk.kind === "pictures" ? { ...chunk, kind: "compatible" as const } : chunk));
+    expect(Head.parse(makeReel(others, RATE)).info).toMatchObject({ hasColors: true, hasTextures: true });
     const links = new Links(head);
     expect(head.chunks.map((chunk) => head.companionsOf(chunk).map(({ number }) => number))).toEqual([[1, 2, 3], [], [], [], [5, 6], [], [], [8], []]);
     expect(head.chunks.map((chunk) => links.previousOf(chunk)?.number ?? null)).toEqual([null, null, null, 2, 0, 1, 3, 4, null]);

@@ -1,6 +1,6 @@
 // The numbers of the statistics overlay, as lines of a name and a value.
 
-import type { Info, Stats, TextureState } from "@meshreel/player-core/types";
+import type { Info, Stats, TextureState, TextureStats } from "@meshreel/player-core/types";
 import { formatAmount, formatCount, formatRate } from "./format.ts";
 import type { PictureStats } from "./stage.ts";
 
@@ -20,7 +20,7 @@ export function statisticsLines(stats: Statistics, info: Info | null, frame: num
     ["Decode", `${stats.decodeMs.toFixed(1)} ms a group, load ${(stats.decodeLoad * 100).toFixed(0)} %`],
     ["Buffer", `${stats.bufferedSeconds.toFixed(1)} s, ${formatCount(stats.stalls)} ${stats.stalls === 1 ? "stall" : "stalls"}`],
     ["Layers", layersText(stats, info?.mostLayers ?? 0)],
-    ["Colours", info?.hasColors ? colorsText(stats.textures) : "none"],
+    ["Colours", info?.hasColors ? colorsText(stats) : "none"],
     ["Triangles", formatCount(stats.triangles)],
     ["Display", stats.fps > 0 ? `${formatCount(stats.fps)} fps, ${stats.frameMs.toFixed(1)} ms each` : "still"],
     ["GPU memory", formatAmount(stats.gpuBytes, "B")],
@@ -37,12 +37,15 @@ function layersText({ layers, wholeLayers }: Statistics, most: number): string {
 const WITHOUT: Readonly<Record<Exclude<TextureState, "shown">, string>> = {
   none: "of vertices",
   off: "of vertices: textures are off",
-  unsupported: "of vertices: this browser decodes no textures",
-  slow: "of vertices: textures took too long",
+  unsupported: "of vertices",
+  slow: "of vertices",
   damaged: "of vertices: the texture is damaged",
   "left out": "of vertices: textures come with more layers",
+  late: "of vertices: the texture is not decoded yet",
 };
 
-function colorsText(textures: TextureState): string {
-  return textures === "shown" ? "AV1 texture" : WITHOUT[textures];
+function colorsText({ textures, textureCodec, textureReason, backgroundLate }: TextureStats): string {
+  const why = textureReason === "" || textures === "off" ? "" : `: ${textureReason}`;
+  if (textures !== "shown") return textures === "unsupported" || textures === "slow" ? WITHOUT[textures] + why : WITHOUT[textures];
+  return `${textureCodec} texture${backgroundLate ? ", the background's is late" : ""}${why}`;
 }

@@ -67,7 +67,8 @@ export class FakePlayback extends EventTarget implements Playback {
   get stats(): Stats {
     return {
       mbps: 2.41, bandwidthMbps: 48.2, decodeMs: 12.3, decodeLoad: 0.08, bufferedSeconds: this.info ? 0.75 : 0, fetchedBytes: 61_000,
-      layers: 3, wholeLayers: 3, stalls: 0, skippedGroups: 0, textures: "none",
+      layers: 3, wholeLayers: 3, stalls: 0, skippedGroups: 0,
+      textures: "none", textureCodec: null, textureReason: "", backgroundLate: false,
     };
   }
 

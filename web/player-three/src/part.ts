@@ -28,6 +28,7 @@ export class Part extends Group {
     const plain = this.#materials.of({ edges: false, places: false });
     this.#faces = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, plain);
     this.#extra = new Mesh<BufferGeometry, RawShaderMaterial>(NOTHING, plain);
+    this.#faces.onBeforeRender = this.#extra.onBeforeRender = (renderer) => this.#image.drawnBy(renderer);
     this.add(this.#faces, this.#extra);
     this.visible = false;
   }

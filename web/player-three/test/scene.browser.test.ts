@@ -223,6 +223,31 @@ describeInBrowser("a scene in Chromium", () => {
     });
   });
 
+  describe("textures", () => {
+    const striped = async (distance: number, stripe: number, colors: readonly [string, string]): Promise<Picture> => {
+      await look("color");
+      await open.page.evaluate((far) => window.api.camera(0, far, 1e-3), distance);
+      await open.page.evaluate(([size, both]) => window.api.showStriped(1024, size, both), [stripe, colors] as const);
+      return picture();
+    };
+    /** Greens of the row of pixels through the middle, where the floor is. */
+    const row = (drawn: Picture): number[] =>
+      Array.from({ length: 200 }, (_, k) => drawn.at([(k - 100) / 100, 0, 0])).filter((color) => color[0] !== 255).map(([, green]) => green);
+
+    test("are the colours of their picture, to the byte", async () => {
+      const drawn = await striped(3, 1024, ["rgb(200, 100, 50)", "black"]);
+      expect(drawn.at([0, 0, 0])).toBeNear([200, 100, 50], 1);
+    });
+
+    test("are looked at in three smaller sizes and no more: beyond, their charts would run into each other", async () => {
+      const kept = row(await striped(19, 16, ["rgb(200, 0, 0)", "rgb(200, 255, 0)"])); // a texel of the third is eight wide
+      expect(kept.length).toBeGreaterThan(20);
+      expect(Math.max(...kept) - Math.min(...kept)).toBeGreaterThan(150);
+      const merged = row(await striped(19, 4, ["rgb(200, 0, 0)", "rgb(200, 255, 0)"]));
+      expect(Math.max(...merged) - Math.min(...merged)).toBeLessThan(10);
+    });
+  });
+
   test("what it shows later costs no upload", async () => {
     await prepare(true);
     await show(0); // the materials of a first track are made with its first picture

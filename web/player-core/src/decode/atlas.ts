@@ -8,7 +8,7 @@ import { decodePlaces } from "../wasm/places.ts";
 import type { Core } from "../wasm/memory.ts";
 import { decodeIntegers } from "./entropy.ts";
 
-const MOST_SIDE = 2048; // texels, as in geometry/atlas.py
+export const MOST_SIDE = 2048; // texels, as in geometry/atlas.py
 
 /** A texture's size, and the places of the corners of a mesh's faces in it, from its upper left corner. */
 export interface Layout {

@@ -13,6 +13,7 @@ const COMPANIONS: ReadonlyMap<number, number> = new Map([
   [ChunkKind.COLORS, Form.VERTEX_COLORS],
   [ChunkKind.ATLAS, Form.PLACES],
   [ChunkKind.PICTURES, Form.VIDEO],
+  [ChunkKind.COMPATIBLE, Form.VIDEO],
 ]);
 const FORMS: readonly number[] = [Form.LAPLACIAN, Form.LAYERS, Form.DRACO, Form.EMPTY, Form.PATCH];
 
@@ -109,7 +110,7 @@ class IndexChecks {
     const isNeeded = this.needed(kind, of, whole).some((numbers) => numbers.length === others.length && numbers.every((number, k) => number === others[k]));
     require(isNeeded, `${name}: of kind ${kind}, of ${of}, that depends on ${others}`);
     this.companions.set(`${of} ${kind}`, this.count);
-    if (kind === ChunkKind.PICTURES) this.atlases.set(of, others[0]);
+    if (form === Form.VIDEO) this.atlases.set(of, others[0]);
   }
 
   /** What a companion may depend on, beside the chunk that it is of. */

@@ -2,7 +2,8 @@
 
 import { Form } from "./layout.gen.ts";
 import { isCompanion } from "./reader.ts";
-import type { Chunk, Head } from "./reader.ts";
+import type { Chunk, CompanionChunk, Head } from "./reader.ts";
+import type { Rendition } from "../types.ts";
 
 export class Links {
   readonly #previous: (Chunk | null)[];
@@ -65,9 +66,13 @@ export function companionLayers(chunk: Chunk, companion: Chunk, layers: number):
   return isScaled ? Math.min(layers, companion.layers.length) : companion.layers.length;
 }
 
-/** Bytes of the first layers of a chunk, and of what is wanted of its companions with these, textures among them or not. */
-export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number, textures: boolean): number {
+/** What is wanted with a chunk where its textures are of one rendition, or are not wanted. */
+export function companionsWith(head: Head, chunk: Chunk, textures: Rendition | null): readonly CompanionChunk[] {
+  return head.companionsOf(chunk).filter(({ kind }) => kind === "colors" || (textures !== null && (kind === "atlas" || kind === textures)));
+}
+
+/** Bytes of the first layers of a chunk, and of what is wanted of its companions with these. */
+export function sizeWithCompanions(head: Head, chunk: Chunk, layers: number, textures: Rendition | null): number {
   const own = sizeOfLayers(chunk, layers);
-  const companions = head.companionsOf(chunk).filter(({ kind }) => textures || kind === "colors");
-  return companions.reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
+  return companionsWith(head, chunk, textures).reduce((sum, companion) => sum + sizeOfLayers(companion, companionLayers(chunk, companion, layers)), own);
 }

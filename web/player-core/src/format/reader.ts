@@ -8,10 +8,12 @@ import { FormatError } from "../errors.ts";
 import { Checksum, ChunkKind, Form, Header, Index, LIMITS, MAGIC, Preamble, VERSION } from "./layout.gen.ts";
 import type { Layer } from "./layout.gen.ts";
 import { unpack, unpackAll } from "./records.ts";
-import type { Box, CompanionKind, Info } from "../types.ts";
+import type { Box, CompanionKind, Info, Rendition } from "../types.ts";
 
 export const FIRST_REQUEST = 16384; // bytes; the head of some minutes of video
 const PREAMBLE_SIZE = Preamble.least;
+/** Videos of textures, the one that is wanted first before the other. */
+export const RENDITIONS: readonly Rendition[] = ["pictures", "compatible"];
 
 /** Where a chunk lies and what it holds. */
 export interface Chunk {
@@ -34,7 +36,10 @@ export type CompanionChunk = Chunk & { readonly kind: CompanionKind };
 export class Head {
   readonly info: Info;
   readonly tracks: readonly (readonly Chunk[])[]; // the groups of each
+  /** What is fetched as one, in the order of the file: a chunk, or a layer of a background's pictures, which is a video of its own. */
+  readonly pieces: readonly Chunk[];
   private readonly companions = new Map<number, readonly CompanionChunk[]>(); // by the chunk that they add to
+  private readonly shown = new Map<number, number>(); // of each static chunk, the first frame of the first group that names it
   private readonly times: Float64Array; // s from the first frame; empty where they follow from the rate
 
   private constructor(
@@ -43,6 +48,8 @@ export class Head {
   ) {
     this.tracks = byTrack(chunks);
     for (const chunk of chunks) if (isCompanion(chunk)) this.companions.set(chunk.dependsOn[0], [...this.companionsOf(chunks[chunk.dependsOn[0]]), chunk]);
+    this.pieces = chunks.flatMap((chunk) => (isVideo(chunk) && chunk.frameCount === 0 ? layersOf(chunk) : [chunk]));
+    for (const { kind, dependsOn, firstFrame } of chunks) if (kind === "group") for (const other of dependsOn) if (!this.shown.has(other)) this.shown.set(other, firstFrame);
     const groups = this.tracks[0];
     const last = groups[groups.length - 1];
     const frameCount = last.firstFrame + last.frameCount;
@@ -136,6 +143,16 @@ export class Head {
     return this.companions.get(chunk.number) ?? [];
   }
 
+  /** The layers of a background's pictures. */
+  piecesOf(pictures: CompanionChunk): readonly CompanionChunk[] {
+    return this.pieces.filter(({ number }) => number === pictures.number) as CompanionChunk[];
+  }
+
+  /** The first frame that is shown with a static chunk; the number of frames where none is. */
+  shownFrom({ number }: Chunk): number {
+    return this.shown.get(number) ?? this.frameCount;
+  }
+
   /** The companion that one is predicted from, or that has the colours of what a change of the background keeps; of the first pictures, their atlas. */
   companionBefore(chunk: Chunk): Chunk | null {
     const of = this.chunks[chunk.dependsOn[0]];
@@ -159,7 +176,18 @@ export function isCompanion(chunk: Chunk): chunk is CompanionChunk {
 }
 
 function isCompanionKind(kind: Chunk["kind"]): kind is CompanionKind {
-  return kind === "colors" || kind === "atlas" || kind === "pictures";
+  return ["colors", "atlas", ...RENDITIONS].includes(kind);
+}
+
+/** Whether a chunk has textures. */
+export function isVideo(chunk: Chunk): chunk is Chunk & { readonly kind: Rendition } {
+  return RENDITIONS.includes(chunk.kind as Rendition);
+}
+
+/** The layers of a chunk, each like a chunk of the same number. */
+function layersOf(chunk: Chunk): Chunk[] {
+  let end = chunk.offset;
+  return chunk.layers.map((layer) => ({ ...chunk, offset: (end += layer.size) - layer.size, size: layer.size, layers: [layer] }));
 }
 
 /** "chunk 3 (track 0, frames 10 to 19)", for messages. */
@@ -202,6 +230,8 @@ function kindOf(kind: number): Chunk["kind"] {
       return "atlas";
     case ChunkKind.PICTURES:
       return "pictures";
+    case ChunkKind.COMPATIBLE:
+      return "compatible";
     default:
       return "unknown";
   }
@@ -236,8 +266,8 @@ function infoOf(header: Header, chunks: readonly Chunk[], trackCount: number, fr
     trackCount,
     mostLayers: scaled.reduce((most, chunk) => Math.max(most, chunk.layers.length - 1), 0),
     size: last.offset + last.size,
-    hasColors: chunks.some(({ kind }) => kind === "colors" || kind === "pictures"),
-    hasTextures: chunks.some(({ kind }) => kind === "pictures"),
+    hasColors: chunks.some((chunk) => chunk.kind === "colors" || isVideo(chunk)),
+    hasTextures: chunks.some(isVideo),
     metadata: metadataOf(header.metadata),
   };
 }

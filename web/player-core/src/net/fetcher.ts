@@ -6,7 +6,7 @@ import { sizeOfLayers } from "../format/links.ts";
 import type { Chunk, Head } from "../format/reader.ts";
 import type { Source } from "./source.ts";
 
-/** The first layers of a chunk. */
+/** The first layers of a chunk, or of another of the head's pieces: this file calls them all chunks. */
 export interface Wish {
   readonly chunk: Chunk;
   readonly count: number;
@@ -49,7 +49,7 @@ export class Fetcher {
   readonly #source: Source;
   readonly #events: FetcherEvents;
   readonly #memory: number;
-  readonly #held = new Map<number, Held>(); // by chunk, those used last at the end
+  readonly #held = new Map<number, Held>(); // by offset of the chunk, those used last at the end
   #heldBytes = 0;
   #wanted = new Set<number>();
   #requests: Request[] = [];
@@ -57,7 +57,7 @@ export class Fetcher {
 
   /** `memory`: bytes that chunks may take that are not wanted any more. */
   constructor(head: Head, source: Source, events: FetcherEvents, memory: number) {
-    this.#chunks = head.chunks;
+    this.#chunks = head.pieces;
     this.#source = source;
     this.#events = events;
     this.#memory = memory;
@@ -79,7 +79,7 @@ export class Fetcher {
 
   /** How many whole layers of a chunk are at hand. */
   layersOf(chunk: Chunk): number {
-    let rest = this.#held.get(chunk.number)?.length ?? 0;
+    let rest = this.#held.get(chunk.offset)?.length ?? 0;
     let layers = 0;
     while (layers < chunk.layers.length && rest >= chunk.layers[layers].size) rest -= chunk.layers[layers++].size;
     return layers;
@@ -87,16 +87,16 @@ export class Fetcher {
 
   /** A copy of the first layers of a chunk. */
   payload(chunk: Chunk, layers: number): Uint8Array<ArrayBuffer> {
-    const held = this.#held.get(chunk.number)!;
+    const held = this.#held.get(chunk.offset)!;
     if (held.pieces.length > 1) held.pieces = [joined(held.pieces)];
-    this.#held.delete(chunk.number);
-    this.#held.set(chunk.number, held);
+    this.#held.delete(chunk.offset);
+    this.#held.set(chunk.offset, held);
     return held.pieces[0].slice(0, sizeOfLayers(chunk, layers)) as Uint8Array<ArrayBuffer>;
   }
 
   /** Fetches these, in their order; what is on its way and not among them is cancelled. */
   want(wishes: readonly Wish[]): void {
-    this.#wanted = new Set(wishes.map(({ chunk }) => chunk.number));
+    this.#wanted = new Set(wishes.map(({ chunk }) => chunk.offset));
     const missing = wishes.map((wish) => this.#missingOf(wish)).filter(({ from, to }) => from < to);
     for (const request of this.#requests) {
       if (!missing.some(({ from, to }) => from <= request.at + JOIN && from < request.to && to > request.at)) request.controller.abort();
@@ -113,7 +113,7 @@ export class Fetcher {
     const end = offset + bytes.length;
     for (let k = this.#chunkAt(offset); k < this.#chunks.length && this.#chunks[k].offset < end; k++) {
       const chunk = this.#chunks[k];
-      const held = this.#held.get(k) ?? { pieces: [], length: 0 };
+      const held = this.#held.get(chunk.offset) ?? { pieces: [], length: 0 };
       const from = chunk.offset + held.length;
       const to = Math.min(end, chunk.offset + chunk.size);
       if (from < offset || from >= to) continue;
@@ -121,7 +121,7 @@ export class Fetcher {
       held.length += to - from;
       this.#heldBytes += to - from;
       this.#fetchedBytes += to - from;
-      this.#held.set(k, held);
+      this.#held.set(chunk.offset, held);
     }
   }
 
@@ -133,7 +133,7 @@ export class Fetcher {
   }
 
   #missingOf({ chunk, count, when }: Wish): Range {
-    const held = this.#held.get(chunk.number)?.length ?? 0;
+    const held = this.#held.get(chunk.offset)?.length ?? 0;
     return { from: chunk.offset + held, to: chunk.offset + sizeOfLayers(chunk, count), when };
   }
 
@@ -209,11 +209,11 @@ export class Fetcher {
 
   #evict(): void {
     let unwanted = 0;
-    for (const [number, { length }] of this.#held) if (!this.#wanted.has(number)) unwanted += length;
-    for (const [number, { length }] of this.#held) {
+    for (const [offset, { length }] of this.#held) if (!this.#wanted.has(offset)) unwanted += length;
+    for (const [offset, { length }] of this.#held) {
       if (unwanted <= this.#memory) return;
-      if (this.#wanted.has(number)) continue;
-      this.#held.delete(number);
+      if (this.#wanted.has(offset)) continue;
+      this.#held.delete(offset);
       this.#heldBytes -= length;
       unwanted -= length;
     }

@@ -1,8 +1,10 @@
 // Reading the head of a file, in one request where it is short.
 
 import { joined } from "../bytes.ts";
+import { decodable } from "../decode/renditions.ts";
 import { FormatError } from "../errors.ts";
 import { FIRST_REQUEST, Head } from "../format/reader.ts";
+import type { Rendition } from "../types.ts";
 import type { Source } from "./source.ts";
 
 const MOST_HEAD = 1 << 26; // bytes; ten hours of groups have a tenth of that
@@ -10,6 +12,7 @@ const MOST_HEAD = 1 << 26; // bytes; ten hours of groups have a tenth of that
 export interface Opened {
   readonly head: Head;
   readonly first: Uint8Array; // the bytes that came with it, from the file's first on
+  readonly decodable: readonly Rendition[] | null; // of its textures: what this browser decodes; null where it has no WebCodecs, or they are none
 }
 
 /** The head of the file in a source. FormatError where it is none, SourceError where it cannot be read. */
@@ -27,5 +30,7 @@ export async function open(source: Source, signal: AbortSignal): Promise<Opened>
     throw new FormatError(`${source.size - head.size} bytes behind the last chunk, copy the file again`);
   }
   source.expect(head.size);
-  return { head, first };
+  const found = head.info.hasTextures ? await decodable() : null;
+  signal.throwIfAborted();
+  return { head, first, decodable: found };
 }

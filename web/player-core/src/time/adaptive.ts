@@ -3,6 +3,7 @@
 import type { Timeline } from "./clock.ts";
 import { mostLayers, sizeWithCompanions } from "../format/links.ts";
 import type { Head } from "../format/reader.ts";
+import type { Rendition } from "../types.ts";
 import { groupsBetween } from "./scheduler.ts";
 
 /** How playback goes. Seconds are of display time. */
@@ -31,7 +32,7 @@ export class Adaptive {
   readonly #timeline: Timeline;
   #rates: readonly number[] = [];
   #ratesAt = NaN; // s
-  #textures = true; // whether their bytes count
+  #textures: Rendition | null; // whose bytes count
   readonly #loads: number[] = []; // of each level at normal speed, as measured last
   #changed = -Infinity; // ms
   #ceiling = Infinity; // level that decoding did not keep up with, less one
@@ -39,15 +40,16 @@ export class Adaptive {
   #penalty: number = PENALTY_MS[0];
 
   /** Starts with what the bandwidth measured so far allows; at best where there is none. */
-  constructor(head: Head, timeline: Timeline, bandwidth: number, speed: number) {
+  constructor(head: Head, timeline: Timeline, bandwidth: number, textures: Rendition | null) {
     this.#head = head;
     this.#timeline = timeline;
-    this.level = affordable(this.rates(0), bandwidth / speed, 0.6);
+    this.#textures = textures;
+    this.level = affordable(this.rates(0), bandwidth, 0.6);
   }
 
-  set textures(on: boolean) {
-    if (on !== this.#textures) this.#ratesAt = NaN;
-    this.#textures = on;
+  set textures(rendition: Rendition | null) {
+    if (rendition !== this.#textures) this.#ratesAt = NaN;
+    this.#textures = rendition;
   }
 
   /** The level for the groups that are fetched next. */

@@ -4,14 +4,14 @@ import { FormatError } from "../errors.ts";
 import type { Fetcher } from "../net/fetcher.ts";
 import { together } from "../format/budget.ts";
 import { Form } from "../format/layout.gen.ts";
-import { companionLayers, mostLayers } from "../format/links.ts";
+import { companionLayers, companionsWith, mostLayers } from "../format/links.ts";
 import type { Links } from "../format/links.ts";
 import type { Outcome, Share } from "./pool.ts";
-import { describe, isCompanion } from "../format/reader.ts";
+import { describe, isCompanion, isVideo } from "../format/reader.ts";
 import type { Chunk, CompanionChunk, Head } from "../format/reader.ts";
 import type { Holdings, Plan, Step } from "./scheduler.ts";
 import type { Companion, DecodeJob } from "../protocol.ts";
-import type { Packed } from "../types.ts";
+import type { Packed, Rendition } from "../types.ts";
 
 export interface DecodingEvents {
   ready(packed: Packed): void;
@@ -46,7 +46,7 @@ export class Decoding implements Holdings {
   #lost: readonly Chunk[] = []; // that the file ends before or within
   readonly #tries = new Map<number, number>();
   #keep: ReadonlySet<number> = new Set();
-  #texturesOn = true;
+  #textures: Rendition | null = null;
   #bytesPerFrame = 0; // of the last groups
   #stale = new Set<number>(); // chunks whose jobs had begun when timings were forgotten
   readonly #timings: { readonly ms: number; readonly frames: number }[] = []; // of the last groups
@@ -89,19 +89,19 @@ export class Decoding implements Holdings {
 
   /** What a chunk is decoded with, but for what can never be. */
   companionsOf(chunk: Chunk): readonly CompanionChunk[] {
-    return this.#head.companionsOf(chunk).filter((companion) => !this.isFailed(companion) && (companion.kind === "colors" || this.#texturesOn));
+    return companionsWith(this.#head, chunk, this.#textures).filter((companion) => !this.isFailed(companion));
   }
 
   /** The pictures that a chunk is shown with where it has so many layers beyond the first; null where it is shown without. */
   picturesOf(chunk: Chunk, layers: number): CompanionChunk | null {
-    const found = this.companionsOf(chunk).find(({ kind }) => kind === "pictures");
+    const found = this.companionsOf(chunk).find(isVideo);
     return found !== undefined && companionLayers(chunk, found, layers + 1) > 0 ? found : null;
   }
 
-  /** Whether textures are shown; those that are wanted again are decoded with the next plan. */
-  set textures(on: boolean) {
-    if (on !== this.#texturesOn) this.version++;
-    this.#texturesOn = on;
+  /** Which textures are shown, if any; those that are wanted again are decoded with the next plan. */
+  set textures(rendition: Rendition | null) {
+    if (rendition !== this.#textures) this.version++;
+    this.#textures = rendition;
   }
 
   /** Gives up the pictures of a chunk and those that need them. */
@@ -113,7 +113,7 @@ export class Decoding implements Holdings {
   /** Whether the bytes of a step are at hand. */
   hasBytes({ chunk, layers }: Step): boolean {
     const has = (other: Chunk, count: number): boolean => this.#fetcher.layersOf(other) >= count;
-    return has(chunk, layers + 1) && this.companionsOf(chunk).every((companion) => companion.kind === "pictures" || has(companion, companionLayers(chunk, companion, layers + 1)));
+    return has(chunk, layers + 1) && this.companionsOf(chunk).every((companion) => isVideo(companion) || has(companion, companionLayers(chunk, companion, layers + 1)));
   }
 
   bytesOf(chunk: Chunk): number {
@@ -243,7 +243,7 @@ export class Decoding implements Holdings {
 
   #companionJobs({ chunk, layers }: Step): Companion[] {
     const counted = this.companionsOf(chunk).map((companion) => ({ companion, count: companionLayers(chunk, companion, layers + 1) }));
-    return counted.filter(({ companion, count }) => companion.kind !== "pictures" && count > 0).map(({ companion, count }) => {
+    return counted.filter(({ companion, count }) => !isVideo(companion) && count > 0).map(({ companion, count }) => {
       const { number, kind, form } = companion;
       return { chunk: number, kind, form, payload: this.#fetcher.payload(companion, count), ranges: rangesOf(companion, count) };
     });

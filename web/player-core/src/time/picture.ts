@@ -54,7 +54,7 @@ export class Picture {
     return background === null || this.#isAtHand(background);
   }
 
-  /** Whether a frame is ready, and its textures are decoded. */
+  /** Whether a frame is ready, and its textures are decoded, but for the background's: that waits for no picture. */
   canShow(frame: number): boolean {
     return this.isReady(frame) && this.#textures.isReady(frame);
   }
@@ -136,7 +136,8 @@ export class Picture {
     const background = this.#head.staticOfFrame(frame);
     const own = background && this.#decoding.packedOf(background);
     next.background = (own ?? (background && this.#held(background, this.#shown.background))) as PackedStatic | null;
-    next.backgroundImage = this.#textures.imageOfBackground(background);
+    const isSame = next.background !== null && next.background.chunk === this.#shown.background?.chunk;
+    next.backgroundImage = next.background && this.#textures.imageOfBackground(frame, isSame ? this.#shown.backgroundImage : null);
     this.#version = this.#currentVersion;
   }
 

@@ -1,16 +1,24 @@
-// The textures of what is shown: which pictures are wanted now and next, and why there are none.
+// The textures of what is shown: which video they come from, which pictures are wanted now and next, and why there are none.
 
 import type { Decoding } from "./decoding.ts";
 import { FormatError } from "../errors.ts";
 import type { Fetcher } from "../net/fetcher.ts";
 import { Form, Pictures, VideoCodec } from "../format/layout.gen.ts";
 import { checkPayload } from "../format/payload.ts";
-import { describe, isCompanion } from "../format/reader.ts";
+import { RENDITIONS, describe, isVideo } from "../format/reader.ts";
 import type { Chunk, CompanionChunk, Head } from "../format/reader.ts";
 import { unpackAll } from "../format/records.ts";
-import type { Shown, TextureImage, TextureState } from "../types.ts";
-import { CONFIG, VideoLane, countOf } from "./video_lane.ts";
+import type { Rendition, Shown, TextureImage, TextureState, TextureStats } from "../types.ts";
+import { CODECS, checkSize, configFor } from "../decode/renditions.ts";
+import { SlowVideo } from "./slow_video.ts";
+import { VideoLane, countOf } from "./video_lane.ts";
 import type { LaneHost, Place } from "./video_lane.ts";
+
+/** What a viewer and a browser have to say of textures. */
+export interface TextureSettings {
+  readonly on: boolean;
+  readonly decodable: readonly Rendition[] | null; // as `decodable` says
+}
 
 export interface TextureEvents {
   warn(error: Error): void;
@@ -18,9 +26,11 @@ export interface TextureEvents {
 }
 
 const AHEAD = 6; // pictures of a track that are decoded, the shown one included: decoders have few to give (guess)
+const NO_WEBCODECS = "this browser has no WebCodecs, or the page is not served securely";
 const MOST_LANES = 8; // tracks with textures: each has a decoder of its own (guess)
-const LATE = 3; // times within LATE_MS that playback had to wait for a picture, until textures are given up (guess)
+const LATE = 3; // times within LATE_MS that playback had to wait for a picture, until another video or none is tried (guess)
 const LATE_MS = 10_000;
+const RETRY_MS = [15_000, 120_000] as const; // until they are tried again that were too slow, first and at most, doubled each time (guess)
 
 export class Textures implements LaneHost {
   /** Counts what changes in what can be shown. */
@@ -31,49 +41,51 @@ export class Textures implements LaneHost {
   readonly #decoding: Decoding;
   readonly #events: TextureEvents;
   readonly #lanes = new Map<number, VideoLane>(); // by track; -1: of the background
-  readonly #chains = new Map<number, CompanionChunk[]>(); // the chunks of each video, by each of them
+  readonly #chains = new Map<number, readonly CompanionChunk[]>(); // the chunks of each video, by each of them
+  readonly #slow = new Map<number, SlowVideo>(); // by the chunk with a background's pictures
   readonly #late: number[] = []; // ms
   #on: boolean;
-  #lack: "unsupported" | "slow" | null = null;
-  #isSupported = false; // as far as is known
-  #isClosed = false;
+  #choices: readonly Rendition[]; // that the file has and the browser decodes, the best first
+  #choice = 0; // which of them; behind the last where none is in time
+  #reason = ""; // why it is not the best that there could be
+  #retryAt = Infinity; // ms
+  #retryIn: number = RETRY_MS[0];
 
-  constructor(head: Head, fetcher: Fetcher, decoding: Decoding, events: TextureEvents, on: boolean) {
+  constructor(head: Head, fetcher: Fetcher, decoding: Decoding, events: TextureEvents, { on, decodable }: TextureSettings) {
     this.#head = head;
     this.#fetcher = fetcher;
     this.#decoding = decoding;
     this.#events = events;
     this.#on = on;
-    for (const chunk of head.chunks) if (isCompanion(chunk) && chunk.kind === "pictures") this.#link(chunk);
-    decoding.textures = on;
-    if (head.info.hasTextures) void this.#ask();
+    for (const chunk of head.chunks) if (isVideo(chunk)) this.#link(chunk);
+    const inFile = RENDITIONS.filter((kind) => head.chunks.some((chunk) => chunk.kind === kind));
+    this.#choices = inFile.filter((kind) => decodable?.includes(kind));
+    const better = inFile.slice(0, this.#choices.length > 0 ? inFile.indexOf(this.#choices[0]) : undefined).map((kind) => CODECS[kind]);
+    if (better.length > 0) this.#reason = decodable === null ? NO_WEBCODECS : `this browser decodes no ${better.join(" and no ")}`;
+    decoding.textures = this.rendition;
+    if (better.length > 0 && this.#choices.length === 0) this.#warn();
   }
 
-  /** Whether textures are wanted, and nothing is known that speaks against them. */
-  get isOn(): boolean {
-    return this.#on && this.#lack === null;
+  /** The video that is fetched and shown; null where textures are not wanted, or none is possible. */
+  get rendition(): Rendition | null {
+    return this.#on ? (this.#choices[this.#choice] ?? null) : null;
   }
 
   set on(on: boolean) {
-    if (on && !this.#on && this.#lack === "slow") this.#lack = null;
+    if (on && !this.#on) this.#choice = 0;
     this.#on = on;
     this.#switch();
   }
 
-  /** What is shown in place of textures, or that they are. */
-  stateOf(shown: Shown | null): TextureState {
-    if (!this.#head.info.hasTextures) return "none";
-    if (!this.#on) return "off";
-    if (this.#lack !== null) return this.#lack;
-    if (shown === null || shown.backgroundImage !== null || shown.images.some((image) => image !== null)) return "shown";
-    const chunks = shown.groups.map((group) => group && this.#head.chunks[group.chunk]);
-    const failed = chunks.some((chunk) => chunk && this.#head.companionsOf(chunk).some((other) => other.kind === "pictures" && this.#decoding.isFailed(other)));
-    return failed ? "damaged" : "left out";
+  statsOf(shown: Shown | null): TextureStats {
+    const codec = this.rendition && CODECS[this.rendition];
+    return { textures: this.#stateOf(shown), textureCodec: codec, textureReason: this.#reason, backgroundLate: shown !== null && this.#isLate(shown) };
   }
 
   /** Decodes the pictures of a frame and of those behind it. */
   aim(frame: number, isShown: (image: TextureImage) => boolean): void {
-    if (!this.isOn || !this.#isSupported || !this.#head.info.hasTextures) return;
+    if (performance.now() >= this.#retryAt) this.#retry();
+    if (this.rendition === null) return;
     const { frameCount, tracks } = this.#head;
     for (let track = 0; track < Math.min(tracks.length, MOST_LANES); track++) {
       const places: Place[] = [];
@@ -84,18 +96,19 @@ export class Textures implements LaneHost {
       }
       if (places.length > 0 || this.#lanes.has(track)) this.#lane(track).want(places, isShown);
     }
-    const place = this.#placeOfBackground(this.#head.staticOfFrame(frame));
-    if (place !== null || this.#lanes.has(-1)) this.#lane(-1).want(place === null ? [] : [place], isShown);
+    const slow = this.#slowOf(frame);
+    const next = frame + (slow?.interval ?? 0);
+    const places = slow === null ? [] : [frame, ...(next < frameCount && this.#slowOf(next) === slow ? [next] : [])].map((shown) => slow.placeOf(shown));
+    if (places.length > 0 || this.#lanes.has(-1)) this.#lane(-1).want(places, isShown);
   }
 
-  /** Whether all pictures of a frame whose groups are at hand are there, but for what can never be. */
+  /** Whether all pictures of the bodies in a frame whose groups are at hand are there, but for what can never be. */
   isReady(frame: number): boolean {
     for (let track = 0; track < this.#head.tracks.length; track++) {
       const place = this.#placeOf(frame, track);
       if (place !== null && this.#lane(track).imageOf(place) === null) return false;
     }
-    const place = this.#placeOfBackground(this.#head.staticOfFrame(frame));
-    return place === null || this.#lane(-1).imageOf(place) !== null;
+    return true;
   }
 
   /** The texture of a track in a frame; null where it has none. */
@@ -104,20 +117,32 @@ export class Textures implements LaneHost {
     return place && this.#sized(this.#lane(track).imageOf(place), place, this.#head.chunkOfFrame(frame, track));
   }
 
-  imageOfBackground(state: Chunk | null): TextureImage | null {
-    const place = this.#placeOfBackground(state);
-    return place && this.#sized(this.#lane(-1).imageOf(place), place, state!);
+  /** The picture of the background in a frame; where it is late, the one that was shown `before` if there was one. */
+  imageOfBackground(frame: number, before: TextureImage | null): TextureImage | null {
+    const place = this.#slowOf(frame)?.placeOf(frame);
+    if (place === undefined) return null;
+    return this.#sized(this.#lane(-1).imageOf(place), place, this.#head.staticOfFrame(frame)!) ?? (this.#slowOf(frame) && before);
   }
 
-  /** Whether the bytes of a chunk's pictures are at hand, where they are wanted. */
+  /** The layers of a background's video that frames from one to another are shown with. */
+  layersOf(state: Chunk, first: number, last: number): readonly CompanionChunk[] {
+    const from = Math.max(first, this.#head.shownFrom(state));
+    const slow = this.#slowOf(from);
+    if (slow === null || this.#head.staticOfFrame(from) !== state) return [];
+    return [...new Set([from, Math.max(from, last)].map((frame) => slow.placeOf(frame).pictures))];
+  }
+
+  /** Whether the bytes of a chunk's pictures are at hand, where it waits for them. */
   hasBytes(chunk: Chunk): boolean {
+    if (chunk.kind === "static") return true;
     const pictures = this.#picturesOf(chunk);
     return pictures === null || this.#fetcher.layersOf(pictures) > 0;
   }
 
   /** The chunks that the pictures of one are decoded from, as far as they were not; null where it is shown without. */
   leadTo(pictures: CompanionChunk): readonly CompanionChunk[] {
-    return this.#lanes.get(pictures.frameCount === 0 ? -1 : pictures.track)?.leadTo(pictures) ?? this.chainTo(pictures);
+    const chain = this.chainOf(pictures);
+    return this.#lanes.get(pictures.track)?.leadTo(pictures) ?? chain.slice(0, chain.indexOf(pictures) + 1);
   }
 
   /** Playback had to wait for a picture whose bytes were there. */
@@ -126,26 +151,46 @@ export class Textures implements LaneHost {
     if (this.#late.length > LATE) this.#late.shift();
     if (this.#late.length < LATE || now - this.#late[0] > LATE_MS) return;
     this.#late.length = 0;
-    this.#giveUp("slow", "this machine decodes them too slowly");
+    const { rendition } = this;
+    if (rendition === null) return;
+    this.#choice++;
+    this.#reason = `this machine decodes ${CODECS[rendition]} too slowly`;
+    if (this.rendition === null) this.#retryAt = now + this.#retryIn;
+    this.#switch();
+    if (this.rendition === null && this.#retryIn === RETRY_MS[0]) this.#warn();
+  }
+
+  refused(): void {
+    const { rendition } = this;
+    this.#choices = this.#choices.filter((kind) => kind !== rendition);
+    if (rendition !== null) this.#reason = `this browser decodes no ${CODECS[rendition]} of that size`;
+    this.#switch();
+    if (this.rendition === null) this.#warn();
   }
 
   close(): void {
-    this.#isClosed = true;
     for (const lane of this.#lanes.values()) lane.close();
     this.#lanes.clear();
   }
 
   chainOf(pictures: CompanionChunk): readonly CompanionChunk[] {
-    return this.#chains.get(pictures.number)!;
+    return this.#chains.get(pictures.number) ?? [pictures];
+  }
+
+  configFor({ kind }: CompanionChunk, first: Uint8Array): VideoDecoderConfig {
+    return configFor(kind as Rendition, first);
   }
 
   packetsOf(pictures: CompanionChunk): readonly Uint8Array[] | null {
     if (this.#fetcher.layersOf(pictures) === 0) return null;
     const data = this.#fetcher.payload(pictures, 1);
     checkPayload(describe(pictures), pictures.form, data, pictures.layers);
-    const { form, codec, packets } = unpackAll(Pictures, data);
-    const isWhole = packets.length === countOf(pictures) && packets.every((packet) => packet.length > 0);
-    if (form !== Form.VIDEO || codec !== VideoCodec.AV1 || !isWhole) throw new FormatError(`${packets.length} pictures for ${countOf(pictures)} frames`);
+    const { form, codec, interval, packets } = unpackAll(Pictures, data);
+    const kind = codec === VideoCodec.AV1 ? "pictures" : "compatible";
+    const isRight = this.#slow.get(pictures.number)?.read(pictures, interval, packets.length) ?? (interval === 1 && packets.length === countOf(pictures));
+    const isWhole = form === Form.VIDEO && kind === pictures.kind && packets.every((packet) => packet.length > 0);
+    if (!isRight || !isWhole) throw new FormatError(`${packets.length} pictures of codec ${codec}, one each ${interval} frames, for ${countOf(pictures)}`);
+    for (const packet of packets) checkSize(kind, packet);
     return packets;
   }
 
@@ -160,36 +205,52 @@ export class Textures implements LaneHost {
     this.#events.changed();
   }
 
-  private chainTo(pictures: CompanionChunk): readonly CompanionChunk[] {
-    const chain = this.chainOf(pictures);
-    return chain.slice(0, chain.indexOf(pictures) + 1);
-  }
-
   #link(chunk: CompanionChunk): void {
-    const before = chunk.dependsOn.length > 2 ? this.#chains.get(chunk.dependsOn[2]) : undefined;
-    const chain = before ?? [];
-    chain.push(chunk);
+    if (chunk.frameCount === 0) return this.#linkSlow(chunk);
+    const chain = (chunk.dependsOn.length > 2 ? this.#chains.get(chunk.dependsOn[2]) : undefined) ?? [];
+    (chain as CompanionChunk[]).push(chunk);
     this.#chains.set(chunk.number, chain);
   }
 
-  async #ask(): Promise<void> {
-    if (typeof VideoDecoder === "undefined") return this.#giveUp("unsupported", "this browser has no WebCodecs, or the page is not served securely");
-    const supported = await VideoDecoder.isConfigSupported(CONFIG).then((answer) => answer.supported === true, () => false);
-    if (this.#isClosed) return;
-    if (!supported) return this.#giveUp("unsupported", "this browser decodes no AV1");
-    this.#isSupported = true;
-    this.changed();
+  #linkSlow(chunk: CompanionChunk): void {
+    const first = this.#head.shownFrom(this.#head.chunks[chunk.dependsOn[0]]);
+    const others = this.#head.chunks.filter(({ kind }) => kind === "static").map((state) => this.#head.shownFrom(state));
+    const end = Math.min(this.#head.frameCount, ...others.filter((other) => other > first));
+    this.#slow.set(chunk.number, new SlowVideo(this.#head.piecesOf(chunk), first, Math.max(1, end - first)));
   }
 
-  #giveUp(lack: "unsupported" | "slow", reason: string): void {
-    this.#lack = lack;
+  /** What is shown in place of textures, or that they are. */
+  #stateOf(shown: Shown | null): TextureState {
+    if (!this.#head.info.hasTextures) return "none";
+    if (!this.#on) return "off";
+    if (this.rendition === null) return this.#choices.length > 0 ? "slow" : "unsupported";
+    if (shown === null || shown.backgroundImage !== null || shown.images.some((image) => image !== null)) return "shown";
+    if (this.#isLate(shown)) return "late";
+    const chunks = [...shown.groups, shown.background].map((packed) => packed && this.#head.chunks[packed.chunk]);
+    const failed = chunks.some((chunk) => chunk && this.#head.companionsOf(chunk).some((other) => isVideo(other) && this.#decoding.isFailed(other)));
+    return failed ? "damaged" : "left out";
+  }
+
+  #isLate({ frame }: Shown): boolean {
+    const place = this.#slowOf(frame)?.placeOf(frame);
+    return place !== undefined && this.#lane(-1).imageOf(place) === null;
+  }
+
+  #warn(): void {
+    this.#events.warn(new Error(`textures are not shown, colours of vertices are: ${this.#reason}`));
+  }
+
+  /** Tries again what was too slow, the last of all: others may have been at work. */
+  #retry(): void {
+    this.#retryAt = Infinity;
+    this.#retryIn = Math.min(2 * this.#retryIn, RETRY_MS[1]);
+    this.#choice = Math.min(this.#choice, this.#choices.length - 1);
     this.#switch();
-    this.#events.warn(new Error(`textures are not shown, colours of vertices are: ${reason}`));
   }
 
   #switch(): void {
-    this.#decoding.textures = this.isOn;
-    if (!this.isOn) for (const lane of this.#lanes.values()) lane.want([], () => true);
+    this.#decoding.textures = this.rendition;
+    if (this.rendition === null) for (const lane of this.#lanes.values()) lane.want([], () => true);
     this.changed();
   }
 
@@ -212,9 +273,11 @@ export class Textures implements LaneHost {
     return pictures && { pictures, index: frame - chunk.firstFrame };
   }
 
-  #placeOfBackground(state: Chunk | null): Place | null {
+  /** The video that the background of a frame is shown with. */
+  #slowOf(frame: number): SlowVideo | null {
+    const state = this.#head.staticOfFrame(frame);
     const pictures = state && this.#picturesOf(state);
-    return pictures && { pictures, index: 0 };
+    return pictures && this.#slow.get(pictures.number)!;
   }
 
   /** A picture of another size than the atlas is no texture, nor are those behind it. */

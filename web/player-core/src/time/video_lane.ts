@@ -2,9 +2,10 @@
 
 import { FormatError } from "../errors.ts";
 import type { CompanionChunk } from "../format/reader.ts";
+import { LAYER_PICTURES } from "./slow_video.ts";
 import type { TextureImage } from "../types.ts";
 
-/** One picture: which it is of those of a chunk. */
+/** One picture: which it is of those of a chunk, or of a layer of a background's. */
 export interface Place {
   readonly pictures: CompanionChunk;
   readonly index: number;
@@ -16,12 +17,11 @@ export interface LaneHost {
   chainOf(pictures: CompanionChunk): readonly CompanionChunk[];
   /** The packets of a chunk; null where its bytes are not at hand. FormatError where they are damaged. */
   packetsOf(pictures: CompanionChunk): readonly Uint8Array[] | null;
+  configFor(pictures: CompanionChunk, first: Uint8Array): VideoDecoderConfig;
   damaged(pictures: CompanionChunk, message: string): void;
+  refused(): void; // the browser has no decoder for such a video after all
   changed(): void; // there is a picture more
 }
-
-/** Main profile, level 4.0 and 8 bits: the largest texture has fewer samples. */
-export const CONFIG = { codec: "av01.0.08M.08", optimizeForLatency: true } as const;
 
 const MOST_PENDING = 8; // packets that the decoder has and has not answered (guess)
 const SILENCE = 3000; // ms without a picture though packets wait: none will come (guess)
@@ -33,7 +33,8 @@ export class VideoLane {
   #wanted: readonly Place[] = [];
   #cursor: Place | null = null; // of the last packet that was given to the decoder
   #decoder: VideoDecoder | null = null;
-  #unpacked: { readonly chunk: number; readonly packets: readonly Uint8Array[] } | null = null;
+  #codec = ""; // that the decoder is set up for
+  #unpacked: { readonly pictures: CompanionChunk; readonly packets: readonly Uint8Array[] } | null = null;
   #serial = 0;
   #silence: ReturnType<typeof setTimeout> | undefined;
 
@@ -104,10 +105,11 @@ export class VideoLane {
     const { pictures, index } = place;
     try {
       const packets = this.#packetsOf(pictures);
-      if (packets === null) return false;
+      if (packets === null || index >= packets.length) return false;
       const isKey = index === 0 && this.#host.chainOf(pictures)[0] === pictures;
       if (isKey) this.#forgetStale();
       this.#decoder ??= this.#open();
+      if (isKey) this.#configure(this.#decoder, this.#host.configFor(pictures, packets[0]));
       const timestamp = ++this.#serial;
       this.#pending.set(timestamp, place);
       this.#cursor = place;
@@ -121,9 +123,9 @@ export class VideoLane {
   }
 
   #packetsOf(pictures: CompanionChunk): readonly Uint8Array[] | null {
-    if (this.#unpacked?.chunk === pictures.number) return this.#unpacked.packets;
+    if (this.#unpacked?.pictures === pictures) return this.#unpacked.packets;
     const packets = this.#host.packetsOf(pictures);
-    this.#unpacked = packets && { chunk: pictures.number, packets };
+    this.#unpacked = packets && { pictures, packets };
     return packets;
   }
 
@@ -139,12 +141,17 @@ export class VideoLane {
       output: (image) => (this.#decoder === decoder ? this.#take(image) : image.close()),
       error: (error) => {
         if (this.#decoder !== decoder) return;
+        if (error.name === "NotSupportedError") return this.#host.refused();
         const [first] = this.#pending.values();
         this.#fail((first ?? this.#cursor)!.pictures, `a damaged picture (${error.message})`);
       },
     });
-    decoder.configure(CONFIG);
     return decoder;
+  }
+
+  #configure(decoder: VideoDecoder, config: VideoDecoderConfig): void {
+    if (config.codec !== this.#codec) decoder.configure(config);
+    this.#codec = config.codec;
   }
 
   #take(image: TextureImage): void {
@@ -179,16 +186,17 @@ export class VideoLane {
     clearTimeout(this.#silence);
     const decoder = this.#decoder;
     this.#decoder = this.#cursor = null;
+    this.#codec = "";
     this.#pending.clear();
     if (decoder !== null && decoder.state !== "closed") decoder.close();
   }
 }
 
-/** How many pictures a chunk has. */
+/** How many pictures a chunk has, or a layer of a background's at most. */
 export function countOf(pictures: CompanionChunk): number {
-  return Math.max(1, pictures.frameCount);
+  return pictures.frameCount || LAYER_PICTURES;
 }
 
 function keyOf(pictures: CompanionChunk, index: number): number {
-  return 65536 * pictures.number + index;
+  return 65536 * pictures.offset + index;
 }

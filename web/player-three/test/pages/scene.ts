@@ -1,6 +1,7 @@
 // The page of scene.browser.test.ts: a canvas of 320 x 240, a scene, and what the tests ask of them.
 
 import { Color, PerspectiveCamera, Scene, WebGLRenderer } from "three";
+import { PLACE_SCALE } from "@meshreel/player-core/types";
 import type { Packed, PackedGroup, PackedStatic, Shown } from "@meshreel/player-core/types";
 import { ReelScene } from "../../src/index.ts";
 import type { Mode } from "../../src/index.ts";
@@ -44,6 +45,24 @@ const api = {
     const background = prepared.find((packed) => packed.kind === "static") ?? null;
     const shown: Shown = { frame, blend, frames: groups.map(() => held), groups, background, images: groups.map(() => null), backgroundImage: null };
     scene.show(shown);
+  },
+  /** Shows the floor with a picture of so many texels, in stripes of two colours. */
+  showStriped(side: number, stripe: number, colors: readonly [string, string]): void {
+    const canvas = new OffscreenCanvas(side, side);
+    const context = canvas.getContext("2d")!;
+    for (let x = 0; x < side; x += stripe) {
+      context.fillStyle = colors[(x / stripe) % 2];
+      context.fillRect(x, 0, stripe, side);
+    }
+    const { packed, positions } = makeFloor();
+    const across = (value: number): number => Math.round(PLACE_SCALE * (value / 3 + 0.5)); // of 3 m
+    const faces = Uint16Array.from([...packed.faces].flatMap((vertex) => [across(positions[vertex][0]), across(positions[vertex][2])]));
+    prepared = [{ ...packed, places: { width: side, height: side, faces, extra: new Uint16Array(0) } }];
+    const image = new VideoFrame(canvas, { timestamp: 0 });
+    scene.prepare(prepared[0], renderer);
+    scene.show({ frame: 0, blend: 0, frames: [], groups: [], background: prepared[0] as PackedStatic, images: [], backgroundImage: image });
+    renderer.render(root, camera);
+    image.close();
   },
   look(mode: Mode, flat = false): void {
     scene.mode = mode;
