@@ -26,7 +26,7 @@ from ..io.file_names import last_number
 from ..io.read import read_file
 from ..io.write import replacing
 from ..types import UP_AXES, UPS, Up
-from .color_cameras import ColorCamera, distortion_of, pictures_in
+from .color_cameras import ColorCamera, check_frames, distortion_of, pictures_in
 
 RIG, SINGLE = "rig.json", "camera.json"
 MOST_PIXELS = 16_384  # of a picture's side (guess)
@@ -172,7 +172,9 @@ def read_rig(folder: Path) -> Rig:
     beside = zip(entries, cameras, strict=True)
     colors = [_color_camera(folder, e["color"], c.record() | {"name": c.name}) for e, c in beside if "color" in e]
     colors += [_color_camera(folder, entry, {"name": f"color{number}"}) for number, entry in enumerate(alone)]
-    return Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
+    rig = Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
+    check_frames(folder, colors, rig.frames)
+    return rig
 
 
 def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:

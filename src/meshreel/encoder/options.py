@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ..analysis.appearance.calibrate import CalibrationOptions
 from ..analysis.fit.slide import SlideOptions
 from ..analysis.fit.surface_fit import FitOptions
 from ..analysis.follow.embedded import EmbeddedOptions
@@ -114,6 +115,7 @@ class AppearanceOptions:
 
     colors: ColorCodingOptions = ColorCodingOptions()  # of the vertices, which every coloured group has
     texture: TextureOptions | None = TextureOptions()  # None: no textures
+    calibration: CalibrationOptions | None = CalibrationOptions()  # of colour cameras; None: they are as they are said
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -52,6 +53,7 @@ from .static import Static, colored_states, is_colored
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
+from .views import Calibrated
 
 QUALITY, PRESET, EFFORT, COLOR = 50.0, "best", "normal", "auto"  # the default operating point (decision 9)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
@@ -117,6 +119,7 @@ class Encoder:
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.find: FindGroups = find_groups
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
+        self._calibrated = cache(partial(Calibrated, self.sequence))
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
 
     @property
@@ -169,7 +172,9 @@ class Encoder:
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
-        job = Job(self.sequence, options, self._executor, stages, self.find, digests=self.digests)
+        how = None if options.appearance is None else options.appearance.calibration
+        sequence = self.sequence if how is None else self._calibrated(how)
+        job = Job(sequence, options, self._executor, stages, self.find, digests=self.digests)
         return replace(job, excerpt=self._excerpt)
 
     def _is_scene(self, options: EncoderOptions) -> bool:
