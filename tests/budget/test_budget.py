@@ -35,7 +35,7 @@ from tests.container.files import HEADER
 
 FORMAT = (Path(__file__).resolve().parents[2] / "FORMAT.md").read_text(encoding="utf-8")
 MEMORY, MEMORY_PER_BYTE = 384 << 20, 16 << 10  # bytes, of FORMAT.md
-WITH_COLORS, WITH_TEXTURES = 96 << 20, 256 << 20  # and more, of FORMAT.md
+WITH_COLORS, WITH_TEXTURES = 96 << 20, 320 << 20  # and more, of FORMAT.md
 SECONDS_PER_CHUNK, SECONDS_PER_BYTE = 2.0, 250e-6  # of FORMAT.md
 SLOWER = 3  # times, at most, that a machine which runs tests beside others may take
 

@@ -21,6 +21,7 @@ from meshreel.encoder.excerpt import Excerpt, read_survey
 from meshreel.encoder.presets import appearance_options, preset_options
 from meshreel.encoder.sequence import Encoder
 from meshreel.errors import FormatError, InputError
+from meshreel.format import budget
 from meshreel.format.layout import ChunkKind
 from meshreel.geometry.derived_sequences import Welded
 from meshreel.io.sequence import open_sequence
@@ -228,6 +229,18 @@ def test_a_scene_has_colors_of_its_room_and_its_bodies(tmp_path: Path) -> None:
         for number in (0, 5):
             assert color_errors(colors[number], video[number]).y > 20
         assert video.background(0).colors is not None
+
+
+def test_colors_that_readers_would_refuse_are_left_out_and_the_summary_tells_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(budget, "LIMITS", replace(budget.LIMITS, colors=0, per_byte=1))
+    body, room = COLORED[:2], [replace(mesh, colors=np.full(mesh.vertices.shape, 9, np.uint8)) for mesh in scene(2)]
+    for meshes, lost in ((body, "2 frames"), (room, "the background")):
+        summary = Encoder(Welded(MeshList(tuple(meshes), 10.0))).encode(tmp_path / "bare.reel", quick())
+        assert f"no colours of {lost}: there are none, or they would cost a reader too much" in summary.warnings
+        assert ChunkKind.COLORS not in kinds((tmp_path / "bare.reel").read_bytes())
+    assert not Encoder(Welded(MeshList(tuple(BODY[:2]), 10.0))).encode(tmp_path / "plain.reel", quick()).warnings
 
 
 def lit(mesh: Mesh, light: float) -> Mesh:

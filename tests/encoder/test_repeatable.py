@@ -6,29 +6,37 @@ import hashlib
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
+import meshreel
 from meshreel.encoder.digests import Digests, line_of
+from meshreel.encoder.presets import appearance_options
 from meshreel.encoder.sequence import Encoder
+from meshreel.format.layout import ChunkKind
 from meshreel.geometry.topology import concatenate
-from meshreel.types import Mesh, MeshList
+from meshreel.types import Mesh, MeshList, Texture
 from tests.small_bodies import body
 from tests.small_options import quick, with_method
 from tests.small_scene import scene
 
 ROOT = Path(__file__).resolve().parents[2]
 TWO = [concatenate([mesh, Mesh(4 - 0.75 * mesh.vertices, mesh.faces[:, ::-1])]) for mesh in body(1, 2)]
+FLAT = TWO[0].vertices[:, :2] / 8 + 0.5
+CHECKS = Texture.of(((np.indices((64, 64)) // 8).sum(axis=0) % 2 * 200).astype(np.uint8)[..., None].repeat(3, axis=2))
 SEQUENCES = {
     "body": (body(1, 5), "best"),
     "noisy body": (body(2, 2), "best"),
     "two bodies": (TWO, "best"),
+    "textured": ([replace(mesh, uv=FLAT[mesh.faces].astype(np.float32), texture=CHECKS) for mesh in TWO], "best"),
     "paper": (body(3, 3), "paper"),
 }
 PROGRAM = """
@@ -46,9 +54,12 @@ def encode_all(jobs: int) -> str:
     with workers(jobs) as executor:
         for name, (frames, preset) in SEQUENCES.items():
             options = with_method(quick(preset, key_interval=0.4 if preset == "best" else None), group_size=2)
+            options = replace(options, appearance=appearance_options(50.0, texture=128, compatible=True))
             path = Path(f"repeatable {os.getpid()}.reel")
             Encoder(MeshList(tuple(frames), 10.0), executor, digests=found.append).encode(path, options)
-            found.append(f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n")
+            with meshreel.open(path) as video:
+                count = sum(chunk.kind in (ChunkKind.PICTURES, ChunkKind.COMPATIBLE) for chunk in video.reader.chunks)
+            found.append(f"{name} {hashlib.sha256(path.read_bytes()).hexdigest()} {count} videos\n")
             path.unlink()
     return "".join(found)
 
@@ -73,6 +84,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def test_any_number_of_threads_gives_the_same_bytes(alone: str, tmp_path: Path):
     assert alone.count("payload") >= 4  # stages are compared, too
+    assert re.search(r"^textured \w+ 4 videos$", alone, re.MULTILINE)
     assert encoded(tmp_path, OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2", IGL_NUM_THREADS="2") == alone
 
 

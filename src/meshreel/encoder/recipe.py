@@ -125,6 +125,8 @@ def encode_interval(
     """
     options = replace(options, target=options.target.scaled(interval.larger))
     if isinstance(options, LayersOptions):
+        if appearance is None:  # what is not kept does not tell where the surface is, either
+            options = replace(options, slide=None)
         if has_pictures(interval, range(1), appearance):  # a frame in the `draco` form has none
             options = replace(options, floor=False)
         groups = layers.encode_interval(interval, options, stages)

@@ -49,7 +49,7 @@ from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
 from .scene import Tracks, encode_bodies, scene_intervals
-from .static import Static, colored_states
+from .static import Static, colored_states, is_colored
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
@@ -206,7 +206,7 @@ def _encode_tracked(job: Job, file: BinaryIO, seen: Survey) -> Summary:
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), texts, continued=_continued(job))
+    return Summary(writer.size, tuple(groups), (*texts, *_bare(job, groups)), continued=_continued(job))
 
 
 def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
@@ -227,7 +227,7 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
-    texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped))
+    texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped), *_bare(job, groups, states))
     return Summary(writer.size, tuple(groups), texts, scene, _continued(job))
 
 
@@ -316,6 +316,14 @@ def _warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]
         yield f"{text}; if something does, encode with --dynamic-only"
     if dropped:
         yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
+
+
+def _bare(job: Job, groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:
+    """Yield a warning of what the file has without colours, though the sequence has some."""
+    frames = sum(group.frame_count for group in groups if group.form != Form.EMPTY and not group.colors)
+    bare = [f"{frames} frames"] * (frames > 0) + ["the background"] * any(not state.companions for state in states)
+    if job.options.appearance is not None and bare and is_colored(job.sequence):
+        yield f"no colours of {' and of '.join(bare)}: there are none, or they would cost a reader too much"
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:

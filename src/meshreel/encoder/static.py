@@ -28,7 +28,7 @@ from ..geometry.decimate import decimate_faces
 from ..geometry.derived_sequences import CapturedSequence
 from ..geometry.painted import Paint, Painted
 from ..geometry.topology import clean, face_normals, vertex_normals
-from ..types import Mesh, Placement, evenly
+from ..types import Mesh, MeshSequence, Placement, evenly
 from .appearance import fitting_size
 from .options import AppearanceOptions, TextureOptions
 from .parts import Change, Parts
@@ -134,25 +134,36 @@ def colored_states(
     sequence: CapturedSequence, parts: Parts, background: BackgroundOptions, options: AppearanceOptions | None
 ) -> list[Static]:
     """Encode the states of the background with the colours that still surface has from each state to the next."""
-    if options is None or not any(sequence[number].is_colored for number in evenly(len(sequence), 3)):
+    if options is None or not is_colored(sequence):
         return encode_static(parts, len(sequence), sequence.frame_rate, background)
-    found, mesh, looks = list[Static](), Mesh.empty(), _Looks(sequence, parts)
+    found, mesh, looks, bare = list[Static](), Mesh.empty(), _Looks(sequence, parts), False
     texture = options.texture if options.texture and (options.texture.always or looks.has_pictures) else None
     states = encode_static(parts, len(sequence), sequence.frame_rate, background, texture is not None)
     ends = [state.frame for state in states[1:]] + [len(sequence)]
     for state, end in zip(states, ends, strict=True):
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
-        canvas = background_canvas(state.payload)
+        canvas, bare = background_canvas(state.payload), bare and state.is_patch  # what changes it has no colours, too
         [coded] = canvas.meshes
         frames = range(state.frame, end)
         colors, seen = looks.colors(frames, mesh.vertices, vertex_normals(mesh))
         shown = spread_colors(mesh, colors.astype(np.float64), seen)[len(mesh.vertices) - coded.vertices :]
-        encoded = encode_group_colors(canvas, [shown], options.colors, None)
+        try:
+            encoded = encode_group_colors(canvas, [shown], options.colors, None)
+        except CostlyError:  # the summary tells of it
+            bare = True
+        if bare:
+            found.append(state)
+            continue
         companions = [Companion(ChunkKind.COLORS, encoded.payload)]
         if texture is not None and not state.is_patch:
             companions += _pictured(mesh, frames, looks, texture)
         found.append(replace(state, companions=tuple(companions)))
     return found
+
+
+def is_colored(sequence: MeshSequence) -> bool:
+    """Return whether some frames of a sequence have colours."""
+    return any(sequence[number].is_colored for number in evenly(len(sequence), 3))
 
 
 def _pictured(mesh: Mesh, frames: range, looks: _Looks, options: TextureOptions) -> list[Companion]:

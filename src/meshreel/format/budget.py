@@ -39,8 +39,8 @@ class Limits:
     painting: int = 256  # of a vertex of the largest mesh with colours
     pictures: int = 768 << 20  # what the pictures of a chunk, or of a layer, may cost, and per_byte more (guess)
     texel: int = 2  # of a picture that is decoded
-    videos: int = 144 << 20  # memory that the decoders of a file's videos may take, and per_byte more: of one (guess)
-    held: int = 36  # of a texel of a video, whose decoder keeps up to 16 pictures
+    videos: int = 176 << 20  # memory that the decoders of all videos may take, and per_byte more: of 2048 x 2048
+    held: int = 44  # of a texel of a video, whose decoder keeps up to 16 pictures (H.264; measured: 42)
 
 
 LIMITS = Limits()

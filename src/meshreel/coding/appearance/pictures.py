@@ -34,7 +34,7 @@ COMMENT = 6  # type of a NAL unit: supplemental enhancement information
 H264_BORDER = 128  # pixels that FFmpeg's decoder counts beside a picture, at most
 LOW_DELAY = 0x80000  # FFmpeg's flag AV_CODEC_FLAG_LOW_DELAY: a picture is shown when its packet is decoded
 LUMA = (0.2126, 0.7152, 0.0722)  # of red, green and blue
-BAND = 256  # rows that become sRGB together: their floats take some MiB
+BAND = 64  # rows that become sRGB together: their floats take some MiB
 BLUE, RED = 1.8556, 1.5748  # what a full colour difference is of blue and of red
 
 

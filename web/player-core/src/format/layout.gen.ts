@@ -29,8 +29,8 @@ export const LIMITS = {
   painting: 256,
   pictures: 805306368,
   texel: 2,
-  videos: 150994944,
-  held: 36,
+  videos: 184549376,
+  held: 44,
 } as const;
 
 export const ChunkKind = {
