@@ -423,6 +423,25 @@ describe("pictures", () => {
     expect(rig.viewer.warnings).toEqual([expect.stringMatching(/^chunk 2 \(pictures, static\): a damaged picture/)]);
   });
 
+  test("of a body that is far are not decoded, and come back without a stall when it is near", async () => {
+    const asked = vi.spyOn(Fetcher.prototype, "want");
+    rig.begin(textured(10, 10), FAST, { bufferSeconds: 1, decodedSeconds: 1 });
+    rig.viewer.far.add(0);
+    await Promise.all([rig.player.play(), pass(1)]);
+    const early = asked.mock.calls.slice(5).flatMap(([wishes]) => wishes.map(({ chunk }) => chunk.kind)); // the first were made before a picture was
+    expect(early.length > 0 && !early.includes("pictures")).toBe(true);
+    vi.restoreAllMocks();
+    expect([frameOf(rig.viewer.shown), rig.player.stats.textures, FakeDecoder.decoded]).toEqual([undefined, "far", []]);
+    rig.viewer.far.clear();
+    await pass(1);
+    const { shown } = rig.viewer;
+    expect(shown!.frame).toBeGreaterThan(40);
+    expect([frameOf(shown), rig.player.stats.textures, rig.player.stats.stalls]).toEqual([shown!.frame, "shown", 0]);
+    rig.viewer.far.add(0);
+    await pass(0.5);
+    expect([frameOf(rig.viewer.shown), FakeDecoder.open.size]).toEqual([undefined, 0]);
+  });
+
   test("are not fetched while they are off or but one layer is played, and come when they are wanted again", async () => {
     rig.begin(textured(2, 2), FAST);
     rig.player.textures = false;
