@@ -9,30 +9,41 @@ from __future__ import annotations
 import io
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from meshreel.capture.procedural import deforming_sphere
-from meshreel.coding.background import decode_background, encode_background, encode_change
-from meshreel.coding.group import encode_group
+from meshreel.coding.appearance.atlas import encode_atlas
+from meshreel.coding.appearance.colors import ColorCodingOptions
+from meshreel.coding.appearance.pictures import VideoOptions
+from meshreel.coding.background import decode_background, decode_change, encode_background, encode_change
+from meshreel.coding.colored import atlas_base, background_canvas, canvas_of, encode_group_colors
+from meshreel.coding.group import continue_group
 from meshreel.coding.intra import encode_empty, encode_intra
 from meshreel.coding.layers.coder import LayerCodingOptions, LayersState, encode_layers
 from meshreel.coding.layers.patches import encode_patches
 from meshreel.coding.paper.displacements import DisplacementOptions
+from meshreel.coding.paper.group import encode_laplacian
 from meshreel.coding.reference_mesh import CodedReference, code_reference
-from meshreel.container.writer import ReelWriter
+from meshreel.container.writer import Companion, ReelWriter
 from meshreel.decoder.video import Video
 from meshreel.decoder.video import open as open_video
-from meshreel.format.layout import Header
+from meshreel.encoder.options import TextureOptions
+from meshreel.encoder.videos import Videos, layered_pictures
+from meshreel.format.layout import ChunkKind, Header
 from meshreel.format.records import pack
+from meshreel.geometry.atlas import Layout
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh
-from tests.golden import frame_record
+from tests.golden import colored_record, frame_record, planes
 
 FRAMES = 4
+COLORS = ColorCodingOptions(step=1 / 24)
+TEXTURES = TextureOptions(video=VideoOptions(crf=50), compatible=True)
 Group = tuple[int, bytes, tuple[int, ...], bool]  # frames, payload, layer ends, whether predicted from the last
 
 
@@ -55,6 +66,19 @@ def main(folder: Path) -> None:
                 add(writer, group)
     with golden(folder, "scene", header()) as writer:
         add_scene(writer)
+    (folder / "colored").mkdir(exist_ok=True)
+    with golden(folder, "colored/vertices", header()) as writer:
+        painted = Painted(writer)
+        for group in (*patched_groups(), moving, still):
+            painted.add(group)
+    with golden(folder, "colored/textures", header()) as writer:
+        painted = Painted(writer)
+        groups = layers_groups(ball(), (3, 2, 1))
+        add_pictures(
+            writer, atlas_base(groups[0][1][: groups[0][2][0]]), [painted.add(group) for group in groups], (3, 2, 1)
+        )
+    with golden(folder, "colored/scene", header()) as writer:
+        add_colored_scene(writer)
 
 
 @contextmanager
@@ -103,6 +127,94 @@ def add_scene(writer: ReelWriter) -> None:
     add(writer, always[2], 0, (second,))
 
 
+class Painted:
+    """The groups of a track, and the colours of their vertices."""
+
+    def __init__(self, writer: ReelWriter) -> None:
+        self._writer = writer
+        self._state: LayersState | None = None
+
+    def add(self, group: Group, background: tuple[int, ...] = ()) -> int:
+        """The number of the next group, shown with the background; its colours are predicted where it is."""
+        frames, payload, _, predicted = group
+        writer, before, state = self._writer, self._writer.last_of(0), self._state if predicted else None
+        first = writer.frames_of(0)
+        add(writer, group, 0, background)
+        meshes, after = continue_group(payload, frames, None, state)
+        canvas = canvas_of(payload, [len(mesh.vertices) for mesh in meshes], None, state)
+        colors = [waves(mesh, first + t) for t, mesh in enumerate(meshes)]
+        coded = encode_group_colors(canvas, colors, COLORS, None if state is None else state.colors)
+        number, known = writer.last_of(0), writer.companion_of(before, ChunkKind.COLORS) if predicted else None
+        needed = (number,) if known is None else (number, known)
+        writer.add_companion(Companion(ChunkKind.COLORS, coded.payload, coded.layers), needed)
+        self._state = None if after is None else replace(after, colors=coded.state)
+        return number
+
+
+def waves(mesh: Mesh, frame: int) -> np.ndarray:
+    """Colours that move over a mesh."""
+    return (128 + 100 * np.sin(9 * mesh.vertices + [0, 1, 2 + frame / 4])).astype(np.uint8)
+
+
+def layout_of(base: Mesh, width: int, height: int) -> Layout:
+    """A mesh seen from two sides, beside each other."""
+    corners = base.vertices[base.faces]
+    behind = corners[..., 2].mean(axis=1, keepdims=True) < 0
+    low, high = base.vertices.min(axis=0), base.vertices.max(axis=0)
+    x, y = ((corners[..., k] - low[k]) / (high[k] - low[k]) for k in range(2))
+    places = np.stack([(x + behind) * (width // 2), y * height], axis=2)
+    return Layout(width, height, np.rint(places).astype(np.int32))
+
+
+def picture(layout: Layout, frame: int) -> np.ndarray:
+    """A picture in which light moves."""
+    y, x = np.indices((layout.height, layout.width))
+    waves = [np.sin(x / 5 + frame / 9), np.cos(y / 4), np.sin((x + y) / 7 - frame / 5)]
+    return np.stack([128 + 90 * wave for wave in waves], axis=2).astype(np.uint8)
+
+
+def add_pictures(writer: ReelWriter, base: Mesh, groups: Sequence[int], counts: Sequence[int]) -> None:
+    """The atlas and the pictures of groups that are predicted one from the other, in both codings."""
+    layout = layout_of(base, 64, 32)
+    atlas = writer.add_companion(Companion(ChunkKind.ATLAS, encode_atlas(base, layout)), (groups[0],))
+    videos, last = Videos(layout, TEXTURES), dict[ChunkKind, int]()
+    for frame in range(sum(counts)):
+        videos.add(picture(layout, frame))
+    for group, own in zip(groups, videos.finish(counts), strict=True):
+        for companion in own:
+            before = (last[companion.kind],) if companion.kind in last else ()
+            last[companion.kind] = writer.add_companion(companion, (group, atlas, *before))
+
+
+def add_colored_scene(writer: ReelWriter) -> None:
+    """A floor under light that moves, in more pictures than a layer has; then it changes, and a ball comes."""
+    squares, knob = patches().mesh, deforming_sphere(1, levels=1)[0]
+    before = encode_background(Mesh.of(4 * squares.vertices, squares.faces), 0.01)
+    floor = decode_background(before)
+    change = encode_change(floor, np.arange(len(floor.faces)) < 9, Mesh.of(0.3 * knob.vertices, knob.faces), 0.01)
+    first = writer.add_static(before)
+    add_background_colors(writer, first, before, floor)
+    layout = layout_of(floor, 32, 32)
+    atlas = writer.add_companion(Companion(ChunkKind.ATLAS, encode_atlas(floor, layout)), (first,))
+    for companion in layered_pictures(layout, range(0, 140, 2), lambda frame: picture(layout, frame), TEXTURES):
+        writer.add_companion(companion, (first, atlas))
+    painted = Painted(writer)
+    add(writer, (150, encode_empty(), (), False), 0, (first,))
+    second = writer.add_static(change, depends_on=(first,))
+    add_background_colors(writer, second, change, decode_change(change, floor))
+    groups = layers_groups(ball(), (2, 1))
+    numbers = [painted.add(group, (second,)) for group in groups]
+    add_pictures(writer, atlas_base(groups[0][1][: groups[0][2][0]]), numbers, (2, 1))
+
+
+def add_background_colors(writer: ReelWriter, number: int, payload: bytes, mesh: Mesh) -> None:
+    """The colours of a background, or of what a change of it adds, which is its end."""
+    canvas = background_canvas(payload)
+    colors = waves(mesh, 0)[len(mesh.vertices) - canvas.meshes[0].vertices :]
+    coded = encode_group_colors(canvas, [colors], COLORS, None)
+    writer.add_companion(Companion(ChunkKind.COLORS, coded.payload), (number,))
+
+
 def header(intervals: tuple[int, ...] = ()) -> Header:
     """Far from the origin, so that a reader in single precision is found out."""
     corner = (0.5, 0.5, 0.5)
@@ -126,7 +238,7 @@ def laplacian_group() -> Group:
     time = np.arange(FRAMES)
     ripple = np.sin(20 * points[:, None, :] + time[None, :, None])
     field = 0.01 * ripple + 0.1 * points[:, None, :] * time[None, :, None] / FRAMES
-    payload, layers = encode_group(reference, field, DisplacementOptions(step=0.002))
+    payload, layers = encode_laplacian(reference, field, DisplacementOptions(step=0.002))
     return FRAMES, payload, layers, False
 
 
@@ -187,6 +299,9 @@ def draco_group() -> Group:
 
 def record(video: Video) -> dict[str, object]:
     """What a reader must find in a file."""
+    if video.reader.is_colored:
+        shown = sorted({*range(min(len(video), 12)), *range(0, len(video), 49), *range(len(video) - 4, len(video))})
+        return {"parts": {str(frame): colored_record(video, frame) for frame in shown}, "planes": planes(video.reader)}
     return {
         "frame_rate": video.frame_rate,
         "timestamps": video.timestamps,

@@ -15,7 +15,7 @@ sys.path.insert(0, str(ROOT))
 import reliability  # noqa: E402
 
 from tests.budget.measure import measured  # noqa: E402
-from tests.budget.test_budget import CASES, MEMORY, MEMORY_PER_BYTE  # noqa: E402
+from tests.budget.test_budget import CASES, promised  # noqa: E402
 
 
 def main() -> int:
@@ -26,7 +26,7 @@ def main() -> int:
             [make] = case.values
             data = make()
             cost = measured(Path(folder) / "worst.reel", data)
-            most = MEMORY + MEMORY_PER_BYTE * len(data)
+            most = promised(data)
             faults += cost.memory > most
             rows.append((cost.memory / 2**20, cost.seconds))
             share = 100 * cost.memory / most

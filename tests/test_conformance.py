@@ -7,10 +7,12 @@ import json
 import pytest
 
 import meshreel
+from meshreel.format.checks import COMPANIONS
 from meshreel.format.layout import ChunkKind
-from tests.golden import GOLDEN, frame_record
+from tests.golden import GOLDEN, colored_record, frame_record, planes
 
 FILES = sorted(GOLDEN.glob("*.reel"))
+COLORED = sorted(GOLDEN.glob("colored/*.reel"))
 
 
 def test_there_is_a_golden_file_for_each_form():
@@ -28,3 +30,20 @@ def test_a_golden_file_decodes_bit_for_bit(path):
     assert video.timestamps == wanted["timestamps"]
     assert [frame_record(mesh) for mesh in video] == wanted["frames"]
     assert [frame_record(mesh) for mesh in video.at(1)] == wanted["frames_with_one_component"]
+
+
+def test_there_is_a_golden_file_for_each_companion_of_a_group_and_of_a_background():
+    chunks = [chunk for path in COLORED for chunk in meshreel.open(path).reader.chunks]
+    assert {(chunk.kind, chunk.frame_count > 0) for chunk in chunks if chunk.kind in COMPANIONS} == {
+        (kind, is_group) for kind in COMPANIONS for is_group in (True, False)
+    }
+    assert max(path.stat().st_size for path in GOLDEN.rglob("*")) < 40_000
+
+
+@pytest.mark.parametrize("path", COLORED, ids=lambda path: path.stem)
+def test_a_golden_file_has_the_same_colours_and_planes(path):
+    pytest.importorskip("av")
+    wanted, video = json.loads(path.with_suffix(".json").read_text()), meshreel.open(path)
+    for frame, parts in wanted["parts"].items():
+        assert colored_record(video, int(frame)) == parts
+    assert planes(video.reader) == wanted["planes"]

@@ -15,7 +15,7 @@ from meshreel.errors import FormatError
 from tests.golden import GOLDEN
 
 FILES = {path.name: path for path in verdict.corpus()}
-GOLDEN_FILES = sorted(GOLDEN.glob("*.reel"))
+GOLDEN_FILES = sorted(GOLDEN.rglob("*.reel"))
 
 
 def test_the_verdicts_on_the_corpus_are_those_that_are_committed():

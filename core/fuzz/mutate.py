@@ -20,7 +20,9 @@ from meshreel.container.writer import pack_head
 from meshreel.errors import FormatError, InputError
 from meshreel.format import kinds
 from meshreel.format.layout import (
+    Atlas,
     ChunkKind,
+    ColorsLevel,
     DisplacementHead,
     DracoGroup,
     EmptyGroup,
@@ -33,8 +35,10 @@ from meshreel.format.layout import (
     LayersGroup,
     LayersLevel,
     LayersPatches,
+    Pictures,
     Preamble,
     StaticPatch,
+    VertexColors,
 )
 from meshreel.format.records import Nested, pack, record_fields, unpack
 from meshreel.types import Mesh
@@ -49,7 +53,15 @@ FIRST = {  # the record that a payload begins with
     Form.DRACO: DracoGroup,
     Form.EMPTY: EmptyGroup,
     Form.PATCH: StaticPatch,
+    Form.VERTEX_COLORS: VertexColors,
+    Form.PLACES: Atlas,
+    Form.VIDEO: Pictures,
 }
+MORE = {
+    Form.LAYERS: [LayersLevel, LayersPatches],
+    Form.VERTEX_COLORS: [ColorsLevel],
+    Form.VIDEO: [Pictures],
+}  # those of further layers
 DRACO = {"base", "reference", "mesh", "meshes"}  # fields that hold Draco bytes
 ChangeBytes = Callable[[bytes], bytes]
 
@@ -170,7 +182,7 @@ class _Change:
         form = Form(layers[0][0])
         if self.random.randrange(10) == 0:
             return self.bytes(data)
-        types = [FIRST[form]] if at == 0 else [LayersLevel, LayersPatches] if form == Form.LAYERS else []
+        types = [FIRST[form]] if at == 0 else MORE.get(form, [])
         for record_type in types if at < len(layers) - 1 else types[::-1]:
             try:
                 record, end = unpack(record_type, data)

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 from mutate import parse
-from verdict import verdict
+from verdict import color, verdict
 
 from meshreel import _core
 from meshreel.coding.layers import coder, trajectories
-from meshreel.format.layout import CodedField, Form, LayersGroup, LayersLevel
-from meshreel.format.records import unpack_all
+from meshreel.format.layout import CodedField, ColorsLevel, Form, LayersGroup, LayersLevel
+from meshreel.format.records import unpack, unpack_all
 
 GOLDEN = Path(__file__).resolve().parents[2] / "conformance" / "v1"
 TARGETS = {  # of Python, and the forms of which a file must have one
@@ -30,6 +30,7 @@ TARGETS = {  # of Python, and the forms of which a file must have one
     "intra": {Form.DRACO},
     "background": {Form.PATCH},
     "patches": {Form.LAYERS},
+    "colored": {Form.VERTEX_COLORS},
 }
 Write = Callable[[str, bytes], None]
 
@@ -40,13 +41,14 @@ def main(folder: Path) -> None:
         (folder / target / hashlib.sha1(data).hexdigest()).write_bytes(data)
 
     watch_calls(write)
-    for path in sorted(GOLDEN.glob("*.reel")):
+    for path in sorted(GOLDEN.rglob("*.reel")):
         data = path.read_bytes()
         forms = {chunk.entry.form for chunk in parse(data)[1]}
         for target, wanted in TARGETS.items():
             if forms & wanted and (target != "patches" or path.stem in ("layers_patched", "scene")):
                 write(target, data)
         verdict(data)
+        color(data)
 
 
 def watch_calls(write: Write) -> None:
@@ -88,6 +90,26 @@ def watch_calls(write: Write) -> None:
     def draco(meshes: Any) -> None:
         write("draco", bytes([len(meshes)]) + b"".join(raw(data)[1:] for data in meshes))
 
+    def colors(
+        records: bytes, vertices: Any, faces: Any, levels: int, count: int, frames: int, chroma: float, before: Any
+    ) -> None:
+        base, at = unpack(CodedField, records)
+        out = mesh(vertices, faces) + bytes([frames - 1, levels]) + field(base)
+        for _ in range(levels):
+            made, at = unpack(ColorsLevel, records, at)
+            out += bytes([made.sibling_weight]) + field(made.values)
+        last = b"\0" if before is None else b"\1" + np.rint(1000 * before).astype("<i2").tobytes()
+        write("colors", out + b"\0\0" + last.ljust(1 + 6 * count, b"\0") + bytes([round(64 * chroma)]))
+
+    def places(vertices: Any, faces: Any, joins: Any, starts: Any, rests: Any) -> None:
+        counts = struct.pack("<HHH", len(joins), len(starts), len(rests))
+        numbers = [
+            symbol
+            for stream, room in ((joins, 4), (starts, 6), (rests, 2))
+            for symbol in [*stream.tolist(), *[0] * (room * len(faces) - len(stream))]
+        ]
+        write("places", mesh(vertices, faces) + b"\0" + counts + b"".join(map(number, numbers)))
+
     watch(_core, "decode_integers", lambda data, values: write("integers", struct.pack("<H", len(values)) + raw(data)))
     watch(_core, "decode_weights", weights)
     watch(trajectories, "decode_trajectories", motion)
@@ -95,6 +117,8 @@ def watch_calls(write: Write) -> None:
     watch(coder, "decode_level", level)
     watch(coder, "decode_last", level)
     watch(_core, "check_draco", draco)
+    watch(_core, "decode_colors", colors)
+    watch(_core, "decode_places", places)
 
 
 def mesh(vertices: Any, faces: Any) -> bytes:
@@ -110,6 +134,11 @@ def mesh(vertices: Any, faces: Any) -> bytes:
 def field(record: CodedField) -> bytes:
     """Return a field as `put_field` of input.h reads it."""
     return bytes([record.columns, record.step_level]) + raw(record.basis) + raw(record.symbols)
+
+
+def number(value: int) -> bytes:
+    """Return a number as `number` of input.h reads it."""
+    return struct.pack("b", value) if -127 <= value <= 127 else b"\x80" + struct.pack("<i", value)
 
 
 def raw(stream: bytes) -> bytes:

@@ -27,10 +27,10 @@ def verdict(data: bytes, layers: int | None = None) -> str:
     """Return "refused" for a file that cannot be opened; otherwise how many frames decode, and a digest of them all.
 
     At most `layers` layers beyond the first are decoded. The digest is of each frame's positions and faces, or of
-    the word "refused".
+    the word "refused". Colours are not of it: the player shows what it can without them.
     """
     try:
-        video = open_video(data).at(layers)
+        video = open_video(data).at(layers, colors=False)
     except FormatError:
         return "refused"
     total, shown = hashlib.sha256(), 0
@@ -50,11 +50,23 @@ def check(data: bytes) -> None:
     """Decode and describe a file; then decode it again, which must give the same, or with fewer layers."""
     first = verdict(data)
     describe(data)
+    color(data)
     layers = zlib.crc32(data) % 4
     if layers == 3:
         assert verdict(data) == first, "a file that decodes in two ways"
     elif first != "refused":
         verdict(data, layers)
+
+
+def color(data: bytes) -> None:
+    """Decode the colours of a file."""
+    with suppress(FormatError):
+        video = open_video(data)
+        for frame in range(min(len(video), MOST_FRAMES)):
+            with suppress(FormatError):
+                for mesh in video.parts(frame).values():
+                    assert mesh.colors is None or len(mesh.colors) == len(mesh.vertices)
+                    assert mesh.texture is None or mesh.texture.pixels.shape[2] == 3
 
 
 def describe(data: bytes) -> None:

@@ -211,7 +211,8 @@ int mr_encode_places(const mr_mesh* mesh, const int32_t* places, mr_place_symbol
         std::vector<Place> copy(3 * mesh->face_count);
         for (size_t k = 0; k < copy.size(); ++k) {
             copy[k] = {places[2 * k], places[2 * k + 1]};
-            if (std::abs(copy[k].u) >= kFarthest || std::abs(copy[k].v) >= kFarthest) return MR_BAD_INPUT;
+            for (double x : {static_cast<double>(copy[k].u), static_cast<double>(copy[k].v)})
+                if (std::fabs(x) >= kFarthest) return MR_BAD_INPUT;
         }
         symbols->join_count = symbols->start_count = symbols->rest_count = 0;
         Writer writer{*symbols};

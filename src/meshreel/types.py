@@ -198,7 +198,7 @@ class MeshSequence(Frames, Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class MeshList:
+class MeshList(MeshSequence):
     """A MeshSequence of meshes that are in memory."""
 
     meshes: tuple[Mesh, ...]
@@ -210,9 +210,6 @@ class MeshList:
 
     def __getitem__(self, index: int) -> Mesh:
         return self.meshes[index]
-
-    def __iter__(self) -> Iterator[Mesh]:
-        return iter(self.meshes)
 
 
 def as_sequence(value: object, frame_rate: float = 30.0) -> MeshSequence:

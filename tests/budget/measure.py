@@ -24,6 +24,8 @@ idle, start, refused = peak(), time.process_time(), []
 with meshreel.open(sys.argv[2]) as video:
     for frame in range(len(video)):
         try:
+            for part in video.parts(frame).values():
+                part.texture and part.texture.pixels
             video[frame]
         except meshreel.FormatError as error:
             refused = [str(error)]

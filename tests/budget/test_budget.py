@@ -27,7 +27,7 @@ from meshreel.encoder.target import Fidelity
 from meshreel.errors import FormatError, InputError
 from meshreel.format import budget
 from meshreel.format.budget import LIMITS, Chain, CostlyError, Size
-from meshreel.format.layout import AnchorRule, Form
+from meshreel.format.layout import AnchorRule, ChunkKind, Form
 from meshreel.types import Mesh
 from tests.budget import worst_files as worst
 from tests.coding.bodies import ball, moving
@@ -35,6 +35,7 @@ from tests.container.files import HEADER
 
 FORMAT = (Path(__file__).resolve().parents[2] / "FORMAT.md").read_text(encoding="utf-8")
 MEMORY, MEMORY_PER_BYTE = 384 << 20, 16 << 10  # bytes, of FORMAT.md
+WITH_COLORS, WITH_TEXTURES = 96 << 20, 256 << 20  # and more, of FORMAT.md
 SECONDS_PER_CHUNK, SECONDS_PER_BYTE = 2.0, 250e-6  # of FORMAT.md
 SLOWER = 3  # times, at most, that a machine which runs tests beside others may take
 
@@ -43,6 +44,9 @@ SMALL = {
     "frames of draco": partial(worst.draco_frames, 3000),
     "layers": partial(worst.layered, 3000),
     "predicted layers": partial(worst.layered, 3000, predicted=5),
+    "colours": partial(worst.painted, 3000),
+    "colours of many frames": partial(worst.painted, 3000, 64),
+    "textures": partial(worst.painted, 3000, 4, side=2048),
     "laplacian": partial(worst.solved, 3000),
     "laplacian of many frames": partial(worst.solved, 3000, 400),
     "laplacian of a fan": partial(worst.fanned, 3000),
@@ -54,6 +58,7 @@ SMALL = {
 LARGE = {
     "draco": partial(worst.draco, 40_000),
     "layers": partial(worst.layered, 40_000),
+    "colours": partial(worst.painted, 40_000),
     "laplacian": partial(worst.solved, 40_000),
     "patches of a background": partial(worst.changed, 60_000),
     "tracks": partial(worst.crowded, 40_000),
@@ -66,6 +71,13 @@ CASES = [
 ]
 
 
+def promised(data: bytes) -> int:
+    """Bytes of memory that a file may cost."""
+    kinds = {chunk.kind for chunk in ReelReader(BytesSource(data)).chunks}
+    more = WITH_COLORS * (ChunkKind.COLORS in kinds) + WITH_TEXTURES * (ChunkKind.PICTURES in kinds)
+    return MEMORY + more + MEMORY_PER_BYTE * len(data)
+
+
 @pytest.mark.parametrize("make", CASES)
 def test_the_worst_legal_file_costs_what_is_promised(make: Callable[[], bytes], tmp_path: Path):
     pytest.importorskip("resource", reason="peak memory is measured on POSIX only")
@@ -74,7 +86,7 @@ def test_the_worst_legal_file_costs_what_is_promised(make: Callable[[], bytes], 
     data = make()
     cost = measured(tmp_path / "worst.reel", data)
     chunks = len(ReelReader(BytesSource(data)).chunks)
-    assert cost.memory <= MEMORY + MEMORY_PER_BYTE * len(data)
+    assert cost.memory <= promised(data)
     assert cost.seconds <= SLOWER * (SECONDS_PER_CHUNK * chunks + SECONDS_PER_BYTE * len(data))
     assert all("its groups of tracks" in message for message in cost.refused)  # all else is legal
 
@@ -82,6 +94,7 @@ def test_the_worst_legal_file_costs_what_is_promised(make: Callable[[], bytes], 
 def test_the_promise_is_that_of_the_document():
     promise = FORMAT[FORMAT.index("## What a file may cost") :]
     assert f"{MEMORY >> 20} MiB + {MEMORY_PER_BYTE >> 10} KiB * n of memory" in promise
+    assert f"{WITH_COLORS >> 20} MiB more with colours of vertices and {WITH_TEXTURES >> 20} MiB more with" in promise
     assert f"at most {SECONDS_PER_CHUNK:g} s + {SECONDS_PER_BYTE * 1e6:g} µs * m" in promise
     numbers = dict(re.findall(r"^\| `(\w+)` \| ([\d,]+) \|", promise, re.MULTILINE))
     assert numbers == {name: f"{value:,}" for name, value in asdict(LIMITS).items()}
@@ -102,6 +115,27 @@ def test_more_than_its_bytes_may_cost_is_refused(cost: Callable[[int], int], gro
     with pytest.raises(CostlyError, match=f"{grown}: 100 bytes that cost"):
         budget.check_cost(cost(most + 1), 100, grown)
     budget.check_cost(cost(most + 1), 100_000, grown)
+
+
+def test_colours_and_pictures_of_more_than_their_bytes_may_have_are_refused():
+    most = (LIMITS.colors + 100 * LIMITS.per_byte) // (LIMITS.painting + 8 * LIMITS.painted)
+    budget.check_colors([(most, 8)], 100)
+    texels = (LIMITS.pictures + 100 * LIMITS.per_byte) // LIMITS.texel
+    budget.check_pictures(texels, 100)
+    for refused in (
+        lambda: budget.check_colors([(most + 1, 8)], 100),
+        lambda: budget.check_colors([(most, 8), (1, 1)], 0),
+        lambda: budget.check_pictures(texels + 1, 100),
+    ):
+        with pytest.raises(CostlyError, match="bytes that cost"):
+            refused()
+
+
+def test_decoders_of_videos_take_what_their_bytes_may():
+    texels = LIMITS.videos // LIMITS.held
+    assert texels == 2048 * 2048  # the largest texture, once
+    assert not budget.are_costly([(texels, 0)]) and budget.are_costly([(texels, 0), (1, 0)])
+    assert not budget.are_costly([(texels, 0), (1000, 1000)])
 
 
 @pytest.mark.parametrize("name", ["draco", "solved"])

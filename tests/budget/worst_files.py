@@ -5,11 +5,14 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import accumulate
 
 import numpy as np
 
 from meshreel import _core
 from meshreel.coding import entropy
+from meshreel.coding.appearance.atlas import encode_atlas
+from meshreel.coding.appearance.pictures import VideoEncoder, VideoOptions, encode_pictures
 from meshreel.coding.background import encode_background
 from meshreel.coding.intra import encode_empty
 from meshreel.coding.layers import orthonormal
@@ -17,13 +20,15 @@ from meshreel.coding.layers.graph import Graph, connectivity, hierarchy
 from meshreel.coding.layers.patches import encode_patches
 from meshreel.coding.mesh import decode_mesh, encode_mesh
 from meshreel.coding.paper import laplacian
-from meshreel.container.writer import ReelWriter
+from meshreel.container.writer import Companion, ReelWriter
 from meshreel.format import budget
 from meshreel.format.budget import LIMITS, Size
 from meshreel.format.checks import MOST_CHANGES, MOST_TRACKS
 from meshreel.format.layout import (
     AnchorRule,
+    ChunkKind,
     CodedField,
+    ColorsLevel,
     Component,
     DisplacementHead,
     DracoGroup,
@@ -35,8 +40,10 @@ from meshreel.format.layout import (
     Origin,
     Presence,
     StaticPatch,
+    VertexColors,
 )
 from meshreel.format.records import pack
+from meshreel.geometry.atlas import Layout
 from meshreel.geometry.topology import subdivide_midpoint
 from meshreel.types import Mesh
 
@@ -213,6 +220,35 @@ def handles(side: int, count: int) -> Mesh:
         for row in ((p[i], p[j], q[i]), (p[j], q[j], q[i]))
     ]
     return Mesh.of(mesh.vertices, np.concatenate([np.delete(mesh.faces, ends, axis=0), np.array(tubes)]))
+
+
+def painted(size: int, frames: int = 16, levels: int = 2, side: int = 0) -> bytes:
+    """A group whose vertices have colours in as many columns as there can be; with a texture of side x side texels."""
+    data, levels = base_of(size, lambda shape: budget.layers_cost(shape, frames), levels)
+    base, colors, pictures = decode_mesh(data, STEP), list[Companion](), list[bytes]()
+    parts, faces, count = [pack(VertexColors(Form.VERTEX_COLORS, Origin.ALONE, 64))], base.faces, len(base.vertices)
+    parts.append(pack(field(hierarchy(base).graph, 3 * frames, 3 * frames)))
+    for _ in range(levels):
+        near = connectivity(faces, count)
+        parts.append(pack(ColorsLevel(24, field(near.siblings.graph(24), 3 * frames, 3 * frames))))
+        faces, count = near.level.faces, near.level.count
+    if side:
+        parts.append(pack(CodedField(0, 80, b"", b"")))  # of the vertices of the patches
+    ends = tuple(accumulate([len(parts[0] + parts[1]), *map(len, parts[2:])]))
+    colors.append(Companion(ChunkKind.COLORS, b"".join(parts), ends))
+    if side:
+        places = np.rint(base.vertices[base.faces][..., :2] / STEP).astype(np.int32) % side
+        colors.append(Companion(ChunkKind.ATLAS, encode_atlas(base, Layout(side, side, places))))
+        encoder = VideoEncoder(side, side, VideoOptions(preset=13))
+        for frame in range(frames):
+            pictures += encoder.add(np.full((side * 3 // 2, side), 16 + frame, np.uint8))
+        colors.append(Companion(ChunkKind.PICTURES, encode_pictures(pictures + encoder.finish())))
+    file = io.BytesIO()
+    with ReelWriter(file, HEADER) as writer:
+        writer.add_group(0, frames, layers(data, levels, frames, patched=bool(side)))
+        for number, companion in enumerate(colors):
+            writer.add_companion(companion, (0,) if number < 2 else (0, 2))
+    return file.getvalue()
 
 
 def changed(size: int) -> bytes:

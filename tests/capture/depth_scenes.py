@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.capture.rig import DepthCamera, make_folders, write_rig
+from meshreel.capture.rig import DepthCamera, write_rig
 from meshreel.io.depth_pictures import write_depth
 
 RADIUS, WALL = 0.4, 1.2  # m; the ball is at the origin, the wall behind it at z = WALL
@@ -40,7 +40,9 @@ def measured(camera, ball=(0.0, 0.0, 0.0), wall=True):
 
 def record(folder, cameras, balls, wall=True):
     """A rig's folder: a frame for each place of the ball."""
-    places = make_folders(folder, tuple(cameras))
+    places = [folder / one.name / "depth" for one in cameras]
+    for place in places:
+        place.mkdir(parents=True, exist_ok=True)
     write_rig(folder, tuple(cameras), 15.0)
     for one, place in zip(cameras, places, strict=True):
         for number, ball in enumerate(balls):

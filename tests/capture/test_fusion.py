@@ -10,8 +10,7 @@ import pytest
 from meshreel.capture.fusion import FusionOptions, fuse_depths
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
-from meshreel.geometry.connected import without_fragments
-from meshreel.geometry.topology import components, face_normals
+from meshreel.geometry.topology import components, face_normals, without_fragments
 from meshreel.types import Mesh
 from tests.capture.depth_scenes import RADIUS, WALL, camera, measured
 

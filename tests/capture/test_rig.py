@@ -181,7 +181,8 @@ def test_colour_of_another_size_is_refused(folder):
 
 def test_colour_cameras_are_read_beside_depth_and_alone(folder):
     (folder / "pictures").mkdir()
-    Image.new("RGB", (50, 40), (9, 8, 7)).save(folder / "pictures" / "color_0.png")
+    for number in range(3):
+        Image.new("RGB", (50, 40), (9, 8, 7)).save(folder / "pictures" / f"color_{number}.png")
     whole = json.loads((folder / "rig.json").read_text())["cameras"][0]
     size = {"folder": "pictures", "width": 50, "height": 40, "fx": 40, "fy": 40, "cx": 25, "cy": 20}
     alone = {key: whole[key] for key in ("camera_to_world",)} | size | {"name": "eye"}
@@ -193,8 +194,20 @@ def test_colour_cameras_are_read_beside_depth_and_alone(folder):
     assert beside.distortion == (0.1, 0.0, 0.01, 0.0, 0.0) and not any(other.distortion)
     np.testing.assert_array_equal(beside.camera_to_world, rig.cameras[0].camera_to_world)
     picture = other.picture(0)
-    assert picture.pixels[0, 0].tolist() == [9, 8, 7] and other.picture(1) is None
+    assert picture.pixels[0, 0].tolist() == [9, 8, 7] and other.picture(3) is None
     np.testing.assert_array_equal(picture.camera.intrinsic, [[40, 0, 25.5], [0, 40, 20.5], [0, 0, 1]])
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words"), [((0, 2), "2 color pictures for 3 frames .* has frame 1:"), ((0, 1, 2, 5), "4 .* frame 5:")]
+)
+def test_colour_with_other_frames_than_depth_is_refused(folder, numbers, words):
+    (folder / "front" / "color").mkdir()
+    for number in numbers:
+        Image.new("RGB", (96, 96)).save(folder / "front" / "color" / f"{number}.png")
+    changed(folder, lambda rig: rig["cameras"][0].update(color="front/color"))
+    with pytest.raises(InputError, match=f"rig: camera front has {words}"):
+        read_rig(folder)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 import meshreel
 from meshreel.io.sequence import open_sequence
 from tests.cli.conftest import FILE, SCENE, failed
+from tests.encoder.test_appearance import BODY, textured, written
 from tests.golden import GOLDEN
 
 
@@ -120,3 +121,29 @@ def test_a_missing_file_and_a_folder_that_cannot_be_are_reported(run, tmp_path):
     (tmp_path / "taken").write_text("")
     assert failed(run("decode", FILE, "-o", tmp_path / "taken"), "taken", "choose another")
     assert failed(run("decode", FILE, "-o", tmp_path, "--format", "fbx"), "fbx")
+
+
+@pytest.fixture(scope="module")
+def colored(tmp_path_factory):
+    """A file whose frames have textures."""
+    path = tmp_path_factory.mktemp("textures") / "a.reel"
+    written([textured(mesh) for mesh in BODY[:2]], path)
+    return path
+
+
+def test_textures_are_kept_or_named_in_one_line(run, tmp_path, monkeypatch, colored):
+    said = run("decode", colored, "-o", tmp_path / "ply")
+    assert said.code == 0 and said.err.count("\n") == 1 and "PLY has no textures" in said.err
+    assert open_sequence(tmp_path / "ply")[0].colors is not None
+    wanted = meshreel.open(colored)[1].texture.pixels
+    for kind in ("obj", "glb"):
+        assert run("decode", colored, "-o", tmp_path / kind, "--format", kind).err == ""
+        np.testing.assert_array_equal(open_sequence(tmp_path / kind)[1].texture.pixels, wanted)
+    assert run("decode", colored, "-o", tmp_path / "npz", "--format", "npz").err == ""
+    np.testing.assert_array_equal(open_sequence(tmp_path / "npz" / "frame_00001.npz")[0].texture.pixels, wanted)
+    monkeypatch.setattr("meshreel.cli.decode.find_spec", {}.get)
+    said = run("decode", colored, "-o", tmp_path / "bare", "--format", "obj")
+    assert said.code == 0 and said.err.count("\n") == 1 and "meshreel[color]" in said.err
+    assert (
+        open_sequence(tmp_path / "bare")[0].texture is None and open_sequence(tmp_path / "bare")[0].colors is not None
+    )

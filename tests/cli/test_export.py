@@ -12,6 +12,7 @@ import pytest
 import meshreel
 from meshreel.cli import main
 from tests.cli.conftest import FILE, SCENE, failed
+from tests.encoder.test_appearance import BODY, textured, written
 from tests.golden import GOLDEN
 from tests.play_glb import PlayedGlb
 
@@ -151,3 +152,19 @@ def test_without_usd_the_extra_is_named(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
     assert failed(run("export", FILE, "-o", tmp_path / "a.usdc"), "pip install 'meshreel[usd]'")
     assert main(["export", str(FILE), "-o", str(tmp_path / "a.glb"), "--quiet"]) == 0
+
+
+def test_a_texture_is_exported_where_it_is_asked_for(run, tmp_path):
+    written([textured(mesh) for mesh in BODY[:2]], tmp_path / "a.reel")
+    for kind in ("glb", "usdc"):
+        for flags in ([], ["--texture"]):
+            said = run("export", tmp_path / "a.reel", "-o", tmp_path / f"a.{kind}", *flags)
+            assert said.code == 0 and ("the texture of its first frame" in said.err) == (kind == "glb" and bool(flags))
+            assert (tmp_path / "a_textures").exists() == (kind == "usdc" and bool(flags))
+            if kind == "glb":
+                assert len(PlayedGlb(tmp_path / "a.glb").tree.get("images", [])) == len(flags)
+    assert "has no textures" in run("export", FILE, "-o", tmp_path / "b.glb", "--texture").err
+    assert [path.name for path in sorted((tmp_path / "a_textures").iterdir())] == [
+        "track_0_00000.png",
+        "track_0_00001.png",
+    ]

@@ -88,6 +88,43 @@ def test_colors_of_vertices_are_near_those_of_the_frames(files: dict[str, bytes]
     np.testing.assert_array_equal(bare.vertices, video[0].vertices)
 
 
+def test_textures_may_have_another_size_in_each_frame(tmp_path: Path) -> None:
+    """What is painted is the same: a ramp over the frame, of 16 x 16 texels or of 96 x 40."""
+    meshes = []
+    for number, mesh in enumerate(textured(mesh) for mesh in BODY):
+        rows, columns = (16, 16) if number % 2 else (40, 96)
+        ramp = np.linspace(20, 220, columns)[None, :, None] * np.ones((rows, 1, 3))
+        meshes.append(replace(mesh, texture=Texture.of(ramp.astype(np.uint8))))
+    video = meshreel.open(written(meshes, tmp_path / "a.reel"))
+    for mesh, shown in zip(meshes, video, strict=True):
+        assert shown.texture is not None and shown.texture.pixels.shape == video[0].texture.pixels.shape
+        assert color_errors(mesh, shown).y > 28
+
+
+@pytest.mark.parametrize("colored", [True, False])
+def test_faces_without_places_are_encoded_beside_faces_with(tmp_path: Path, colored: bool) -> None:
+    """The places of some are NaN, those of others are outside of 0 to 1, where the texture is repeated."""
+    meshes = []
+    for mesh, painted_mesh in zip(BODY[:2], COLORED, strict=False):
+        uv = textured(mesh).uv + np.float32([2, -3])
+        uv[: len(uv) // 3] = np.nan
+        flat = Texture.of(np.full((8, 8, 3), 90, np.uint8))
+        meshes.append(replace(painted_mesh if colored else mesh, uv=uv, texture=flat))
+    for mesh, shown in zip(meshes, meshreel.open(written(meshes, tmp_path / "a.reel")), strict=True):
+        assert shown.texture is not None and color_errors(mesh, shown).y > 25
+
+
+def test_a_texture_that_cannot_be_read_ends_the_encoding_with_its_name(tmp_path: Path) -> None:
+    for number, mesh in enumerate(BODY[:2]):
+        write_mesh(textured(mesh), tmp_path / f"frame_{number}.obj")
+    whole = (tmp_path / "frame_1.png").read_bytes()
+    (tmp_path / "frame_1.png").write_bytes(whole[: len(whole) // 2])
+    options = replace(quick(), appearance=appearance_options(50.0, "auto"))
+    with pytest.raises(InputError, match=r"frame_1.png: cannot be read .*write it again, or give --color none"):
+        Encoder(open_sequence(tmp_path)).encode(tmp_path / "a.reel", replace(options, scene=None))
+    assert not (tmp_path / "a.reel").exists()
+
+
 def test_every_way_to_a_frame_gives_the_same_colors(files: dict[str, bytes]) -> None:
     in_order = [mesh.colors for mesh in meshreel.open(files["vertices"])]
     for order in ([5, 2, 4, 0], [FRAMES - 1], [3, 3, 1]):

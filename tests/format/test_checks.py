@@ -166,3 +166,60 @@ def test_any_index_passes_or_is_refused_and_what_passes_leads_somewhere(index):
 def test_metadata_that_is_no_json_object_is_refused(text):
     with pytest.raises(FormatError, match=r"Header\.metadata"):
         parse_metadata(text)
+
+
+LAYERED = replace(GROUP, form=Form.LAYERS)
+COLORS = replace(GROUP, kind=ChunkKind.COLORS, form=Form.VERTEX_COLORS, depends_on=(0,))
+ATLAS = replace(COLORS, kind=ChunkKind.ATLAS, form=Form.PLACES)
+PICTURES = replace(COLORS, kind=ChunkKind.PICTURES, form=Form.VIDEO, depends_on=(0, 2))
+COMPATIBLE = replace(PICTURES, kind=ChunkKind.COMPATIBLE)
+FIRST = (LAYERED, COLORS, ATLAS, PICTURES, COMPATIBLE)
+NEXT = (*FIRST, replace(LAYERED, depends_on=(0,)))  # chunk 5
+
+
+def after(companion: IndexEntry, *depends_on: int) -> IndexEntry:
+    return replace(companion, depends_on=depends_on)
+
+
+def test_groups_and_backgrounds_have_companions():
+    others = after(COLORS, 5, 1), after(PICTURES, 5, 2, 3), after(COMPATIBLE, 5, 2, 4)
+    for order in (others, others[::-1], others[:1], (after(COLORS, 5),)):
+        check_index(Index((*NEXT, *order)))
+    still = [replace(one, frames=0) for one in FIRST[1:]]
+    check_index(Index((STATIC, *still, PATCH, replace(still[0], depends_on=(5,)), GROUP)))
+    check_index(Index((*FIRST, replace(COLORS, kind=77, form=99, frames=3, depends_on=(9,)))))  # of a later version
+
+
+@pytest.mark.parametrize(
+    "chunks",
+    [
+        (COLORS, LAYERED),
+        (LAYERED, COLORS, COLORS),
+        (*FIRST, after(PICTURES, 0, 2)),
+        (LAYERED, after(COLORS, 1)),
+        (LAYERED, COLORS, after(COLORS, 1)),
+        (LAYERED, after(COLORS)),
+        (LAYERED, after(COLORS, 1 << 60)),
+        (LAYERED, replace(COLORS, frames=4)),
+        (LAYERED, replace(COLORS, frames=0)),
+        (LAYERED, replace(COLORS, track=1)),
+        (LAYERED, replace(COLORS, form=Form.VIDEO)),
+        (LAYERED, replace(ATLAS, form=Form.VERTEX_COLORS)),
+        (LAYERED, COLORS, replace(PICTURES, depends_on=(0,))),
+        (LAYERED, COLORS, after(PICTURES, 0, 1)),
+        (LAYERED, COLORS, LAYERED, after(COLORS, 2, 1)),  # of a group that is not predicted
+        (GROUP, COLORS, ATLAS),  # of a form without a base mesh
+        (*NEXT, after(ATLAS, 5)),
+        (*NEXT, after(COLORS, 5, 3)),
+        (*NEXT, after(PICTURES, 5, 2)),
+        (*NEXT, after(PICTURES, 5, 2, 4)),  # of the other coding
+        (*NEXT, after(PICTURES, 5, 3, 2)),
+        (*NEXT, after(PICTURES, 5, 2, 3, 4)),
+        (*NEXT[:3], replace(NEXT[5]), after(PICTURES, 3, 2)),  # where the group before has none
+        (STATIC, PATCH, replace(ATLAS, frames=0, depends_on=(1,)), GROUP),
+        (STATIC, ATLAS, GROUP),
+    ],
+)
+def test_companions_of_other_chunks_or_in_another_order_are_refused(chunks):
+    with pytest.raises(FormatError, match=r"chunk \d: "):
+        check_index(Index(chunks))

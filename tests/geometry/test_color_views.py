@@ -80,3 +80,10 @@ def test_unseen_vertices_have_the_means_of_their_neighbours() -> None:
 @pytest.mark.parametrize("at, wanted", [((0.5, 0.5), (0, 0)), ((2.0, 1.5), (1.5, 1)), ((79.9, 0), (79, 0))])
 def test_pixels_are_blended_between_their_middles(at: tuple[float, float], wanted: tuple[float, float]) -> None:
     np.testing.assert_allclose(sampled(PIXELS, np.array([at]))[0, :2], wanted, atol=0.01)
+
+
+def test_a_picture_that_is_too_bright_is_divided_by_its_gains() -> None:
+    bright = ColorPicture(AHEAD, PIXELS, gains=(2.0, 0.5, 1.0))
+    colors, seen = ColorViews([bright], WALL).at(np.array([[0.0, 0, 2]]), NORMALS[:1])
+    assert seen.all()
+    np.testing.assert_allclose(colors, [[39.5 / 2, 39.5 * 2, 0]])

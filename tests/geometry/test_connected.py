@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshreel.geometry.connected import connected_faces, without_fragments
+from meshreel.geometry.topology import connected_faces, without_fragments
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, sphere
 

@@ -17,6 +17,7 @@ from meshreel.errors import InputError
 from meshreel.geometry.painted import Painted
 from meshreel.geometry.topology import clean, concatenate, part_of, weld
 from meshreel.io.color import from_linear, to_linear
+from meshreel.io.glb_file import cut_at_seams
 from meshreel.io.meshes import read_mesh
 from meshreel.io.pictures import pack_picture, read_picture
 from meshreel.io.sequence import open_sequence
@@ -227,6 +228,29 @@ def test_the_texture_of_a_glb_may_be_text_but_not_another_file(tmp_path: Path, u
         np.testing.assert_array_equal(loaded.mesh.texture.pixels, PICTURE)
     else:
         assert loaded.mesh.texture is None and loaded.dropped == {"a texture (it is in another file)"}
+
+
+def test_a_damaged_picture_in_a_glb_is_told_when_it_is_asked_for(tmp_path: Path) -> None:
+    write_mesh(patched(), tmp_path / "m.glb")
+    data = bytearray((tmp_path / "m.glb").read_bytes())
+    begin = data.index(b"IHDR")
+    for damage, message in ((b"NOPE", "cannot be read"), (b"IHDR\0\1\0\0\0\1\0\0", "more than 8192 x 8192")):
+        data[begin : begin + len(damage)] = damage
+        (tmp_path / "m.glb").write_bytes(data)
+        mesh = read_mesh(tmp_path / "m.glb").mesh
+        with pytest.raises(InputError, match=f"the texture of a GLB: .*({message}|is no picture)"):
+            _ = mesh.texture.pixels
+
+
+def test_a_vertex_is_repeated_for_each_of_its_places_and_no_more() -> None:
+    mesh = patched()
+    origins, corners, places = cut_at_seams(mesh.faces, mesh.uv)
+    np.testing.assert_array_equal(origins[corners], mesh.faces)
+    np.testing.assert_array_equal(places[corners], mesh.uv)
+    known = {(int(v), *uv.view(np.uint32)) for v, uv in zip(origins, places, strict=True)}
+    assert len(known) == len(origins) < mesh.faces.size
+    whole = cut_at_seams(BALL.faces.astype(np.int32), np.zeros((len(BALL.faces), 3, 2), np.float32))
+    np.testing.assert_array_equal(whole[1], BALL.faces)  # no seam: the vertices that there were, in their order
 
 
 def test_places_that_are_no_numbers_are_none(tmp_path: Path) -> None:

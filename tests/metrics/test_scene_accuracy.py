@@ -10,7 +10,15 @@ import pytest
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
 from meshreel.metrics.distance import PSNR_CEILING
-from meshreel.metrics.scene_accuracy import Scene, Sight, SightOptions, scene_means, scene_row, visible
+from meshreel.metrics.scene_accuracy import (
+    Scene,
+    Sight,
+    SightOptions,
+    compare_with_truth,
+    scene_means,
+    scene_row,
+    visible,
+)
 from meshreel.types import Mesh
 from tests.metrics.shapes import moved, noisy, plane, sphere
 
@@ -145,3 +153,9 @@ def test_impossible_options_and_labels_are_refused():
             SightOptions(**wrong)
     with pytest.raises(InputError, match="grazing"):
         SightOptions(grazing=91.0)
+
+
+def test_a_clean_frame_without_faces_cannot_label_others():
+    nothing = Scene(Mesh.empty(), np.zeros(0, bool), [sight()], complete=True)
+    with pytest.raises(InputError, match="frame 3 of the truth has no faces"):
+        compare_with_truth([], [], lambda _: nothing, [3])

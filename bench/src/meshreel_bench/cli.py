@@ -112,9 +112,8 @@ def run(
 ) -> None:
     """Run an experiment and print what it promised and reached.
 
-    Every row is appended to the output as soon as it is there, and rows that are there are not run again. Sequences
-    that take long to make are kept in a folder beside it, whose name ends in `.cache`. How files are read (`--fps`,
-    `--frames`, `--scale`) is about sequences of your own.
+    Rows that the output has are not run again. Sequences that take long to make are kept in a folder beside it, whose
+    name ends in `.cache`. How files are read (`--fps`, `--frames`, `--scale`) is about sequences of your own.
 
     Parameters
     ----------
@@ -158,8 +157,8 @@ def report(
 ) -> None:
     """Write pages, plots and tables from rows, and from nothing else.
 
-    `results.md` is the first page; `results/` beside it has an appendix and a plot for each experiment. Rows on the
-    paper's sequences also make `reproducing.md`: its numbers beside ours. Same rows, same bytes.
+    `results.md` is the first page; `results/` beside it has an appendix and a plot for each experiment; rows on the
+    paper's sequences also make `reproducing.md`. Same rows, same bytes.
 
     Parameters
     ----------

@@ -35,10 +35,7 @@ class Codec(Protocol):
 
 @runtime_checkable
 class TwoStepCodec(Codec, Protocol):
-    """A codec whose encoder first analyses what does not depend on the rate: a sweep does that once for its points.
-
-    `encode` is `code` of the result of `analyse`.
-    """
+    """A codec whose encoder first analyses what does not depend on the rate: a sweep does that once for its points."""
 
     @property
     def analysis_key(self) -> str:

@@ -1,12 +1,9 @@
-"""Names of curves, as rows have them and as papers write them.
-
-In -> out: the name of a curve -> its title. A curve is named by its codec; where a basis is fixed, other options that
-are not `USUAL` follow (`report.values.curve_of`).
-"""
+"""Names of curves as rows have them (`report.values.curve_of`), and as papers write them."""
 
 from __future__ import annotations
 
 BEST = "meshreel best"
+TEXTURED, PAINTED = f"{BEST}, texture", f"{BEST}, vertices"  # in colour
 TSMC = "meshreel paper m, quality 50"  # as the paper has it: the number of basis vectors is varied
 TUNED = "meshreel paper"  # the same system, the quality varied and the basis chosen by it: spares what m alone cannot
 TVMC, DRACO, KLT, NECGS = "tvmc", "draco", "klt_tsdf", "necgs"

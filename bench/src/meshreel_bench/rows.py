@@ -13,7 +13,7 @@ from meshreel.errors import InputError
 
 Option = str | int | float | bool | None
 Options = dict[str, Option]
-Metrics = Literal["distances", "views", "parallel views", "regions"]
+Metrics = Literal["distances", "views", "parallel views", "regions", "colors"]
 
 
 class Point(msgspec.Struct, frozen=True):
@@ -24,8 +24,8 @@ class Point(msgspec.Struct, frozen=True):
     options: Options = {}
     frames: int | None = None  # the first frames of the sequence; None: all
     sampled: bool = False  # the codec is given some frames of a scene only: it is slow, or codes every frame alone
-    # distances alone; also pictures, from where the cameras stood or from four sides (perspective, or parallel); or
-    # people and background of a simulated scene, each against the truth and against the input
+    # distances alone; also pictures, from where the cameras stood or from four sides (perspective, or parallel); people
+    # and background of a simulated scene against truth and input; or colours of parallel views and cameras' pictures
     metrics: Metrics = "views"
 
     @property
@@ -55,6 +55,22 @@ class Group(msgspec.Struct, frozen=True, omit_defaults=True):
     key: int | None = None  # frame that the others are predicted from, where the file names it
 
 
+class ColorBytes(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Bytes of a stream's colours; of its geometry, what a chain of groups begins with."""
+
+    vertices: int = 0  # colours of moving bodies' vertices
+    atlas: int = 0  # places in textures
+    pictures: list[int] = []  # of each texture
+    background: int = 0  # all colours of what stands still
+    base: int = 0  # base meshes of groups that need no other: no colours
+    chains: int = 1
+
+    @property
+    def all(self) -> int:
+        """All bytes of colours."""
+        return self.vertices + self.atlas + self.background + sum(self.pictures)
+
+
 class Stream(msgspec.Struct, frozen=True, omit_defaults=True):
     """Encoded sequence."""
 
@@ -62,6 +78,7 @@ class Stream(msgspec.Struct, frozen=True, omit_defaults=True):
     coded_frames: int
     background_bytes: int = 0  # share of `bytes` that is sent once
     groups: list[Group] = []
+    colors: ColorBytes | None = None
 
 
 class Encoding(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -111,10 +128,7 @@ class Row(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Return the rows of a file; of several rows of a point the last that was measured counts.
-
-    A last line that was not written to its end is left out. Raises InputError where a line is no row.
-    """
+    """Return the rows of a file, each point's last; a last line cut short is left out. InputError for no row."""
     try:
         lines = path.read_bytes().split(b"\n")
     except OSError as error:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from jaxtyping import TypeCheckError
 from meshreel_bench.codecs import make_codec
-from meshreel_bench.codecs.klt_tsdf import KltTsdfCodec, codec, train
-from meshreel_bench.codecs.klt_tsdf.basis import MOST, ONE, basis_of, decode_basis, encode_basis, learned, pack_learned
+from meshreel_bench.codecs.klt_tsdf import KltTsdfCodec, codec
+from meshreel_bench.codecs.klt_tsdf.basis import MOST, ONE, basis_of, decode_basis, encode_basis, learned
 from meshreel_bench.codecs.klt_tsdf.blocks import (
     decode_bits,
     decode_places,
@@ -17,8 +17,7 @@ from meshreel_bench.codecs.klt_tsdf.blocks import (
     encode_places,
 )
 from meshreel_bench.codecs.klt_tsdf.grid import VOLUME, prepared, sample, voxel_index
-from meshreel_bench.codecs.klt_tsdf.surface import Field, crossed, field_of, polygonize
-from meshreel_bench.codecs.klt_tsdf.weights import Model, forward
+from meshreel_bench.codecs.klt_tsdf.surface import Field, crossed, polygonize
 
 from meshreel.capture.procedural import SoftBodiesOptions, deforming_sphere, sliding_sphere, soft_bodies
 from meshreel.errors import FormatError, InputError
@@ -189,18 +188,6 @@ def test_the_basis_is_orthonormal_to_its_rounding_and_survives_coding():
     again = decode_basis(encode_basis(symbols), MOST)
     assert np.array_equal(basis_of(again).vectors, basis.vectors)
     assert (basis.vectors == np.rint(basis.vectors)).all()
-
-
-def test_training_finds_a_basis_for_what_it_has_seen():
-    generator = np.random.default_rng(1)
-    ball = prepared(Mesh(10.3 * sliding_sphere(1, levels=4)[0].vertices + 0.4, sliding_sphere(1, levels=4)[0].faces))
-    some = train._some(sample(ball), generator)
-    symbols, energies = train._symbols(*train._moments(some.values, train.trust(some)))
-    assert energies[0] > 100 * energies[20]
-    assert len(pack_learned(symbols, energies)) < 3000
-    field = field_of(some.places, forward(some, Model(basis_of(symbols), 100), energies), Model(basis_of(symbols), 100))
-    off = np.abs(field.values[field.index] / (ONE * 4096) - some.values)[some.near]
-    assert np.sqrt((off**2).mean()) < 0.1
 
 
 def test_crossed_cells_are_those_that_have_faces(body):

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from meshreel_bench.datasets import BODIES, DEMO, SYNTHETIC, Store, checksums, forth_and_back
+from meshreel_bench.datasets.remesh import SideBySide
 from meshreel_bench.datasets.scenes import PROCEDURAL
-from meshreel_bench.datasets.side_by_side import SideBySide
 
 from meshreel.capture.procedural import sliding_sphere
 from meshreel.errors import InputError
@@ -69,14 +69,6 @@ def test_a_file_more_or_one_by_another_name_is_other_data(planted):
     second = checksums.checksum(folder)
     (folder / "b.obj").rename(folder / "c.obj")
     assert len({first, second, checksums.checksum(folder)}) == 3
-
-
-def test_color_pictures_of_a_recording_leave_its_checksum_as_it_is(planted):
-    folder = planted / "performers" / "walker"
-    before = checksums.checksum(folder)
-    (folder / "color").mkdir()
-    (folder / "color" / "00000.png").write_text("")
-    assert checksums.checksum(folder) == before
 
 
 def test_a_table_of_checksums_is_rewritten_from_the_data(planted):

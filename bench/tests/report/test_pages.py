@@ -22,7 +22,7 @@ ROWS = [row("ball", codec, rate, 55 + 5 * rate) for codec in (BEST, "zipmesh") f
 
 @pytest.fixture
 def no_plots(monkeypatch):
-    monkeypatch.setattr(pages, "plot_curves", lambda *about: about[-1])
+    monkeypatch.setattr(pages, "plot_curves", lambda *about: about[3])  # the path
 
 
 def test_rows_of_anybodys_codec_are_in_the_appendix_of_figure_6(tmp_path):
@@ -41,7 +41,7 @@ def test_rows_of_anybodys_codec_are_in_the_appendix_of_figure_6(tmp_path):
 
 def test_a_plot_has_a_panel_for_each_measure_and_a_line_for_each_curve_and_the_floor():
     rows = [*ROWS, floor("ball", d2_psnr_paper=62.0)]
-    figure = curves_figure(rows, (D2, MASKED), looks_of([BEST, "zipmesh"]))
+    figure = curves_figure(rows, (D2, MASKED), looks_of([BEST, "zipmesh"]), "mbps")
     first, second = figure.axes
     assert [line.get_label() for line in first.lines] == [BEST, "zipmesh", "the truth itself"]
     assert len(second.lines) == 2 and first.get_title(loc="left") == "ball, 10 frames"

@@ -7,7 +7,7 @@ import pytest
 from meshreel_bench.experiments.study import D2, NORMALS
 from meshreel_bench.names import TSMC, TVMC, title
 from meshreel_bench.report.values import REST_S, curve, curve_of, floors, hull_of, rated, value
-from meshreel_bench.rows import Decoding, Encoding, Group, Stream
+from meshreel_bench.rows import ColorBytes, Decoding, Encoding, Group, Stream
 
 from bench.tests.made_up import failed, floor, row
 
@@ -86,3 +86,18 @@ def test_points_with_a_fixed_basis_are_a_curve_by_what_else_is_chosen():
 def test_rows_without_a_rate_are_on_no_curve_and_the_floor_is_that_of_the_truth():
     rows = [ROW, failed("ball", "best", "slow"), floor("ball", d2_psnr_paper=59.0, ssim=None)]
     assert rated(rows, "ball") == [ROW] and floors(rows) == {"d2_psnr_paper": 59.0}
+
+
+def test_a_rate_of_a_key_counts_once_what_a_chain_begins_with():
+    colors = ColorBytes(vertices=2400, atlas=600, pictures=[9000, 100, 300], base=2000)
+    found = row("person", "codec", 1.0, 40.0, frames=3, stream=Stream(21_400, 3, colors=colors))
+    geometry = 21_400 - 12_400 - 2000
+    wanted = 2400 + 600 + 9000 + 119 * 200 + 2000 + geometry * 120 / 3
+    assert value(found, "mbps.120") == pytest.approx(wanted * 8 * 30 / 120 / 1e6)
+    assert value(found, "texture_mbps.32") == pytest.approx((9600 + 31 * 200) * 8 * 30 / 32 / 1e6)
+    assert value(found, "vertices_mbps.120") == pytest.approx(2400 * 2 / 1e6)
+    assert value(found, "color_share") == pytest.approx(12_400 / 21_400)
+    several = row("room", "codec", 1.0, 40.0, stream=Stream(1000, 10, colors=ColorBytes(background=500, chains=2)))
+    assert value(several, "mbps.120") == several.mbps and value(several, "texture_mbps.120") is None
+    assert value(several, "background_color_mbps") == pytest.approx(0.5 * several.mbps)
+    assert value(row("person", "codec", 1.0, 40.0), "color_mbps") is None

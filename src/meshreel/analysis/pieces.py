@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from ..format.checks import MOST_TRACKS
-from ..geometry.topology import components, face_normals
+from ..geometry.topology import components, face_normals, linked
 from ..types import Mesh
 
 LEAST = 0.05  # of the area of the frame's largest piece: smaller ones are bits (guess)
@@ -104,8 +104,7 @@ def bodies_of(frames: Sequence[tuple[Piece, ...]]) -> list[Int64[np.ndarray, " P
         here, there = starts[number], starts[number + 1]
         links += [(here + k, there + int(best)) for k, best in enumerate(apart.argmin(axis=1))]
         links += [(here + int(best), there + k) for k, best in enumerate(apart.argmin(axis=0))]
-    ends = np.array(links, np.int32).reshape(-1, 2)
-    label = components(ends[:, [0, 1, 1]], int(starts[-1]))
+    label = linked(np.array(links, np.int64).reshape(-1, 2), int(starts[-1]))
     if not 1 < label.max() + 1 <= MOST_TRACKS:
         return None
     return np.split(label, starts[1:-1])

@@ -5,10 +5,9 @@ In -> out: MeshSequence -> Survey. Errors in any frame surface here, before minu
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64
@@ -21,6 +20,7 @@ from .pieces import Piece, pieces_of
 
 UNLIKE = 30.0  # times the median size: a larger frame of a room must be in another unit; a guess
 LARGEST_RATIO = 10.0  # largest ratio of the diagonals of two frames in one interval: a guess
+Report = Callable[[str, int], object]  # takes a stage, and how many frames more have passed it
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,23 +82,16 @@ class Survey:
                 least = most = diagonal
 
 
-@runtime_checkable
-class Counter(Protocol):
-    """Counter of the frames that have passed each stage."""
-
-    def add(self, stage: str, count: int) -> None: ...
-
-
-def survey(sequence: MeshSequence, stages: Counter | None = None, cleaned: bool = True) -> Survey:
+def survey(sequence: MeshSequence, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
     """Survey a sequence with one frame in memory at a time. Raises InputError if it is empty or a frame is invalid.
 
     Unless `cleaned`, faces without area count like any others, and pieces are not looked for: scenes have too many
     faces to search for them.
     """
-    return joined([survey_of(sequence, range(len(sequence)), stages, cleaned)])
+    return joined([survey_of(sequence, range(len(sequence)), report, cleaned)])
 
 
-def survey_of(sequence: MeshSequence, numbers: range, stages: Counter | None = None, cleaned: bool = True) -> Survey:
+def survey_of(sequence: MeshSequence, numbers: range, report: Report = lambda *_: None, cleaned: bool = True) -> Survey:
     """Survey some frames of a sequence as `survey` does; `joined` makes one of the surveys of all its parts."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     diagonals, flattened, dropped, pieces = list[float](), list[int](), 0, list[tuple[Piece, ...]]()
@@ -113,8 +106,7 @@ def survey_of(sequence: MeshSequence, numbers: range, stages: Counter | None = N
         if not mesh.is_empty:
             lower, upper = mesh.box
             low, high = np.minimum(low, lower), np.maximum(high, upper)
-        if stages is not None:
-            stages.add("survey", 1)
+        report("survey", 1)
     return Survey(low, high, tuple(diagonals), tuple(flattened), dropped=dropped, pieces=tuple(pieces))
 
 

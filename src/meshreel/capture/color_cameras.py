@@ -7,7 +7,7 @@ pictures that are aligned with its depth, or an object that says what is differe
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,6 +69,15 @@ def pictures_in(folder: Path, name: str) -> dict[int, Path]:
     if not found:
         raise InputError(f"{folder}: camera {name} has no color pictures; record some, or leave `color` out")
     return found
+
+
+def check_frames(folder: Path, cameras: Sequence[ColorCamera], frames: Sequence[int]) -> None:
+    """Raise InputError where a camera has pictures of other frames than these, which depth cameras have."""
+    for camera in cameras:
+        if odd := set(camera.files) ^ set(frames):
+            counts = f"{len(camera.files)} color pictures for {len(frames)} frames of depth"
+            text = f"{folder}: camera {camera.name} has {counts}; only one of both has frame {min(odd)}"
+            raise InputError(f"{text}: give every frame a picture of its number, and no others")
 
 
 def distortion_of(entry: Mapping[str, Any]) -> tuple[float, ...]:

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import overload
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -69,7 +68,6 @@ class RoomOptions:
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
-        """Raise InputError for options that cannot be met."""
         if self.frames < 1:
             raise InputError(f"frames {self.frames} is below 1; ask for at least one")
         if not 0.008 <= self.spacing <= 0.1:
@@ -79,7 +77,7 @@ class RoomOptions:
 
 
 @dataclass(frozen=True, slots=True)
-class Room(Sequence[SceneFrame]):
+class Room:
     """Clean frames of `furnished_room`."""
 
     options: RoomOptions
@@ -88,13 +86,10 @@ class Room(Sequence[SceneFrame]):
     def __len__(self) -> int:
         return self.options.frames
 
-    @overload
-    def __getitem__(self, index: int) -> SceneFrame: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[SceneFrame]: ...
-    def __getitem__(self, index: int | slice) -> SceneFrame | list[SceneFrame]:
-        if isinstance(index, slice):
-            return [self[k] for k in range(*index.indices(len(self)))]
+    def __iter__(self) -> Iterator[SceneFrame]:
+        return (self[number] for number in range(len(self)))
+
+    def __getitem__(self, index: int) -> SceneFrame:
         number = range(len(self))[operator.index(index)]
         people = self.people(number)
         parts = np.repeat(np.arange(1 + len(people)), [len(mesh.faces) for mesh in (self.still, *people)])
@@ -153,7 +148,8 @@ def record_room(
 
 def room_cameras(width: int = 320, count: int = 4) -> tuple[DepthCamera, ...]:
     """Return depth cameras in the corners that look down at the middle; pictures of `width` x 0.9 `width` pixels."""
-    return tuple(_resized(camera, width) for camera in corner_cameras(np.array(_LOW), np.array(_HIGH), count))
+    cameras = corner_cameras(np.array(_LOW), np.array(_HIGH), count)
+    return tuple(camera.resized(width, round(width * camera.height / camera.width)) for camera in cameras)
 
 
 def _walker(seconds: float) -> Pose:
@@ -173,15 +169,6 @@ def _child(seconds: float) -> Pose:
     out = np.array([math.cos(heading), 0.0, -math.sin(heading)])  # to its left
     wrists = tuple(place + side * (0.2 + sway) * out + [0.0, 1.2, 0.0] for side in (1.0, -1.0))
     return Pose(place, heading, wrists=(wrists[0], wrists[1]), reach=(1.0, 1.0), size=0.68, girth=1.05)
-
-
-def _resized(camera: DepthCamera, width: int) -> DepthCamera:
-    """Return the camera with pictures of another width; the middle of pixel i is at i."""
-    height = round(width * camera.height / camera.width)
-    ratios = (width / camera.width, height / camera.height)
-    focal = (camera.focal[0] * ratios[0], camera.focal[1] * ratios[1])
-    center = ((camera.center[0] + 0.5) * ratios[0] - 0.5, (camera.center[1] + 0.5) * ratios[1] - 0.5)
-    return replace(camera, width=width, height=height, focal=focal, center=center)
 
 
 def _box(box: Box) -> Mesh:

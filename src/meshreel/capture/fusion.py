@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import UInt16
 
 from ..errors import InputError
-from ..geometry.connected import without_fragments
+from ..geometry.topology import without_fragments
 from ..geometry.tsdf import SEEN, TRUNCATION, extract, integrate
 from ..types import Mesh
 from .rig import DepthCamera

@@ -35,7 +35,6 @@ class SoftBodiesOptions:
     seed: int = 0  # of the grids
 
     def __post_init__(self) -> None:
-        """Raise InputError for options that cannot be met."""
         if self.frames < 1:
             raise InputError(f"frames {self.frames} is below 1; ask for at least one")
         if not 1 <= self.people <= 3:
@@ -57,7 +56,6 @@ class SoftBodies(MeshSequence):
 
     @property
     def frame_rate(self) -> float:
-        """Frames per second, 1/s."""
         return self.options.frame_rate
 
     def __len__(self) -> int:

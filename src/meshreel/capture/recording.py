@@ -6,6 +6,7 @@ of a camera that stands still measure mostly the same depths in all frames.
 
 from __future__ import annotations
 
+import pickle
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -49,7 +50,6 @@ class Recording(MeshSequence):
 
     @property
     def frame_rate(self) -> float:
-        """Frames per second, 1/s."""
         return self.rig.frame_rate
 
     def __len__(self) -> int:
@@ -122,23 +122,17 @@ class Kept:
 
     def __init__(self) -> None:
         self._file: Any = None  # io.FileIO
-        # Offset in the file, numbers of vertices and of faces, and whether there are colours.
-        self._places: dict[int, tuple[int, int, int, bool]] = {}
+        self._places: dict[int, tuple[int, int]] = {}  # offset in the file, and size, bytes
         self._full = False
 
     def get(self, number: int) -> Mesh | None:
         """Return a kept mesh, or None."""
         if self._file is None or number not in self._places:
             return None
-        offset, vertices, faces, colored = self._places[number]
-        data = bytearray(24 * vertices + 12 * faces + 3 * vertices * colored)
+        offset, size = self._places[number]
         self._file.seek(offset)
-        if self._file.readinto(data) != len(data):
-            return None
-        points = np.frombuffer(data, np.float64, 3 * vertices)
-        corners = np.frombuffer(data, np.int32, 3 * faces, 24 * vertices)
-        colors = np.frombuffer(data, np.uint8, offset=24 * vertices + 12 * faces).reshape(-1, 3) if colored else None
-        return Mesh(points.reshape(-1, 3), corners.reshape(-1, 3), colors)
+        data = self._file.read(size)
+        return pickle.loads(data) if len(data) == size else None
 
     def put(self, number: int, mesh: Mesh) -> None:
         """Keep a mesh, unless the disk has no room; then none is kept from now on."""
@@ -147,13 +141,12 @@ class Kept:
         try:
             if self._file is None:  # without a buffer: one that could not be written would fail again when it is read
                 self._file = tempfile.TemporaryFile(prefix="meshreel-", buffering=0)  # noqa: SIM115
-            offset, data = self._file.seek(0, 2), mesh.vertices.tobytes() + mesh.faces.tobytes()
-            data += b"" if mesh.colors is None else mesh.colors.tobytes()
+            offset, data = self._file.seek(0, 2), pickle.dumps(mesh)
             self._full = self._file.write(data) != len(data)
         except OSError:  # frames that are read again are then fused again
             self._full = True
         if not self._full:
-            self._places[number] = (offset, len(mesh.vertices), len(mesh.faces), mesh.colors is not None)
+            self._places[number] = (offset, len(data))
 
 
 def open_recording(

@@ -10,7 +10,7 @@ import difflib
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,9 @@ from ..geometry.depth import DepthPicture
 from ..io.depth_pictures import read_depth
 from ..io.file_names import last_number
 from ..io.read import read_file
-from ..io.write import make_folder, replacing
+from ..io.write import replacing
 from ..types import UP_AXES, UPS, Up
-from .color_cameras import ColorCamera, distortion_of, pictures_in
+from .color_cameras import ColorCamera, check_frames, distortion_of, pictures_in
 
 RIG, SINGLE = "rig.json", "camera.json"
 MOST_PIXELS = 16_384  # of a picture's side (guess)
@@ -89,6 +89,13 @@ class DepthCamera:
         """The camera as a PinholeCamera, in which the middle of pixel i is at i + 1/2."""
         shifted = self.intrinsic + np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
         return PinholeCamera(self.width, self.height, shifted, self.extrinsic)
+
+    def resized(self, width: int, height: int) -> DepthCamera:
+        """Return the camera with pictures of another size; the middle of pixel i is at i."""
+        ratios = (width / self.width, height / self.height)
+        focal = (self.focal[0] * ratios[0], self.focal[1] * ratios[1])
+        center = ((self.center[0] + 0.5) * ratios[0] - 0.5, (self.center[1] + 0.5) * ratios[1] - 0.5)
+        return replace(self, width=width, height=height, focal=focal, center=center)
 
     def in_range(self, depth: UInt16[np.ndarray, "H W"]) -> UInt16[np.ndarray, "H W"]:
         """Return depths with those outside the camera's range set to 0, no measurement."""
@@ -165,7 +172,9 @@ def read_rig(folder: Path) -> Rig:
     beside = zip(entries, cameras, strict=True)
     colors = [_color_camera(folder, e["color"], c.record() | {"name": c.name}) for e, c in beside if "color" in e]
     colors += [_color_camera(folder, entry, {"name": f"color{number}"}) for number, entry in enumerate(alone)]
-    return Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
+    rig = Rig(folder, cameras, files, rate, tuple(_unknown(folder, entries)), tuple(colors))
+    check_frames(folder, colors, rig.frames)
+    return rig
 
 
 def read_cameras(folder: Path) -> tuple[tuple[DepthCamera, ...], float]:
@@ -201,14 +210,6 @@ def _described(folder: Path) -> tuple[list[Any], tuple[DepthCamera, ...], float,
     if not isinstance(alone, list):
         raise InputError(f"{path}: color_cameras is {alone!r:.40} and not a list; {_SEE}")
     return entries, cameras, float(rate), alone
-
-
-def make_folders(folder: Path, cameras: tuple[DepthCamera, ...]) -> list[Path]:
-    """Make a folder for each camera's depth pictures, where `rig.json` will name it."""
-    folders = [folder / camera.name / "depth" for camera in cameras]
-    for place in folders:
-        make_folder(place)
-    return folders
 
 
 def write_rig(

@@ -55,11 +55,7 @@ class SimulatedColor:
     @staticmethod
     def beside(depth: DepthCamera, sensor: ColorSensorOptions, random: np.random.Generator) -> SimulatedColor:
         """Return a camera in the place of a depth camera, with errors of its own."""
-        width, height = round(depth.width * sensor.scale), round(depth.height * sensor.scale)
-        ratios = (width / depth.width, height / depth.height)
-        focal = (depth.focal[0] * ratios[0], depth.focal[1] * ratios[1])
-        center = ((depth.center[0] + 0.5) * ratios[0] - 0.5, (depth.center[1] + 0.5) * ratios[1] - 0.5)
-        camera = replace(depth, width=width, height=height, focal=focal, center=center)
+        camera = depth.resized(round(depth.width * sensor.scale), round(depth.height * sensor.scale))
         gains = np.exp(sensor.gain * random.standard_normal() + sensor.balance * random.standard_normal(3))
         return SimulatedColor(camera, gains, sensor)
 
@@ -87,12 +83,16 @@ class SimulatedColor:
         ahead = np.linalg.solve(camera.intrinsic, np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])).T
         turn, eye = self.camera.camera_to_world[:3, :3], self.camera.camera_to_world[:3, 3]
         points = products(ahead * depth[:, None], turn.T) + eye
-        light = np.array(LIGHT) / np.linalg.norm(LIGHT)
-        c, s = math.cos(TURNS * frame), math.sin(TURNS * frame)
-        light = np.array([c * light[0] + s * light[2], light[1], c * light[2] - s * light[0]])
-        shade = AMBIENT + (1 - AMBIENT) * np.abs(face_normals(mesh)[0][faces] @ light)
         image = np.zeros((*seen.faces.shape, 3))
-        image[rows, columns] = paint(points, faces) * shade[:, None] * self.gains
+        image[rows, columns] = paint(points, faces) * shade_of(mesh, faces, frame)[:, None] * self.gains
         image = np.stack([gaussian_filter(image[..., k], self.sensor.blur) for k in range(3)], axis=2)
         image += self.sensor.noise * random.standard_normal(image.shape)
         return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+
+def shade_of(mesh: Mesh, faces: Int64[np.ndarray, " N"], frame: int) -> Float64[np.ndarray, " N"]:
+    """Return the share of light that faces have in a frame; part of it turns about the second axis."""
+    x, y, z = np.array(LIGHT) / np.linalg.norm(LIGHT)
+    c, s = math.cos(TURNS * frame), math.sin(TURNS * frame)
+    light = np.array([c * x + s * z, y, c * z - s * x])
+    return AMBIENT + (1 - AMBIENT) * np.abs(face_normals(mesh)[0][faces] @ light)

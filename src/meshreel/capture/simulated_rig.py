@@ -21,7 +21,7 @@ from ..geometry.topology import concatenate, face_normals
 from ..io.depth_pictures import write_depth
 from ..io.write import make_folder, replacing, write_mesh, write_picture
 from ..types import Mesh
-from .rig import RIG, DepthCamera, make_folders, write_rig
+from .rig import RIG, DepthCamera, write_rig
 from .simulated_color import ColorSensorOptions, Painter, SimulatedColor
 
 TRUTH = "truth"  # folder of the clean meshes
@@ -115,8 +115,9 @@ def simulate_rig(
 
     `rig.json` is written last: a folder without it is incomplete. `progress` gets the number of finished frames.
     """
-    places = make_folders(folder, cameras)
-    make_folder(folder / TRUTH)
+    places = [folder / camera.name / "depth" for camera in cameras]  # where `rig.json` will name them
+    for place in (*places, folder / TRUTH):
+        make_folder(place)
     labels, count = {}, 0
     eyes = _color_cameras(cameras, sensor, color)
     for camera in cameras[: len(eyes)]:
@@ -128,7 +129,8 @@ def simulate_rig(
             write_depth(_measured(scene, camera, sensor, random), place / f"depth_{number:05}.png")
             if which < len(eyes) and frame.paint is not None:
                 picture = eyes[which].picture(frame.mesh, frame.paint, number, random)
-                write_picture(picture, folder / camera.name / "color" / f"color_{number:05}.png")
+                path = folder / camera.name / "color" / f"color_{number:05}.png"
+                write_picture(picture, path)
         write_mesh(frame.mesh, folder / TRUTH / f"frame_{number:05}.ply")
         labels[f"frame_{number:05}"] = np.packbits(frame.dynamic)
         count = number + 1

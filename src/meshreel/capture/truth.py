@@ -8,7 +8,8 @@ from __future__ import annotations
 import operator
 import zipfile
 import zlib
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -31,6 +32,10 @@ class Truth:
     packed: tuple[np.ndarray, ...]  # a bit per face, set if it moves; untrusted, checked frame by frame
     cameras: tuple[DepthCamera, ...]  # with their true poses
     frame_rate: float  # 1/s
+
+    def only(self, numbers: Sequence[int]) -> Truth:
+        """Return the truth of some of its frames, which are numbered anew."""
+        return replace(self, paths=tuple(self.paths[k] for k in numbers), packed=tuple(self.packed[k] for k in numbers))
 
     def __len__(self) -> int:
         return len(self.paths)

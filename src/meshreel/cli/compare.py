@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +12,6 @@ from cyclopts import Parameter
 from rich.table import Table
 
 from ..capture.recording import Recording
-from ..capture.rig import DepthCamera
-from ..capture.simulated_rig import SceneFrame
 from ..capture.truth import Truth, read_truth
 from ..container.sources import FileSource
 from ..decoder.video import Video
@@ -25,7 +23,7 @@ from ..geometry.topology import weld
 from ..io.sequence import FileSequence, SequenceOptions, open_sequence
 from ..metrics.comparison import compare_sequences
 from ..metrics.error_sheet import SheetOptions, write_sheet
-from ..metrics.scene_comparison import compare_with_truth
+from ..metrics.scene_accuracy import Scene, Sight, compare_with_truth
 from ..metrics.viewpoints import read_cameras
 from ..types import Frames, Mesh, MeshSequence
 from .console import Common, StageBars
@@ -82,7 +80,11 @@ def command(
         with common.stages(len(sequence)) as progress:
             row = compare_sequences(sequence, counted(other, progress), options).to_row()
             if truth is not None:
-                row |= {"truth": _against_truth(sequence, other, truth, knowing.truth_every, progress)}
+                row |= {
+                    "truth": against_truth(
+                        sequence, other, truth, range(0, len(sequence), knowing.truth_every), progress
+                    )
+                }
         if sheet is not None:
             write_sheet(sequence, other, sheet, shown)
     except FormatError as error:  # names the chunk, but not the file
@@ -105,26 +107,7 @@ def _sheet_cameras(looking: Looking, sequence: MeshSequence) -> tuple[PinholeCam
     return tuple(view for view in views if (view.width, view.height) == (views[0].width, views[0].height))
 
 
-@dataclass(frozen=True, slots=True)
-class ChosenTruth:
-    """Clean frames for the --frames of the originals."""
-
-    truth: Truth
-    numbers: range
-
-    @property
-    def cameras(self) -> tuple[DepthCamera, ...]:
-        """True poses of the cameras."""
-        return self.truth.cameras
-
-    def __len__(self) -> int:
-        return len(self.numbers)
-
-    def __getitem__(self, index: int) -> SceneFrame:
-        return self.truth[self.numbers[index]]
-
-
-def open_truth(folder: Path, reading: Reading, count: int) -> ChosenTruth:
+def open_truth(folder: Path, reading: Reading, count: int) -> Truth:
     """Open the truth of `count` frames chosen by `reading`. Raises InputError if it has another length."""
     truth = read_truth(folder)
     numbers = reading.options().chosen(len(truth))
@@ -132,14 +115,20 @@ def open_truth(folder: Path, reading: Reading, count: int) -> ChosenTruth:
         chosen = "" if len(numbers) == len(truth) else f" of {len(truth)} that --frames {reading.frames} leaves"
         text = f"{folder} is the truth of {len(numbers)} frames{chosen}, the originals have {count}"
         raise InputError(f"{text}; give that of the same recording, or choose with --frames A:B")
-    return ChosenTruth(truth, numbers)
+    return truth.only(numbers)
 
 
-def _against_truth(
-    sequence: MeshSequence, other: Frames, truth: ChosenTruth, every: int, progress: StageBars
+def against_truth(
+    sequence: MeshSequence, other: Frames, truth: Truth, numbers: Sequence[int], progress: StageBars
 ) -> dict[str, Any]:
-    numbers = range(0, len(sequence), every)
-    return compare_with_truth(sequence, other, truth, numbers, lambda done: progress("truth", done, len(numbers)))
+    """Compare the meshes of some frames with the clean ones, as `compare_with_truth` does."""
+    sights = [Sight(camera.view, *camera.depth_range) for camera in truth.cameras]
+
+    def clean(number: int) -> Scene:
+        frame = truth[number]
+        return Scene(frame.mesh, frame.dynamic, sights, complete=True)
+
+    return compare_with_truth(sequence, other, clean, numbers, lambda done: progress("truth", done, len(numbers)))
 
 
 def truth_table(row: dict[str, Any]) -> Table:

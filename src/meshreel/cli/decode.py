@@ -10,7 +10,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..decoder.video import BACKGROUND, Video
+from ..container.reader import ReelReader
+from ..decoder.tracks import moving_of_frame
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..export.frames import Part, check_part, joined, write_frames
@@ -50,8 +51,18 @@ def command(
         raise InputError(f"--layers must not be negative, got {layers}")
     video = open_video(file).at(layers)
     check_part(file, video.reader, only)
-    decode, lost = _decoder(video, only, format)
+    parts: dict[Part, Callable[[int], list[Mesh]]] = {
+        "all": lambda frame: [*video.parts(frame).values()],
+        "background": lambda frame: [video.background(frame)],
+        "moving": lambda frame: moving_of_frame(video.tracks, frame),
+    }
+    lost = _not_kept(video.reader, format)
     common.warn(lost)
+
+    def decode(frame: int) -> Mesh:
+        meshes = parts[only](frame)
+        return joined([replace(mesh, uv=None, texture=None) for mesh in meshes] if lost else meshes)
+
     make_folder(output)
     names = frame_names(len(video), format)
     common.warn(left_over(output, names, f"frame_*.{format}"))
@@ -65,19 +76,12 @@ def command(
     common.result(row, f"{output}: {len(video)} {format} files")
 
 
-def _decoder(video: Video, only: Part, format: str) -> tuple[Callable[[int], Mesh], tuple[str, ...]]:
-    """Return the function that decodes a frame for files of a format, and a warning of what these do not keep."""
-    decode: dict[Part, Callable[[int], Mesh]]
-    decode = {"all": video.__getitem__, "background": video.background, "moving": video.moving}
-    if all(chunk.kind != ChunkKind.PICTURES for chunk in video.reader.chunks):
-        return decode[only], ()
-    lost = (
-        "" if find_spec("av") and find_spec("PIL") else "textures need the extra color: pip install 'meshreel[color]'"
-    )
-    lost = "PLY has no textures: give --format obj or glb for them" if format == "ply" else lost
-    if lost:
-        bare = decode[only]
-        return lambda frame: replace(bare(frame), uv=None, texture=None), (f"{lost}; colours of vertices are kept",)
-    decode["all"] = lambda frame: joined([*video.parts(frame).values()])
-    decode["moving"] = lambda frame: joined([part for name, part in video.parts(frame).items() if name != BACKGROUND])
-    return decode[only], ()
+def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:
+    """Return a warning of what files of a format do not keep of the colours of a video."""
+    if all(chunk.kind != ChunkKind.PICTURES for chunk in reader.chunks):
+        return ()
+    if format == "ply":
+        return ("PLY has no textures, colours of vertices are kept: give --format obj or glb for textures",)
+    if find_spec("av") and find_spec("PIL"):
+        return ()
+    return ("no textures, colours of vertices are kept: textures need the extra color: pip install 'meshreel[color]'",)

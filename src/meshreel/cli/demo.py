@@ -6,7 +6,7 @@ Everything is procedural. The output is the rig with its truth, the .reel file a
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -16,15 +16,12 @@ from ..capture.recording import Recording, open_recording
 from ..capture.rig import RIG, read_cameras
 from ..capture.simulated_rig import TRUTH
 from ..capture.truth import read_truth
-from ..decoder.video import Video
 from ..decoder.video import open as open_video
 from ..encoder.presets import preset_options
 from ..encoder.sequence import encode
 from ..errors import InputError
 from ..metrics.error_sheet import SheetOptions, write_sheet
-from ..metrics.scene_comparison import compare_with_truth
-from ..types import MeshSequence
-from .compare import truth_table
+from .compare import against_truth, truth_table
 from .console import Common, StageBars, called_as
 from .encode import describe, summary_row
 from .info import describe_file, rate_table
@@ -70,7 +67,8 @@ def command(
         capture = _captured(output / "rig", room, progress)
         summary = encode(capture, file, options=options, executor=executor, progress=progress, resume=False)
         with open_video(file) as video:
-            truth = _judged(output / "rig", capture, video, progress)
+            clean = read_truth(output / "rig" / TRUTH)
+            truth = against_truth(capture, video, clean, _spread(frames, _JUDGED), progress)
             write_sheet(capture, video, picture, SheetOptions(frames=_spread(frames, 3), height=360, unit="mm"))
     described = describe_file(file)
     sizes = {name: described[name] for name in ("bytes_by_content", "mbps_by_content")}
@@ -107,12 +105,6 @@ def _forget(folder: Path, names: list[str]) -> None:
     for pattern in ("rig.json", "corner*/depth/depth_*.png", "corner*/color/color_*.png", f"{TRUTH}/frame_*.ply"):
         for path in folder.glob(pattern):
             path.unlink()
-
-
-def _judged(rig: Path, capture: MeshSequence, video: Video, progress: StageBars) -> dict[str, Any]:
-    numbers = _spread(len(capture), _JUDGED)
-    truth = read_truth(rig / TRUTH)
-    return compare_with_truth(capture, video, truth, numbers, lambda k: progress("truth", k, len(numbers)))
 
 
 def _spread(count: int, most: int) -> tuple[int, ...]:

@@ -113,7 +113,7 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
     frames, count, options = scene.frames, len(scene.frames), scene.options
     chosen = evenly(count, previews)
     names = [Path(name).stem for name in frame_names(count, "npz")]
-    tally, preview = _Tally(), _Preview()
+    tally, rows = _Tally(), list[tuple[FrameViews, list[int]]]()
     with common.stages(count) as progress:
         by: Segmentation
         if scene.masker is None:
@@ -133,12 +133,13 @@ def _write_labels(scene: _Labelling, output: Path, previews: int, common: Common
                 mesh = frames[number]
                 colors = label_colors(labels.moving, labels.bodies)
                 write_colored(mesh, colors, output / COLORED / f"{names[number]}.ply")
-                preview.add(number, *look_at_labels(mesh, labels.moving, labels.bodies, views))
+                pictures, shown = look_at_labels(mesh, labels.moving, labels.bodies, views)
+                rows.append((FrameViews(number, pictures), shown))
             progress("label", number + 1, count)
     with replacing(output / CAMERAS) as file:
         file.write(pack_cameras(views))
     if chosen:
-        write_picture(preview.picture(), output / SHEET)
+        write_picture(_sheet(rows), output / SHEET)
     return tally.row() | {"views": len(views)}
 
 
@@ -170,22 +171,11 @@ class _Tally:
         return counted | shares_row | {"bodies": bodies}
 
 
-class _Preview:
-    """Pictures of some frames; the sheet shows the views that see most moving faces."""
-
-    def __init__(self) -> None:
-        self._rows = list[FrameViews]()
-        self._counts = list[list[int]]()
-
-    def add(self, frame: int, pictures: list[UInt8[np.ndarray, "H W 3"]], moving: list[int]) -> None:
-        """Add a frame: a picture from each view, and the number of moving faces that it shows."""
-        self._rows.append(FrameViews(frame, pictures))
-        self._counts.append(moving)
-
-    def picture(self) -> UInt8[np.ndarray, "Y X 3"]:
-        """Return the sheet, one row for each frame."""
-        best = sorted(np.argsort(-np.sum(self._counts, axis=0), kind="stable")[:COLUMNS].tolist())
-        return sheet([FrameViews(row.frame, [row.pictures[view] for view in best]) for row in self._rows], best)
+def _sheet(previews: list[tuple[FrameViews, list[int]]]) -> UInt8[np.ndarray, "Y X 3"]:
+    """Return a sheet with a row for each frame: of all views, those that show most moving faces, which are given."""
+    counts = np.sum([shown for _, shown in previews], axis=0)
+    best = sorted(np.argsort(-counts, kind="stable")[:COLUMNS].tolist())
+    return sheet([FrameViews(row.frame, [row.pictures[view] for view in best]) for row, _ in previews], best)
 
 
 def _describe(row: dict[str, Any]) -> str:

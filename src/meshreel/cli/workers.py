@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-import sys
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -16,12 +15,11 @@ from multiprocessing.queues import SimpleQueue
 from typing import Any
 
 from .. import __version__
-from ..encoder.worker import Told, end_with_parent, tell_to
+from ..encoder.worker import Told, die_with_parent, end_with_parent, tell_to
 from ..errors import InputError
 from ..io.differences import first_difference
 
 _BLOCKS = hasattr(signal, "pthread_sigmask")
-_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of Linux's prctl
 CONNECTS = 10.0  # s, in which a scheduler answers (guess)
 
 
@@ -127,10 +125,5 @@ def _begin(queue: SimpleQueue[Told]) -> None:
     tell_to(queue.put)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    # At once, too, where a library holds Python's lock. The signal follows the thread that started the worker:
-    # here the command's main thread, so it is not for an executor of a caller's own.
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+    die_with_parent()  # the command's main thread, which started it: this is not for an executor of a caller's own
     end_with_parent()

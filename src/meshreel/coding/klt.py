@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import _core
 from ..geometry import strict
-from ..shapes import Float64, Int64
+from ..shapes import Bool, Float64, Int64
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,10 @@ class Basis:
     mean: Float64[np.ndarray, " C"]  # C = 3 T numbers, frame by frame; units of the field
     vectors: Float64[np.ndarray, "C M"]  # columns of unit length
     energies: Float64[np.ndarray, " M"]  # mean square of each weight, units of the field squared
+
+    def only(self, kept: Bool[np.ndarray, " M"] | Int64[np.ndarray, " N"]) -> Basis:
+        """Return the basis of some of its vectors."""
+        return Basis(self.mean, np.ascontiguousarray(self.vectors[:, kept]), self.energies[kept])
 
 
 def fit(field: Float64[np.ndarray, "V T 3"]) -> Basis:

@@ -18,7 +18,8 @@ from ..coding.appearance.pictures import VideoDecoder, decode_pictures, from_i42
 from ..coding.colored import Canvas, atlas_base
 from ..container.reader import Chunk, ReelReader
 from ..errors import FormatError
-from ..format.layout import LAYER_PICTURES, ChunkKind
+from ..format.budget import are_costly
+from ..format.layout import LAYER_PICTURES, ChunkKind, Pictures
 from ..geometry.atlas import Layout
 from ..shapes import UInt8
 from ..types import Mesh, Texture
@@ -28,24 +29,49 @@ from ..types import Mesh, Texture
 class _Place:
     """Where the decoder of a chain stands."""
 
-    first: tuple[int, int]  # chunk and layer with which the chain begins
     decoder: VideoDecoder
-    after: tuple[int, int]  # chunk and layer whose pictures were decoded last
-    count: int  # of these pictures
+    texels: int  # of a picture
+    size: int  # bytes of the chunk whose pictures were decoded last
+    after: tuple[int, int]  # this chunk, and the layer
+    count: int = 0  # of these pictures
+    planes: np.ndarray | None = None  # of the last of them
+
+
+class Decoders:
+    """Decoders of the videos of a file, each at the picture that was asked for last, as many as memory has."""
+
+    def __init__(self) -> None:
+        self.lock = threading.Lock()
+        self.refused = dict[tuple[int, int], tuple[int, str]]()  # by chunk and layer: whole pictures, and what follows
+        self._places = dict[tuple[int, int], _Place]()  # by those that a chain begins with; the last used is the last
+
+    def take(self, first: tuple[int, int], texels: int, size: int) -> _Place | None:
+        """Return the place of a chain, which is forgotten, for it may fail; and so are others, until it has room."""
+        place = self._places.pop(first, None)
+        while self._places and are_costly([(texels, size), *((one.texels, one.size) for one in self._places.values())]):
+            del self._places[next(iter(self._places))]
+        return place
+
+    def keep(self, first: tuple[int, int], place: _Place) -> None:
+        """Keep the place of a chain."""
+        self._places[first] = place
+
+    def check(self, link: tuple[int, int], stop: int | None) -> None:
+        """Raise the FormatError of bytes that were refused, where the first `stop` pictures, or all, need them."""
+        whole, message = self.refused.get(link, (0, ""))
+        if message and (stop is None or stop > whole):
+            raise FormatError(message)
 
 
 class TrackPictures:
     """Textures of the frames of one track."""
 
-    def __init__(self, reader: ReelReader) -> None:
-        self._reader = reader
+    def __init__(self, reader: ReelReader, decoders: Decoders) -> None:
+        self._reader, self._decoders = reader, decoders
         self._layouts: tuple[int, Layout] | None = None  # of the atlas that was asked for last
         self._sizes = dict[int, tuple[int, int]]()  # of the textures of all atlases that were asked for
         self._layers = dict[tuple[int, int], tuple[int, int]]()  # what `_sizes_of` found, by chunk and layer
         self._background: tuple[int, int, Mesh] | None = None  # the state and picture shown last, and their mesh
-        self._place: _Place | None = None
-        self._last: tuple[tuple[int, int], np.ndarray] | None = None  # chunk and frame, and the planes of its picture
-        self._lock = threading.Lock()  # of the decoder, which has one place
 
     def textured(self, chunk: Chunk, meshes: list[Mesh], canvas: Canvas) -> list[Mesh]:
         """Return the frames of a group with the textures that it has. FormatError where its atlas is damaged."""
@@ -77,10 +103,8 @@ class TrackPictures:
 
         Raises FormatError where it, or a picture before it in its chain, is damaged.
         """
-        with self._lock:
-            if self._last is None or self._last[0] != (number, at):
-                self._last = (number, at), self._decoded(number, at)
-            return self._last[1]
+        with self._decoders.lock:
+            return self._decoded(number, at)
 
     def picture(self, number: int, at: int) -> UInt8[np.ndarray, "H W 3"]:
         """Return the same picture in sRGB."""
@@ -107,34 +131,52 @@ class TrackPictures:
     def _sizes_of(self, number: int, layer: int) -> tuple[int, int]:
         """Return of a layer of a background's pictures the frames that each is shown for, and how many they are."""
         if (number, layer) not in self._layers:
-            record = decode_pictures(self._reader.read_layer(number, layer), 0)
+            record = self._record((number, layer), self._reader.read_layer(number, layer))
             self._layers[number, layer] = record.interval, len(record.packets)
         return self._layers[number, layer]
 
     def _decoded(self, number: int, at: int) -> UInt8[np.ndarray, "R W"]:
-        chain, planes = self._chain(number, at), None
-        here = chain[-1], at % LAYER_PICTURES if self._is_static(number) else at
-        place, self._place = self._place, None  # until the pictures are decoded: a decoder that failed is of no use
-        if place is not None and (place.first != chain[0] or (place.after, place.count) > here):
+        chain, known = self._chain(number, at), self._decoders
+        width, height = self._sizes[self._reader.chunks[number].depends_on[1]]
+        here = chain[-1], 1 + (at % LAYER_PICTURES if self._is_static(number) else at)
+        place = known.take(chain[0], width * height, self._reader.chunks[number].size)
+        if place is not None and (place.after, place.count) > here:
             place = None
+        if place is None or (place.after, place.count) < here:
+            place = self._advanced(place, chain, here[1], width, height)
+        known.keep(chain[0], place)
+        assert place.planes is not None
+        return place.planes
+
+    def _advanced(
+        self, place: _Place | None, chain: list[tuple[int, int]], count: int, width: int, height: int
+    ) -> _Place:
+        """Return the place behind the first `count` pictures of the last link of a chain."""
         for link in chain if place is None else chain[chain.index(place.after) :]:
-            chunk = self._reader.chunks[link[0]]
+            stop, done, chunk = count if link == chain[-1] else None, 0, self._reader.chunks[link[0]]
+            self._decoders.check(link, stop)
+            data = self._reader.read_layer(*link)
             try:
-                record = decode_pictures(self._reader.read_layer(*link), chunk.frame_count)
-                if place is None:
-                    size = self._sizes[chunk.depends_on[1]]
-                    place = _Place(link, VideoDecoder(*size, record.codec), link, 0)
-                stop = here[1] + 1 if link == here[0] else len(record.packets)
-                if stop > len(record.packets):
-                    raise FormatError(f"{len(record.packets)} pictures in a layer that is not the last")
-                for packet in record.packets[place.count if link == place.after else 0 : stop]:
-                    planes = place.decoder.decode(packet)
+                record = self._record(link, data)
+                place = place or _Place(VideoDecoder(width, height, record.codec), width * height, 0, link)
+                planes, done = place.planes, place.count if link == place.after else 0
+                for packet in record.packets[done:stop]:
+                    planes, done = place.decoder.decode(packet), done + 1
             except FormatError as error:
+                self._decoders.refused[link] = done, f"{chunk}: {error}"
                 raise FormatError(f"{chunk}: {error}") from error
-            place = replace(place, after=link, count=stop)
-        assert place is not None and planes is not None
-        self._place = place
-        return planes
+            place = replace(place, size=chunk.size, after=link, count=done, planes=planes)
+        assert place is not None
+        return place
+
+    def _record(self, link: tuple[int, int], data: bytes) -> Pictures:
+        """Unpack a layer of pictures; of a background, all but the last have the same number."""
+        chunk = self._reader.chunks[link[0]]
+        width, height = self._sizes[chunk.depends_on[1]]
+        record = decode_pictures(data, chunk.frame_count, width * height)
+        if link[1] < len(chunk.layers) - 1 and len(record.packets) < LAYER_PICTURES:
+            raise FormatError(f"{len(record.packets)} pictures in a layer that is not the last")
+        return record
 
     def _chain(self, number: int, at: int) -> list[tuple[int, int]]:
         """Return chunk and layer of all pictures that are decoded before one of them, and with it."""

@@ -22,7 +22,7 @@ from ..format.layout import ChunkKind, Form
 from ..shapes import Float, UInt8
 from ..types import Frames, Mesh, Placement
 from .cache import MOST_KEPT, NO_GROUP, CachedGroup, CachedStates, Refusals, memory_of, read_only
-from .pictures import TrackPictures
+from .pictures import Decoders, TrackPictures
 
 MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes: the groups of one frame take no more memory than the largest legal group
 
@@ -30,8 +30,18 @@ MOST_TOGETHER = 8 * MOST_NUMBERS  # bytes: the groups of one frame take no more 
 class Track(Frames):
     """One moving body over the whole file: a mesh for each frame, empty in frames without the body."""
 
-    def __init__(self, reader: ReelReader, number: int, layers: int | None = None, colored: bool = True) -> None:
-        """Decode track `number` from at most `layers` layers of each group beyond its first; None: from all."""
+    def __init__(
+        self,
+        reader: ReelReader,
+        number: int,
+        layers: int | None = None,
+        colored: bool = True,
+        decoders: Decoders | None = None,
+    ) -> None:
+        """Decode track `number` from at most `layers` layers of each group beyond its first; None: from all.
+
+        Tracks that share `decoders` take no more memory for their textures than is good.
+        """
         self.reader = reader
         self._colored = colored and reader.is_colored
         self.number = number
@@ -39,7 +49,7 @@ class Track(Frames):
         self._place = placement(reader)
         self._group = NO_GROUP
         self._states = CachedStates({})
-        self._pictures = TrackPictures(reader)
+        self._pictures = TrackPictures(reader, decoders or Decoders())
         self._refusals = Refusals()  # of frames
         self._lost = Refusals()  # of states, which may be whole where frames of the same group are damaged
 
@@ -167,10 +177,10 @@ class Track(Frames):
 class Background:
     """The background of each frame. It has no layers: all of it is read, whatever the layers of the tracks."""
 
-    def __init__(self, reader: ReelReader, colored: bool = True) -> None:
+    def __init__(self, reader: ReelReader, colored: bool = True, decoders: Decoders | None = None) -> None:
         self.reader = reader
         self._colored = colored
-        self._pictures = TrackPictures(reader)
+        self._pictures = TrackPictures(reader, decoders or Decoders())
         self._place = placement(reader)
         # Number of a chunk, its mesh, and what led to it; replaced as a whole, as other threads do.
         self._last = (-1, Mesh.empty(), Chain())

@@ -19,6 +19,7 @@ from ..errors import FormatError, InputError
 from ..geometry.topology import concatenate
 from ..shapes import Float
 from ..types import Mesh, Up
+from .pictures import Decoders
 from .tracks import Background, Track, copy_vertices, moving_of_frame
 
 if TYPE_CHECKING:
@@ -76,8 +77,9 @@ class Video(Sequence[Mesh]):
         self.reader = reader
         self.layers = layers
         self._colored = colored
-        self.tracks = tuple(Track(reader, number, layers, colored) for number in range(len(reader.tracks)))
-        self._background = Background(reader, colored)
+        decoders, numbers = Decoders(), range(len(reader.tracks))
+        self.tracks = tuple(Track(reader, number, layers, colored, decoders) for number in numbers)
+        self._background = Background(reader, colored, decoders)
         self._close = close
 
     def at(self, layers: int | None = None, colors: bool = True) -> Video:

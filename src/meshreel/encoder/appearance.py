@@ -24,7 +24,7 @@ from ..container.writer import Companion
 from ..errors import InputError
 from ..format.budget import CostlyError
 from ..format.layout import ChunkKind, Form
-from ..geometry.painted import Paint, Painted
+from ..geometry.painted import Paint
 from ..types import GREY, Mesh
 from .forms import EncodedGroup
 from .interval import Interval
@@ -66,7 +66,7 @@ def colored_groups(
         if not group.predicted:
             yield from chain.done()
             state, chain = None, _Chain()
-        paints = [_paint(interval, number) for number in numbers]
+        paints = [interval.paint(number) for number in numbers]
         if any(paint is not None for paint in paints):
             state = chain.add(group, paints, options, state, has_pictures(interval, numbers, options))
         else:
@@ -81,14 +81,6 @@ def has_pictures(interval: Interval, numbers: range, options: AppearanceOptions 
     if options.texture.always or interval.views is not None:
         return True
     return any(interval.frames[number].texture is not None for number in numbers)
-
-
-def _paint(interval: Interval, number: int) -> Paint | None:
-    """Return what knows the colours of a frame, counted in its interval."""
-    mesh = interval.frames[number]
-    if mesh.is_empty or not (mesh.is_colored or interval.views is not None):
-        return None
-    return Painted(mesh) if interval.views is None else interval.views.at(interval.first_frame + number)
 
 
 class _Chain:

@@ -6,7 +6,7 @@ group. What is known of a candidate stays with it, so that no frame is tracked o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,12 +14,14 @@ from jaxtyping import Float64
 
 from ..analysis.fit.closeness import Closeness
 from ..analysis.fit.frame import FrameSurface
+from ..analysis.fit.slide import Slide
 from ..analysis.fit.surface_fit import Fitting
 from ..analysis.follow.embedded import Tracker
 from ..analysis.follow.fused_template import fused_mesh
 from ..analysis.follow.template import base_mesh, shared_detail
 from ..coding.layers.coder import LayersState
 from ..coding.reference_mesh import CodedReference, code_on_lattice
+from ..geometry.painted import Paint
 from ..types import Mesh
 from .digests import Digests, note
 from .options import LayersOptions
@@ -39,6 +41,7 @@ class Ahead:
     noise: float  # RMS distance of the frames from the truth, normalised
     target: Fidelity  # that the frames should reach, normalised
     digests: Digests | None = None
+    paint: Callable[[int], Paint | None] = lambda _: None  # what knows the colours of the frame with a number
 
     def __len__(self) -> int:
         return len(self.surfaces)
@@ -62,6 +65,7 @@ class Followed:
     positions: Float64[np.ndarray, "V 3"]  # its fit to the last frame
     closeness: Closeness
     residual: float  # usual residual of its fits, RMS
+    slide: Slide | None = None  # to where its colours were; None: it has none
 
 
 class Candidate:
@@ -74,6 +78,7 @@ class Candidate:
         self.key, self.before, self._options, self._noise = key, before, options, ahead.noise
         self._target, self._tracker = ahead.target.distance, tracker
         self._fits, self._residuals = dict[int, Float64[np.ndarray, "V 3"]](), dict[int, float]()
+        self.slide: Slide | None = None
         self._ends = dict[int, int]()  # by side, the frame where the template is lost
 
     @classmethod
@@ -90,7 +95,7 @@ class Candidate:
         surface, key = Mesh(before.positions, before.reference.base.faces), ahead.first - 1
         found = cls(ahead, key, options, Tracker(surface, key, options.embedded, ahead.noise), before)
         found._take(before.reference, before.positions, before.closeness)
-        found._rest, found._usual = before.positions, before.residual
+        found._rest, found._usual, found.slide = before.positions, before.residual, before.slide
         return found
 
     def others(self, ahead: Ahead) -> list[Candidate]:
@@ -130,14 +135,33 @@ class Candidate:
         first = np.stack([self._fits[number] for number in numbers])
         if not self._options.fit.components or len(numbers) == 1:
             return first
+        first = self._slid(ahead, numbers, first)
         detail = shared_detail(self.reference.mesh.faces, len(self.reference.mesh.vertices), self.reference.levels)
         triples = zip(numbers, detail(first), first, strict=True)
         return np.stack([self._fitting.second(ahead.at(number), *both) for number, *both in triples])
 
+    def _slid(
+        self, ahead: Ahead, numbers: range, positions: Float64[np.ndarray, "T V 3"]
+    ) -> Float64[np.ndarray, "T V 3"]:
+        """Return fits to frames, slid to where these have the colours of the key frame, if they have colours."""
+        options, faces = self._options.slide, self.reference.base.faces
+        if options is None:
+            return positions
+        if self.slide is None and (paint := ahead.paint(self.key)) is not None:
+            self.slide = Slide(faces, self._fits[self.key], paint, options)
+        if self.slide is None:
+            return positions
+        pairs = [(number, ahead.paint(number)) for number in numbers if number != self.key]
+        found = positions.copy()
+        for number, paint in pairs:
+            if paint is not None:
+                found[number - numbers.start] = self.slide.to(positions[number - numbers.start], paint)
+        return found
+
     def followed(self, state: LayersState, positions: Float64[np.ndarray, "V 3"], numbers: range) -> Followed:
         """Return the template at the end of a group of these frames, for the group after it."""
         usual = self._usual if self.before else float(np.median([self._residuals[number] for number in numbers]))
-        return Followed(self.reference, state, positions, self._closeness, usual)
+        return Followed(self.reference, state, positions, self._closeness, usual, self.slide)
 
     def _limit(self, ahead: Ahead) -> float:
         """Return the residual beyond which a frame is lost: there is none below a key that is lost itself."""

@@ -27,22 +27,18 @@ class Digests:
     """Collects the lines of an interval, which may be encoded in another process."""
 
     def __init__(self, track: int, frame: int) -> None:
-        self._where, self._lines = {"track": track, "frame": frame}, list[str]()
-
-    def add(self, stage: str, *values: object) -> None:
-        """Add the line of a stage."""
-        self._lines.append(line_of(stage, *values, **self._where))
+        self.where, self.lines = {"track": track, "frame": frame}, list[str]()
 
     def take(self) -> tuple[str, ...]:
         """Return the lines since the last call."""
-        lines, self._lines = tuple(self._lines), []
+        lines, self.lines = tuple(self.lines), []
         return lines
 
 
 def note(digests: Digests | None, stage: str, *values: object) -> None:
     """Add the line of a stage where digests are wanted."""
     if digests is not None:
-        digests.add(stage, *values)
+        digests.lines.append(line_of(stage, *values, **digests.where))
 
 
 def line_of(stage: str, *values: object, **where: int) -> str:

@@ -13,6 +13,7 @@ from ..analysis.pieces import piece_of_faces
 from ..analysis.survey import Survey
 from ..errors import InputError
 from ..geometry.derived_sequences import DerivedSequence
+from ..geometry.painted import Paint, Painted
 from ..geometry.topology import clean, part_of
 from ..types import Frames, Mesh
 from .digests import Digests
@@ -44,6 +45,13 @@ class Interval:
         frames = self.frames.only() if isinstance(self.frames, NormalisedFrames) else self.frames
         views = None if self.views is None else self.views.only(range(self.first_frame, self.stop))
         return replace(self, frames=frames, views=views)
+
+    def paint(self, number: int) -> Paint | None:
+        """Return what knows the colours of a frame, counted from the first; None where nothing does."""
+        mesh = self.frames[number]
+        if mesh.is_empty or not (mesh.is_colored or self.views is not None):
+            return None
+        return Painted(mesh) if self.views is None else self.views.at(self.first_frame + number)
 
     @property
     def observed(self) -> Any:

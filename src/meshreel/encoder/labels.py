@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, UInt16
+from scipy.spatial import cKDTree
 
 from ..analysis.scene.bodies import BodyOptions, with_ring
 from ..analysis.scene.labelling import Segmentation
@@ -48,8 +49,6 @@ def label_frames(sequence: MeshSequence, segmentation: Segmentation, options: En
 
 def _numbers(part: Mesh, bodies: list[tuple[int, Mesh]]) -> UInt16[np.ndarray, " F"]:
     """Return the number of the body that has each moving face; bodies are connected pieces and a ring around them."""
-    from scipy.spatial import cKDTree
-
     found = np.zeros(len(part.faces), np.uint16)
     corners = part.vertices[part.faces[:, 0]]
     for number, body in bodies:

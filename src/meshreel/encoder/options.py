@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ..analysis.appearance.calibrate import CalibrationOptions
+from ..analysis.fit.slide import SlideOptions
 from ..analysis.fit.surface_fit import FitOptions
 from ..analysis.follow.embedded import EmbeddedOptions
 from ..analysis.follow.fused_template import FusedOptions
@@ -65,6 +67,7 @@ class LayersOptions:
     template: TemplateOptions = field(default_factory=TemplateOptions)
     fused: FusedOptions = field(default_factory=FusedOptions)
     fit: FitOptions = FitOptions(strides=(4, 3, 2, 1), restart=False, pull=0.3, second_smoothing=0.7)
+    slide: SlideOptions | None = SlideOptions()  # of fits to frames with colours; None: shape alone tells
     plan: PlanOptions = PlanOptions()
     errors: tuple[float, ...] = ()  # of a key's further templates, which are tried: times `template.error`
     layers: LayerCodingOptions = field(default_factory=LayerCodingOptions)
@@ -112,6 +115,7 @@ class AppearanceOptions:
 
     colors: ColorCodingOptions = ColorCodingOptions()  # of the vertices, which every coloured group has
     texture: TextureOptions | None = TextureOptions()  # None: no textures
+    calibration: CalibrationOptions | None = CalibrationOptions()  # of colour cameras; None: they are as they are said
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -52,6 +53,7 @@ from .static import Static, colored_states
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
+from .views import Calibrated
 
 QUALITY, PRESET, EFFORT, COLOR = 50.0, "best", "normal", "auto"  # the default operating point (decision 9)
 MEASURED = 4  # frames of a scene that are compared with the decoded ones (guess)
@@ -117,6 +119,7 @@ class Encoder:
         self.progress, self.digests, self._excerpt = progress, digests, excerpt
         self.find: FindGroups = find_groups
         self._scene: tuple[SegmentOptions, BackgroundOptions, Parts] | None = None
+        self._calibrated = cache(partial(Calibrated, self.sequence))
         self._stands: bool | None = masker is not None or None  # most stands still; None: unknown yet
 
     @property
@@ -126,7 +129,11 @@ class Encoder:
 
     def intervals(self, options: EncoderOptions) -> Iterator[Interval]:
         """Yield the intervals that `encode` encodes, of all tracks of a scene."""
-        return _intervals(self._job(options), self.parts(options))
+        job, parts = self._job(options), self.parts(options)
+        if parts is None:
+            seen = surveyed(job)
+            return intervals_of(job, seen, tracked_bodies(job, seen))
+        return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))
 
     def parts(self, options: EncoderOptions) -> Parts | None:
         """Return the parts of the scene; None where the sequence is no scene, or `options.scene` is None."""
@@ -165,7 +172,9 @@ class Encoder:
 
     def _job(self, options: EncoderOptions) -> Job:
         stages = Stages(self.progress, len(self.sequence) if self._excerpt is None else len(self._excerpt.frames))
-        job = Job(self.sequence, options, self._executor, stages, self.find, digests=self.digests)
+        how = None if options.appearance is None else options.appearance.calibration
+        sequence = self.sequence if how is None else self._calibrated(how)
+        job = Job(sequence, options, self._executor, stages, self.find, digests=self.digests)
         return replace(job, excerpt=self._excerpt)
 
     def _is_scene(self, options: EncoderOptions) -> bool:
@@ -217,8 +226,8 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     size, tracks = sum(map(len, states)), 1 + max(group.track for group in groups)
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
-    still = () if any(group.form != Form.EMPTY for group in groups) else _still(2 * parts.segmentation.cell)
-    texts = (*warnings_of(seen), *_astray(parts.astray), *still, *_lost(coded.dropped))
+    moves = any(group.form != Form.EMPTY for group in groups)
+    texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped))
     return Summary(writer.size, tuple(groups), texts, scene, _continued(job))
 
 
@@ -255,18 +264,9 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     _add_companions(writer, number, group.companions, before[0] if before else None)
     key = None if group.key is None else each.first_frame + group.key
     fidelity = group.fidelity.scaled(unit)
-    size, share = len(payload), each.share
-    return GroupSummary(
-        group.form,
-        group.frame_count,
-        size,
-        fidelity,
-        group.predicted,
-        key,
-        track,
-        share,
-        sum(map(len, group.companions)),
-    )
+    colors = sum(map(len, group.companions))
+    facts = (group.form, group.frame_count, len(payload), fidelity, group.predicted)
+    return GroupSummary(*facts, key, track, each.share, colors)
 
 
 def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:
@@ -304,27 +304,18 @@ def warnings_of(seen: Survey) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _lost(faces: int) -> tuple[str, ...]:
-    """Return a warning of moving pieces of a scene that belong to no body."""
-    if not faces:
-        return ()
-    return (f"{faces} faces of bits that move, far from all bodies and there only for a moment, are not kept",)
-
-
-def _still(least: float) -> tuple[str, ...]:
-    """Return a warning of a scene in which nothing moves by more than `least`, m."""
-    text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
-    return (f"{text}; if something does, encode with --dynamic-only",)
-
-
-def _astray(share: float) -> tuple[str, ...]:
-    """Return a warning of still surface that the file lacks, by its share of all surface."""
-    if share <= ASTRAY:
-        return ()
-    text = f"{100 * share:.1f} % of the surface stands still, but is far from the background that frames share"
-    return (
-        f"{text}, and is not kept: it flies, or is there for a while only; to keep all, encode with --dynamic-only",
-    )
+def _warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]:
+    """Yield warnings of still surface, of all moving surface or of `dropped` faces of it that the file lacks."""
+    if parts.astray > ASTRAY:
+        text = f"{100 * parts.astray:.1f} % of the surface stands still, but is far from the background that frames"
+        why = "it flies, or is there for a while only"
+        yield f"{text} share, and is not kept: {why}; to keep all, encode with --dynamic-only"
+    if not moves:
+        least = 2 * parts.segmentation.cell
+        text = f"nothing moves by more than {least:.2g} m, or no view sees it: the whole scene is background"
+        yield f"{text}; if something does, encode with --dynamic-only"
+    if dropped:
+        yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:
@@ -338,11 +329,3 @@ def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> He
         maximum=tuple(map(float, high)),
         metadata=json.dumps(metadata, separators=(",", ":")),
     )
-
-
-def _intervals(job: Job, parts: Parts | None) -> Iterator[Interval]:
-    """Yield the intervals of a sequence, of a scene where there are parts."""
-    if parts is None:
-        seen = surveyed(job)
-        return intervals_of(job, seen, tracked_bodies(job, seen))
-    return scene_intervals(job, parts, Tracks(parts.segmentation.cell, job.scene.bodies))

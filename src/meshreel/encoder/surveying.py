@@ -23,7 +23,7 @@ SLICE = 32  # frames that a worker surveys at once: some seconds (guess)
 def surveyed(job: Job, cleaned: bool = True) -> Survey:
     """Survey the sequence of a job as `survey` does, with its errors; with an executor, workers read the files."""
     if job.executor is None or not job.sequence.is_stored:
-        return survey(job.sequence, job.stages, cleaned)
+        return survey(job.sequence, job.stages.add, cleaned)
     count, found = len(job.sequence), dict[int, Survey]()
 
     def calls() -> Iterator[Call]:

@@ -23,7 +23,7 @@ from ..format.records import pack
 from ..geometry.closest_points import Surface
 from ..geometry.decimate import decimate
 from ..geometry.strict import dot
-from ..geometry.topology import clean, components, concatenate, drop_unreferenced, face_normals
+from ..geometry.topology import clean, components, concatenate, connected_faces, drop_unreferenced, face_normals
 from ..types import Mesh
 
 BODY = 0.98  # share of the surface; the rest is the tails (decision 13)
@@ -288,7 +288,7 @@ class _Frame:
         touched = np.zeros(count, bool)
         touched[faces[far]] = True
         wide = np.flatnonzero(touched[faces].any(axis=1))
-        labels = components(faces[wide], count)[faces[wide, 0]]
+        labels = connected_faces(faces[wide], count)
         order = np.argsort(labels, kind="stable")
         yield from np.split(wide[order], np.flatnonzero(np.diff(labels[order])) + 1) if len(wide) else ()
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
+from ..analysis.appearance.calibrate import CalibrationOptions, Correction, calibrate
 from ..analysis.survey import Survey
-from ..geometry.color_views import MARGIN, ColorFrames, ColorViews
-from ..geometry.derived_sequences import CapturedSequence, only
-from ..types import MeshSequence, Placement
+from ..geometry.color_views import MARGIN, ColorFrames, ColorPicture, ColorViews
+from ..geometry.derived_sequences import CapturedSequence, DerivedSequence, only
+from ..types import MeshSequence, Placement, evenly
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,3 +37,33 @@ class Views:
         pictures = [picture.placed(place) for picture in self.colors[number] if picture is not None]
         mesh = self.sequence[number]
         return ColorViews(pictures, mesh.at((mesh.vertices - place.origin) / place.scale), MARGIN / place.scale, clear)
+
+
+class Calibrated(DerivedSequence):
+    """The same frames, whose colour cameras are corrected, once, so that they agree in what they see."""
+
+    def __init__(self, source: MeshSequence, options: CalibrationOptions) -> None:
+        super().__init__(source)
+        self.options = options
+
+    @cached_property
+    def colors(self) -> ColorFrames | None:
+        """The colour pictures of the frames, corrected; None where the source has none."""
+        known = super().colors
+        if known is None:
+            return None
+        some = evenly(len(self), self.options.frames)
+        found = calibrate(((self._source[number], known[number]) for number in some), self.options)
+        return known if found is None else _Corrected(known, tuple(found))
+
+
+@dataclass(frozen=True, slots=True)
+class _Corrected:
+    """The pictures of colour cameras, with a correction for each camera."""
+
+    colors: ColorFrames
+    corrections: tuple[Correction, ...]
+
+    def __getitem__(self, index: int) -> list[ColorPicture | None]:
+        pairs = zip(self.colors[index], self.corrections, strict=True)
+        return [None if picture is None else correction.of(picture) for picture, correction in pairs]

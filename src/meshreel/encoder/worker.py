@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import signal
+import sys
 import threading
 from collections.abc import Callable
 from functools import cache
@@ -26,6 +28,14 @@ def tell(number: int, stage: str, done: int, total: int) -> None:
     del total
     if _listener is not None:
         _listener((number, stage, done))
+
+
+def die_with_parent() -> None:
+    """Ask Linux to kill this process when the thread that started it ends, also where a library holds Python's lock."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL))  # 1: PR_SET_PDEATHSIG of linux/prctl.h
 
 
 @cache

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Float32
 
 from ..container.reader import Chunk, ReelReader
+from ..decoder.pictures import Decoders
 from ..decoder.tracks import Background, Track
 from ..errors import InputError
 from ..format.layout import Form
@@ -72,8 +73,9 @@ def export(
     frames or the file cannot be written, and FormatError if a chunk is damaged.
     """
     frames = range(reader.frame_count) if frames is None else frames
-    tracks = tuple(Track(reader, number, options.layers) for number in range(len(reader.tracks)))
-    source = _Source(reader, tracks, Background(reader), frames, options.texture)
+    decoders, numbers = Decoders(), range(len(reader.tracks))
+    tracks = tuple(Track(reader, number, options.layers, decoders=decoders) for number in numbers)
+    source = _Source(reader, tracks, Background(reader, decoders=decoders), frames, options.texture)
     written = 0
     with _writer(path, _animation(reader, frames, options.up or reader.up)) as writer:
         if options.only != "moving":

@@ -98,7 +98,7 @@ class GlbWriter:
     def _material(self, colored: bool) -> int:
         """Return the material of faces without a place in a picture."""
         if colored not in self._materials:
-            self._materials[colored] = self._file.unlit({}) if colored else self._file.add("materials", _MATERIAL)
+            self._materials[colored] = self._file.put_unlit({}) if colored else self._file.add("materials", _MATERIAL)
         return self._materials[colored]
 
     def _animate(self, shape: Shape, node: int) -> None:

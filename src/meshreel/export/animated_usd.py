@@ -129,22 +129,20 @@ class UsdWriter:
             visibility.Set(states[is_shown], self._codes[frame])
 
     def _move(self, mesh: Any, shape: Shape) -> int:
-        """Write points and normals, which USD interpolates linearly between samples; return their bytes."""
+        """Write points, normals and colours, which USD interpolates linearly between samples; return their bytes."""
         from pxr import Usd, UsdGeom, Vt
 
         size = 0
         points, normals, extent = mesh.CreatePointsAttr(), mesh.CreateNormalsAttr(), mesh.CreateExtentAttr()
-        shown, picture = (
-            mesh.CreateDisplayColorPrimvar(),
-            None if shape.uv is None else self._picture(mesh, shape, shape.uv),
-        )
+        shown = mesh.CreateDisplayColorPrimvar()
+        picture = None if shape.uv is None else self._picture(mesh, shape, shape.uv)
         for number, frame in enumerate(shape.frames):
             code = Usd.TimeCode.Default() if shape.count == 1 else Usd.TimeCode(self._codes[shape.first + number])
             local = self._animation.local(shape, frame.vertices)
             points.Set(Vt.Vec3fArray.FromNumpy(local), code)
             normals.Set(Vt.Vec3fArray.FromNumpy(unit_normals(frame)), code)
             extent.Set(Vt.Vec3fArray.FromNumpy(np.stack([local.min(axis=0), local.max(axis=0)])), code)
-            size += 2 * local.nbytes
+            size += (2 if frame.colors is None else 3) * local.nbytes
             if frame.colors is not None:
                 shown.Set(Vt.Vec3fArray.FromNumpy(light(frame.colors)), code)
             if picture is not None and frame.texture is not None and shape.first + number < shape.shown[0][1]:
@@ -163,19 +161,13 @@ class UsdWriter:
         places = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", types.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
         places.Set(Vt.Vec2fArray.FromNumpy(np.nan_to_num(uv).reshape(-1, 2)))
         material = UsdShade.Material.Define(self._stage, path)
-        surface, picture, reader = (
-            UsdShade.Shader.Define(self._stage, path.AppendChild(name)) for name in ("surface", "picture", "places")
-        )
-        for shader, kind in (
-            (surface, "UsdPreviewSurface"),
-            (picture, "UsdUVTexture"),
-            (reader, "UsdPrimvarReader_float2"),
-        ):
+        kinds = ("UsdPreviewSurface", "UsdUVTexture", "UsdPrimvarReader_float2")
+        surface, picture, reader = (UsdShade.Shader.Define(self._stage, path.AppendChild(kind)) for kind in kinds)
+        for shader, kind in zip((surface, picture, reader), kinds, strict=True):
             shader.CreateIdAttr(kind)
         reader.CreateInput("varname", types.String).Set("st")
         picture.CreateInput("sourceColorSpace", types.Token).Set("sRGB")
-        st = reader.CreateOutput("result", types.Float2)
-        picture.CreateInput("st", types.Float2).ConnectToSource(st)
+        picture.CreateInput("st", types.Float2).ConnectToSource(reader.CreateOutput("result", types.Float2))
         rgb = picture.CreateOutput("rgb", types.Float3)
         surface.CreateInput("diffuseColor", types.Color3f).ConnectToSource(rgb)
         surface.CreateInput("roughness", types.Float).Set(0.9)

@@ -37,6 +37,10 @@ class Limits:
     colors: int = 96 << 20  # what any chunk of colours may cost, and per_byte more (guess)
     painted: int = 32  # of a vertex with colours, in each frame
     painting: int = 256  # of a vertex of the largest mesh with colours
+    pictures: int = 768 << 20  # what the pictures of a chunk, or of a layer, may cost, and per_byte more (guess)
+    texel: int = 2  # of a picture that is decoded
+    videos: int = 144 << 20  # memory that the decoders of a file's videos may take, and per_byte more: of one (guess)
+    held: int = 36  # of a texel of a video, whose decoder keeps up to 16 pictures
 
 
 LIMITS = Limits()
@@ -135,6 +139,19 @@ def check_colors(meshes: Sequence[tuple[int, int]], size: int) -> None:
     cost += LIMITS.painting * max((vertices for vertices, _ in meshes), default=0)
     if cost > LIMITS.colors + LIMITS.per_byte * size:
         raise CostlyError(f"colours: {size} bytes that cost {cost} to decode")
+
+
+def check_pictures(texels: int, size: int) -> None:
+    """Raise CostlyError if a video of so many texels, of all pictures together, costs more than it may."""
+    cost = LIMITS.texel * texels
+    if cost > LIMITS.pictures + LIMITS.per_byte * size:
+        raise CostlyError(f"pictures: {size} bytes that cost {cost} to decode")
+
+
+def are_costly(videos: Sequence[tuple[int, int]]) -> bool:
+    """Return whether decoders of videos of so many texels, in chunks of so many bytes, take more than they may."""
+    texels, size = (sum(column) for column in zip(*videos, strict=True))
+    return LIMITS.held * texels > LIMITS.videos + LIMITS.per_byte * size
 
 
 def check_cost(cost: int, size: int, what: str) -> None:

@@ -33,6 +33,7 @@ class ColorPicture:
     camera: PinholeCamera
     pixels: UInt8[np.ndarray, "H W 3"]
     distortion: tuple[float, ...] = (0.0,) * 5
+    gains: tuple[float, float, float] = (1.0, 1.0, 1.0)  # by which its channels are too bright
 
     def project(
         self, points: Float64[np.ndarray, "N 3"]
@@ -145,7 +146,7 @@ class View:
     def colors(self, points: Float64[np.ndarray, "N 3"], chosen: Bool[np.ndarray, " N"]) -> Float64[np.ndarray, "N 3"]:
         """Return the colours of the chosen places in the picture; 0 of others."""
         found = np.zeros((len(points), 3))
-        found[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0])
+        found[chosen] = sampled(self.picture.pixels, self.picture.project(points[chosen])[0]) / self.picture.gains
         return found
 
 

@@ -98,7 +98,6 @@ class DerivedSequence(MeshSequence):
 
     @property
     def frame_rate(self) -> float:
-        """Frames per second, 1/s."""
         return self._source.frame_rate
 
     @property

@@ -23,14 +23,9 @@ def close_holes(mesh: Mesh, perimeter: float) -> Mesh:
         if np.linalg.norm(around - np.roll(around, -1, axis=0), axis=1).sum() > perimeter:
             continue
         vertices.append(around.mean(axis=0, keepdims=True))
-        faces.append(_fan(loop, count))
+        faces.append(np.stack([np.roll(loop, -1), loop, np.full(len(loop), count)], axis=1))  # wound against it
         count += 1
     return Mesh.of(np.concatenate(vertices), np.concatenate(faces))
-
-
-def _fan(loop: Int64[np.ndarray, " n"], middle: int) -> Int64[np.ndarray, "n 3"]:
-    """Return faces that join the loop to one vertex, wound against the loop, which follows the faces beside it."""
-    return np.stack([np.roll(loop, -1), loop, np.full(len(loop), middle)], axis=1)
 
 
 def _boundary_loops(mesh: Mesh) -> list[Int64[np.ndarray, " n"]]:

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float64, Int64
 from ..types import Mesh
 from .closest_points import Surface
 from .strict import rounded
-from .topology import components, face_normals, weld
+from .topology import connected_faces, face_normals, weld
 
 BLOCK = 4  # grid points along a side of a block, which is classified at once where no surface crosses it (guess)
 MOST_BLOCKS = 1 << 19  # of the sampling grid; bounds memory when a few small bodies lie far apart (guess)
@@ -122,11 +122,11 @@ def _touched(
 
 def _parts(mesh: Mesh) -> Int64[np.ndarray, " F"]:
     """Label each face with its body: its connected component, or the component that encloses it."""
-    labels = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
+    labels = connected_faces(mesh.faces, len(mesh.vertices))
     if labels.max() > 0:  # UV seams look like gaps until equal positions are welded
         welded = weld(mesh)
         if len(welded.faces) == len(mesh.faces):
-            labels = components(welded.faces, len(welded.vertices))[welded.faces[:, 0]]
+            labels = connected_faces(welded.faces, len(welded.vertices))
     labels = np.unique(labels, return_inverse=True)[1].reshape(-1)
     areas = np.bincount(labels, face_normals(mesh)[1])
     large = np.flatnonzero(areas > SPECK * areas.sum())

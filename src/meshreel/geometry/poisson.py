@@ -16,11 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64
+from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..types import Mesh
 from .decimate import decimate
-from .topology import clean, components
+from .topology import clean, connected_faces, large_pieces
 
 _LEAVES = re.compile(rb"\[WARNING\] [^\n]*\n[^\n]*_getValues\n[^\n]*getValue assumes leaf node\n")
 _ONE_AT_A_TIME = threading.Lock()  # the library keeps state in static variables: two threads would change the bits
@@ -67,7 +68,7 @@ def reconstruct(
         solid, density = build(cloud, depth=options.depth, n_threads=1)
     whole = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
     mesh = decimate(whole, options.vertices)
-    gaps = _gaps(mesh.vertices, points)
+    gaps = cKDTree(points).query(mesh.vertices)[0]  # to the nearest point
     trusted = _dense(mesh, whole, np.asarray(density), options.trim) & (gaps <= options.reach)
     kept = trusted[mesh.faces].all(axis=1)
     kept |= _holes(mesh, ~kept, options.hole) & (gaps <= 3 * options.reach)[mesh.faces].all(axis=1)
@@ -102,9 +103,7 @@ def drop_small(mesh: Mesh, share: float) -> Mesh:
     """Remove connected components that have less than this share of the faces of the largest one."""
     if mesh.is_empty:
         return mesh
-    label = components(mesh.faces, len(mesh.vertices))[mesh.faces[:, 0]]
-    size = np.bincount(label)
-    return clean(Mesh.of(mesh.vertices, mesh.faces[size[label] >= share * size.max()]))
+    return clean(Mesh.of(mesh.vertices, mesh.faces[large_pieces(mesh.faces, len(mesh.vertices), share)]))
 
 
 def thin_out(
@@ -127,21 +126,12 @@ def thin_out(
 
 def _dense(mesh: Mesh, whole: Mesh, levels: Float64[np.ndarray, " W"], trim: float) -> Bool[np.ndarray, " V"]:
     """Return which vertices of the decimated mesh lie where the points are not much sparser than in the median."""
-    from scipy.spatial import cKDTree
-
     return levels[cKDTree(whole.vertices).query(mesh.vertices)[1]] >= np.median(levels) - trim
-
-
-def _gaps(queries: Float64[np.ndarray, "V 3"], points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " V"]:
-    """Return the distance from each query to the nearest point."""
-    from scipy.spatial import cKDTree
-
-    return cKDTree(points).query(queries)[0]
 
 
 def _holes(mesh: Mesh, cut: Bool[np.ndarray, " F"], share: float) -> Bool[np.ndarray, " F"]:
     """Return which of the faces to cut are in patches so small that a hole would be worse than a guessed surface."""
     label = np.zeros(len(mesh.faces), dtype=np.int64)
-    label[cut] = 1 + components(mesh.faces[cut], len(mesh.vertices))[mesh.faces[cut][:, 0]]
+    label[cut] = 1 + connected_faces(mesh.faces[cut], len(mesh.vertices))
     size = np.bincount(label)
     return cut & (size[label] <= share * len(mesh.faces))

@@ -53,7 +53,8 @@ class Rays:
 
     def cast(self, origins: Float64[np.ndarray, "N 3"], directions: Float64[np.ndarray, "N 3"]) -> Hit:
         """Find the first intersection of each of N rays."""
-        answer = self._cast(origins, directions)
+        rays = np.concatenate([origins - self._origin, directions], axis=1).astype(np.float32)
+        answer = self._scene.cast_rays(self._tensor(rays))
         uv = answer["primitive_uvs"].numpy().astype(np.float64)
         barycentric = np.stack([1 - uv.sum(axis=1), uv[:, 0], uv[:, 1]], axis=1)
         return Hit(_faces(answer), answer["t_hit"].numpy().astype(np.float64), barycentric)
@@ -86,10 +87,6 @@ class Rays:
     @cached_property
     def _normals(self) -> Float64[np.ndarray, "F 3"]:
         return face_normals(self._mesh)[0]
-
-    def _cast(self, origins: np.ndarray, directions: np.ndarray) -> dict:
-        rays = np.concatenate([origins - self._origin, directions], axis=1).astype(np.float32)
-        return self._scene.cast_rays(self._tensor(rays))
 
 
 def pixels_near(camera: PinholeCamera, mesh: Mesh) -> Bool[np.ndarray, "H W"]:

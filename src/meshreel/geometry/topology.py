@@ -40,6 +40,12 @@ def edge_lengths(mesh: Mesh) -> Float64[np.ndarray, " E"]:
     return np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
 
 
+def longest_edges(vertices: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
+    """Return the length of the longest edge of each face, in the unit of the vertices."""
+    corners = vertices[faces]
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+
+
 def subdivide_midpoint(mesh: Mesh, levels: int = 1) -> Mesh:
     """Cut each triangle into four at its edge midpoints, `levels` times (paper, section 3.3.2).
 
@@ -144,3 +150,29 @@ def _places(mesh: Mesh) -> Float32[np.ndarray, "F 3 2"]:
 def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:
     """Label each of `count` vertices with its connected component; components are numbered by their first vertex."""
     return _core.components(faces, count).astype(np.int64)
+
+
+def linked(pairs: Int64[np.ndarray, "L 2"], count: int) -> Int64[np.ndarray, " N"]:
+    """Label each of `count` things with what it is connected to by pairs of them, as `components` does."""
+    return components(pairs[:, [0, 1, 1]].astype(np.int32), count)
+
+
+def connected_faces(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " F"]:
+    """Label each face with its connected component; labels of vertices without faces do not occur."""
+    return components(faces, count)[faces[:, 0]]
+
+
+def large_pieces(faces: Int32[np.ndarray, "F 3"], count: int, share: float) -> Bool[np.ndarray, " F"]:
+    """Return the faces of connected components with at least this share of the faces of the largest one."""
+    label = connected_faces(faces, count)
+    size = np.bincount(label, minlength=1)
+    return size[label] >= share * size.max()
+
+
+def without_fragments(mesh: Mesh, least: float) -> Mesh:
+    """Remove connected components whose area is below `least`, in squared units of the vertices."""
+    if mesh.is_empty:
+        return mesh
+    labels = connected_faces(mesh.faces, len(mesh.vertices))
+    areas = np.bincount(labels, face_normals(mesh)[1])
+    return part_of(mesh, areas[labels] >= least)

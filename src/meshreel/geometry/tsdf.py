@@ -47,11 +47,10 @@ def fill_grid(
     grid = new_grid(voxel, max(len(blocks), 1))
     if not len(blocks):
         return grid
-    tensor = o3d.core.Tensor.from_numpy
-    places, _ = grid.hashmap().activate(tensor(np.ascontiguousarray(blocks)))
+    places, _ = grid.hashmap().activate(_tensor(blocks))
     places = places.to(o3d.core.int64)
     for name, values in (("tsdf", distances), ("weight", weights)):
-        grid.attribute(name)[places] = tensor(np.ascontiguousarray(values[..., None]))
+        grid.attribute(name)[places] = _tensor(values[..., None])
     return grid
 
 

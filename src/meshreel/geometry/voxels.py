@@ -40,7 +40,7 @@ class Lattice:
     def keys(self, points: Float64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
         """Return the key of each point's cell; points beyond the range of keys get a cell at its border."""
         cells = np.floor((points - self.origin) / self.size)
-        return _key(np.clip(cells, 2 - _HALF, _HALF - 2).astype(np.int64) + _HALF)
+        return (np.clip(cells, 2 - _HALF, _HALF - 2).astype(np.int64) + _HALF) @ _STRIDES
 
     def cells(self, keys: Int64[np.ndarray, " P"]) -> Int64[np.ndarray, "P 3"]:
         """Return the integer coordinates of cells, counted from the origin along each axis."""
@@ -88,7 +88,3 @@ def spread(mesh: Mesh, spacing: float) -> tuple[Float64[np.ndarray, "N 3"], Int6
     """Return points on a mesh about `spacing` apart at most, and the face of each, ascending; every face has one."""
     points, faces = _core.spread(mesh.vertices, mesh.faces, spacing, _MOST_PARTS)
     return points, faces.view(np.int64)  # of the same size, by its usual name
-
-
-def _key(cells: Int64[np.ndarray, "N 3"]) -> Int64[np.ndarray, " N"]:
-    return cells @ _STRIDES

@@ -49,9 +49,7 @@ def so_far() -> Work:
 
 def since(before: Work) -> Work:
     """Return what this thread has done since `so_far` returned `before`."""
-    return {
-        kind: number - before.get(kind, 0) for kind, number in sorted(so_far().items()) if number > before.get(kind, 0)
-    }
+    return dict(sorted((_counts() - Counter(before)).items()))
 
 
 def add(work: Work) -> None:

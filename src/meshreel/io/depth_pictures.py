@@ -13,7 +13,7 @@ from jaxtyping import UInt16
 
 from ..errors import InputError
 from .read import read_file
-from .write import replacing
+from .write import write_picture
 
 _DEEP = ("I;16", "I;16B", "I;16L", "I")  # modes in which versions of Pillow return 16 bits per pixel
 
@@ -37,9 +37,4 @@ def read_depth(path: Path) -> UInt16[np.ndarray, "H W"]:
 
 def write_depth(depth: UInt16[np.ndarray, "H W"], path: Path) -> None:
     """Write depths as a 16-bit grayscale PNG."""
-    from PIL import Image
-
-    packed = io.BytesIO()
-    Image.fromarray(depth).save(packed, format="PNG")
-    with replacing(path) as file:
-        file.write(packed.getvalue())
+    write_picture(depth, path)

@@ -77,10 +77,6 @@ class GlbFile:
         self._append(values.astype(values.dtype.newbyteorder("<"), copy=False).tobytes(), what)
         return self.add("accessors", accessor)
 
-    def put_colors(self, colors: UInt8[np.ndarray, "V 3"], what: object = "its arrays") -> int:
-        """Append colours to the newest view of vertices."""
-        return self.put(light(colors), "VEC3", what)
-
     def put_places(self, uv: Float32[np.ndarray, "V 2"], what: object = "its arrays") -> int:
         """Append places in a texture, as `Mesh.uv` has them; glTF counts from the upper row, and has no NaN."""
         self.open_vertices(8)
@@ -93,15 +89,13 @@ class GlbFile:
         self._append(data, what)
         self._tree["bufferViews"][-1]["byteLength"] = len(data)
         image = self.add("images", {"bufferView": len(self._tree["bufferViews"]) - 1, "mimeType": "image/png"})
-        return self.unlit({"baseColorTexture": {"index": self.add("textures", {"source": image})}})
+        return self.put_unlit({"baseColorTexture": {"index": self.add("textures", {"source": image})}})
 
-    def unlit(self, surface: dict[str, Any]) -> int:
+    def put_unlit(self, surface: dict[str, Any]) -> int:
         """Add a material that shows colours as they are, and return its number."""
         self._tree["extensionsUsed"] = [_UNLIT]
-        extensions: dict[str, Any] = {_UNLIT: {}}
-        return self.add(
-            "materials", {"doubleSided": True, "pbrMetallicRoughness": surface | _MATT, "extensions": extensions}
-        )
+        looks = {"pbrMetallicRoughness": surface | _MATT, "extensions": {_UNLIT: {}}}
+        return self.add("materials", {"doubleSided": True} | looks)
 
     def put_faces(self, faces: Faces, frames: list[dict[str, int]], what: object = "its faces") -> list[dict[str, Any]]:
         """Append faces and return their primitives: those with a place in a picture, and the others.

@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import UInt8, UInt16
 
 from ..errors import InputError
 from ..types import Texture
@@ -69,7 +69,7 @@ def parse_picture(data: bytes, where: str) -> UInt8[np.ndarray, "H W 3"]:
     return pixels
 
 
-def pack_picture(pixels: UInt8[np.ndarray, "H W *C"]) -> bytes:
+def pack_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"]) -> bytes:
     """Return the bytes of a PNG file, grey or in colour. Raises InputError where Pillow is missing."""
     try:
         from PIL import Image

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import UInt8, UInt16
 
 from ..errors import InputError
 from ..types import Mesh
-from .glb_file import COLORS, PLACES, Faces, GlbFile, cut_at_seams, distinct_places
+from .glb_file import COLORS, PLACES, Faces, GlbFile, cut_at_seams, distinct_places, light
 from .pictures import pack_picture
 from .unfinished import cannot_be_written, unfinished
 
@@ -95,7 +95,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
         yield file
 
 
-def write_picture(pixels: UInt8[np.ndarray, "H W *C"], path: Path) -> None:
+def write_picture(pixels: UInt8[np.ndarray, "H W *C"] | UInt16[np.ndarray, "H W"], path: Path) -> None:
     """Write a picture as PNG, grey or in colour."""
     data = pack_picture(pixels)
     with replacing(path) as file:
@@ -172,8 +172,8 @@ def _primitives(file: GlbFile, mesh: Mesh) -> list[dict[str, Any]]:
         frame[PLACES] = file.put_places(places)
     file.open_vertices()
     frame["POSITION"] = file.put(mesh.vertices.astype("<f4"), "VEC3", bounded=True)
-    frame |= {} if colors is None else {COLORS: file.put_colors(colors)}
-    material = None if colors is None else file.unlit({})
+    frame |= {} if colors is None else {COLORS: file.put(light(colors), "VEC3")}
+    material = None if colors is None else file.put_unlit({})
     return file.put_faces(Faces(mesh.faces, pictured, picture, material), [frame])
 
 

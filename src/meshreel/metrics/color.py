@@ -50,9 +50,12 @@ def color_errors(original: Mesh, decoded: Mesh) -> ColorErrors:
         return ColorErrors(same, same, same)
     pair = Painted(original), Painted(decoded)
     squares = np.maximum(_squares(original, *pair), _squares(decoded, *pair[::-1]))
-    return ColorErrors(
-        *(10 * math.log10(PEAK**2 / square) if square > LEAST else math.inf for square in squares.tolist())
-    )
+    return ColorErrors(*map(psnr, squares.tolist()))
+
+
+def psnr(square: float) -> float:
+    """Return the PSNR of a mean squared difference of 8-bit values, dB; infinite for equal ones."""
+    return 10 * math.log10(PEAK**2 / square) if square > LEAST else math.inf
 
 
 def _squares(mesh: Mesh, here: Painted, there: Painted) -> Float64[np.ndarray, " 3"]:

@@ -1,26 +1,85 @@
-"""Pictures of coloured surfaces by ray casting, unlit, on white: what a viewer of a recording sees."""
+"""Pictures of coloured surfaces by ray casting, unlit, on white, and how far those of two meshes are apart.
+
+Two meshes and cameras -> RenderErrors. Luma is that of ITU-R BT.709, full range; SSIM is that of `metrics.ssim`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, Float32, Int32, UInt8
 
 from ..geometry.painted import Painted
 from ..geometry.raycast import Rays
 from ..types import Mesh
+from .color import PEAK, TO_YUV, psnr
+from .render import Crop, Pixels, crop_of
+from .ssim import MARGIN, ssim_view
 from .viewpoints import Camera
+
+
+@dataclass(frozen=True, slots=True)
+class RenderErrors:
+    """Errors of coloured pictures, over all views; PSNRs are those of luma, dB, infinite for equal pictures."""
+
+    y_union: float  # over pixels that either mesh covers: silhouettes count
+    y_inside: float  # over those that both cover
+    ssim: float  # masked, as `NormalSsim.masked`
+
+
+@dataclass(frozen=True, slots=True)
+class ColorView:
+    """Surface and colours that one camera sees in one crop (`render.Picture`)."""
+
+    colors: Float32[np.ndarray, "H W 3"]  # 0 to 1
+    faces: Int32[np.ndarray, "H W"]  # -1 where nothing is seen
+
+    @property
+    def covered(self) -> Bool[np.ndarray, "H W"]:
+        """Where the mesh is seen."""
+        return self.faces >= 0
+
+
+class Colored:
+    """A mesh prepared for several views in its colours; one without is grey (`render.Visible`)."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._surface = None if mesh.is_empty else (Rays(mesh), Painted(mesh))
+
+    def look(self, pixels: Pixels) -> ColorView:
+        """Render the mesh in a crop of a camera's image."""
+        shape, image = pixels.crop.shape, np.ones((*pixels.crop.shape, 3), np.float32)
+        if self._surface is None or 0 in shape:
+            return ColorView(image, np.full(shape, -1, np.int32))
+        (rays, painted), pose = self._surface, pixels.camera.extrinsic
+        origins, directions = pixels.rays
+        hit = rays.cast((origins - pose[:3, 3]) @ pose[:3, :3], directions @ pose[:3, :3])
+        seen = hit.faces >= 0
+        colors = painted.on(hit.faces[seen], hit.barycentric[seen])
+        image.reshape(-1, 3)[seen] = np.clip(np.rint(colors), 0, 255) / 255
+        return ColorView(image, hit.faces.reshape(shape))
 
 
 def render_colors(mesh: Mesh, camera: Camera) -> UInt8[np.ndarray, "H W 3"]:
     """Render a mesh with its colours; one without is grey."""
-    image = np.full((camera.height, camera.width, 3), 255, np.uint8)
-    if mesh.is_empty:
-        return image
-    rows, columns = np.mgrid[: camera.height, : camera.width]
-    origins, directions = camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
-    turn, move = camera.extrinsic[:3, :3], camera.extrinsic[:3, 3]
-    hit = Rays(mesh).cast((origins - move) @ turn, directions @ turn)
-    seen = hit.faces >= 0
-    colors = Painted(mesh).on(hit.faces[seen], hit.barycentric[seen])
-    image.reshape(-1, 3)[seen] = np.clip(np.rint(colors), 0, 255)
-    return image
+    view = Colored(mesh).look(Pixels(camera, Crop(0, camera.height, 0, camera.width)))
+    return np.rint(255 * view.colors).astype(np.uint8)
+
+
+def render_errors(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> RenderErrors:
+    """Compare pictures of two meshes in their colours; where no view sees any, they are equal."""
+    pair, scores = (Colored(original), Colored(decoded)), list[float]()
+    squares, counts = np.zeros(2), np.zeros(2)
+    for camera in cameras:
+        pixels = Pixels(camera, crop_of([original, decoded], camera, MARGIN))
+        a, b = (one.look(pixels) for one in pair)
+        apart = np.square(PEAK * ((a.colors - b.colors).astype(np.float64) @ TO_YUV[0]))
+        for which, mask in enumerate((a.covered | b.covered, a.covered & b.covered)):
+            squares[which] += apart[mask].sum()
+            counts[which] += mask.sum()
+        masked = ssim_view(a, b, pixels)[1]
+        scores += [] if masked is None else [masked]
+    union, inside = (squares / np.maximum(counts, 1)).tolist()
+    return RenderErrors(psnr(union), psnr(inside), float(np.mean(scores)) if scores else 1.0)

@@ -18,13 +18,15 @@ import numpy as np
 from ..errors import InputError
 from ..types import Mesh
 from .color import color_errors
+from .color_render import render_errors
 from .distance import PSNR_CEILING, SurfaceErrors, surface_errors
 from .ssim import ssim_normals
 from .viewpoints import Box, Camera, ViewOptions, read_cameras, views_around
 
 Row = dict[str, Any]
-_PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", "y_psnr", "u_psnr", "v_psnr", "yuv_psnr")
-_LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked")
+_COLORS = ("y_psnr", "u_psnr", "v_psnr", "yuv_psnr", "view_y_psnr", "view_y_psnr_inside")
+_PSNRS = ("d2_psnr_paper", "d1_psnr", "d2_psnr", "symmetric_psnr", *_COLORS)
+_LARGER_IS_BETTER = (*_PSNRS, "ssim", "ssim_masked", "view_ssim")
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +103,9 @@ def frame_row(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
     if original.is_colored and decoded.is_colored:
         colors = color_errors(original, decoded)
         row |= {"y_psnr": colors.y, "u_psnr": colors.u, "v_psnr": colors.v, "yuv_psnr": colors.yuv}
+        if cameras:
+            views = render_errors(original, decoded, cameras)
+            row |= {"view_y_psnr": views.y_union, "view_y_psnr_inside": views.y_inside, "view_ssim": views.ssim}
     if cameras:
         ssim = ssim_normals(original, decoded, cameras)
         row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}

@@ -86,8 +86,7 @@ def error_at_pixels(view: View, decoded: Mesh) -> Float64[np.ndarray, " N"]:
     points = view.points - center
     if len(points) == 0:
         return np.zeros(0)
-    hits = Surface(Mesh.of(decoded.vertices - center, decoded.faces)).closest(points)
-    return np.linalg.norm(hits.points - points, axis=1)
+    return Surface(Mesh.of(decoded.vertices - center, decoded.faces)).distances(points)
 
 
 def _rows(originals: Frames, decoded: Frames, options: SheetOptions) -> Iterator[SheetRow]:

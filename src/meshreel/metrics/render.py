@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32
@@ -80,6 +81,21 @@ def crop_of(meshes: list[Mesh], camera: Camera, border: int = 8) -> Crop:
 def look(mesh: Mesh, camera: Camera, crop: Crop) -> View:
     """Return the camera's view of the mesh in the crop."""
     return Visible(mesh).look(Pixels(camera, crop))
+
+
+@runtime_checkable
+class Picture(Protocol):
+    """What a mesh looks like in a crop: `View`, or in its own colours."""
+
+    @property
+    def covered(self) -> Bool[np.ndarray, "H W"]:
+        """Where a mesh is seen."""
+        ...
+
+    @property
+    def colors(self) -> Float32[np.ndarray, "H W 3"]:
+        """Colors, 0 to 1."""
+        ...
 
 
 class Pixels:

@@ -16,10 +16,9 @@ simulated rigs. The noisy input may take the place of the truth.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64
@@ -29,14 +28,14 @@ from ..geometry.cameras import PinholeCamera
 from ..geometry.closest_points import Surface, carried_labels
 from ..geometry.raycast import Rays
 from ..geometry.topology import face_normals
-from ..types import Mesh
+from ..types import Frames, Mesh
+from .comparison import Row, finite
 from .distance import PSNR_CEILING, psnr, quantile
 from .even_points import Scatter, scatter
 from .normals import WORST_ANGLE, angles, interpolate, welded_normals
-from .render import BACKGROUND
+from .render import BACKGROUND, Crop, Pixels
 from .ssim import BORDER, ssim_map
 
-Row = dict[str, Any]
 PARTS = ("all", "people", "background")
 
 
@@ -179,6 +178,32 @@ def scene_means(rows: Sequence[Row]) -> Row:
     return means
 
 
+def compare_with_truth(
+    originals: Frames,
+    decoded: Frames,
+    truth: Callable[[int], Scene],
+    numbers: Sequence[int],
+    progress: Callable[[int], None] = lambda _done: None,
+) -> Row:
+    """Measure the decoded meshes and the originals (noise floor) against the truth, in the frames `numbers`.
+
+    Returns a JSON-ready row of means, and of each frame under `per_frame`; numbers that are not finite, or of a missing
+    part, are None. `progress` gets the number of finished frames. Raises InputError for a clean frame without faces,
+    since then it cannot label other meshes.
+    """
+    frames: list[Row] = []
+    for done, number in enumerate(numbers, 1):
+        clean = truth(number)
+        if clean.mesh.is_empty:
+            raise InputError(f"frame {number} of the truth has no faces; simulate the rig again")
+        floor = scene_row(clean, clean.labelled(originals[number]))
+        frames.append({"noise_floor": floor, "decoded": scene_row(clean, clean.labelled(decoded[number]))})
+        progress(done)
+    means = {name: finite(scene_means([frame[name] for frame in frames])) for name in ("noise_floor", "decoded")}
+    rows = [{name: finite(row) for name, row in frame.items()} for frame in frames]
+    return {"frames": list(numbers)} | means | {"per_frame": rows}
+
+
 @dataclass(frozen=True, slots=True)
 class _Matched:
     """Points of one scene matched with the closest points of another."""
@@ -247,8 +272,7 @@ def _picture(scene: Scene, camera: PinholeCamera) -> Picture:
     colors = np.full((*shape, 3), BACKGROUND, np.float32)
     covered, dynamic = np.zeros(shape, bool), np.zeros(shape, bool)
     if not scene.mesh.is_empty:
-        rows, columns = np.mgrid[: camera.height, : camera.width]
-        _, ahead = camera.rays(np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
+        _, ahead = Pixels(camera, Crop(0, camera.height, 0, camera.width)).rays
         eye = np.broadcast_to(camera.eye - scene.origin, ahead.shape)
         hit = scene.rays.cast(eye, ahead @ np.linalg.inv(camera.extrinsic[:3, :3]).T)
         covered = (hit.faces >= 0).reshape(shape)

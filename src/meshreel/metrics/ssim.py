@@ -14,11 +14,12 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..types import Mesh
-from .render import Pixels, Visible, crop_of
+from .render import Picture, Pixels, Visible, crop_of
 from .viewpoints import Camera
 
 _SIDE = 7  # pixels, side of the SSIM window: scikit-image's default
 BORDER = _SIDE // 2
+MARGIN = 2 * _SIDE  # pixels of a crop around what is seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +33,15 @@ class NormalSsim:
 def ssim_normals(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> NormalSsim:
     """Compute SSIM between the normal-colored renderings of two meshes (paper, section 4: four views)."""
     pair = Visible(original), Visible(decoded)
-    crops = [crop_of([original, decoded], camera, border=2 * _SIDE) for camera in cameras]
-    scores = [_ssim_view(*pair, Pixels(camera, crop)) for camera, crop in zip(cameras, crops, strict=True)]
+    views = [Pixels(camera, crop_of([original, decoded], camera, MARGIN)) for camera in cameras]
+    scores = [ssim_view(pair[0].look(pixels), pair[1].look(pixels), pixels) for pixels in views]
     counted = [masked for _, masked in scores if masked is not None]
     return NormalSsim(float(np.mean([whole for whole, _ in scores])), float(np.mean(counted)) if counted else 1.0)
 
 
-def _ssim_view(original: Visible, decoded: Visible, pixels: Pixels) -> tuple[float, float | None]:
+def ssim_view(a: Picture, b: Picture, pixels: Pixels) -> tuple[float, float | None]:
+    """Return SSIM of two pictures over the whole image, and over pixels that either covers; None without such."""
     camera, crop = pixels.camera, pixels.crop
-    a, b = original.look(pixels), decoded.look(pixels)
     interior = np.zeros((camera.height, camera.width), dtype=bool)
     interior[BORDER:-BORDER, BORDER:-BORDER] = True
     inside = interior[crop.top : crop.bottom, crop.left : crop.right]

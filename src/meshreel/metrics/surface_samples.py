@@ -49,7 +49,18 @@ class Matches:
 
 def sample(mesh: Mesh, center: Float64[np.ndarray, " 3"]) -> Samples:
     """Sample a mesh, a result of `used_surface`, moved so that `center` is the origin."""
-    return _sample(_moved(mesh, -center))
+    mesh = Mesh.of(mesh.vertices - center, mesh.faces)
+    normals = welded_normals(mesh)
+    levels = _levels(len(mesh.faces))
+    fine = subdivide_midpoint(mesh, levels)  # the same surface; old vertices stay first
+    fine_normals = subdivide_midpoint(Mesh.of(normals, mesh.faces), levels).vertices
+    areas = face_normals(fine)[1]
+    # 1/12 for each corner and 3/4 for the centroid integrate quadratics over a triangle exactly
+    shares = np.bincount(fine.faces.reshape(-1), np.repeat(areas / 12, 3), len(fine.vertices))
+    weights = np.concatenate([shares, areas * 0.75])
+    points = np.concatenate([fine.vertices, _centroids(fine.vertices, fine.faces)])
+    directions = np.concatenate([fine_normals, _centroids(fine_normals, fine.faces)])
+    return Samples(mesh, normals, points, unit(directions), weights / weights.sum())
 
 
 def match(source: Samples, target: Samples, resolution: float) -> Matches:
@@ -68,24 +79,6 @@ def used_surface(mesh: Mesh) -> Mesh:
     """Remove zero-area faces and vertices that no face uses; the result may be empty."""
     areas = face_normals(mesh)[1]
     return drop_unreferenced(Mesh.of(mesh.vertices, mesh.faces[areas > 0]))
-
-
-def _moved(mesh: Mesh, offset: Float64[np.ndarray, " 3"]) -> Mesh:
-    return Mesh.of(mesh.vertices + offset, mesh.faces)
-
-
-def _sample(mesh: Mesh) -> Samples:
-    normals = welded_normals(mesh)
-    levels = _levels(len(mesh.faces))
-    fine = subdivide_midpoint(mesh, levels)  # the same surface; old vertices stay first
-    fine_normals = subdivide_midpoint(Mesh.of(normals, mesh.faces), levels).vertices
-    areas = face_normals(fine)[1]
-    # 1/12 for each corner and 3/4 for the centroid integrate quadratics over a triangle exactly
-    shares = np.bincount(fine.faces.reshape(-1), np.repeat(areas / 12, 3), len(fine.vertices))
-    weights = np.concatenate([shares, areas * 0.75])
-    points = np.concatenate([fine.vertices, _centroids(fine.vertices, fine.faces)])
-    directions = np.concatenate([fine_normals, _centroids(fine_normals, fine.faces)])
-    return Samples(mesh, normals, points, unit(directions), weights / weights.sum())
 
 
 def _centroids(values: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, "F 3"]:

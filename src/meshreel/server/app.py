@@ -24,7 +24,7 @@ from ..errors import InputError
 from . import files
 from .assets import FRESH, PAGE, SAFE, Asset, Player, is_unchanged
 from .library import Facts, Library, as_text
-from .pages import PLAIN, STYLE, gallery_page, player_page
+from .pages import PLAIN, gallery_page, player_page
 from .posters import Posters
 
 EXPOSED = ("Accept-Ranges", "Content-Length", "Content-Range", "ETag")
@@ -44,7 +44,8 @@ def make_app(
     "*" allows all of them. `/` plays the file of a library with `only` one, otherwise it is a gallery; `/watch/NAME`
     plays a file and `/files/NAME` sends it. Raises InputError for a malformed origin.
     """
-    built, posters, style = Player(player or built_player()), Posters(), Asset.of(STYLE.encode(), "text/css")
+    built, posters = Player(player or built_player()), Posters()
+    style = Asset.of(Path(__file__).with_name("gallery.css").read_bytes(), "text/css")
     pages = _Pages(library, built, posters)
     routes = [
         Route("/", pages.home),

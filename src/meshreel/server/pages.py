@@ -29,29 +29,6 @@ _HEAD = """\
 <link rel="stylesheet" href="{style}">
 """
 
-STYLE = """\
-:root { color-scheme: light dark; }
-body { margin: 0; padding: 24px; font: 16px/1.5 system-ui, sans-serif; color: #14171c; background: #f4f5f7; }
-h1 { font-size: 20px; margin: 0 0 16px; overflow-wrap: anywhere; }
-ul { display: grid; grid-template-columns: repeat(auto-fill, minmax(220px, 1fr)); gap: 16px; margin: 0; padding: 0; }
-li { list-style: none; border-radius: 8px; overflow: hidden; background: #fff; box-shadow: 0 1px 3px rgb(0 0 0 / 20%); }
-a { display: block; color: inherit; text-decoration: none; }
-a:focus-visible { outline: 3px solid #2563eb; outline-offset: -3px; }
-a:hover .name { text-decoration: underline; }
-img, .blank { display: block; width: 100%; aspect-ratio: 4 / 3; object-fit: contain; background: #e2e5ea; }
-.facts-box { padding: 10px 12px 12px; }
-.name { font-weight: 600; overflow-wrap: anywhere; }
-.facts { color: #4a5160; font-size: 14px; }
-.error { color: #a4161a; font-size: 14px; overflow-wrap: anywhere; }
-@media (prefers-color-scheme: dark) {
-  body { color: #e8eaee; background: #14171c; }
-  li { background: #20242b; }
-  img, .blank { background: #2a2f38; }
-  .facts { color: #aab1bd; }
-  .error { color: #ff9b9b; }
-}
-"""
-
 # A play mark, shown for files without a poster.
 PLAIN = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 480 360"><path d="M210 140v80l70-40z" fill="#8a92a0"/></svg>'

@@ -21,6 +21,7 @@ import numpy as np
 
 from ..decoder.video import Video
 from ..decoder.video import open as open_video
+from ..encoder.worker import die_with_parent
 from ..errors import MeshreelError
 from ..types import Mesh
 
@@ -37,7 +38,7 @@ def main() -> None:
     """Draw a poster for each line, until input ends. An empty answer at the start says that all is ready."""
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # libraries that print must not disturb the answers
-    _end_with_parent()
+    die_with_parent()
     if hasattr(os, "nice"):
         os.nice(NICE)
     with suppress(ModuleNotFoundError):  # without the renderer there are no posters
@@ -71,14 +72,6 @@ def _limit_memory() -> None:
 
         resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def _end_with_parent() -> None:
-    """Ask Linux to kill this process when the thread of the server that started it ends."""
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL))  # 1: PR_SET_PDEATHSIG of linux/prctl.h
 
 
 def _set_alarm(seconds: float) -> None:

@@ -89,10 +89,9 @@ def from_template(mesh: Mesh, frame: FrameSurface, gate: float, least: float) ->
 
 
 def from_borders(mesh: Mesh, frame: FrameSurface, gate: float, least: float) -> Rows:
-    sides = border_sides(mesh.faces)
-    mine, theirs = sample_border(mesh, sides), sample_border(frame.mesh, border_sides(frame.mesh.faces))
-    share = np.tile((np.arange(SAMPLES) + 0.5) / SAMPLES, len(sides.faces))
-    faces, starts = np.repeat(sides.faces, SAMPLES), np.repeat(sides.sides, SAMPLES)
+    faces, starts = (np.repeat(of_sides, SAMPLES) for of_sides in border_sides(mesh.faces))
+    mine, theirs = sample_border(mesh), sample_border(frame.mesh)
+    share = np.tile((np.arange(SAMPLES) + 0.5) / SAMPLES, len(faces) // SAMPLES)
     corners = np.zeros((len(faces), 3))
     corners[np.arange(len(faces)), starts], corners[np.arange(len(faces)), (starts + 1) % 3] = 1 - share, share
     ahead, back = cKDTree(theirs.points).query(mine.points)[1], cKDTree(mine.points).query(theirs.points)[1]

@@ -97,7 +97,7 @@ def test_an_open_border_is_laid_on_the_frame_s_border() -> None:
     fit = fit_frames(template.faces, small[None], [frame], QUICK)
     rim = np.abs(template.vertices[:, :2]).max(axis=1) > 0.299
     assert np.abs(np.abs(fit.positions[0][rim, :2]).max(axis=1) - 0.3).max() < 0.001
-    assert len(border_sides(template.faces).faces) == 4 * 19
+    assert len(border_sides(template.faces)[0]) == 4 * 19
 
 
 def test_the_second_fit_is_nearer_to_few_components() -> None:

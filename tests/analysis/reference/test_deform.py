@@ -10,12 +10,13 @@ from meshreel.analysis.reference.deform import (
     DeformOptions,
     Neighbours,
     bind,
+    blended,
     center_motions,
     move,
-    move_normals,
     neighbours,
 )
 from meshreel.errors import InputError
+from meshreel.geometry.rigid import rotate
 from meshreel.geometry.topology import subdivide_midpoint, vertex_normals
 from meshreel.types import Centers, Mesh
 
@@ -77,7 +78,7 @@ def test_normals_turn_with_their_points() -> None:
     mesh, source = ball((0, 0, 0)), inside((0, 0, 0))
     near = kin(source)
     motions = center_motions(source, source @ rotation(1.0).T, near)
-    turned = move_normals(vertex_normals(mesh), bind(mesh, source, near, OPTIONS), motions, near)
+    turned = rotate(blended(bind(mesh, source, near, OPTIONS), motions, near), vertex_normals(mesh))
     np.testing.assert_allclose(turned, vertex_normals(mesh) @ rotation(1.0).T, atol=1e-9)
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from meshreel.analysis.scene.labelling import looks
 from meshreel.analysis.scene.views import ViewsOptions, place_views
-from meshreel.analysis.scene.votes import primitive_ids
 from meshreel.errors import InputError
-from meshreel.geometry.raycast import Rays
 from meshreel.geometry.topology import face_normals, subdivide_midpoint
 from meshreel.types import Mesh, MeshList
 from tests.metrics.shapes import moved, sphere
@@ -37,7 +36,7 @@ ROOM = together(box((0, 0, 0), (5, 2.5, 4), inwards=True), box((1, 0, 1), (2.5, 
 
 def seen_share(mesh, views):
     """The share of the area whose faces some pixel sees."""
-    ids = primitive_ids(Rays(mesh), views)
+    ids = np.stack([seen.faces for seen in looks(mesh, views)])
     areas = face_normals(mesh)[1]
     return areas[np.unique(ids[ids >= 0])].sum() / areas.sum()
 
@@ -61,7 +60,7 @@ def test_views_see_the_surface_of_all_inspected_frames():
     moments = MeshList(tuple(together(box((0, 0, 0), (5, 2.5, 4), True), moved(ball, (x, 1, 2))) for x in (1, 2, 4)))
     views = place_views(moments, SMALL)
     for mesh in moments:
-        ids = primitive_ids(Rays(mesh), views)
+        ids = np.stack([seen.faces for seen in looks(mesh, views)])
         assert np.unique(ids[ids >= len(mesh.faces) - len(ball.faces)]).size > 0.6 * len(ball.faces)
 
 

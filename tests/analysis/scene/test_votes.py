@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from meshreel.analysis.scene.views import ViewsOptions, place_views
-from meshreel.analysis.scene.votes import Votes, primitive_ids
+from meshreel.analysis.scene.votes import Votes
 from meshreel.geometry.raycast import Rays
 from tests.metrics.shapes import sphere
 
@@ -47,7 +47,7 @@ def test_a_mask_of_one_half_of_a_ball_finds_that_half():
     ball = sphere(levels=4)
     views = place_views([ball], ViewsOptions(count=12, width=160, height=120, reach=3.0))
     rays = Rays(ball)
-    ids = primitive_ids(rays, views)
+    ids = np.stack([rays.look(view).faces for view in views])
     assert ids.shape == (12, 120, 160) and ids.dtype == np.int32
     right = ball.vertices[ball.faces].mean(axis=1)[:, 0] > 0
     votes = Votes.of(ids, (ids >= 0) & right[ids], len(ball.faces))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from meshreel.coding.appearance.pictures import (
+    BAND,
     VideoDecoder,
     VideoEncoder,
     VideoOptions,
@@ -17,9 +18,11 @@ from meshreel.coding.appearance.pictures import (
     to_i420,
 )
 from meshreel.errors import FormatError, InputError
+from meshreel.format.budget import CostlyError
 from meshreel.format.layout import LAYER_PICTURES, VideoCodec
 
 pytest.importorskip("av")
+SHOWN, HIDDEN = b"\x32\1\x10", b"\x32\1\0"  # headers of pictures, that of AV1's OBU first
 X, Y = np.meshgrid(np.arange(96), np.arange(64))
 PICTURES = [
     np.stack([128 + 100 * np.sin(X / 9 + t / 5), 128 + 90 * np.cos(Y / 7), 2.0 * X], axis=2).astype(np.uint8)
@@ -43,6 +46,17 @@ def test_planes_are_bt_709_in_limited_range() -> None:
         assert planes.shape == (3, 2) and planes[0, 0] == wanted[0]
         assert planes.reshape(-1)[4:].tolist() == list(wanted[1:])
         assert np.abs(from_i420(planes).astype(int) - color).max() <= 2
+
+
+def test_bands_of_rows_are_one_picture() -> None:
+    planes = np.random.default_rng(0).integers(0, 256, (3 * BAND // 2 + 3, 6)).astype(np.uint8)
+    whole, cuts = from_i420(planes), [6 * (BAND + 2), 6 * (BAND + 2) * 5 // 4]
+    luma, blue, red = (
+        plane.reshape(-1, width) for plane, width in zip(np.split(planes.reshape(-1), cuts), (6, 3, 3), strict=True)
+    )
+    last = np.concatenate([luma[BAND:].reshape(-1), blue[BAND // 2 :].reshape(-1), red[BAND // 2 :].reshape(-1)])
+    np.testing.assert_array_equal(whole[BAND:], from_i420(last.reshape(-1, 6)))
+    assert whole.shape == (BAND + 2, 6, 3)
 
 
 @pytest.mark.parametrize("codec", VideoCodec)
@@ -71,20 +85,46 @@ def test_damaged_pictures_are_refused(codec: VideoCodec) -> None:
 
 
 def test_a_group_has_a_picture_for_each_frame() -> None:
-    data = encode_pictures([b"one", b"two"])
-    assert decode_pictures(data, 2).packets == (b"one", b"two")
-    slow = encode_pictures([b"one", b"two"], interval=4)
-    for count, bad in ((3, data), (2, data[:-1]), (2, encode_pictures([b"one", b""])), (2, slow)):
+    data = encode_pictures([SHOWN, SHOWN + HIDDEN])
+    assert decode_pictures(data, 2, 4).packets == (SHOWN, SHOWN + HIDDEN)
+    slow = encode_pictures([SHOWN, SHOWN], interval=4)
+    for count, bad in ((3, data), (2, data[:-1]), (2, encode_pictures([SHOWN, b""])), (2, slow)):
         with pytest.raises(FormatError):
-            decode_pictures(bad, count)
+            decode_pictures(bad, count, 4)
+
+
+@pytest.mark.parametrize("codec", VideoCodec)
+def test_truncated_and_changed_records_are_refused_before_anything_is_decoded_or_decode(codec: VideoCodec) -> None:
+    found = packets(codec=codec)[:3]
+    data, wrong = encode_pictures(found, codec), 0
+    for length in range(len(data)):
+        with pytest.raises(FormatError):
+            decode_pictures(data[:length], 3, 96 * 64)
+    for at in [*range(12), *range(12, len(data), 97)]:
+        changed = data[:at] + bytes([data[at] ^ 255]) + data[at + 1 :]
+        try:
+            record = decode_pictures(changed, 3, 96 * 64)
+            decoder = VideoDecoder(96, 64, record.codec)
+            assert all(decoder.decode(packet).shape == (96, 96) for packet in record.packets)
+        except FormatError:
+            wrong += 1
+    assert wrong > 5
+
+
+def test_pictures_that_cost_more_than_their_bytes_may_are_refused() -> None:
+    texels, data = 2048 * 2048, encode_pictures([SHOWN + 7 * HIDDEN] * 11)
+    assert len(decode_pictures(data, 11, texels).packets) == 11
+    with pytest.raises(CostlyError, match=r"pictures: .* bytes that cost"):
+        decode_pictures(encode_pictures([SHOWN + 7 * HIDDEN] * 13), 13, texels)
+    assert len(decode_pictures(encode_pictures([SHOWN + 7 * HIDDEN] * 13), 13, texels // 4).packets) == 13
 
 
 def test_a_layer_of_a_background_has_at_most_64_pictures() -> None:
-    record = decode_pictures(encode_pictures([b"one"] * LAYER_PICTURES, interval=4), 0)
+    record = decode_pictures(encode_pictures([SHOWN] * LAYER_PICTURES, interval=4), 0, 4)
     assert (len(record.packets), record.interval) == (LAYER_PICTURES, 4)
     for count, interval in ((LAYER_PICTURES + 1, 4), (0, 4), (1, 0)):
         with pytest.raises(FormatError):
-            decode_pictures(encode_pictures([b"one"] * count, interval=interval), 0)
+            decode_pictures(encode_pictures([SHOWN] * count, interval=interval), 0, 4)
 
 
 def test_without_pyav_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

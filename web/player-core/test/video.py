@@ -33,8 +33,8 @@ def main(frames: int, side: int) -> None:
             packets[name] += encoder.add(planes)
     for name, encoder in encoders.items():
         packets[name] += encoder.finish()
-    texts = {name: [base64.b64encode(packet).decode() for packet in found] for name, found in packets.items()}
-    json.dump(texts, sys.stdout)
+    coded = {name: [base64.b64encode(packet).decode() for packet in found] for name, found in packets.items()}
+    json.dump(coded, sys.stdout)
 
 
 if __name__ == "__main__":

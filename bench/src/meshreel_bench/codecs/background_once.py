@@ -1,8 +1,4 @@
-"""Background once, then decimated Draco per frame: the strongest anchor without tracking. A sequence <-> .reel.
-
-The background is found and coded as meshreel does; what moves in each frame is decimated and coded by Draco. A sequence
-that is no scene is decimated Draco per frame.
-"""
+"""Background once, as meshreel codes it, then what moves as decimated Draco per frame: an anchor without tracking."""
 
 from __future__ import annotations
 
@@ -54,9 +50,9 @@ class BackgroundOnceDracoCodec(TwoSteps):
         """Return the background and what moves. Raises InputError for frames that cannot be used."""
         stages, options = Stages(progress, len(sequence)), SceneOptions()
         if not (len(sequence) and is_scene(sequence)):
-            seen = survey(sequence, stages)
+            seen = survey(sequence, stages.add)
             return Still((), Frames(sequence.frame_rate, seen, [seen.normalise(mesh) for mesh in sequence]))
-        parts = take_apart(captured(sequence), survey(sequence, stages, cleaned=False), options, stages)
+        parts = take_apart(captured(sequence), survey(sequence, stages.add, cleaned=False), options, stages)
         states = encode_static(parts, len(sequence), sequence.frame_rate, options.background)
         moving = list[Mesh]()
         for number, mesh in enumerate(sequence):

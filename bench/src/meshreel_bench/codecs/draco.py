@@ -1,7 +1,6 @@
-"""Draco per frame, as it is or decimated first: anchors A1, A2 and A2s. In -> out: a sequence <-> a .reel file.
+"""Draco per frame, as it is or decimated first (QEM that keeps borders): anchors A1, A2 and A2s. <-> a .reel file.
 
-Every frame is a group of its own, so that the rate counts an index as other codecs' rates do. QEM runs
-scale-normalised and keeps open borders.
+Every frame is a group of its own, so that the rate counts an index as other codecs' rates do.
 """
 
 from __future__ import annotations

@@ -41,10 +41,7 @@ class Prepared(TwoSteps):
 
 @dataclass(frozen=True, slots=True)
 class MeshreelCodec(Prepared):
-    """A preset at a quality; options that are None keep the preset's values.
-
-    `basis_size` fixes the number of components m; a `variant` (`.variants`) changes one thing of the preset.
-    """
+    """A preset at a quality; options that are None keep the preset's values; `basis_size` is m; see `.variants`."""
 
     preset: str = "paper"
     quality: float = 50.0  # 0 to 100
@@ -61,9 +58,10 @@ class MeshreelCodec(Prepared):
 
     @property
     def name(self) -> str:
-        """The name in rows and plots; points with a fixed m or a variant make another curve."""
+        """The name in rows and plots; points with colours, a fixed m or a variant make another curve."""
+        colored = "" if self.color == "none" else f", {self.color}"
         changed = "" if self.variant is None else f", {self.variant}"
-        return f"meshreel {self.preset}{changed}" + ("" if self.basis_size is None else " m")
+        return f"meshreel {self.preset}{colored}{changed}" + ("" if self.basis_size is None else " m")
 
     @property
     def encoder_options(self) -> EncoderOptions:

@@ -1,7 +1,4 @@
-"""Anchors of a captured scene with labels: decimated Draco of whole frames (a), or of what moves (b). Frames <-> .reel.
-
-Anchor b has the background as its first frame; its decoder puts the parts together. QEM keeps open borders.
-"""
+"""Anchors of a scene with labels: decimated Draco of whole frames (a), or of what moves (b). Frames <-> .reel."""
 
 from __future__ import annotations
 

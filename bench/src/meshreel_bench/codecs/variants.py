@@ -1,7 +1,4 @@
-"""Presets with one part switched off or replaced, by name: what an ablation compares with the whole.
-
-In -> out: EncoderOptions -> EncoderOptions. A variant is one line of VARIANTS; `experiments.ablation` runs them.
-"""
+"""Presets with one part switched off or replaced, by name: what an ablation compares with the whole."""
 
 from __future__ import annotations
 

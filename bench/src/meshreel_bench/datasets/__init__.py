@@ -17,6 +17,7 @@ from meshreel.capture.procedural import SoftBodiesOptions, soft_bodies
 from meshreel.capture.recording import open_recording
 from meshreel.errors import InputError
 from meshreel.geometry.cameras import PinholeCamera
+from meshreel.geometry.color_views import ColorFrames
 from meshreel.geometry.derived_sequences import Chosen
 from meshreel.geometry.topology import weld
 from meshreel.io.file_names import is_pattern
@@ -25,11 +26,11 @@ from meshreel.types import MeshSequence
 
 from .captured import Captured
 from .checksums import check_source, checksum, known_checksums
-from .remesh import RemeshedSequence, RemeshOptions
+from .child import CAMERAS, FRAMES, Child, Clean
+from .remesh import Place, RemeshedSequence, RemeshOptions, SideBySide
 from .rooms import PEOPLE, ROOM
 from .scenes import PROCEDURAL, SCENES, SceneData, open_scene
 from .shapes import gears, prism
-from .side_by_side import Place, SideBySide
 
 DEMO = "demo"  # procedural bodies: needs no benchmark data
 SHAPES: dict[str, Callable[..., MeshSequence]] = {"gears": gears, "prism": prism}  # neither do these
@@ -42,14 +43,15 @@ BODIES: dict[str, Place] = {  # of SYNTHETIC, m: on one floor, 30 cm apart
 }
 SYNTHETIC_FRAMES = 10
 RECORDINGS = ("living_room",)
+CHILD = "procedural_child"  # needs no benchmark data
 PERFORMERS, RECORDED = "performers", "captures"  # folders of the benchmark data
-SCALES = {"basketball_player": 0.1}  # to metres; the others are in metres
+SCALES = {"basketball_player": 0.1, "textured/basketball_player": 0.1}  # to metres; the others are in metres
 REMESHED = {  # new connectivity in every frame: of a body, its first frames
     "crane60": ("crane", 60, RemeshOptions()),
     "samba60": ("samba", 60, RemeshOptions()),
     "dancer160k": ("dancer", 4, RemeshOptions(vertices=160_000, levels=2)),
 }
-NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, PROCEDURAL, *RECORDINGS, *REMESHED)
+NAMES = (DEMO, *SHAPES, SYNTHETIC, *SCENES, PROCEDURAL, CHILD, *RECORDINGS, *REMESHED)
 # Endings of names: the same sequence in another order, of the wanted length.
 PLAYED: dict[str, Callable[[MeshSequence, int], MeshSequence]] = {
     "-backwards": lambda sequence, count: Chosen(sequence, range(len(sequence))[::-1][:count]),
@@ -64,6 +66,7 @@ class Dataset:
     sequence: MeshSequence
     cameras: tuple[PinholeCamera, ...] = ()  # where it was seen from; none: look from around it
     scene: SceneData | None = None  # of a simulated scene
+    pictures: ColorFrames | None = None  # of colour cameras: what decoded colours are compared with
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +78,7 @@ class Store:
     own: SequenceOptions = SequenceOptions()  # how files that are not the benchmark's become a sequence
 
     def open(self, name: str, frames: int | None = None) -> Dataset:
-        """Return the sequence of that name or path; its first `frames` frames where that is asked for.
-
-        Raises InputError where data are missing or are not those of the benchmark.
-        """
+        """Return the first frames of a sequence by name or path. InputError where data are missing or others."""
         for ending, played in PLAYED.items():
             if name.endswith(ending):
                 known = self.open(name.removesuffix(ending), None)
@@ -91,6 +91,9 @@ class Store:
             return _scene(name, self.data, frames, self.cache)
         if name in RECORDINGS:
             return _recording(name, self.data, frames, self.cache)
+        if name == CHILD:
+            child = Child(_kept(name, self.cache) / f"{name}-{frames or FRAMES}", frames or FRAMES)
+            return Dataset(child, tuple(camera.view for camera in CAMERAS), pictures=Clean(child.room))
         if name == SYNTHETIC:
             count = min(frames or SYNTHETIC_FRAMES, SYNTHETIC_FRAMES)
             bodies = [(_open_files(body, self.data, count), place) for body, place in BODIES.items()]
@@ -102,10 +105,7 @@ class Store:
         return Dataset(_open_files(name, self.data, frames, self.own))
 
     def digest(self, name: str) -> str | None:
-        """Return a digest of a user's sequence and its options of reading; None for benchmark data.
-
-        Raises InputError where it is missing.
-        """
+        """Return a digest of a user's sequence and its options of reading; None for benchmark data."""
         for ending in PLAYED:
             name = name.removesuffix(ending)
         if name in NAMES:
@@ -129,7 +129,7 @@ def _scene(name: str, data: Path, frames: int | None, cache: Path | None) -> Dat
         for source in (ROOM, *(Path(PERFORMERS, f"{body}.npz") for body in PEOPLE)):
             check_source(data / source, source)
     scene = open_scene(name, data, _kept(name, cache), frames)
-    return Dataset(scene.meshes, scene.meshes.cameras, scene)
+    return Dataset(scene.meshes, scene.meshes.cameras, scene, scene.meshes.colors)
 
 
 def _recording(name: str, data: Path, frames: int | None, cache: Path | None) -> Dataset:
@@ -137,7 +137,7 @@ def _recording(name: str, data: Path, frames: int | None, cache: Path | None) ->
     check_source(data / source, source)
     recording, _ = open_recording(data / source, frames=":" if frames is None else f":{frames}", keep=False)
     captured = Captured(recording, _kept(name, cache) / name / "meshes")
-    return Dataset(captured, captured.cameras)
+    return Dataset(captured, captured.cameras, pictures=captured.colors)
 
 
 def _kept(name: str, cache: Path | None) -> Path:
@@ -148,8 +148,8 @@ def _kept(name: str, cache: Path | None) -> Path:
 
 def _open_files(name: str, data: Path, frames: int | None, own: SequenceOptions | None = None) -> FileSequence:
     path = _found(name, data)
-    if path.parent == data / PERFORMERS:
-        check_source(path, Path(PERFORMERS, path.name))
+    if path.is_relative_to(data):
+        check_source(path, path.relative_to(data))
     options = SequenceOptions(scale=SCALES.get(name, 1.0)) if own is None or _is_known(path, data) else own
     chosen = options.frames if frames is None else f":{frames}"
     return open_sequence(path, replace(options, frames=chosen, weld=weld))
@@ -179,4 +179,4 @@ def _is_path(name: str) -> bool:
 
 def _is_known(path: Path, data: Path) -> bool:
     """Whether a path is of the benchmark data, which have checksums."""
-    return path.parent == data / PERFORMERS and Path(PERFORMERS, path.name).as_posix() in known_checksums()
+    return path.is_relative_to(data) and path.relative_to(data).as_posix() in known_checksums()

@@ -1,7 +1,4 @@
-"""A rig's recording as a benchmark has it: each frame fused once and kept as a file.
-
-In: a recording, a folder. Out: its meshes, with what the cameras measured of them.
-"""
+"""A rig's recording as a benchmark has it: each frame fused once and kept as a file."""
 
 from __future__ import annotations
 
@@ -17,10 +14,7 @@ from meshreel.types import Frames, Mesh, Up
 
 
 class Captured(Frames):
-    """The frames of a recording, made as `meshreel capture` makes them where the folder lacks them.
-
-    What the cameras measured comes from the rig itself.
-    """
+    """The frames of a recording, made as `meshreel capture` makes them where the folder lacks them."""
 
     def __init__(self, recording: Recording, folder: Path) -> None:
         make_folder(folder)

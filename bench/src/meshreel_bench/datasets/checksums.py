@@ -1,27 +1,21 @@
-"""SHA-256 of the benchmark data that the published rows were measured on.
-
-In: a path. Out: nothing, or InputError: other data of the same name are refused before anything is measured.
-"""
+"""SHA-256 of the benchmark data that the published rows were measured on; other data of the same name are refused."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import sys
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 from meshreel.errors import InputError
 
-TABLE = "checksums.json"  # package data: by path below the benchmark data
-UNREAD = "color"  # folder of a recording whose pictures no measurement reads
+TABLE = "checksums.json"  # package data: by path below the benchmark data; `python -m` this with their folder writes it
 
 
 def check_source(path: Path, known_as: Path) -> None:
-    """Raise InputError where `path` differs from the benchmark data called `known_as`.
-
-    Data without a checksum are accepted; a missing path is left to the function that opens it.
-    """
+    """Raise InputError where `path` is there and is not the benchmark data called `known_as`, if these are known."""
     expected = known_checksums().get(known_as.as_posix())
     if expected is None or not path.exists():
         return
@@ -45,14 +39,9 @@ def write_checksums(data: Path, table: Path) -> None:
 
 
 def checksum(path: Path) -> str:
-    """Return the SHA-256 of a file, or of names and contents of a folder's files in the order of their names.
-
-    The color pictures of a recording are left out. Files are read again where their sizes or times have changed.
-    Raises InputError where one cannot be read.
-    """
+    """Return the SHA-256 of a file, or of a folder's names and contents. InputError for unreadable ones."""
     try:
-        below = (p for p in path.rglob("*") if p.is_file() and path / UNREAD not in p.parents)
-        listed = sorted(below) if path.is_dir() else [path]
+        listed = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
         stamps = [(file, file.stat()) for file in listed]
         return _checksum(path, tuple((file, stat.st_size, stat.st_mtime_ns) for file, stat in stamps))
     except OSError as error:
@@ -72,3 +61,7 @@ def _checksum(path: Path, stamps: tuple[tuple[Path, int, int], ...]) -> str:
         digest.update(f"{file.relative_to(path).as_posix()} {len(data)}\n".encode())
         digest.update(data)
     return digest.hexdigest()
+
+
+if __name__ == "__main__":
+    write_checksums(Path(sys.argv[1]), Path(__file__).with_name(TABLE))

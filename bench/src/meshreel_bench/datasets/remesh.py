@@ -1,4 +1,4 @@
-"""Constant-topology sequences given new connectivity in every frame, as captures have it: one reproducible recipe.
+"""Sequences made of captured ones: with new connectivity in every frame, as captures have it, or side by side.
 
 In -> out: frames on one list of faces -> frames that share nothing but their surface. Per frame, with its number as
 the seed: midpoint subdivision, vertices moved along the surface, QEM, vertices and faces in a random order.
@@ -7,6 +7,7 @@ the seed: midpoint subdivision, vertices moved along the surface, QEM, vertices 
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,10 +17,12 @@ from jaxtyping import Float64
 from meshreel.geometry.closest_points import Surface
 from meshreel.geometry.decimate import decimate
 from meshreel.geometry.derived_sequences import DerivedSequence
-from meshreel.geometry.topology import subdivide_midpoint, unique_edges, vertex_normals
+from meshreel.geometry.topology import concatenate, subdivide_midpoint, unique_edges, vertex_normals
 from meshreel.io.meshes import read_mesh
 from meshreel.io.write import write_mesh
-from meshreel.types import Mesh, MeshSequence
+from meshreel.types import Frames, Mesh, MeshSequence
+
+Place = tuple[float, float, float]  # m, added to the coordinates
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,10 +35,7 @@ class RemeshOptions:
 
 
 class RemeshedSequence(DerivedSequence):
-    """The frames of a sequence, remeshed when they are asked for; kept as PLY files where a folder is given.
-
-    The files are a cache: a frame is the same with and without it, and two processes may fill it at once.
-    """
+    """The frames of a sequence, remeshed when they are asked for; a folder keeps them as PLY files."""
 
     def __init__(self, source: MeshSequence, folder: Path | None = None, options: RemeshOptions = RemeshOptions()):
         super().__init__(source)
@@ -49,11 +49,26 @@ class RemeshedSequence(DerivedSequence):
             return remesh(self._source[number], number, self._options)
         o = self._options
         path = self._folder / f"{o.vertices}-{o.levels}-{o.jitter:g}-{number:05}.ply"
-        if path.exists():
-            return read_mesh(path, str(path)).mesh
-        mesh = remesh(self._source[number], number, self._options)
-        write_mesh(mesh, path)
-        return mesh
+        if not path.exists():
+            write_mesh(remesh(self._source[number], number, o), path)
+        return read_mesh(path, str(path)).mesh
+
+
+class SideBySide(Frames):
+    """A frame has the frames of all bodies, each at its place, as long as the shortest; the rate is the first one's."""
+
+    def __init__(self, bodies: Sequence[tuple[MeshSequence, Place]]) -> None:
+        """At least one."""
+        self._bodies = tuple(bodies)
+        self.frame_rate = bodies[0][0].frame_rate
+
+    def __len__(self) -> int:
+        return min(len(body) for body, _ in self._bodies)
+
+    def __getitem__(self, index: int) -> Mesh:
+        number = range(len(self))[index]
+        frames = ((body[number], place) for body, place in self._bodies)
+        return concatenate([Mesh.of(mesh.vertices + place, mesh.faces) for mesh, place in frames])
 
 
 def remesh(mesh: Mesh, seed: int, options: RemeshOptions = RemeshOptions()) -> Mesh:

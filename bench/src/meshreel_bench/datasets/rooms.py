@@ -1,7 +1,4 @@
-"""The benchmark scenes `room2` and `room2-standing`: a furnished room and two people, seen by four simulated cameras.
-
-In: the room and the performers of the benchmark data. Out: a rig's folder, for `meshreel capture`, with the truth.
-"""
+"""The benchmark scenes `room2` and `room2-standing`: a furnished room, two people, four simulated cameras, as a rig."""
 
 from __future__ import annotations
 

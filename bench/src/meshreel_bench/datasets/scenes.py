@@ -1,8 +1,7 @@
 """The benchmark scenes, captured: noisy fused meshes, the truth, and labels of the faces that move.
 
-In: a scene's name, the benchmark data, a folder to keep things in. Out: a SceneData. What is made is kept: the rig
-(minutes), the fused meshes (a frame a second or two), the labels and the background that an anchor is given; labels
-that the encoder finds for as long as its code is the same.
+What is made is kept: the rig (minutes), the fused meshes (a frame a second or two), labels, and the background that an
+anchor is given; labels that the encoder finds for as long as its code is the same.
 """
 
 from __future__ import annotations
@@ -32,6 +31,7 @@ from meshreel.geometry.decimate import decimate_faces
 from meshreel.geometry.derived_sequences import Chosen
 from meshreel.io.meshes import read_mesh
 from meshreel.io.write import make_folder, replacing, write_mesh
+from meshreel.metrics.scene_accuracy import Scene, Sight
 from meshreel.types import Mesh, MeshSequence, evenly
 
 from .captured import Captured
@@ -92,10 +92,7 @@ class SceneFrames(Chosen):
 
 
 def open_scene(name: str, data: Path, cache: Path, frames: int | None = None) -> SceneData:
-    """The scene called `name`, made below `cache` where it is not there yet; its first frames, where that is asked for.
-
-    Raises InputError for an unknown name and where the benchmark data are missing.
-    """
+    """The first frames of a scene, made below `cache` where it is not there. InputError for missing data."""
     folder = cache / (name if frames is None else f"{name}-{frames}")
     rig, meshes = folder / "rig", folder / "meshes"
     if not (rig / RIG).exists():
@@ -133,6 +130,12 @@ def _find_labels(meshes: MeshSequence, path: Path) -> None:
     make_folder(path.parent)
     with replacing(path) as file:
         np.savez_compressed(file, allow_pickle=False, **labels)
+
+
+def true_scene(truth: Truth, number: int) -> Scene:
+    """Prepare a clean frame for measurements of other meshes."""
+    frame, sights = truth[number], [Sight(camera.view, *camera.depth_range) for camera in truth.cameras]
+    return Scene(frame.mesh, frame.dynamic, sights, complete=True)
 
 
 def _nearest_labels(clean: SceneFrame, fused: Mesh) -> Bool[np.ndarray, " F"]:

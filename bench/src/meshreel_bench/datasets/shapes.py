@@ -1,7 +1,4 @@
-"""Procedural shapes with sharp edges that move rigidly: two gears in mesh, and a prism of 10 vertices.
-
-In: a number of frames. Out: a sequence in metres, 30 frames a second; each piece keeps its connectivity.
-"""
+"""Shapes with sharp edges that move rigidly, in metres, 30 frames/s: two gears in mesh, a prism of 10 vertices."""
 
 from __future__ import annotations
 

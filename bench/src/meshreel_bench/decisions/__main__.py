@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from . import backgrounds, correspondence, fused, procedural, tails, templates, views
+from . import correspondence, fused, procedural, scene, tails, templates
 from .rows import Row, Sources, replace_rows
 from .tables import write_tables
 
@@ -20,8 +20,8 @@ MEASURE: dict[str, Callable[[Sources], Iterable[Row]]] = procedural.MEASURE | {
     "template": templates.measure,
     "tails": tails.measure,
     "fused": fused.measure,
-    "views": views.measure,
-    "backgrounds": backgrounds.measure,
+    "views": scene.measure_views,
+    "backgrounds": scene.measure_backgrounds,
 }
 
 

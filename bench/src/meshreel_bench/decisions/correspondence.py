@@ -1,7 +1,4 @@
-"""Decision 11: tracked centers against embedded deformation, both followed by the same surface fit.
-
-In: the benchmark data. Out: two rows for each case, with distances before and after the fit, motion bits and time.
-"""
+"""Decision 11: tracked centers against embedded deformation, both followed by the same surface fit."""
 
 from __future__ import annotations
 
@@ -14,13 +11,13 @@ from jaxtyping import Float64
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.fit.residual import Residual, residual_of
 from meshreel.analysis.fit.surface_fit import FitOptions, Guides, fit_frames
-from meshreel.analysis.follow.embedded import register
+from meshreel.analysis.follow.embedded import EmbeddedOptions, Tracker
 from meshreel.analysis.reference.centers import ReferenceCenterOptions, affinity, largest_distances
 from meshreel.analysis.reference.deform import DeformOptions, bind, center_motions, move, neighbours
 from meshreel.analysis.reference.track import TrackOptions, track_centers
 from meshreel.coding import klt
 from meshreel.geometry.decimate import decimate
-from meshreel.geometry.topology import subdivide_midpoint, unique_edges, vertex_normals
+from meshreel.geometry.topology import subdivide_midpoint, unique_edges
 from meshreel.metrics.distance import surface_errors
 from meshreel.types import Mesh
 
@@ -82,7 +79,21 @@ def centers(frames: Sequence[Mesh], key: int, template: Mesh) -> Positions:
 
 def embedded(frames: Sequence[Mesh], key: int, template: Mesh) -> Positions:
     """Move the template by embedded deformation of the key frame's mesh."""
-    return register(frames[key], frames, key).move(template.vertices, vertex_normals(template))
+    return placed(registered(frames, key, EmbeddedOptions()), len(frames), template)
+
+
+def registered(frames: Sequence[Mesh], key: int, options: EmbeddedOptions) -> Tracker:
+    """Track the key frame's mesh through all frames, outward from the key."""
+    tracker = Tracker(frames[key], key, options)
+    for frame in [*range(key + 1, len(frames)), *range(key - 1, -1, -1)]:
+        tracker.step(frame, frames[frame])
+    return tracker
+
+
+def placed(tracker: Tracker, frames: int, template: Mesh) -> Positions:
+    """Move a template on or near the key frame's mesh to each frame."""
+    binding = tracker.bound(template)
+    return np.stack([tracker.placed(frame, template.vertices, binding) for frame in range(frames)])
 
 
 def distances(stage: str, frames: Sequence[Mesh], positions: Positions, template: Mesh) -> Row:
@@ -103,10 +114,7 @@ def distances(stage: str, frames: Sequence[Mesh], positions: Positions, template
 
 
 def motion_bits(positions: Positions, base: Mesh, key: int) -> tuple[float, float]:
-    """Return bits per vertex of the base's trajectories: sum over KLT columns of log2(1 + energy / step^2) / 2.
-
-    First those of the trajectories, then those of the difference from the mean of a vertex's neighbours.
-    """
+    """Return bits per vertex of trajectories, log2(1 + energy / step^2) / 2; and of differences from neighbours."""
     field = np.moveaxis(positions - positions[key], 0, 1)
     basis = klt.fit(field)
     edges = unique_edges(base.faces)[0]

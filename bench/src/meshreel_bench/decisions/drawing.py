@@ -1,7 +1,4 @@
-"""Panels for the documentation's pictures: meshes by ray casting, points and bars by matplotlib, all headless.
-
-A Sheet is a row of equal panels in whole pixels. The same input gives the same PNG bytes.
-"""
+"""Panels of equal size for the documentation's pictures: meshes by ray casting, points and bars by matplotlib."""
 
 from __future__ import annotations
 

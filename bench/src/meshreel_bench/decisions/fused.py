@@ -1,7 +1,4 @@
-"""Decision 16: people cut out of the fused, noisy room2; `layers` against the truth and against decimated Draco.
-
-In: the captured scene with its truth. Out: rows of the input, of qualities, of a wrong noise and of the anchors.
-"""
+"""Decision 16: people cut out of the fused, noisy room2; `layers` against the truth and against decimated Draco."""
 
 from __future__ import annotations
 

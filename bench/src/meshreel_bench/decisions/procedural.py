@@ -1,7 +1,4 @@
-"""Decisions 1, 2, 5, 6, 7 and 10, measured on one group of the procedural story at quality 50.
-
-In: nothing; the frames are procedural. Out: rows; some minutes in all.
-"""
+"""Decisions 1, 2, 5, 6, 7 and 10, measured on one group of the procedural story at quality 50, in some minutes."""
 
 from __future__ import annotations
 

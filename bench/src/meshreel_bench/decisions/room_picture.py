@@ -1,7 +1,4 @@
-"""The picture of docs/tutorial.md: the procedural room as it is captured, taken apart, coded and decoded.
-
-In: nothing; the room is simulated. Out: a PNG. Called by `pictures`.
-"""
+"""The picture of docs/tutorial.md: the procedural room as it is captured, taken apart, coded and decoded."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Rows behind docs/decisions and the captured frames that they are measured on.
-
-In: the folder of the benchmark data. Out: frames in normalised coordinates; rows of a JSON-lines file.
-"""
+"""Rows behind docs/decisions and the captured frames that they are measured on, in normalised coordinates."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""One group of procedural frames taken through every stage of preset `paper`, for pictures and for decisions.
-
-In: frames of the procedural story, in which two people walk up to each other and take hands. Out: Stages.
-"""
+"""One group of procedural frames taken through every stage of preset `paper`, for pictures and for decisions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Tables of docs/decisions, each made from rows between its markers `<!-- table: NAME -->` and `<!-- end -->`.
-
-In: a folder of pages with their rows. Out: pages whose tables are those of the rows.
-"""
+"""Tables of docs/decisions, each made from rows between its markers `<!-- table: NAME -->` and `<!-- end -->`."""
 
 from __future__ import annotations
 

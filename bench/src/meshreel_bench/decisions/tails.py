@@ -1,7 +1,4 @@
-"""Decision 13: a layer of patches on captured bodies; none, dropped faces alone, both, and all that could be gained.
-
-In: the benchmark data. Out: four rows for each case and quality.
-"""
+"""Decision 13: a layer of patches on captured bodies; none, dropped faces alone, both, all that could be gained."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Decision 14: the template and the steps of `layers`; base meshes, levels, midpoints and ratios of steps.
-
-In: the frames of the dancer. Out: a row for each template, choice of the coder and step.
-"""
+"""Decision 14: the template and the steps of `layers`; base meshes, levels, midpoints and ratios of steps."""
 
 from __future__ import annotations
 
@@ -13,16 +10,15 @@ import numpy as np
 
 from meshreel.analysis.fit.frame import FrameSurface
 from meshreel.analysis.fit.surface_fit import Guides, fit_surfaces
-from meshreel.analysis.follow.embedded import register
 from meshreel.analysis.follow.template import shared_detail
 from meshreel.coding.layers.coder import LayerCodingOptions, encode_layers
 from meshreel.coding.reference_mesh import CodedReference, code_on_lattice
 from meshreel.encoder.options import LayersOptions
 from meshreel.encoder.target import measure as measure_fidelity
 from meshreel.geometry.decimate import decimate
-from meshreel.geometry.topology import vertex_normals
 from meshreel.types import Mesh
 
+from .correspondence import placed, registered
 from .rows import Case, Row, Sources, mbps_of
 
 CASE = Case("dancer")
@@ -44,12 +40,12 @@ def measure(sources: Sources) -> Iterator[Row]:
     best, frames = LayersOptions(), CASE.frames(sources.data)
     targets = [FrameSurface(frame) for frame in frames]
     key = len(frames) // 2
-    motion = register(frames[key], frames, key, best.embedded)
+    tracker = registered(frames, key, best.embedded)
     for vertices, levels in TEMPLATES:
         reference = code_on_lattice(decimate(frames[key], vertices), LATTICE * best.layers.step, levels)
         base, faces = reference.mesh, reference.base.faces
         shared = shared_detail(base.faces, len(base.vertices), levels)
-        predictions = motion.move(reference.base.vertices, vertex_normals(reference.base))
+        predictions = placed(tracker, len(frames), reference.base)
         positions = fit_surfaces(faces, predictions, targets, best.fit, Guides(None, shared, key))
         name = f"{vertices} vertices, {levels} levels"
         tried: dict[str, dict[str, Any]] = {"": {}} | (CHOICES if (vertices, levels) == TRIED else {})

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from meshreel.errors import InputError
 
-from . import ablations, figure6, layers, scenes, speed, tables, targets
+from . import ablations, color, figure6, layers, scenes, speed, targets
 from .study import Study
 
 # In the order of the report.
 EXPERIMENTS: dict[str, Study] = {
     "figure6": figure6.STUDY,
-    "table1": tables.TABLE_1,
-    "table2": tables.TABLE_2,
+    "table1": figure6.TABLE_1,
+    "table2": figure6.TABLE_2,
     "ablation_centers": ablations.CENTERS,
     "ablation_gof": ablations.GOF,
     "ablation_basis": ablations.BASIS,
@@ -20,6 +20,7 @@ EXPERIMENTS: dict[str, Study] = {
     "layers": layers.STUDY,
     "targets": targets.STUDY,
     "speed": speed.STUDY,
+    "color": color.STUDY,
 }
 
 

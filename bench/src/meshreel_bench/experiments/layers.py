@@ -1,8 +1,4 @@
-"""Targets of the preset `best`: against the hull of all per-frame anchors, on performers and colliding shapes.
-
-Ten frames each of captured performers, sixty of two bodies that are remeshed in every frame, and sixty of two shapes
-that collide; 30 frames a second, four parallel views.
-"""
+"""Targets of the preset `best`: against the hull of all per-frame anchors, on performers and colliding shapes."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
-"""Targets of scenes: a room that stands still and two people in it, four simulated depth cameras.
+"""Targets of scenes: a room and two people, against the truth and the noisy input, four simulated depth cameras.
 
 Anchor a is decimated Draco of whole frames, anchor b a background once and decimated people, both by true labels.
-Everything is measured against the truth and against the noisy input, people and background each for itself.
 """
 
 from __future__ import annotations

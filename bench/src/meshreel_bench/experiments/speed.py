@@ -1,7 +1,4 @@
-"""Targets of speed: processor time, memory and work of encodes, and the time of a decode.
-
-Times are those of one core of a machine at rest: each is scaled by a fixed loop that runs beside it, in its process.
-"""
+"""Targets of speed: processor time of one core at rest, memory and work of encodes, and the time of a decode."""
 
 from __future__ import annotations
 

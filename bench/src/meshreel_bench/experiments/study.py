@@ -1,7 +1,4 @@
-"""Declarations of experiments: sweeps of codecs over sequences, measures to compare by, and promises.
-
-Declarations are data: `measure` runs their points, `report` judges their promises and renders their rows.
-"""
+"""Declarations of experiments: sweeps over sequences, measures to compare by, promises. `report` judges and renders."""
 
 from __future__ import annotations
 
@@ -189,6 +186,7 @@ class Study:
     frames: Mapping[str, int] = field(default_factory=dict)  # the first ones of a sequence; none given: all
     common: tuple[Measure, float] | None = None  # table of each curve's point nearest to this quality
     common_mbps: float | None = None  # the same by rate
+    rate: str = "mbps"  # of plots: name of a row's value
     notes: Sequence[str] = ()  # Markdown, before the tables
 
     def points(self, small: bool = False) -> Iterator[Point]:

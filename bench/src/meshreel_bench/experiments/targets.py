@@ -6,7 +6,7 @@ from ..names import TUNED
 from .study import D2, MASKED, NORMALS, SYMMETRIC, Always, Bound, Flat, Promise, Reaches, Study, Sweep, Which, at_most
 
 BODIES = ("dancer", "basketball_player", "mitch")
-# The authors' released code on dancer, one group of 10 frames, K = 2000: m -> Mbps, D2 in dB (`report.published`).
+# The authors' released code on dancer, one group of 10 frames, K = 2000: m -> Mbps, D2 in dB (`published.json`).
 RELEASED = {3: (2.23, 51.87), 5: (3.29, 54.35), 10: (5.78, 56.4), 30: (15.46, 59.02)}
 LARGEST = {"basis_size": 10, "quality": 100.0}  # the reference subdivides to 20k vertices
 # Fractions and bits on or near the hull of a full sweep on dancer; others only cost time.

@@ -1,7 +1,4 @@
-"""Count of wrong triangles: those that bridge bodies which are separate in the original frame, and slivers.
-
-In -> out: an original frame and its decoded one -> a count; 0 where all is well, and where the original is one piece.
-"""
+"""Counts of wrong triangles: those that bridge bodies which are separate in the original frame, and slivers."""
 
 from __future__ import annotations
 

@@ -35,8 +35,8 @@ def reference_s() -> float:
 class StageTimer:
     """Progress callback that charges processor time to the stage that reports.
 
-    As a context manager it also counts work, and runs the fixed loop before, after and, where the system has timers,
-    meanwhile: a machine that others use is slower at one time than at another. The loop and imports are not charged.
+    As a context manager it also counts work, and runs the fixed loop before, after and meanwhile, for a machine that
+    others use is slower at times. The loop and imports are not charged.
     """
 
     def __enter__(self) -> StageTimer:

@@ -1,7 +1,6 @@
 """Metrics of decoded frames: against the input, and where a scene is simulated, against the truth.
 
-In: the frames that are measured, original and decoded. Out: values by name, over the frames and for each. Names that
-begin with `truth_` or `input_` are of whole scenes, people and background; `seam_` is where these meet.
+Names that begin with `truth_` or `input_` are of whole scenes, people and background; `seam_` is where these meet.
 """
 
 from __future__ import annotations
@@ -15,17 +14,17 @@ from meshreel.decoder.video import open as open_video
 from meshreel.errors import InputError
 from meshreel.format.layout import MAGIC
 from meshreel.geometry.derived_sequences import Chosen
-from meshreel.metrics.comparison import ComparisonOptions, compare_sequences
+from meshreel.metrics.comparison import ComparisonOptions, compare_sequences, finite
 from meshreel.metrics.scene_accuracy import Scene, scene_means, scene_row
-from meshreel.metrics.scene_comparison import finite, true_scene
 from meshreel.metrics.viewpoints import Box, Camera
 from meshreel.types import Mesh
 
 from ..datasets import Dataset
-from ..datasets.scenes import SceneData
+from ..datasets.scenes import SceneData, true_scene
 from ..parallel_views import parallel_views_around
 from ..rows import Metrics
 from .bridges import count_bridges, count_degenerate
+from .color import picture_psnrs, picture_squares, swimming
 from .seams import measure_seam, seam_row
 
 KEPT = ("d2_psnr_paper", "normal_error_deg", "ssim", "ssim_masked")  # of each frame
@@ -49,6 +48,8 @@ def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame
     if metrics == "regions":
         return _regions(frames), {}
     values, per_frame = _to_input(frames, metrics)
+    if metrics == "colors":
+        return values | finite(_colors(frames)), per_frame
     if frames.known.scene is not None:
         values |= _means("truth", [(_true(frames.known.scene, number)) for number in frames.numbers], frames.decoded)
     return values, per_frame
@@ -57,7 +58,7 @@ def measure_frames(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame
 def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
     originals = Chosen(frames.known.sequence, frames.numbers)
     cameras: Sequence[Camera] | None = frames.known.cameras or None
-    if cameras is None and metrics == "parallel views":
+    if cameras is None and metrics in ("parallel views", "colors"):
         cameras = parallel_views_around(Box.of(originals))
     options = ComparisonOptions(cameras, ssim=metrics != "distances")
     row: dict[str, Any] = compare_sequences(originals, frames.decoded, options).to_row()
@@ -69,6 +70,19 @@ def _to_input(frames: Measured, metrics: Metrics) -> tuple[Values, PerFrame]:
         values["bridges"] = sum(count_bridges(a, b) for a, b in zip(originals, frames.decoded, strict=True))
         values["degenerate_faces"] = sum(map(count_degenerate, frames.decoded))
     return values, per_frame
+
+
+def _colors(frames: Measured) -> dict[str, float]:
+    """Return PSNRs beside the pictures of cameras, where there are any, and of a file's successive textures."""
+    video = open_video(frames.data) if frames.data.startswith(MAGIC) else None
+    pictures, originals = frames.known.pictures, frames.known.sequence
+    found = picture_psnrs(
+        picture_squares(picture, originals[k], mesh, 0 if video is None else len(video.background(k).faces))
+        for k, mesh in zip(frames.numbers, frames.decoded, strict=True)
+        for picture in (pictures[k] if pictures else ())
+        if picture is not None
+    )
+    return found if video is None else found | swimming(video, originals)
 
 
 def _regions(frames: Measured) -> Values:

@@ -1,8 +1,7 @@
 """Measurement of a point: rate of all bytes, metrics of decoded frames, times of both directions.
 
-In: a point, and where its sequence is. Out: its row. Bodies are judged by all frames, scenes by some. A codec is given
-all frames, or those of a sampled point alone; the rate is then theirs. Two names stand in a codec's place: `captured`
-is the truth itself, beyond which noise is coded, and `segmentation` is the encoder's labels of what moves.
+Bodies are judged by all frames, scenes by some. A codec is given all, or those of a sampled point; the rate is then
+theirs. In a codec's place `captured` is the truth itself, `segmentation` the encoder's labels of what moves.
 """
 
 from __future__ import annotations
@@ -24,17 +23,20 @@ from meshreel.types import MeshSequence, evenly
 
 from ..codec import Codec, TwoStepCodec
 from ..codecs import codec_version, make_codec
+from ..codecs.colored_draco import ColoredDracoCodec
 from ..codecs.scenes import BackgroundDracoCodec
 from ..datasets import Dataset, Store
 from ..datasets.scenes import FOUND, SceneFrames
+from ..experiments.study import FLOOR
+from ..experiments.study import FOUND as SEGMENTATION
 from ..rows import Encoding, Group, Point, Row, Stream
 from .clock import StageTimer, cost_of
+from .color import color_bytes
 from .decode import decoded_apart
 from .maker import maker
 from .metrics import Measured, measure_frames
 from .segmentation import score_labels
 
-TRUTH, SEGMENTATION = "captured", "segmentation"  # in a codec's place
 TRUTH_NAME = "the truth itself"
 SOME = 10  # frames of a scene that a sampled point has; of all other points every second of these is measured
 KEYS = "key_frames"  # of a file's metadata: numbers of the frames that others are predicted from
@@ -56,7 +58,7 @@ def measure_point(point: Point, store: Store) -> Row:
     row = empty_row(point, store, frames=count, frame_rate=known.sequence.frame_rate, measured_frames=numbers)
     if point.codec == SEGMENTATION:
         return msgspec.structs.replace(row, metrics=_segmentation(known))
-    if point.codec == TRUTH:
+    if point.codec == FLOOR:
         if known.scene is None:
             raise InputError("the truth itself is known of simulated scenes only")
         clean = [known.scene.truth[number].mesh for number in numbers]
@@ -138,7 +140,8 @@ def _encoded(codec: Codec, source: MeshSequence, what: object) -> tuple[bytes, E
 def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
     """Return size, groups and what is sent once; no groups of bytes that are no .reel file."""
     if not data.startswith(MAGIC):
-        return Stream(len(data), frames)
+        colors = codec.color_bytes(data) if isinstance(codec, ColoredDracoCodec) else None
+        return Stream(len(data), frames, colors=colors)
     reader = ReelReader(BytesSource(data))
     keys = {int(key) for key in reader.metadata.get(KEYS, ())}
     groups = list[Group]()
@@ -149,7 +152,7 @@ def _stream(codec: Codec, data: bytes, frames: int) -> Stream:
     once = sum(chunk.size for chunk in reader.chunks if chunk.kind == ChunkKind.STATIC)
     if isinstance(codec, BackgroundDracoCodec):
         once = codec.background_bytes(data)
-    return Stream(len(data), frames, once, groups)
+    return Stream(len(data), frames, once, groups, color_bytes(reader))
 
 
 def _segmentation(known: Dataset) -> dict[str, float | None]:

@@ -1,7 +1,6 @@
-"""Sweeps: points become rows of a file, one after the other or side by side.
+"""Sweeps: points become rows of a file, one after the other or side by side, each as soon as it is there.
 
-In: points, the file of their rows. Out: rows, each in the file as soon as it is there. A point whose codec crashes,
-raises, takes too long or decodes nonsense has a row as well, that says so.
+A point whose codec crashes, raises, takes too long or decodes nonsense has a row as well, that says so.
 """
 
 from __future__ import annotations
@@ -36,8 +35,7 @@ class Sweep:
 def run_points(points: Sequence[Point], file: Path, sweep: Sweep, report: Report = lambda *_: None) -> list[Row]:
     """Return the rows of all points, and append each new one to the file as soon as it is there.
 
-    Points that have a row in the file are not measured again, unless their sequence or codec has changed. Raises
-    InputError where a sequence is missing: that is no codec's failure.
+    Those that are in the file count, unless sequence or codec have changed. InputError where a sequence is missing.
     """
     wanted, stored = {point.key for point in points}, read_rows(file) if file.exists() else []
     found = {row.point.key: row for row in stored if row.point.key in wanted and _is_valid(row, sweep)}

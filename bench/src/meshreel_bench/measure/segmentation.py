@@ -1,8 +1,4 @@
-"""Score of a segmentation into faces that move and faces that stand.
-
-In: labels of each frame's faces, found and true -> intersection over union of the dynamic faces, mean and worst frame,
-and the share of the static faces that are called dynamic.
-"""
+"""Score of a segmentation into faces that move and faces that stand: found and true labels of each frame's faces."""
 
 from __future__ import annotations
 
@@ -17,10 +13,7 @@ Labels = Bool[np.ndarray, " _"]  # True: the face moves; one a face of the frame
 
 
 def score_labels(found: Iterable[Labels], true: Iterable[Labels]) -> dict[str, float | None]:
-    """Return the scores of labels that are given frame by frame: 1, 1 and 0 are perfect.
-
-    The IoU of a frame without dynamic faces, found or true, is 1. Raises InputError where frames or faces do not fit.
-    """
+    """Return scores of labels frame by frame: 1, 1 and 0 are perfect. InputError where frames do not fit."""
     overlaps, called, static = list[float](), 0, 0
     try:
         for number, (a, b) in enumerate(zip(found, true, strict=True)):

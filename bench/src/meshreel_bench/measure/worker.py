@@ -1,7 +1,6 @@
 """Functions in a fresh process, with a time limit: a crash, an error or an endless loop costs its caller an exception.
 
-In: a generator function and its arguments. Out: what it yields, as it comes. The process has one thread for numerical
-libraries, so that times can be compared, and ends with its parent.
+It has one thread for numerical libraries, so that times can be compared, and ends with its parent.
 """
 
 from __future__ import annotations
@@ -27,10 +26,7 @@ class WorkerError(Exception):
 
 
 def in_fresh_process(task: Callable[..., Iterator[Any]], *about: object, limit_s: float | None = None) -> Iterator[Any]:
-    """Yield what `task(*about)` yields in a fresh process; each value may take `limit_s` seconds of wall time.
-
-    Raises WorkerError where it takes longer, raises an error or ends. Arguments and values are pickled.
-    """
+    """Yield what `task(*about)` yields in a fresh process, by pickle. WorkerError after `limit_s`, an error, an end."""
     os.environ.update(_ONE_THREAD)  # of processes that start from now on: libraries here have read theirs
     here, there = _SPAWN.Pipe(duplex=False)
     process = _SPAWN.Process(target=_answer, args=(there, task, about))

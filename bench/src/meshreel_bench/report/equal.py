@@ -1,7 +1,4 @@
-"""Rates that codecs need for the same quality, each interpolated on its own curve as BD-rates are.
-
-In -> out: rows of one sequence -> lines of Markdown. The qualities follow from the rows: `common_quality`.
-"""
+"""Rates that codecs need for the same quality, each interpolated on its own curve as BD-rates are: rows -> Markdown."""
 
 from __future__ import annotations
 

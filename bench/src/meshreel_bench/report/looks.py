@@ -1,7 +1,4 @@
-"""Look of each curve in plots, order of curves in tables, and the direction in which a metric is better.
-
-In -> out: names of curves -> a color, a marker and a line for each; the name of a metric -> a sign.
-"""
+"""Look of each curve in plots, order of curves in tables, and the direction in which a metric is better."""
 
 from __future__ import annotations
 
@@ -71,8 +68,3 @@ def direction(key: str) -> int:
     if any(word in key for word in _LOWER) or key.endswith(_LOWER_UNITS):
         return -1
     return 1 if any(word in key for word in _HIGHER) else 0
-
-
-def arrow(sign: int) -> str:
-    """Return the direction in a table's head; empty for 0."""
-    return {1: " ↑", -1: " ↓"}.get(sign, "")

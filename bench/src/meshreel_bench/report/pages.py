@@ -1,7 +1,4 @@
-"""Pages of a report: `results.md`, an appendix for each experiment, `reproducing.md`, and the README's numbers.
-
-In -> out: rows -> Markdown, PNG and JSON. Same rows, same bytes.
-"""
+"""Pages of a report: first page, an appendix for each experiment, `reproducing.md`, the README's numbers."""
 
 from __future__ import annotations
 
@@ -70,7 +67,7 @@ def write_report(rows: Sequence[Row], folder: Path) -> list[Path]:
         pages[Path(FOLDER, f"appendix-{part.name}.md")] = list(_appendix(part))
         if part.rated:
             path = folder / FOLDER / f"{part.name}.png"
-            plots.append(plot_curves(part.rows, part.study.measures[:2], looks, path))
+            plots.append(plot_curves(part.rows, part.study.measures[:2], looks, path, part.study.rate))
     for part, sequence in _shown(parts):
         own = [row for row in part.rows if row.point.sequence == sequence]
         plots.append(plot_curves(own, (D2, MASKED), looks, folder / FOLDER / _plot_name(part, sequence)))
@@ -109,7 +106,9 @@ def _first_page(parts: Sequence[Part]) -> list[str]:
             for part, name in _shown(parts)
             for line in (f"![{tables.text(name)}: quality against rate]({FOLDER}/{_plot_name(part, name)})", "")
         ],
-        "{table}": [line for part in parts if part.name == OPEN for line in _summary(part)],
+        "{table}": [
+            line for p in parts if p.name == OPEN for line in tables.summary_table(p.rows, p.study.best or "", D2)
+        ],
         "{appendices}": [f"- [{p.study.title}]({FOLDER}/appendix-{p.name}.md), {_counted(p)}" for p in parts],
     }
     page = (files(__package__) / TEXT).read_text(encoding="utf-8")
@@ -126,11 +125,6 @@ def _kept_promises(parts: Sequence[Part]) -> list[str]:
         return [f"All {len(found)} targets that were measured are met."]
     head = f"Of {len(found)} targets {len(found) - len(missed)} are met. Missed:"
     return [head, "", *(f"- {tables.text(v.text)} ({v.bound}): {tables.text(v.value)}" for v in missed)]
-
-
-def _summary(part: Part) -> list[str]:
-    """Return BD-rates of the best codec against all others on all sequences, by D2."""
-    return tables.summary_table(part.rows, part.study.best, D2) if part.study.best else []
 
 
 def _counted(part: Part) -> str:

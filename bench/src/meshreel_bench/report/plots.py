@@ -1,7 +1,6 @@
-"""Rate-distortion plots as PNG, 17 cm wide: the width of a page of a paper.
+"""Rate-distortion plots as PNG, 17 cm wide as a page, a line of panels for each sequence, a panel a measure.
 
-In -> out: rows of one study -> a file with a line of panels for each sequence, a panel a measure. Same rows, same
-picture, whatever settings of matplotlib the user has.
+Same rows, same picture, whatever settings of matplotlib the user has.
 """
 
 from __future__ import annotations
@@ -27,32 +26,28 @@ _HEIGHT = 2.3  # inches, of a line of panels
 _LINE = 0.155  # inches, of the legend, from one to the next
 _LEGEND_COLUMNS = 3
 _SETTINGS: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",  # comes with matplotlib
-    "font.size": 7.0,
-    "axes.linewidth": 0.6,
-    "axes.titlesize": 7.0,
-    "axes.labelsize": 7.0,
-    "legend.fontsize": 7.0,
+    **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize", "legend.fontsize"), 7.0),
     "xtick.labelsize": 6.5,
     "ytick.labelsize": 6.5,
+    "axes.linewidth": 0.6,
+    "font.family": "DejaVu Sans",  # comes with matplotlib
     "text.parse_math": False,  # a name may have dollars
 }
 _BETTER = {1: "↑ higher is better", -1: "↓ lower is better", 0: ""}
 
 
-def plot_curves(rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], path: Path) -> Path:
-    """Write quality against rate of every curve; return the path.
-
-    `looks` has every curve. A dotted line is what the truth itself reaches.
-    """
+def plot_curves(
+    rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], path: Path, rate: str = "mbps"
+) -> Path:
+    """Write quality against rate of every curve of `looks`; a dotted line is what the truth reaches."""
     with _settings():
-        figure = curves_figure(rows, measures, looks)
+        figure = curves_figure(rows, measures, looks, rate)
         with replacing(path) as file:
             figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
     return path
 
 
-def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look]) -> Any:
+def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mapping[str, Look], rate: str) -> Any:
     """Return the figure of `plot_curves`."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -67,7 +62,7 @@ def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mappi
     for panels, sequence in zip(lines, sequences, strict=True):
         own = [row for row in rows if row.point.sequence == sequence]
         for panel, measure in zip(panels, measures, strict=True):
-            _draw(panel, own, measure, looks)
+            _draw(panel, own, measure, looks, rate)
         panels[0].set_title(f"{sequence}, {rated(own)[0].frames} frames", loc="left", fontweight="bold")
     handles = {
         name: line for panel in lines.flat for line, name in zip(*panel.get_legend_handles_labels(), strict=True)
@@ -81,11 +76,12 @@ def curves_figure(rows: Sequence[Row], measures: Sequence[Measure], looks: Mappi
     return figure
 
 
-def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str, Look]) -> None:
+def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str, Look], rate: str) -> None:
     """Draw one panel: the first look last, over the others."""
-    own = rated(rows)
+    own, rates = rated(rows), [value(row, rate) or row.mbps for row in rated(rows)]
     for place, (name, look) in enumerate(looks.items()):
-        found = [(row.mbps, value(row, measure.key)) for row in own if curve_of(row) == name]
+        pairs = zip(rates, own, strict=True)
+        found = [(mbps, value(row, measure.key)) for mbps, row in pairs if curve_of(row) == name]
         points = sorted((mbps, quality) for mbps, quality in found if quality is not None)
         if points:
             style: dict[str, Any] = {"color": look.color, "marker": look.marker, "lw": look.width, "ms": look.size}
@@ -95,7 +91,7 @@ def _draw(panel: Any, rows: Sequence[Row], measure: Measure, looks: Mapping[str,
     panel.set(xlabel="rate (Mbps)", ylabel=measure.label, xscale="log")
     panel.set_title(_BETTER[direction(measure.key)], loc="right", color="dimgray", fontsize=6.5, pad=3)
     panel.grid()
-    set_rates(panel, [row.mbps for row in own])
+    set_rates(panel, rates)
 
 
 def set_rates(panel: Any, rates: Sequence[float]) -> None:

@@ -1,7 +1,4 @@
-"""Tables in Markdown, made from data frames: operating points, rates at equal quality, BD-rates, failures, makers.
-
-In -> out: rows -> lines of Markdown. Names and reasons are escaped: what a row holds is text, and never markup.
-"""
+"""Tables in Markdown, made from data frames. Names and reasons are escaped: what a row holds is never markup."""
 
 from __future__ import annotations
 
@@ -14,13 +11,13 @@ import pandas as pd
 from ..bd_rate import bd_rate
 from ..experiments.study import Measure
 from ..rows import Options, Row
-from .looks import arrow, direction, in_order
+from .looks import direction, in_order
 from .values import curve, curve_of, rated, sequences, value
 from .verdicts import Verdict
 
 NEAR = 1.25  # factor of a rate within which points are compared
 NEAR_DB = 1.0  # of a PSNR
-DAGGER = "†"
+DAGGER, ARROWS = "†", {1: " ↑", -1: " ↓"}
 
 
 def text(found: object) -> str:
@@ -32,10 +29,7 @@ def text(found: object) -> str:
 
 
 def markdown(table: pd.DataFrame) -> list[str]:
-    """Return the lines of a table; texts are Markdown, numbers have four digits, what is missing is empty.
-
-    Columns of which nothing is known are left out.
-    """
+    """Return the lines of a table, numbers in four digits; columns of which nothing is known are left out."""
     known = table.loc[:, [bool(table[name].map(_cell).any()) for name in table.columns]]
     heads = [str(name) for name in known.columns]
     lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
@@ -43,10 +37,9 @@ def markdown(table: pd.DataFrame) -> list[str]:
 
 
 def ranked(table: pd.DataFrame, signs: Mapping[str, int], groups: Sequence[Hashable] | None = None) -> pd.DataFrame:
-    """Return the table with the best number of each column bold and the second best italic, and arrows in the heads.
+    """Return the table with the best number of each column, and group, bold and the second italic, arrows in heads.
 
-    `signs` is 1 where more is better, -1 where less is. Rows are ranked among those of an equal group, and not where it
-    is None. Equal as printed is equal; one number alone has no rank.
+    `signs` is 1 where more is better, -1 where less is; rows whose group is None have no rank.
     """
     groups = groups if groups is not None else [True] * len(table)
     marked = table.astype(object)
@@ -58,7 +51,7 @@ def ranked(table: pd.DataFrame, signs: Mapping[str, int], groups: Sequence[Hasha
             mark = {1.0: "**", 2.0: "*"}.get(rank, "") if counts[index] > 1 else ""
             if mark:
                 marked.loc[index, name] = f"{mark}{_cell(table.loc[index, name])}{mark}"
-    return marked.rename(columns={name: f"{name}{arrow(sign)}" for name, sign in signs.items()})
+    return marked.rename(columns={name: name + ARROWS.get(sign, "") for name, sign in signs.items()})
 
 
 def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
@@ -122,10 +115,7 @@ def value_table(rows: Sequence[Row]) -> list[str]:
 
 
 def bd_table(rows: Sequence[Row], one: str, measures: Sequence[Measure], is_anchor: bool = False) -> list[str]:
-    """Return BD-rates of a curve against every other one of a sequence, with the qualities that both reach.
-
-    Negative: `one` needs less rate for equal quality. With `is_anchor` they are those of every other one against it.
-    """
+    """Return BD-rates of a curve against every other one; those of every other one against it with `is_anchor`."""
     names = in_order(map(curve_of, rows))
     if one not in names or len(names) < 2:
         return []
@@ -171,10 +161,7 @@ def bd_cell(rows: Sequence[Row], test: str, other: str, measure: Measure) -> str
 
 
 def comparable_table(rows: Sequence[Row], wanted: float, measure: Measure | None) -> list[str]:
-    """Return each curve at its point nearest to a quality, or to a rate in Mbps, ranked among those of a sequence.
-
-    A point that is not within `NEAR_DB`, or a factor of `NEAR`, has a dagger, and is not ranked.
-    """
+    """Return each curve's point nearest to a quality or a rate, ranked among those of a sequence where it is near."""
     records, groups = list[dict[str, object]](), list[Hashable]()
     for sequence in sequences(rows):
         for name, row in _nearest(rated(rows, sequence), wanted, measure).items():

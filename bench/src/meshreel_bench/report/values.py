@@ -14,7 +14,7 @@ from meshreel.encoder.surveying import SLICE
 from ..bd_rate import Curve, hull
 from ..experiments.study import FLOOR, Measure
 from ..names import USUAL
-from ..rows import Group, Row
+from ..rows import ColorBytes, Group, Row
 
 SECONDS = 10.0  # in which a background is sent once, for `mbps_background_10s`
 HALF = 30  # frames of each half of a long sequence
@@ -30,8 +30,9 @@ def value(row: Row, key: str) -> float | None:
     for prefix, found in (("encode_s.", row.encoding.stages_s), ("work.", row.encoding.work)) if row.encoding else ():
         if key.startswith(prefix):
             return found.get(key.removeprefix(prefix))
-    if key.startswith("efficiency."):
-        return _efficiency(row, *map(int, key.split(".")[1:]))
+    name, *numbers = key.split(".")
+    if name in WITH_NUMBERS and numbers:
+        return WITH_NUMBERS[name](row, *map(int, numbers))
     return DERIVED[key](row) if key in DERIVED else row.metrics.get(key)
 
 
@@ -44,10 +45,7 @@ def _mbps_background_10s(row: Row) -> float | None:
 
 
 def _without_keys(row: Row) -> float | None:
-    """Return the mean of masked SSIM over the frames that are no key frames; over all where every frame is one.
-
-    A key frame that the file does not name is taken to be the best frame of its group.
-    """
+    """Return the mean of masked SSIM over frames that are no keys, which the file names, or the best of groups."""
     found = row.per_frame.get("ssim_masked")
     if row.stream is None or not row.stream.groups or not found or len(found) != row.frames:
         return None
@@ -86,10 +84,7 @@ def _at_rest(seconds: float | None, reference_s: float | None) -> float | None:
 
 
 def _efficiency(row: Row, workers: int, interval: int) -> float | None:
-    """Return what share of their time workers are busy with an hour of frames, by a model with a row's times.
-
-    Slices are surveyed, then intervals coded, in any order and by whoever is free; what their parent does is left out.
-    """
+    """Return what share of their time workers are busy with an hour of frames, by a row's times and without parent."""
     stages = row.encoding.stages_s if row.encoding else {}
     if "survey" not in stages:
         return None
@@ -108,9 +103,42 @@ def _end(times: np.ndarray, workers: int) -> float:
     return max(free)
 
 
+def _of_key(row: Row, what: str, frames: int) -> float | None:
+    """Return a rate, Mbps, of so many frames, if a chain went on: its beginning once, the mean of what follows."""
+    known = None if row.stream is None else row.stream.colors
+    if row.stream is None or known is None or known.chains > 1:
+        return row.mbps if row.stream and what == "all" else None
+    first, *others = known.pictures or [0]
+    sizes = {
+        "vertices": known.vertices,
+        "texture": known.atlas + first + (frames - 1) * sum(others) / max(len(others), 1),
+    }
+    rest = row.stream.bytes - known.all - known.base
+    sizes["all"] = sum(sizes.values()) + known.base + rest * frames / row.stream.coded_frames
+    return 8 * sizes[what] * row.frame_rate / frames / 1e6
+
+
+WITH_NUMBERS: dict[str, Callable[..., float | None]] = {
+    "efficiency": _efficiency,
+    "mbps": lambda row, frames: _of_key(row, "all", frames),
+    "texture_mbps": lambda row, frames: _of_key(row, "texture", frames),
+    "vertices_mbps": lambda row, frames: _of_key(row, "vertices", frames),
+}
+
+
+def _color_mbps(row: Row, share: Callable[[ColorBytes], int]) -> float | None:
+    """Return the rate of some bytes of colours over the whole sequence."""
+    if row.stream is None or row.stream.colors is None:
+        return None
+    return row.mbps * share(row.stream.colors) / row.stream.bytes
+
+
 DERIVED: dict[str, Callable[[Row], float | None]] = {
     "mbps": lambda row: row.mbps if row.stream else None,
     "mbps_background_10s": _mbps_background_10s,
+    "color_mbps": lambda row: _color_mbps(row, lambda known: known.all),
+    "background_color_mbps": lambda row: _color_mbps(row, lambda known: known.background),
+    "color_share": lambda row: found / row.mbps if (found := _color_mbps(row, lambda known: known.all)) else None,
     "background_bytes": lambda row: row.stream.background_bytes if row.stream else None,
     "encode_s": lambda row: row.encoding.s if row.encoding else None,
     "encode_s_at_rest": lambda row: _at_rest(row.encoding.s, row.encoding.reference_s) if row.encoding else None,
@@ -163,10 +191,7 @@ def hull_of(rows: Sequence[Row], names: Sequence[str], measure: Measure) -> Curv
 
 
 def floors(rows: Iterable[Row]) -> dict[str, float]:
-    """Return what the truth itself reaches, by metric, from the rows of one sequence; empty where it is not measured.
-
-    Against the input it is worth what the input is worth against the truth.
-    """
+    """Return what the truth itself reaches by metric; against the input what the input reaches against the truth."""
     found = [row for row in rows if row.point.codec == FLOOR and not row.failed]
     known: dict[str, Any] = dict(found[0].metrics) if found else {}
     if found and found[0].point.metrics == "regions":

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Float64, Int32, Int64
 
 from ...geometry.topology import border_mask, face_normals, unique_edges
 from ...types import Mesh
@@ -27,30 +27,23 @@ class Border:
     outward: Float64[np.ndarray, "N 3"]  # in the face's plane, away from the surface
 
 
-@dataclass(frozen=True, slots=True)
-class BorderSides:
-    """Border half-edges of a mesh, which no second face shares: the face of each, and the corner where it starts."""
-
-    faces: Int64[np.ndarray, " E"]
-    sides: Int64[np.ndarray, " E"]
-
-
-def border_sides(faces: np.ndarray) -> BorderSides:
-    """Find the border half-edges of some faces."""
+def border_sides(faces: Int32[np.ndarray, "F 3"]) -> tuple[Int64[np.ndarray, " E"], Int64[np.ndarray, " E"]]:
+    """Find the half-edges that no second face shares: the face of each, and the corner where it starts."""
     edges, of_faces = unique_edges(faces)
-    at, sides = np.nonzero(border_mask(edges, of_faces)[of_faces])
-    return BorderSides(at, sides)
+    found, sides = np.nonzero(border_mask(edges, of_faces)[of_faces])
+    return found, sides
 
 
-def sample_border(mesh: Mesh, edges: BorderSides) -> Border:
+def sample_border(mesh: Mesh) -> Border:
     """Place `SAMPLES` evenly spaced points on each border edge, in order."""
-    ends = mesh.vertices[mesh.faces[edges.faces]]
-    pick = np.arange(len(edges.faces))
-    along = ends[pick, (edges.sides + 1) % 3] - ends[pick, edges.sides]
+    faces, sides = border_sides(mesh.faces)
+    ends = mesh.vertices[mesh.faces[faces]]
+    pick = np.arange(len(faces))
+    start, end = ends[pick, sides], ends[pick, (sides + 1) % 3]
+    along = end - start
     along /= np.maximum(np.linalg.norm(along, axis=1), 1e-300)[:, None]
-    normals = face_normals(Mesh(mesh.vertices, mesh.faces[edges.faces]))[0]
+    normals = face_normals(Mesh(mesh.vertices, mesh.faces[faces]))[0]
     outward = np.cross(along, normals)  # counter-clockwise faces lie to the left of their edges
     share = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    start, end = ends[pick, edges.sides], ends[pick, (edges.sides + 1) % 3]
     points = start[:, None] + share[:, None] * (end - start)[:, None]
     return Border(points.reshape(-1, 3), normals.repeat(SAMPLES, axis=0), outward.repeat(SAMPLES, axis=0))

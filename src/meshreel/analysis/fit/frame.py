@@ -14,7 +14,7 @@ from ... import _core
 from ...geometry.closest_points import Hits, Surface, area_samples
 from ...geometry.topology import border_edges, vertex_normals
 from ...types import Mesh
-from .border import border_sides, sample_border
+from .border import sample_border
 
 ON_BORDER = 1e-6  # points of a surface with an interpolated `inside` up to this lie on an open border: rounding
 
@@ -56,7 +56,7 @@ class FrameSurface:
     @cached_property
     def target(self) -> _core.FitTarget:
         """The frame as the core's fit takes it."""
-        rim = sample_border(self.mesh, border_sides(self.mesh.faces))
+        rim = sample_border(self.mesh)
         whole = (self.surface.tree, self.mesh.vertices, self.mesh.faces, self.normals, self.inside.view(np.uint8))
         return _core.FitTarget(*whole, rim.points, rim.normals, rim.outward)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -81,17 +81,9 @@ class EmbeddedOptions:
         if not (min(self.torn) > 0 and min(self.doubt, self.lost) >= 0):
             raise InputError(f"torn {self.torn}, doubt {self.doubt}, lost {self.lost}: give > 0, >= 0, >= 0")
 
-    def limits(self, noise: float) -> ResidualLimits:
-        """Return the limits for frames at this RMS distance from the truth."""
-        return ResidualLimits(math.hypot(self.doubt, noise), math.hypot(self.lost, LOST * noise))
-
-
-@dataclass(frozen=True, slots=True)
-class ResidualLimits:
-    """Residuals at which tracking is repeated or given up, as in EmbeddedOptions, for frames of known noise."""
-
-    doubt: float
-    lost: float
+    def limits(self, noise: float) -> EmbeddedOptions:
+        """Return options with the limits for frames at this RMS distance from the truth."""
+        return replace(self, doubt=math.hypot(self.doubt, noise), lost=math.hypot(self.lost, LOST * noise))
 
 
 class Tracker:
@@ -193,16 +185,20 @@ class Tracker:
             return [self._poses[last]]
         first = max(before, key=lambda f: f * side)
         ahead = _extrapolated(self._poses[first], self._poses[last], (frame - last) / (last - first))
-        gate = self.options.coarse.gates[-1]
-        poses = [ahead, self._poses[last]]
-        return sorted(poses, key=lambda pose: -self._fine.matched(surface, pose, gate, self.options.agreement))
+        gate, poses = self.options.coarse.gates[-1], [ahead, self._poses[last]]
+        weights = [
+            self._fine.core.matched(surface, pose.rotations, pose.positions, gate, self.options.agreement)
+            for pose in poses
+        ]
+        return poses if weights[0] >= weights[1] else poses[::-1]
 
     def _carried(self, pose: Pose, surface: _core.DeformTarget, torn: float) -> Pose:
         """Move a pose by a coarse graph whose rest is that pose, so that its detail stays."""
         few, fine = self._few, self._fine
         here = Pose(pose.rotations[: len(few.nodes)], pose.positions[: len(few.nodes)])
         points, normals = moved(fine.points, fine.nodes, fine.binding, pose), turned(fine.normals, fine.binding, pose)
-        rest = _Rest(here.positions, few.edges, points, normals, few.binding, few.holds(here, torn))
+        held = few.core.holds(here.rotations, here.positions, torn)
+        rest = _Rest(here.positions, few.edges, points, normals, few.binding, held)
         carried = self._rounds(rest, Pose.at(here.positions), surface, self.options.coarse, torn)
         positions = moved(pose.positions, here.positions, self._nodes_by_few, carried)
         return Pose(products(rotation(self._nodes_by_few, carried), pose.rotations), positions)
@@ -232,7 +228,7 @@ class _Rest:
     points: Float64[np.ndarray, "S 3"]
     normals: Float64[np.ndarray, "S 3"]
     binding: Binding
-    held: Float64[np.ndarray, " E"]  # factor of each edge's squared row weight
+    held: Float64[np.ndarray, " E"]  # factor of each edge's squared row weight: 1, or a quarter for one that is torn
 
     @property
     def core(self) -> _core.Deformation:
@@ -240,14 +236,6 @@ class _Rest:
         edges, bound = self.edges.astype(np.int32), self.binding.indices.astype(np.int32)
         weights = self.binding.weights
         return _core.Deformation(self.nodes, edges, self.held, self.points, self.normals, bound, weights)
-
-    def holds(self, pose: Pose, torn: float) -> Float64[np.ndarray, " E"]:
-        """Return the factor of each edge: 1 for one as at rest, a quarter for one off by `torn` of its length."""
-        return self.core.holds(pose.rotations, pose.positions, torn)
-
-    def matched(self, surface: _core.DeformTarget, pose: Pose, gate: float, agreement: float) -> float:
-        """Return the sum of the weights of all pairs of samples at a pose."""
-        return self.core.matched(surface, pose.rotations, pose.positions, gate, agreement)
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,23 +249,18 @@ class Motion:
     residuals: Float64[np.ndarray, " T"]  # symmetric RMS; 0 at the key, infinite at an empty frame
     neighbours: int = 4
 
-    def move(
-        self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None
-    ) -> Float64[np.ndarray, "T P 3"]:
-        """Move points on or near the key mesh to each frame; normals keep them off a near sheet that faces away."""
-        binding = self.bound(points, normals)
-        poses = (Pose(r, p) for r, p in zip(self.rotations, self.positions, strict=True))
-        return np.stack([moved(points, self.graph.nodes, binding, pose) for pose in poses])
-
     def bound(self, points: Float64[np.ndarray, "P 3"], normals: Float64[np.ndarray, "P 3"] | None = None) -> Binding:
-        """Bind points on or near the key mesh to the nodes of the nearest vertices."""
+        """Bind points on or near the key mesh to the nodes of the nearest vertices.
+
+        Normals keep them off a near sheet that faces away.
+        """
         own = np.concatenate([self.mesh.vertices, NORMAL_REACH * vertex_normals(self.mesh)], axis=1)
         asked = points if normals is None else np.concatenate([points, NORMAL_REACH * normals], axis=1)
         vertices = cKDTree(own[:, : asked.shape[1]]).query(asked)[1].reshape(-1)
         return self.graph.bind(points, self.graph.cells[vertices], self.neighbours)
 
     def back(self, frame: int, mesh: Mesh) -> Mesh:
-        """Move a mesh on or near a frame to the pose of the key frame, by the inverse of `move`.
+        """Move a mesh on or near a frame to the pose of the key frame, by the inverse of `moved`.
 
         Faces with a vertex at which the motion has no inverse are left out.
         """
@@ -293,16 +276,6 @@ class Motion:
                 mesh.vertices, self.graph.nodes, self.graph.bind(points, cells, self.neighbours), pose
             )
         return clean(Mesh(points, mesh.faces[known[mesh.faces].all(axis=1)]))
-
-
-def register(key_mesh: Mesh, frames: Sequence[Mesh], key: int, options: EmbeddedOptions | None = None) -> Motion:
-    """Track the key frame's mesh through all frames, outward from the key. Raises InputError for an invalid key."""
-    if not 0 <= key < len(frames):
-        raise InputError(f"key {key} is not one of {len(frames)} frames: give 0 to {len(frames) - 1}")
-    tracker = Tracker(key_mesh, key, options)
-    for frame in [*range(key + 1, len(frames)), *range(key - 1, -1, -1)]:
-        tracker.step(frame, frames[frame])
-    return tracker.motion(range(len(frames)))
 
 
 def _extrapolated(first: Pose, last: Pose, ratio: float) -> Pose:

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float32, Float64, Int64
+from scipy.spatial import cKDTree
 
 from ...errors import InputError
-from ...geometry.rigid import apply, blend, fit_rigid, from_rigid, rotate
+from ...geometry.rigid import apply, blend, fit_rigid, from_rigid
 from ...geometry.strict import exp
 from ...geometry.topology import unique_edges, vertex_normals
 from ...types import Mesh
@@ -77,8 +78,6 @@ def center_motions(
 
 def bind(mesh: Mesh, source: Float64[np.ndarray, "K 3"], neighbours: Neighbours, options: DeformOptions) -> Binding:
     """Choose the centers that move each vertex of a mesh in the source pose, with their weights."""
-    from scipy.spatial import cKDTree
-
     choices = min(options.guard_choices, len(source))
     reach, near = cKDTree(source).query(mesh.vertices, k=choices)
     reach, near = reach.reshape(-1, choices), near.reshape(-1, choices).astype(np.int64)
@@ -101,14 +100,17 @@ def move(
     return apply(blended(binding, motions, neighbours), points)
 
 
-def move_normals(
-    normals: Float64[np.ndarray, "V 3"],
-    binding: Binding,
-    motions: Float64[np.ndarray, "K 8"],
+def moved_to(
+    mesh: Mesh,
+    pose: Float64[np.ndarray, "K 3"],
+    targets: Float64[np.ndarray, "T K 3"],
     neighbours: Neighbours,
-) -> Float64[np.ndarray, "V 3"]:
-    """Rotate the normals of bound points as `move` rotates the points."""
-    return rotate(blended(binding, motions, neighbours), normals)
+    options: DeformOptions,
+) -> Float64[np.ndarray, "T V 3"]:
+    """Move the vertices of a mesh in a pose of the centers to each of some others (eq. 7)."""
+    binding = bind(mesh, pose, neighbours, options)
+    motions = (center_motions(pose, target, neighbours) for target in targets)
+    return np.stack([move(mesh.vertices, binding, each, neighbours) for each in motions])
 
 
 def blended(

@@ -20,7 +20,7 @@ from ...types import Centers, Mesh
 from ..fit.frame import FrameSurface
 from ..fit.surface_fit import FitOptions, Guides, fit_surfaces
 from .centers import ReferenceCenterOptions, affinity, largest_distances, reference_centers
-from .deform import DeformOptions, Neighbours, bind, center_motions, move, neighbours
+from .deform import DeformOptions, Neighbours, moved_to, neighbours
 from .fuse import FuseOptions, Group, GroupCenters
 
 MDS = -1  # stands for the pose of eq. 5 where a frame number is expected
@@ -102,10 +102,7 @@ def extract_reference(frames: Sequence[Mesh], centers: Centers, options: Referen
 
 def predict(reference: Reference, mesh: Mesh, centers: Centers, options: DeformOptions) -> Float64[np.ndarray, "T V 3"]:
     """Deform a mesh in the reference pose, as the decoded and subdivided reference, to the pose of each frame."""
-    binding = bind(mesh, reference.pose, reference.neighbours, options)
-    kin = reference.neighbours
-    motions = (center_motions(reference.pose, pose, kin) for pose in centers.positions)
-    return np.stack([move(mesh.vertices, binding, each, kin) for each in motions])
+    return moved_to(mesh, reference.pose, centers.positions, reference.neighbours, options)
 
 
 def _trials(group: Group, canonical: Float64[np.ndarray, "K 3"], options: ReferenceOptions) -> tuple[Trial, ...]:
@@ -143,7 +140,7 @@ def _trial(group: Group, surfaces: list[FrameSurface], attempt: _Attempt, option
     rms = []
     for frame_surface, moved in zip(some, fitted, strict=True):
         original = frame_surface.mesh.vertices
-        there = _gaps(Surface(Mesh(moved, mesh.faces)), original[:: max(1, len(original) // PROBES)])
+        there = Surface(Mesh(moved, mesh.faces)).distances(original[:: max(1, len(original) // PROBES)])
         back = _outside(frame_surface.surface, moved, group.edge)
         rms.append(max(np.sqrt(np.mean(there**2)), np.sqrt(np.mean(back**2))))
     return Trial(frame, key, float(np.mean(rms)), float(np.max(rms)))
@@ -168,7 +165,3 @@ def _outside(surface: Surface, points: Float64[np.ndarray, "N 3"], most: float) 
     gaps = np.linalg.norm(offset, axis=1)
     inside = np.einsum("nd,nd->n", offset, surface.normals[hits.faces]) < 0
     return np.where(inside, np.minimum(gaps, most), gaps)
-
-
-def _gaps(surface: Surface, points: Float64[np.ndarray, "N 3"]) -> Float64[np.ndarray, " N"]:
-    return np.linalg.norm(surface.closest(points).points - points, axis=1)

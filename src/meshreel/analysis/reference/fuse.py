@@ -18,9 +18,11 @@ from ...errors import InputError
 from ...geometry.decimate import decimate
 from ...geometry.holes import close_holes
 from ...geometry.poisson import PoissonOptions, drop_small, reconstruct, thin_out
+from ...geometry.rigid import apply, rotate
 from ...geometry.topology import (
     clean,
-    components,
+    large_pieces,
+    longest_edges,
     subdivide_midpoint,
     unique_edges,
     vertex_areas,
@@ -28,7 +30,7 @@ from ...geometry.topology import (
 )
 from ...types import Mesh
 from .centers import center_spacing
-from .deform import Binding, DeformOptions, Neighbours, bind, center_motions, move, move_normals
+from .deform import Binding, DeformOptions, Neighbours, bind, blended, center_motions, moved_to
 
 Edges = tuple[Int64[np.ndarray, "E 2"], Int64[np.ndarray, "F 3"]]  # result of geometry.topology.unique_edges
 
@@ -86,9 +88,7 @@ class Group:
 
     def sent(self, mesh: Mesh, pose: Float64[np.ndarray, "K 3"]) -> Float64[np.ndarray, "T V 3"]:
         """Deform the vertices of a mesh in this pose to each frame."""
-        binding = bind(mesh, pose, self.kin, self.deform)
-        motions = (center_motions(pose, target, self.kin) for target in self.positions)
-        return np.stack([move(mesh.vertices, binding, each, self.kin) for each in motions])
+        return moved_to(mesh, pose, self.positions, self.kin, self.deform)
 
     def cloud(
         self, pose: Float64[np.ndarray, "K 3"], key: int, subdivisions: int
@@ -137,13 +137,13 @@ class Group:
     ) -> tuple[Float64[np.ndarray, "V 3"], Float64[np.ndarray, "V 3"], Int32[np.ndarray, "F 3"]]:
         """Return a frame's vertices and normals in a pose, and those of its faces that do not tear on the way."""
         frame, binding = self.frames[t], self.bindings[t]
-        motions = center_motions(self.positions[t], pose, self.kin)
-        points = move(frame.vertices, binding, motions, self.kin)
+        turns = blended(binding, center_motions(self.positions[t], pose, self.kin), self.kin)
+        points = apply(turns, frame.vertices)
         spoiled = np.zeros(len(points), bool)
         spoiled[frame.faces[self.parting[t] | self._torn(frame.vertices, points, self.edges[t])]] = True
         faces = frame.faces[~spoiled[frame.faces].any(axis=1)]
-        faces = faces[_large(faces, len(points), self.fuse.smallest)]
-        return points, move_normals(self.normals[t], binding, motions, self.kin), faces
+        faces = faces[large_pieces(faces, len(points), self.fuse.smallest)]  # else: bound to the wrong body's centers
+        return points, rotate(turns, self.normals[t]), faces
 
     def _parting(self, edges: Edges, binding: Binding, pose: Float64[np.ndarray, "K 3"]) -> Bool[np.ndarray, " F"]:
         """Return the faces that join centers which are much farther from each other in some frame than in this pose."""
@@ -162,15 +162,6 @@ class Group:
     def _around(self, amounts: Float64[np.ndarray, " K"]) -> Float64[np.ndarray, " K"]:
         """Sum amounts over each center's neighbourhood: surface passes between neighbours from frame to frame."""
         return np.sum(amounts[self.kin.indices] * self.kin.affinities, axis=1)
-
-
-def _large(faces: Int32[np.ndarray, "F 3"], count: int, share: float) -> Bool[np.ndarray, " F"]:
-    """Return the faces of connected pieces that are not tiny: a patch bound to the wrong body's centers is cut off."""
-    if len(faces) == 0:
-        return np.zeros(0, bool)
-    label = components(faces, count)[faces[:, 0]]
-    size = np.bincount(label)
-    return size[label] >= share * size.max()
 
 
 def _dense(
@@ -195,13 +186,8 @@ def _dense(
         finer, finer_normals = (subdivide_midpoint(Mesh(a, faces)) for a in (points, normals))
         points, normals, faces = finer.vertices, finer_normals.vertices, finer.faces
         if round_ >= subdivisions:
-            faces = faces[_longest_edges(points, faces) > longest]
+            faces = faces[longest_edges(points, faces) > longest]
     return np.concatenate(found), np.concatenate(turned)
-
-
-def _longest_edges(points: Float64[np.ndarray, "V 3"], faces: Int32[np.ndarray, "F 3"]) -> Float64[np.ndarray, " F"]:
-    corners = points[faces]
-    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
 
 
 def _lengths(vertices: Float64[np.ndarray, "V 3"], edges: np.ndarray) -> Float64[np.ndarray, " E"]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64, Int32, Int64
+from scipy.spatial import cKDTree
 
 from ... import _core
 from ...errors import InputError
@@ -135,8 +136,6 @@ class _Affinities:
     def __init__(
         self, centers: Float64[np.ndarray, "K 3"], bodies: Int32[np.ndarray, " K"], options: TrackOptions
     ) -> None:
-        from scipy.spatial import cKDTree
-
         self._options = options
         rows, columns = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
         for body in range(int(bodies.max()) + 1):

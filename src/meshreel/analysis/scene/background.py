@@ -15,7 +15,7 @@ from jaxtyping import Float64, Int64
 
 from ...errors import InputError
 from ...geometry.closest_points import Surface
-from ...geometry.connected import without_fragments
+from ...geometry.topology import without_fragments
 from ...geometry.tsdf import SIDE, extract, fill_grid
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh

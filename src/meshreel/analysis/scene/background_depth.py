@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float32
+from scipy.ndimage import binary_dilation
 
-from ...geometry.connected import without_fragments
 from ...geometry.depth import DepthPicture
 from ...geometry.raycast import Rays, pixels_near
-from ...geometry.topology import face_normals, part_of
+from ...geometry.topology import face_normals, part_of, without_fragments
 from ...geometry.tsdf import SEEN, TRUNCATION, extract, integrate
 from ...types import Mesh
 from .background import BackgroundOptions
@@ -62,8 +62,6 @@ def usual_pictures(moments: Iterable[Moment], options: BackgroundOptions = Backg
 
 def _still(picture: DepthPicture, rays: Rays, moment: Moment) -> np.ndarray:
     """Return the depths of a picture with 0 for pixels that see moving faces or lie within `BESIDE` pixels of those."""
-    from scipy.ndimage import binary_dilation
-
     moves = pixels_near(picture.camera, Mesh(moment.mesh.vertices, moment.mesh.faces[~moment.still]))
     faces = rays.faces_in(picture.camera, moves)  # of the whole mesh: what stands still may hide what moves
     moves[moves] = (faces >= 0) & ~np.append(moment.still, True)[faces]

@@ -12,11 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
+from scipy.spatial import cKDTree
 
 from ...errors import InputError
 from ...geometry.closest_points import Surface
-from ...geometry.connected import connected_faces
-from ...geometry.topology import concatenate, face_normals, part_of, with_neighbours
+from ...geometry.topology import (
+    concatenate,
+    connected_faces,
+    face_normals,
+    linked,
+    longest_edges,
+    part_of,
+    with_neighbours,
+)
 from ...geometry.voxels import Lattice, around, distinct, spread
 from ...types import Mesh
 
@@ -66,9 +74,7 @@ def ring(mesh: Mesh, moves: Bool[np.ndarray, " F"], cell: float) -> Bool[np.ndar
     other frames have only the floor there. Without these faces bodies would hover by a cell.
     """
     found = with_neighbours(mesh.faces, moves) & ~moves
-    corners = mesh.vertices[mesh.faces[found]]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1, initial=0.0)
-    found[found] = longest <= RING * cell
+    found[found] = longest_edges(mesh.vertices, mesh.faces[found]) <= RING * cell
     return found
 
 
@@ -158,11 +164,7 @@ def _cells(mesh: Mesh, lattice: Lattice) -> Int64[np.ndarray, " C"]:
 
 def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
     """Label the pieces: pieces that come near each other in consecutive frames have one label."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    rows, columns = [], []
-    start = 0
+    links, start = list[tuple[int, int]](), 0
     while start < len(pieces):
         frame = pieces[start].frame
         here = [k for k in range(start, len(pieces)) if pieces[k].frame == frame]
@@ -171,15 +173,9 @@ def _linked(pieces: list[_Piece]) -> Int64[np.ndarray, " N"]:
         owner = np.repeat(later, [len(pieces[k].cells) for k in later])
         for k in here:
             near = np.isin(keys, around(pieces[k].cells))
-            for other in np.unique(owner[near]):
-                rows.append(k)
-                columns.append(int(other))
+            links += [(k, int(other)) for other in np.unique(owner[near])]
         start = here[-1] + 1
-    if not pieces:
-        return np.zeros(0, np.int64)
-    links = (np.array(rows, np.int32), np.array(columns, np.int32))
-    graph = coo_array((np.ones(len(rows), bool), links), shape=(len(pieces), len(pieces)))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return linked(np.array(links, np.int64).reshape(-1, 2), len(pieces))
 
 
 def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, options: BodyOptions) -> int:
@@ -203,7 +199,5 @@ def _given(bodies: list[list[list[Mesh]]], bits: list[_Piece], frames: int, opti
 
 def _gap(mesh: Mesh, others: list[Mesh]) -> float:
     """Return the smallest distance between a vertex of `mesh` and one of `others`, m."""
-    from scipy.spatial import cKDTree
-
     points: Float64[np.ndarray, "N 3"] = np.concatenate([other.vertices for other in others])
     return float(cKDTree(points).query(mesh.vertices)[0].min())

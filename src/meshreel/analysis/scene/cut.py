@@ -13,9 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order, maximum_flow
+from scipy.spatial import cKDTree
 
 from ...errors import InputError
 from ...geometry.strict import exp
+from ...geometry.topology import linked
 from .places import Places
 
 _UNIT = 20  # integer capacity of a link of weight 1: a guess
@@ -70,15 +74,11 @@ def connected(
 
     `alike` receives the ends of all links, as indices into `chosen`, and returns which links connect; all by default.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     first, second = _links(places, chosen)
     if alike is not None:
         kept = alike(first, second)
         first, second = first[kept], second[kept]
-    graph = coo_array((np.ones(len(first), bool), (first, second)), shape=(len(chosen), len(chosen)))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
+    return linked(np.stack([first, second], axis=1), len(chosen))
 
 
 def _large(places: Places, chosen: Bool[np.ndarray, " P"], fewest: int) -> Bool[np.ndarray, " P"]:
@@ -104,8 +104,6 @@ def _within(
     points: Float64[np.ndarray, "N 3"], others: Float64[np.ndarray, "M 3"], reach: float
 ) -> Bool[np.ndarray, " N"]:
     """Return which points have one of the others within reach; bounding the search makes it ten times as fast."""
-    from scipy.spatial import cKDTree
-
     return cKDTree(others).query(points, distance_upper_bound=np.nextafter(reach, np.inf))[0] <= reach
 
 
@@ -113,8 +111,6 @@ def _around(
     points: Float64[np.ndarray, "N 3"], seeds: Float64[np.ndarray, "M 3"], share: Float64[np.ndarray, " M"]
 ) -> Float64[np.ndarray, " N"]:
     """Return the mean share of the seeds nearest to each point."""
-    from scipy.spatial import cKDTree
-
     thin = slice(None, None, max(1, len(seeds) // 20_000))
     count = min(_AROUND, len(seeds[thin]))
     found = cKDTree(seeds[thin]).query(points, k=np.arange(1, count + 1))[1]
@@ -143,9 +139,6 @@ def _cut(
 
     `moves` and `rests` are the capacities between each place and the source, and the sink; `weights` those of links.
     """
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
-
     count = len(moves)
     source, sink, own = count, count + 1, np.arange(count)
     common = np.minimum(moves, rests)  # this flow passes in any case, so it is left out

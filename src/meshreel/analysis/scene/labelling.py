@@ -12,11 +12,11 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64, UInt8
+from scipy.spatial import cKDTree
 
 from ...geometry.cameras import PinholeCamera
-from ...geometry.connected import connected_faces
 from ...geometry.raycast import Rays, Seen
-from ...geometry.topology import face_normals, unique_edges
+from ...geometry.topology import connected_faces, face_normals, unique_edges
 from ...geometry.voxels import Lattice, spread
 from ...types import Mesh
 from .masks import Masker
@@ -147,8 +147,6 @@ class ByPlace:
     @cached_property
     def _tree(self) -> Any:
         """The middles of the places as a tree, which takes a tenth of a second to make."""
-        from scipy.spatial import cKDTree
-
         return cKDTree(self.lattice.centers(self.keys))
 
 
@@ -181,9 +179,7 @@ class ByMasks:
         """Raise ValueError: `changes` is empty, so there is no valid argument."""
         raise ValueError(f"change {change} of a mesh of {len(mesh.faces)} faces: masks know of no changes")
 
-    def gone(self, change: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
-        """Raise ValueError: `changes` is empty, so there is no valid argument."""
-        raise ValueError(f"change {change} of a mesh of {len(mesh.faces)} faces: masks know of no changes")
+    gone = came  # nor does anything leave the room
 
     def moving(self, frame: int, mesh: Mesh) -> Bool[np.ndarray, " F"]:
         """Return True for each face that the votes of the pixels call moving; the masks of a frame are made once.

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int32, Int64, UInt16
+from scipy.ndimage import minimum_filter
 
 from ...errors import InputError
 from ...geometry.cameras import PinholeCamera
@@ -246,8 +247,6 @@ def _sensed(
 
 def _least_around(depth: np.ndarray) -> np.ndarray:
     """Return the smallest depth of each pixel and its eight neighbours; 0 where one of the nine measured nothing."""
-    from scipy.ndimage import minimum_filter
-
     return np.asarray(minimum_filter(depth, 3))
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Int32, Int64
+from scipy.spatial import cKDTree
 
 from ...errors import InputError
 from .cut import connected
@@ -77,8 +78,6 @@ def find_rest(
 
 def _with_unknown(places: Places, moving: Bool[np.ndarray, " P"], rest: Rest) -> Rest:
     """Give moving places that are never seen free, as under a chair's legs, the rest of the nearest one that is."""
-    from scipy.spatial import cKDTree
-
     free = places.tally.free > 0
     known, unknown = np.flatnonzero(moving & free), np.flatnonzero(moving & ~free)
     if not rest.changes or not len(unknown):

@@ -5,14 +5,10 @@ In: the face that each pixel sees, and a mask of the moving pixels. Out: votes, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int32, Int64
-
-from ...geometry.cameras import PinholeCamera
-from ...geometry.raycast import Rays
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +20,7 @@ class Votes:
 
     @staticmethod
     def of(ids: Int32[np.ndarray, "X H W"], masks: Bool[np.ndarray, "X H W"], faces: int) -> Votes:
-        """Count the votes on `faces` faces; `ids` come from `primitive_ids`, masks are True where a pixel moves."""
+        """Count the votes on `faces` faces; `ids` are those that pixels see, -1: none; `masks`: what moves."""
         assert ids.shape == masks.shape, "one mask per view"
         hit = ids >= 0
         return Votes(
@@ -36,8 +32,3 @@ class Votes:
     def score(self) -> Float64[np.ndarray, " F"]:
         """Share of the pixels seeing a face that call it moving, 0 to 1; 0 for a face that no view sees."""
         return self.dynamic / np.maximum(self.seen, 1)  # eq. 4
-
-
-def primitive_ids(rays: Rays, views: Sequence[PinholeCamera]) -> Int32[np.ndarray, "X H W"]:
-    """Return the face that each pixel of each view sees, -1 for none (eq. 1); all views have one size."""
-    return np.stack([rays.look(view).faces for view in views])  # eq. 1

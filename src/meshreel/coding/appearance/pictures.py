@@ -16,9 +16,11 @@ from typing import Any, Literal
 import numpy as np
 
 from ...errors import FormatError, InputError
+from ...format.budget import check_pictures
 from ...format.layout import LAYER_PICTURES, Form, Pictures, VideoCodec
 from ...format.records import pack, unpack_all
 from ...shapes import UInt8
+from .packets import coded_pictures
 
 PRESET = 6  # of SVT: 4 takes 2.5 times as long for 3 % fewer bytes
 ENCODERS = {VideoCodec.AV1: "libsvtav1", VideoCodec.H264: "libx264"}
@@ -32,6 +34,7 @@ COMMENT = 6  # type of a NAL unit: supplemental enhancement information
 H264_BORDER = 128  # pixels that FFmpeg's decoder counts beside a picture, at most
 LOW_DELAY = 0x80000  # FFmpeg's flag AV_CODEC_FLAG_LOW_DELAY: a picture is shown when its packet is decoded
 LUMA = (0.2126, 0.7152, 0.0722)  # of red, green and blue
+BAND = 256  # rows that become sRGB together: their floats take some MiB
 BLUE, RED = 1.8556, 1.5748  # what a full colour difference is of blue and of red
 
 
@@ -116,16 +119,18 @@ def encode_pictures(packets: Sequence[bytes], codec: VideoCodec = VideoCodec.AV1
     return pack(Pictures(Form.VIDEO, codec, interval, tuple(packets)))
 
 
-def decode_pictures(data: bytes, frames: int) -> Pictures:
+def decode_pictures(data: bytes, frames: int, texels: int) -> Pictures:
     """Return the packets of a group's pictures, or of a layer of those of a background, which has 0 frames.
 
-    Raises FormatError where a group has not one for each frame, or the layer none, or more than it may.
+    Raises FormatError where a group has not one for each frame, or the layer none, or more than it may; and CostlyError
+    where pictures of so many texels cost more than the bytes may.
     """
     record = unpack_all(Pictures, data)
     count, interval = len(record.packets), record.interval
     right = (count, interval) == (frames, 1) if frames else interval > 0 and 0 < count <= LAYER_PICTURES
     if record.form != Form.VIDEO or not right or not all(record.packets):
         raise FormatError(f"{count} pictures, one each {interval} frames, for {frames} frames")
+    check_pictures(texels * sum(coded_pictures(packet, record.codec) for packet in record.packets), len(data))
     return record
 
 
@@ -143,13 +148,19 @@ def from_i420(planes: UInt8[np.ndarray, "R W"]) -> UInt8[np.ndarray, "H W 3"]:
     """Return the picture in sRGB."""
     width = planes.shape[1]
     height = planes.shape[0] * 2 // 3
-    flat, size = planes.reshape(-1).astype(np.float64), width * height
-    luma = (flat[:size].reshape(height, width) - 16) * (255 / 219)
-    blue, red = (
-        _doubled((plane.reshape(height // 2, width // 2) - 128) * (255 / 224))
-        for plane in (flat[size : size * 5 // 4], flat[size * 5 // 4 :])
-    )
-    shown = [luma + RED * red, luma - (LUMA[2] * BLUE * blue + LUMA[0] * RED * red) / LUMA[1], luma + BLUE * blue]
+    luma, blue, red = np.split(planes.reshape(-1), [width * height, width * height * 5 // 4])
+    pixels = np.empty((height, width, 3), np.uint8)
+    for top in range(0, height, BAND):
+        rows, half = slice(top, top + BAND), slice(top // 2, (top + BAND) // 2)
+        differences = (plane.reshape(height // 2, width // 2)[half] for plane in (blue, red))
+        pixels[rows] = _shown(luma.reshape(height, width)[rows], *differences)
+    return pixels
+
+
+def _shown(luma: np.ndarray, blue: np.ndarray, red: np.ndarray) -> np.ndarray:
+    y = (luma.astype(np.float64) - 16) * (255 / 219)
+    b, r = (_doubled((plane.astype(np.float64) - 128) * (255 / 224)) for plane in (blue, red))
+    shown = [y + RED * r, y - (LUMA[2] * BLUE * b + LUMA[0] * RED * r) / LUMA[1], y + BLUE * b]
     return np.clip(np.rint(np.stack(shown, axis=2)), 0, 255).astype(np.uint8)
 
 

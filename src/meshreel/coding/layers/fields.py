@@ -15,7 +15,7 @@ from ...errors import InputError
 from ...format.layout import CodedField
 from ...format.records import pack
 from ...geometry import strict
-from ...shapes import Bool, Float64, Int32, Int64
+from ...shapes import Bool, Float64, Int32
 from .. import entropy, klt
 from ..steps import step_of
 from . import orthonormal
@@ -75,10 +75,10 @@ def encode_field(
     centered = trajectories - (np.ldexp(mean, -bits) if has_mean else 0.0)
     basis = klt.fit_about(np.zeros(width), centered)
     kept = np.flatnonzero(basis.energies > (LEAST_RMS * rate.step) ** 2)
-    coded = _Columns(centered, _only(basis, kept), graph, rate, surface)
+    coded = _Columns(centered, basis.only(kept), graph, rate, surface)
     while not (pays := coded.pays()).all():
         kept = kept[pays]
-        coded = _Columns(centered, _only(basis, kept), graph, rate, surface)
+        coded = _Columns(centered, basis.only(kept), graph, rate, surface)
     packed = entropy.encode_integers(np.concatenate([side, coded.basis]))
     record = CodedField(len(kept), rate.rung, packed, coded.stream)
     decoded = decode_field(record, graph, width, has_mean)
@@ -130,10 +130,6 @@ class _Columns:
         bits = 8.0 * self.sizes + np.bincount(rows, basis_bits, count)
         saved = (self.weights**2).sum(axis=1) - ((self.weights - self.decoded) ** 2).sum(axis=1)
         return saved > self.rate.price * self.rate.step**2 * bits
-
-
-def _only(basis: klt.Basis, kept: Int64[np.ndarray, " M"]) -> klt.Basis:
-    return klt.Basis(basis.mean, np.ascontiguousarray(basis.vectors[:, kept]), basis.energies[kept])
 
 
 def _mean_bits(step: float) -> int:

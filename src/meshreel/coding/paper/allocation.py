@@ -15,7 +15,7 @@ from ...errors import InputError
 from ...format.layout import AnchorRule
 from ...geometry.strict import log2
 from ...geometry.topology import components
-from ...shapes import Bool, Float64, Int32, Int64
+from ...shapes import Float64, Int32, Int64
 from .. import entropy, klt
 from ..steps import RUNGS, rung_of, step_of
 from . import quantize
@@ -92,14 +92,14 @@ def allocate(
         kept = np.arange(len(basis.energies)) < options.basis_size
     else:
         kept = basis.energies > (0.4 * options.step) ** 2  # weaker components are not tried (guess)
-    coded = _Components(field, _only(basis, kept), system, options)
+    coded = _Components(field, basis.only(kept), system, options)
     ladder = [np.full(coded.count, rung_of(options.step) + offset) for offset in LADDER]
     values = np.array([coded.value(coded.rounded(rungs), rungs, neighbours) for rungs in ladder])
     rungs = np.choose(values.argmin(axis=0), ladder) if coded.count else ladder[0]
     pays = values.min(axis=0) < coded.dropped() if options.basis_size is None else np.ones(coded.count, dtype=bool)
     if not pays.all():
         kept[kept] = pays
-        coded, rungs = _Components(field, _only(basis, kept), system, options), rungs[pays]
+        coded, rungs = _Components(field, basis.only(kept), system, options), rungs[pays]
     return Allocation(coded.basis, rungs)
 
 
@@ -146,10 +146,6 @@ class _Components:
     def dropped(self) -> Float64[np.ndarray, " M"]:
         """Return the distortion caused by leaving each component out."""
         return (self.weights**2).sum(axis=0)
-
-
-def _only(basis: klt.Basis, kept: Bool[np.ndarray, " C"]) -> klt.Basis:
-    return klt.Basis(basis.mean, np.ascontiguousarray(basis.vectors[:, kept]), basis.energies[kept])
 
 
 def steps_of(rungs: Int64[np.ndarray, " M"]) -> Float64[np.ndarray, " M"]:

@@ -27,6 +27,10 @@ export const LIMITS = {
   colors: 100663296,
   painted: 32,
   painting: 256,
+  pictures: 805306368,
+  texel: 2,
+  videos: 150994944,
+  held: 36,
 } as const;
 
 export const ChunkKind = {

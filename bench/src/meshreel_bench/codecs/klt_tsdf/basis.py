@@ -1,13 +1,13 @@
-"""The KLT of a block's distances, in integers: a mean and principal components, learned offline (`train`).
+"""The KLT of a block's distances, in integers: a mean and principal components, learned offline.
 
-A vector is a sum of products of discrete Legendre (Gram) polynomials of total degree 8 at most. Blocks were learned
-under all 48 symmetries of the cube, so each vector is even or odd along each axis and takes about twenty small
-integers: the whole basis costs a kilobyte, and every platform decodes the same values from it.
+A vector is a sum of products of discrete Legendre (Gram) polynomials of total degree 8 at most, even or odd along each
+axis, for blocks were learned under all symmetries of the cube: it takes about twenty small integers.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -16,8 +16,9 @@ import numpy as np
 from jaxtyping import Float64, Int32, Int64
 
 from meshreel.coding.entropy import decode_integers, encode_integers
+from meshreel.errors import FormatError
+from meshreel.format.kinds import Blob, Varint
 
-from .blobs import join, split
 from .grid import OFFSETS, POINTS
 
 DEGREE = 8  # of the polynomials, in all three axes together
@@ -25,7 +26,8 @@ ONE = 1 << 12  # what a value of 1 is in a basis; a vector's root mean square is
 COEFFICIENT = 1 << 9  # what a coefficient of 1 is
 MOST = 64  # components that were learned
 ENERGY = 1 << 20  # what a mean square of 1 is in the package data
-FILE = "basis.bin"  # package data: energies, mean and components, as `pack_learned` writes them
+_BLOB = Blob(Varint())
+FILE = "basis.bin"  # package data: energies, mean and components; its trainer is in this repository, commit 4ca03122
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,17 @@ def learned(count: int) -> tuple[BasisSymbols, Float64[np.ndarray, " M"]]:
     return BasisSymbols(symbols.classes[:count], symbols.coefficients[: count + 1]), energies[:count]
 
 
-def pack_learned(symbols: BasisSymbols, energies: Float64[np.ndarray, " M"]) -> bytes:
-    """The package data that `learned` reads."""
-    integers = np.maximum(np.rint(energies * ENERGY), 1).astype(np.int32)
-    return join([encode_integers(integers), encode_basis(symbols)])
+def join(blobs: Iterable[bytes]) -> bytes:
+    """Return all blobs behind their lengths."""
+    return b"".join(map(_BLOB.pack, blobs))
+
+
+def split(data: bytes, count: int) -> list[bytes]:
+    """Return the `count` blobs of `data`. Raises FormatError where it holds fewer, or more."""
+    blobs, offset = list[bytes](), 0
+    for _ in range(count):
+        blob, offset = _BLOB.unpack(data, offset)
+        blobs.append(blob)
+    if offset != len(data):
+        raise FormatError(f"{len(data) - offset} bytes too many; the stream is damaged")
+    return blobs

@@ -1,7 +1,4 @@
-"""Entropy coding of what a group of frames says: which blocks hold surface, their symbols, and what is left out.
-
-All by the product's adaptive range coder with contexts from neighbours that are decoded already: beside, below, behind.
-"""
+"""Entropy coding of what a group says: which blocks hold surface, their symbols, what is left out."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from meshreel.errors import InputError
 from meshreel.format.kinds import Array, Rest, Varint
 from meshreel.format.records import pack, unpack, unpack_all
 
-from .blobs import join, split
+from .basis import join, split
 from .grid import block_keys
 
 MOST_PLACES = 1 << 19  # of a group's box: 1024 cells along its diagonal need no more
@@ -40,10 +37,7 @@ class Box:
 
 
 def neighbours(frames: Sequence[Int64[np.ndarray, "_ 3"]], reach: int = 3) -> Neighbours:
-    """For the places of all frames, one after the other, those before them in their frame that touch them.
-
-    A frame's places are sorted. `reach` 1: by a face; 2: by an edge, too; 3: by a corner, too.
-    """
+    """For sorted places of all frames, those before them that touch them: by a face, an edge (reach 2), a corner."""
     offsets = _AROUND[np.abs(_AROUND).sum(axis=1) <= reach]
     later, earlier, start = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], 0
     for places in frames:

@@ -1,7 +1,4 @@
-"""The codec of `klt_tsdf`: a sequence <-> one stream of a head, a basis and groups of frames.
-
-Only the process that measures a stream decodes it: the checksum tells damage, and no law behind it is checked.
-"""
+"""The codec of `klt_tsdf`: a sequence <-> one stream of a head, a basis and groups of frames."""
 
 from __future__ import annotations
 
@@ -21,8 +18,7 @@ from meshreel.types import Mesh, MeshSequence
 
 from ...codec import Progress
 from ..base import DecodedFrames, Options
-from .basis import MOST, basis_of, decode_basis, encode_basis, learned
-from .blobs import join, split
+from .basis import MOST, basis_of, decode_basis, encode_basis, join, learned, split
 from .frames import Group, decode_frame, decode_group, encode_group
 from .weights import STEP_ONE, TRUNCATION, Model
 
@@ -60,14 +56,10 @@ class KltTsdfCodec(Options):
 
     def __post_init__(self) -> None:
         """Refuses what cannot be coded."""
-        if not 8 <= self.cells <= 1024:
-            raise InputError(f"cells {self.cells:g}: give 8 to 1024 along the diagonal")
-        if not 1 <= self.basis <= MOST:
-            raise InputError(f"basis {self.basis}: give 1 to {MOST} components")
-        if not 0.0005 <= self.step <= 1:
-            raise InputError(f"step {self.step:g}: give 0.0005 to 1 truncations")
-        if not 1 <= self.group <= MOST_GROUP:
-            raise InputError(f"group {self.group}: give 1 to {MOST_GROUP} frames")
+        ranges = {"cells": (8, 1024), "basis": (1, MOST), "step": (0.0005, 1), "group": (1, MOST_GROUP)}
+        for name, (least, most) in ranges.items():
+            if not least <= getattr(self, name) <= most:
+                raise InputError(f"{name} {getattr(self, name):g}: give {least:g} to {most}")
 
     def encode(self, sequence: MeshSequence, progress: Progress | None = None) -> bytes:
         """The stream. Raises InputError where frames take more blocks than memory is for."""

@@ -1,8 +1,7 @@
 """A group of frames <-> bytes: each frame for itself, the entropy coder's models together.
 
-What decoded surface is not there in the original (past the border of an open surface, where signs contradict each
-other, or where few components ripple) is left out cell by cell: a bit for each block, and one for each cell that the
-decoded zero level passes in the blocks that have such.
+Decoded surface that is not there in the original (past a border, where signs contradict each other, or few components
+ripple) is left out: a bit for each block, and one for each crossed cell in the blocks that have such.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from jaxtyping import Float64, Int32, Int64
 from meshreel.geometry.closest_points import Surface
 from meshreel.types import Mesh
 
-from .blobs import join, split
+from .basis import join, split
 from .blocks import decode_bits, decode_places, decode_symbols, encode_bits, encode_places, encode_symbols
 from .grid import SIDE, block_keys, prepared, sample
 from .surface import Field, cells_of, crossed, field_of, polygonize, without

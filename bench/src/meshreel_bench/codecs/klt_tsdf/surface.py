@@ -54,8 +54,7 @@ def _closed(
 ) -> Float64[np.ndarray, " U"]:
     """The distances without surface that leaves the blocks by less than a voxel, which would end there in a hole.
 
-    A block that is not there is on one side of the surface, whole: the side that its voxels tell that are known. Those
-    on the other, if near, are put on this one.
+    A block that is not there is on one side, that of its known voxels; others, if near, are put on this one.
     """
     voxels, owners = _outsiders(places, keys)
     if len(voxels) == 0:

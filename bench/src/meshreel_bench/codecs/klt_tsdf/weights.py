@@ -1,8 +1,7 @@
 """Blocks <-> weights of the components: projection and quantisation, and distances from symbols again.
 
-`forward` finds the weights whose distances match where the surface is near; beyond truncation only the sign and that
-the distance is large counts (Tang et al. 2018). Weights are then quantised one after the other, each rounding made good
-by those still to come. `distances` is in integers: the same distances, sign by sign, on every platform.
+Beyond truncation only the sign and that the distance is large counts (Tang et al. 2018). Weights are quantised in turn,
+each rounding made good by those to come. `distances` is in integers: the same on every platform.
 """
 
 from __future__ import annotations

@@ -9,15 +9,13 @@ Differs from the publication:
 - The fit of a volume (eq. 1) measures distances between the two surfaces, both ways; the authors compare pictures of
   depth and silhouette, whose renderer needs a GPU.
 - Entropy coding is the adaptive range coder of `coding.entropy`; the authors propose Huffman coding or better.
-- Each frame has a grid around it, of one size for all frames, moved by whole cells; the authors scale meshes to a cube.
-- Open surfaces are coded, too: a sheet has an inside behind its faces, and the decoder leaves out sign flips far from
-  any surface (`grid`). The authors take closed surfaces.
+- Each frame has a grid around it, moved by whole cells; the authors scale meshes to a cube. Open surfaces are coded,
+  too: a sheet has an inside behind its faces, and flips of sign far from any surface are left out (`grid`).
 - Training starts from weights that preserve the size of values and from an empty volume; with PyTorch's own rule values
-  fade, and a thousand steps go into unlearning noise. `encode` refuses sets of which training has lost a frame.
-- Networks narrow as the authors' do (64, 48, 32, 24, 16), in proportion to `channels`; no head layer, no grids of 256.
-  The defaults are a quarter as wide with fewer, faster steps, and weight the structural similarities 1 instead of 10.
-  The publication's own point (section 4.1), for a GPU, is `resolution=128, channels=64, epochs=400, fitting=100,
-  batch=4, rate=1e-3, structure=10`.
+  fade. `encode` refuses sets of which training has lost a frame.
+- Networks narrow as the authors' do, in proportion to `channels`; no head layer, no grids of 256. The defaults are a
+  quarter as wide with fewer, faster steps, and weight the structural similarities 1 instead of 10. The publication's
+  point, for a GPU: `resolution=128, channels=64, epochs=400, fitting=100, batch=4, rate=1e-3, structure=10`.
 Where the publication is silent, the authors' code decides: truncation at 2 cells, a deformation of 1 is half a cell,
 windows of 11 points for the structural similarity, a rise of the learning rate over a fifth of the epochs.
 """

@@ -1,8 +1,7 @@
 """Deformable marching cubes (NeCGS, section 3.1): the surface of a TSDF-Def volume.
 
-In -> out: signed distances and deformations at the points of a grid -> a mesh in cells. A vertex is the zero of the
-distance on an edge between two grid points that the deformation has moved. The 256 cases are derived, not stored. On a
-face with four crossings each inside corner is cut off alone, in both cubes of the face: the surface has no holes.
+A vertex is the zero of the distance on an edge between two grid points that the deformation has moved. On a face with
+four crossings each inside corner is cut off alone, in both cubes of the face: the surface has no holes.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Fit of a TSDF-Def volume to a mesh (NeCGS, section 3.1, eq. 1). Needs the extra `necgs`.
+"""Fit of a TSDF-Def volume to a mesh (NeCGS, section 3.1, eq. 1), in cells. Needs the extra `necgs`.
 
-In -> out: distances and a mesh, in cells -> a K x K x K x 4 volume. Adam reduces the squared distances between the
-extracted surface and the mesh, both ways, and the size of the deformations.
+Adam reduces the squared distances between the extracted surface and the mesh, both ways, and the deformations.
 """
 
 from __future__ import annotations

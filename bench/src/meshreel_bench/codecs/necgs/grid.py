@@ -1,8 +1,7 @@
 """Placement of the grids of frames, and truncated signed distances of a mesh at their points.
 
-In -> out: meshes, m -> one grid per frame; a mesh in cells -> K x K x K values, negative inside. Inside is where the
-winding number is above 1/2; close to a sheet, which has no inside on either side, such as the wall of a room seen from
-within, it is behind the sheet. The decoder trims the flips of sign past the border of a sheet.
+Inside is where the winding number is above 1/2; close to a sheet, which has no inside on either side, such as the wall
+of a room, it is behind the sheet. The decoder trims the flips of sign past the border of a sheet.
 """
 
 from __future__ import annotations

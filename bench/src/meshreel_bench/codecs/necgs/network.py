@@ -1,7 +1,6 @@
 """Auto-decoder (NeCGS, section 3.2 and appendix B): embedded features -> TSDF-Def volumes. Needs the extra `necgs`.
 
-Each module is a convolution of 3 x 3 x 3, a shuffle of its channels into 2 x 2 x 2 points, and a GELU; a last
-convolution makes the four numbers of every point.
+A module is a convolution of 3 x 3 x 3, a shuffle of channels into 2 x 2 x 2 points, a GELU; a last convolution follows.
 """
 
 from __future__ import annotations
@@ -64,10 +63,7 @@ def rounded(values: Tensor, bits: int) -> Tensor:
 
 
 def initial_parameters(shape: Shape, seed: int) -> list[Tensor]:
-    """Return weights that preserve the size of values (He et al. 2015) and biases of zero.
-
-    The last convolution makes an empty volume: far from any surface, without deformation.
-    """
+    """Return weights that preserve the size of values (He et al. 2015), biases of zero; the last are of nothing."""
     generator = torch.Generator().manual_seed(seed)
     found = []
     for inputs, outputs in shape.layers:

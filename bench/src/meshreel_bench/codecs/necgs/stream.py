@@ -1,7 +1,4 @@
-"""Bytes of a coded set: a head, then streams of integers (`coding.entropy`). In -> out: a record <-> bytes.
-
-Only the process that measures a stream decodes it: the checksum tells damage, and no law behind it is checked.
-"""
+"""Bytes of a coded set: a head, then streams of integers. Only what measures a stream decodes it: no law is checked."""
 
 from __future__ import annotations
 

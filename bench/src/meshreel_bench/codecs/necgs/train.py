@@ -1,7 +1,6 @@
 """Training of the auto-decoder (NeCGS, section 3.2): volumes -> symbols. Needs the extra `necgs`.
 
-Features and parameters are rounded in every step. The loss is eq. 3: the mean absolute error, plus 5 times that of
-points near the surface, plus `structure` times the distance of two structural similarities from 1.
+The loss is eq. 3: the mean absolute error, 5 times that of points near the surface, and two structural similarities.
 """
 
 from __future__ import annotations
@@ -29,10 +28,7 @@ Report = Callable[[int, int], None]  # epochs done, epochs
 
 @repeatable()
 def train(volumes: Volumes, options: NecgsCodec, report: Report) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return the symbols of at least one volume's features, N x features, and of the network's tensors, flat.
-
-    They are equal for the same seed on the same machine.
-    """
+    """Return symbols of features, N x features, and of the network's tensors, flat; the same for a seed and machine."""
     place, shape = choose_device(options.device), options.shape
     generator = torch.Generator().manual_seed(options.seed)
     size = (len(volumes), shape.features, SIDE, SIDE, SIDE)

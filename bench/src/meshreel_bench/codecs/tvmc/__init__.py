@@ -4,9 +4,8 @@ The baseline of the TSMC paper (section 4.2), after "TVMC: Time-Varying Mesh Com
 Meshes" (Chen, Hácha, Váša and Dasari, MMSys 2025). References and displacements are those of preset `paper`.
 
 Differs from the publication:
-- It decodes without the originals. The published code writes displacements in the order of a k-d tree and looks each up
-  among the originals; here they keep their order, which costs bytes.
-- Vertices are ordered along the reference's surface, so that Draco predicts each from a neighbour: fewer bytes.
+- It decodes without the originals, where the published code looks displacements up: they keep their order, which costs
+  bytes. Vertices are ordered along the reference's surface, so that Draco predicts each from a neighbour: fewer bytes.
 - One quantization step in metres for all groups, with `qp` bits for the widest frame; there each frame has its own.
 - Vertices are fitted to the surface with a smooth field; there each jumps to the nearest vertex of the frame.
 - Groups are cut, and frames become Draco meshes, where no reference follows them, as in preset `paper`. The quality of

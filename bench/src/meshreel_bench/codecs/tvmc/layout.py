@@ -1,7 +1,4 @@
-"""The bytes of a TVMC* stream: one record, then its checksum. In -> out: Stream <-> bytes.
-
-Only the process that measures a stream decodes it: the checksum tells damage, and no law behind it is checked.
-"""
+"""The bytes of a TVMC* stream: a record, then a checksum. Only what measures it decodes it: no law is checked."""
 
 from __future__ import annotations
 
@@ -14,7 +11,7 @@ import numpy as np
 
 from meshreel.errors import FormatError
 from meshreel.format.kinds import F64, U8, U32, Array, Blob, Bytes, Choice, List, Varint
-from meshreel.format.layout import Checksum, Form
+from meshreel.format.layout import Checksum
 from meshreel.format.records import Nested, least_size, pack, unpack_all
 
 MAGIC = b"TVMC"
@@ -87,11 +84,6 @@ def unpack_stream(data: bytes) -> Stream:
     if unpack_all(Checksum, data[size:]).crc != zlib.crc32(data[:size]):
         raise FormatError(f"a TVMC* stream of {len(data)} bytes whose checksum is wrong; damaged or truncated")
     return unpack_all(Stream, data[:size])
-
-
-def is_patch(state: State) -> bool:
-    """Return whether a state is a patch of the previous one."""
-    return state.payload[:1] == bytes([Form.PATCH])
 
 
 def is_bare(stream: Stream, frame: int) -> bool:

@@ -1,7 +1,6 @@
 """A tracked group <-> bytes: the reference as a Draco mesh, the displacements of each frame as a Draco point cloud.
 
-Draco gets displacements as whole multiples of the step, with an origin and a range that leave them unchanged: they
-decode equally on every platform, to within half a step. Clouds are sequential, the only method that keeps their order.
+Draco gets whole multiples of the step in a range that leaves them unchanged; clouds are sequential: these keep order.
 """
 
 from __future__ import annotations
@@ -70,9 +69,6 @@ def decode_cloud(data: bytes, step: float) -> Float64[np.ndarray, "V 3"]:
 
 
 def surface_order(mesh: Mesh) -> Int64[np.ndarray, " V"]:
-    """Return vertices in the order in which faces mention them, those without a face last: neighbours are close.
-
-    This saves 11 to 47 % of the bytes against the original order, which has all midpoints last (dancer, qp 12 to 4).
-    """
+    """Return vertices in the order in which faces mention them: 11 to 47 % fewer bytes (dancer, qp 12 to 4)."""
     names: Int32[np.ndarray, " N"] = np.append(mesh.faces.ravel(), np.arange(len(mesh.vertices), dtype=np.int32))
     return np.argsort(np.unique(names, return_index=True)[1], kind="stable").astype(np.int64)

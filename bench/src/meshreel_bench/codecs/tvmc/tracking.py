@@ -1,7 +1,4 @@
-"""Rate-independent content of a TVMC* stream: references, displacements, the background.
-
-In: an encoder that has tracked the frames, options of preset `paper`. Out: Tracking.
-"""
+"""Content of a TVMC* stream that no rate changes. In: an encoder that has tracked the frames. Out: Tracking."""
 
 from __future__ import annotations
 
@@ -50,10 +47,7 @@ class Tracking:
 
 
 def track_sequence(encoder: Encoder, options: EncoderOptions) -> Tracking:
-    """Return the groups of each body of a sequence; reuses the analysis of a prepared encoder.
-
-    Raises InputError for frames that cannot be used.
-    """
+    """Return the groups of each body, by a prepared encoder's analysis. Raises InputError for unusable frames."""
     sequence, parts, groups = encoder.sequence, encoder.parts(options), list[Tracked | Untracked]()
     assert isinstance(options.method, PaperOptions), "references are those of the paper's recipe"
     for interval in encoder.intervals(options):

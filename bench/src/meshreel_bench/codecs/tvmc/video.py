@@ -8,11 +8,12 @@ from collections.abc import Iterator
 from meshreel.coding.background import decode_background, decode_change
 from meshreel.coding.intra import decode_intra
 from meshreel.encoder.options import MOST_FRAMES
+from meshreel.format.layout import Form
 from meshreel.geometry.topology import concatenate
 from meshreel.types import Mesh, Placement
 
 from ..base import DecodedFrames
-from .layout import Kind, is_bare, is_patch, unpack_stream
+from .layout import Kind, is_bare, unpack_stream
 from .tracked import decode_tracked
 
 
@@ -58,7 +59,7 @@ class TvmcVideo(DecodedFrames):
             return
         if number != self._background[0]:
             first = number
-            while is_patch(states[first]):
+            while states[first].payload[:1] == bytes([Form.PATCH]):
                 first -= 1
             mesh = decode_background(states[first].payload)
             for state in states[first + 1 : number + 1]:

@@ -1,0 +1,102 @@
+"""Targets of colour: a person with textures, a room in colour, the demo's capture, a child for ten seconds.
+
+The person has three frames. Rates of a key in N frames are those of N frames whose later ones are like the other two.
+"""
+
+from __future__ import annotations
+
+from ..names import PAINTED, TEXTURED
+from ..rows import Options
+from .study import NORMALS, Always, Bound, Measure, NoMore, Promise, Reaches, Study, Sweep, Which, at_most
+
+PERSON, ROOM, DEMO, CHILD = "textured/basketball_player", "living_room", "procedural_room", "procedural_child"
+YUV = Measure("yuv_psnr", "YUV 6:1:1, pointwise", " dB")
+VIEWS = Measure("view_y_psnr", "Y of views, silhouettes included", " dB")
+MEASURES = (
+    YUV,
+    VIEWS,
+    Measure("view_y_psnr_inside", "inside", " dB"),
+    Measure("view_ssim", "SSIM of views in colour"),
+    Measure("picture_y_psnr", "Y beside the cameras' pictures", " dB"),
+    Measure("picture_still_y_psnr", "of what stands", " dB"),
+    Measure("picture_moving_y_psnr", "of what moves", " dB"),
+    Measure("swimming_psnr", "the same place in successive frames", " dB"),
+    Measure("texture_psnr", "successive textures", " dB"),
+    NORMALS,
+    Measure("color_mbps", "colours", " Mbps", -1),
+    Measure("background_color_mbps", "of the background", " Mbps", -1),
+    Measure("color_share", "their share", "", -1),
+    Measure("mbps.120", "all, a key in 120 frames", " Mbps", -1),
+    Measure("texture_mbps.120", "textures alone, a key in 120", " Mbps", -1),
+)
+BOTH = {"quality": (20.0, *(50.0,) * 4, 80.0), "color_quality": (20.0, 28.0, 50.0, 62.0, 70.0, 80.0)}
+
+PROMISES: tuple[Promise, ...] = (
+    *(
+        Reaches(
+            f"person: textures, a key in {key} frames",
+            Which(PERSON, TEXTURED),
+            (Bound(YUV.key, db, "dB"), at_most(f"texture_mbps.{key}", mbps, "Mbps")),
+            aim,
+        )
+        for key, aim in ((120, ""), (32, "itself"))
+        for db, mbps in ((38.2, 0.07), (40.4, 0.18))
+    ),
+    Reaches(
+        "person: geometry and colour, a key in 120 frames",
+        Which(PERSON, TEXTURED),
+        (Bound(YUV.key, 39.8, "dB"), at_most("mbps.120", 0.5, "Mbps"), at_most(NORMALS.key, 5.0, "degrees")),
+        "41 dB",
+    ),
+    NoMore(
+        "person, quality 50: rate against AVIF and Draco with UVs, no better in YUV",
+        Which(PERSON, TEXTURED, {"quality": 50.0, "color_quality": 50.0}),
+        "mbps.120",
+        0.05,
+        (Which(PERSON, "Draco with colours, avif", {"quality": 40}),),
+    ),
+    Reaches(
+        "person: colours of vertices at the decoded level",
+        Which(PERSON, PAINTED),
+        (Bound(YUV.key, 32.0, "dB"), at_most("vertices_mbps.120", 0.02, "Mbps")),
+    ),
+    Always("person: the same place in successive frames", Which(PERSON, TEXTURED), Bound("swimming_psnr", 36.0, "dB")),
+    Always("child: successive textures", Which(CHILD, TEXTURED), Bound("texture_psnr", 36.0, "dB")),
+    Reaches(
+        "child, six cameras that err: seen surface beside clean pictures",
+        Which(CHILD, TEXTURED),
+        (Bound("picture_y_psnr", 33.0, "dB"),),
+        "36 dB",
+    ),
+    Reaches(
+        "living_room: what stands still beside the camera's pictures, colours of the background",
+        Which(ROOM, TEXTURED),
+        (Bound("picture_still_y_psnr", 38.0, "dB"), at_most("background_color_mbps", 0.06, "Mbps")),
+        "41 dB",
+    ),
+)
+OURS: Options = {"preset": "best", "color": "texture"}
+SMALL: Options = {"color": "vertices", "bits": 8}  # procedural bodies have no textures
+STUDY = Study(
+    title="Colour",
+    sequences=(PERSON, ROOM, DEMO, CHILD),
+    sweeps=(
+        Sweep("meshreel", BOTH, OURS | {"texture": 1024}, only=(PERSON,)),
+        Sweep("meshreel", {}, {"preset": "best", "color": "vertices"}, only=(PERSON,)),
+        Sweep("meshreel", {"quality": (50.0, 80.0)}, OURS, only=(ROOM, DEMO)),
+        Sweep("meshreel", {"quality": (50.0,)}, OURS | {"texture": 512}, only=(CHILD,)),
+        Sweep("colored_draco", {"bits": (5, 8)}, {"qp": 10}, only=(PERSON,)),
+        Sweep("colored_draco", {"quality": (25, 40, 60)}, {"color": "avif", "bits": 11}, only=(PERSON,), small=SMALL),
+        Sweep("colored_draco", {"quality": (54, 42, 30)}, {"color": "av1", "bits": 11}, only=(PERSON,), small=SMALL),
+    ),
+    metrics="colors",
+    measures=MEASURES,
+    promises=PROMISES,
+    frames={ROOM: 24, DEMO: 20},
+    rate="mbps.120",
+    notes=(
+        "Colours of decoded surface are compared with those of the closest original points, in four parallel views",
+        "without light and, where cameras took pictures, with these (of *procedural_child*, with ones without errors).",
+        "A person's rates of *a key in 120 frames* follow from three: what a chain begins with counts once.",
+    ),
+)

@@ -1,0 +1,90 @@
+"""Colours of decoded frames beside pictures of the same moments, how much textures swim, and the bytes of colours."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from jaxtyping import Float64
+
+from meshreel.coding.group import payload_bytes_by_purpose
+from meshreel.container.reader import ReelReader
+from meshreel.decoder.video import Video
+from meshreel.format.layout import ChunkKind, Form, Pictures
+from meshreel.format.records import unpack_all
+from meshreel.geometry.color_views import ColorPicture
+from meshreel.geometry.painted import Painted
+from meshreel.geometry.topology import blend
+from meshreel.metrics.color import PEAK, POINTS, TO_YUV, psnr
+from meshreel.metrics.color_render import Colored
+from meshreel.metrics.even_points import scatter
+from meshreel.metrics.render import Crop, Pixels
+from meshreel.types import Mesh, MeshSequence
+
+from ..rows import ColorBytes
+
+EDGE = 2  # pixels from silhouettes that do not count: pictures are registered to depth within as many (living_room)
+PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # all that is seen, what stands, what moves
+
+
+def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still: int) -> Float64[np.ndarray, "3 2"]:
+    """Return squared differences of luma and pixels, summed for each of `PARTS`, where a camera sees both frames.
+
+    The first `still` faces of the decoded frame stand still. The camera's lens must not bend.
+    """
+    from scipy.ndimage import binary_erosion
+
+    camera = picture.camera
+    pixels = Pixels(camera, Crop(0, camera.height, 0, camera.width))
+    shown, both = Colored(decoded).look(pixels), Colored(original).look(pixels).covered
+    apart = np.square(PEAK * shown.colors.astype(np.float64) @ TO_YUV[0] - picture.pixels @ TO_YUV[0])
+    parts = (shown.covered & (shown.faces < still), shown.faces >= still)
+    stands, moves = (binary_erosion(mask & both, iterations=EDGE) for mask in parts)
+    return np.array([[apart[mask].sum(), mask.sum()] for mask in (stands | moves, stands, moves)])
+
+
+def picture_psnrs(found: Iterable[Float64[np.ndarray, "3 2"]]) -> dict[str, float]:
+    """Return the PSNR of luma of each part that is seen, over all pixels of all pictures."""
+    total = sum(found, np.zeros((3, 2))).tolist()
+    return {name: psnr(square / count) for name, (square, count) in zip(PARTS, total, strict=True) if count}
+
+
+def color_bytes(reader: ReelReader) -> ColorBytes | None:
+    """Return what the colours of a file take, and the base meshes of groups that need no other; None: no colours."""
+    sizes, pictures = dict.fromkeys(("vertices", "atlas", "background"), 0), list[int]()
+    for chunk in reader.chunks:
+        if chunk.kind == ChunkKind.PICTURES and chunk.frame_count:
+            pictures += map(len, unpack_all(Pictures, reader.read_chunk(chunk.number)).packets)
+        elif chunk.kind in (ChunkKind.COLORS, ChunkKind.ATLAS, ChunkKind.PICTURES):
+            own = "vertices" if chunk.kind == ChunkKind.COLORS else "atlas"
+            sizes[own if chunk.frame_count else "background"] += chunk.size
+    if not any(sizes.values()):
+        return None
+    first = [chunk for chunk in reader.groups if chunk.form != Form.EMPTY and reader.group_before(chunk) is None]
+    parts = [payload_bytes_by_purpose(reader.read_chunk(chunk.number)) for chunk in first]
+    base = sum(each.get("base mesh", 0) for each in parts)
+    return ColorBytes(**sizes, pictures=pictures, base=base, chains=len(first))
+
+
+def swimming(video: Video, originals: MeshSequence) -> dict[str, float]:
+    """Return mean PSNRs of red, green and blue from one frame to the next of a chain of groups.
+
+    `swimming_psnr`: what coloured originals show at the same places of the tracked surface; `texture_psnr`: textures as
+    decoded, which a coarse quantiser keeps from changing.
+    """
+    found, reader = {"swimming_psnr": list[float](), "texture_psnr": list[float]()}, video.reader
+    is_colored = len(originals) > 0 and originals[0].is_colored
+    for number, track in enumerate(video.tracks):
+        for frame, mesh in enumerate(track):
+            chunk, now = reader.chunk_of_frame(frame, number), dict[str, np.ndarray]()
+            if frame == chunk.first_frame and reader.group_before(chunk) is None:
+                first, before, places = mesh, dict(now), scatter(mesh, np.ones(len(mesh.faces), bool), POINTS)
+            if mesh.texture is not None:
+                now["texture_psnr"] = mesh.texture.pixels.astype(np.float32)
+            if is_colored and not mesh.is_empty and np.array_equal(mesh.faces, first.faces):
+                points = blend(mesh.vertices, mesh.faces[places.faces], places.barycentric)
+                now["swimming_psnr"] = Painted(originals[frame]).at(points, points)[0]
+            for name in now.keys() & before.keys():
+                found[name].append(psnr(float(np.mean(np.square(now[name] - before[name])))))
+            before = now
+    return {name: float(np.mean(values)) for name, values in found.items() if values}
