@@ -34,7 +34,6 @@ export class Player extends PlaybackTarget implements Playback {
   #session: Session | null = null;
   #clock: Clock | null = null;
   #error: Error | null = null;
-
   #start = 0; // s, where to begin once the head is there
   #loop = false;
   #rate = 1;
@@ -187,11 +186,12 @@ export class Player extends PlaybackTarget implements Playback {
     this.#seek(this.#clock, timeline.startOf(frame));
   }
 
-  update(now: number): Shown | null {
+  update(now: number, far?: ReadonlySet<number>): Shown | null {
     const session = this.#session;
     const clock = this.#clock;
     if (session === null || clock === null) return null;
     const { picture, timeline } = session;
+    if (far) session.textures.far = far;
     clock.advance(now);
     const frame = timeline.frameAt(clock.time);
     const isShown = picture.show(frame, this.interpolate ? timeline.blendAt(clock.time, frame) : 0);

@@ -200,7 +200,7 @@ export class Session {
   /** A chunk's layers, and behind them what comes with these. */
   #wishesOf({ chunk, layers }: Step, when: When): Wish[] {
     const count = layers + 1;
-    const others = this.decoding.companionsOf(chunk).filter((other) => chunk.kind === "group" || !isVideo(other));
+    const others = this.decoding.companionsOf(chunk).filter((other) => !isVideo(other) || (chunk.kind === "group" && !this.textures.isFar(chunk)));
     const companions = others.map((other) => ({ chunk: other, count: companionLayers(chunk, other, count), when }));
     return [{ chunk, count, when }, ...companions];
   }
@@ -209,7 +209,7 @@ export class Session {
   #pictureWishes({ coming, steps }: Plan, whenOf: (ahead: number) => When): Wish[] {
     const layers = new Map(steps.map((step) => [step.chunk, step.layers]));
     return coming.flatMap(({ chunk, ahead }) => {
-      if (chunk.kind === "static") return [];
+      if (chunk.kind === "static" || this.textures.isFar(chunk)) return [];
       const pictures = this.decoding.picturesOf(chunk, layers.get(chunk) ?? this.decoding.decodedAt(chunk));
       if (pictures === null || (ahead > 0 && layers.has(chunk))) return [];
       const lead = ahead > 0 ? [pictures] : this.textures.leadTo(pictures);

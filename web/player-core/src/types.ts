@@ -99,9 +99,9 @@ export interface TextureImage {
 
 /**
  * Whether textures are shown, and if not, why: the file has none, they are switched off, the browser cannot decode them or not in time, they are
- * damaged, left out with layers, or not decoded yet.
+ * damaged, left out with layers, seen too small, or not decoded yet.
  */
-export type TextureState = "shown" | "none" | "off" | "unsupported" | "slow" | "damaged" | "left out" | "late";
+export type TextureState = "shown" | "none" | "off" | "unsupported" | "slow" | "damaged" | "left out" | "far" | "late";
 
 export interface TextureStats {
   readonly textures: TextureState;
@@ -192,7 +192,7 @@ export interface Playback extends EventTarget {
   pause(): void;
   /** Pauses and moves by a number of frames; a negative one goes back. */
   step(frames: number): void;
-  /** To be called once a displayed picture, with a clock's milliseconds. Null where nothing can be shown yet. */
-  update(now: number): Shown | null;
+  /** To be called once a displayed picture, with a clock's milliseconds and the tracks that need no textures. Null where nothing can be shown yet. */
+  update(now: number, far?: ReadonlySet<number>): Shown | null;
   dispose(): void;
 }

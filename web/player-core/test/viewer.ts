@@ -25,6 +25,7 @@ export class Viewer {
   mostAlive = 0;
   pictures = 0;
   shown: Shown | null = null;
+  far = new Set<number>();
   readonly #head: Head | null;
   readonly #timer: ReturnType<typeof setInterval>;
 
@@ -46,7 +47,7 @@ export class Viewer {
   }
 
   look(): void {
-    const shown = this.player.update(performance.now());
+    const shown = this.player.update(performance.now(), this.far);
     this.pictures++;
     if (shown === null) return;
     this.shown = shown;

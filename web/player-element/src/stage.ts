@@ -21,6 +21,7 @@ export interface Stage extends EventTarget {
   readonly canvas: HTMLCanvasElement;
   readonly stats: PictureStats;
   readonly presenting: boolean; // to a headset
+  readonly far: ReadonlySet<number>; // tracks that were drawn so small that textures make no difference
   mode: Mode;
   background: string; // a CSS colour
   camera: string; // as the attribute has it; "" fits the view

@@ -1,7 +1,7 @@
 // A stage that draws with three.js: the recording, a camera that orbits it, and a headset.
 
 import type { Box, Info, Packed, Shown } from "@meshreel/player-core/types";
-import { ReelScene } from "@meshreel/player-three";
+import { ReelScene, updateFar } from "@meshreel/player-three";
 import type { Mode } from "@meshreel/player-three";
 import { VrSession } from "@meshreel/xr";
 import type { VrActions } from "@meshreel/xr";
@@ -13,6 +13,7 @@ import { stoodUp, turnOf } from "./upright.ts";
 import type { Up } from "./upright.ts";
 
 const FOV = 45; // degrees, of the picture's height
+const TANGENT = Math.tan((FOV * Math.PI) / 360); // of half of that
 const FROM = new Vector3(0.25, 0.25, 1).normalize(); // where a view that fits looks from
 const MARGIN = 1.05; // of the distance at which everything just fits
 const STEEPEST = 0.01; // radians from straight above or below
@@ -38,6 +39,8 @@ export class ThreeStage extends EventTarget implements Stage {
   #free = 1; // of the picture's height: what the bar leaves
   #isFit = true; // the camera was not moved by hand: it fits again when the picture's size changes
   #session: VrSession | null = null;
+  readonly #place = new Vector3(); // of the eye, in the recording's space
+  readonly far = new Set<number>();
 
   constructor(canvas: HTMLCanvasElement) {
     super();
@@ -120,6 +123,8 @@ export class ThreeStage extends EventTarget implements Stage {
 
   draw(shown: Shown | null): boolean {
     if (shown) this.#reel.show(shown);
+    if (this.presenting) this.far.clear(); // it comes near
+    else if (shown) updateFar(this.far, shown, this.#reel.worldToLocal(this.#place.copy(this.#eye.position)), this.canvas.height / (2 * TANGENT));
     this.#reel.visible = shown !== null;
     const moves = !this.presenting && this.#orbit.update();
     this.#renderer.render(this.#scene, this.#eye);
@@ -139,8 +144,7 @@ export class ThreeStage extends EventTarget implements Stage {
   fit(): void {
     if (!this.#box) return;
     const { middle } = this.#ball(this.#box);
-    const half = Math.tan((FOV * Math.PI) / 360);
-    const distance = MARGIN * distanceOf(this.#box, half * this.#eye.aspect, half * this.#free);
+    const distance = MARGIN * distanceOf(this.#box, TANGENT * this.#eye.aspect, TANGENT * this.#free);
     this.#look(middle.clone().addScaledVector(FROM, distance || 1), middle);
     this.#isFit = true;
   }

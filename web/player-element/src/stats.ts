@@ -41,6 +41,7 @@ const WITHOUT: Readonly<Record<Exclude<TextureState, "shown">, string>> = {
   slow: "of vertices",
   damaged: "of vertices: the texture is damaged",
   "left out": "of vertices: textures come with more layers",
+  far: "of vertices: textures are too small to be seen",
   late: "of vertices: the texture is not decoded yet",
 };
 

@@ -142,7 +142,7 @@ export class View {
     this.#clock += since < 0 || since > LONGEST_GAP ? PICTURE : since;
     this.#before = now;
     const playback = this.#playback;
-    const shown = playback?.update(this.#clock) ?? null;
+    const shown = playback?.update(this.#clock, this.stage.far) ?? null;
     const fresh = this.#dirty || this.stage.presenting || (shown !== null && shown !== this.#last);
     const moving = fresh && this.#draw(shown);
     if (shown) this.#last = shown;

@@ -145,6 +145,7 @@ export class FakeStage extends EventTarget implements Stage {
   readonly canvas: HTMLCanvasElement;
   readonly stats = { triangles: 41_234, gpuBytes: 12_345_678, headsetRate: 0 };
   presenting = false;
+  readonly far = new Set<number>();
   mode: Mode = "shaded";
   background = "";
   up: Stage["up"] = null;

@@ -1,5 +1,7 @@
 import { expect, test } from "vitest";
 import { trackColor } from "../src/colors.ts";
+import type { Shown } from "@meshreel/player-core/types";
+import { updateFar } from "../src/far.ts";
 import { localFrame, triangleCount, vertexRoom } from "../src/ranges.ts";
 import { Upload } from "../src/upload.ts";
 import { makeFloor, makeGroup } from "./analytic.ts";
@@ -10,6 +12,19 @@ test("a frame shows the group's triangles and its own, and a frame beside the gr
   expect([9, 10, 11, 12, 13, 14].map((frame) => localFrame(packed, frame))).toEqual([0, 0, 1, 2, 3, 3]);
   expect([10, 11, 12, 13].map((frame) => triangleCount(packed, frame) - sphereTriangles)).toEqual([0, 0, 2, 0]);
   expect(triangleCount(makeFloor(3).packed, 5)).toBe(18);
+});
+
+test("a body is far where it is small, and near again where it is somewhat larger", () => {
+  const { packed } = makeGroup({ track: 1 });
+  const shown: Shown = { frame: 0, blend: 0, frames: [0, 0], groups: [null, packed], background: null, images: [null, null], backgroundImage: null };
+  const across = Math.hypot(...packed.box.size);
+  const far = new Set<number>();
+  const states = [100, 80, 50, 80, 100].map((pixels) => {
+    const [x, y, z] = packed.box.minimum.map((low, k) => low + packed.box.size[k] / 2);
+    updateFar(far, shown, { x, y, z: z + (1000 * across) / pixels }, 1000);
+    return [...far];
+  });
+  expect(states).toEqual([[], [], [1], [1], []]);
 });
 
 test("numbers of vertices go up to the texture's end", () => {

@@ -44,6 +44,8 @@ export class Textures implements LaneHost {
   readonly #chains = new Map<number, readonly CompanionChunk[]>(); // the chunks of each video, by each of them
   readonly #slow = new Map<number, SlowVideo>(); // by the chunk with a background's pictures
   readonly #late: number[] = []; // ms
+  readonly #far = new Set<number>(); // tracks that are seen too small for textures
+  readonly #early = new Set<number>(); // tracks that are shown without until their first picture is there
   #on: boolean;
   #choices: readonly Rendition[]; // that the file has and the browser decodes, the best first
   #choice = 0; // which of them; behind the last where none is in time
@@ -77,6 +79,21 @@ export class Textures implements LaneHost {
     this.#switch();
   }
 
+  /** Tracks that are seen so small that their textures make no difference: these are neither fetched nor decoded. */
+  set far(far: ReadonlySet<number>) {
+    for (let track = 0; track < this.#head.tracks.length; track++) {
+      if (far.has(track) === this.#far.has(track)) continue;
+      this.version++;
+      if (!this.#far.delete(track)) this.#far.add(track);
+      this.#early.add(track);
+    }
+  }
+
+  /** Whether the pictures of a chunk are left out, as its track is far. */
+  isFar({ kind, track }: Chunk): boolean {
+    return kind === "group" && this.#far.has(track);
+  }
+
   statsOf(shown: Shown | null): TextureStats {
     const codec = this.rendition && CODECS[this.rendition];
     return { textures: this.#stateOf(shown), textureCodec: codec, textureReason: this.#reason, backgroundLate: shown !== null && this.#isLate(shown) };
@@ -95,6 +112,7 @@ export class Textures implements LaneHost {
         if (place !== null) places.push(place);
       }
       if (places.length > 0 || this.#lanes.has(track)) this.#lane(track).want(places, isShown);
+      if (places.length > 0 && this.#lane(track).imageOf(places[0]) !== null) this.#early.delete(track);
     }
     const slow = this.#slowOf(frame);
     const next = frame + (slow?.interval ?? 0);
@@ -106,7 +124,7 @@ export class Textures implements LaneHost {
   isReady(frame: number): boolean {
     for (let track = 0; track < this.#head.tracks.length; track++) {
       const place = this.#placeOf(frame, track);
-      if (place !== null && this.#lane(track).imageOf(place) === null) return false;
+      if (place !== null && !this.#early.has(track) && this.#lane(track).imageOf(place) === null) return false;
     }
     return true;
   }
@@ -134,7 +152,7 @@ export class Textures implements LaneHost {
 
   /** Whether the bytes of a chunk's pictures are at hand, where it waits for them. */
   hasBytes(chunk: Chunk): boolean {
-    if (chunk.kind === "static") return true;
+    if (chunk.kind === "static" || this.#early.has(chunk.track)) return true;
     const pictures = this.#picturesOf(chunk);
     return pictures === null || this.#fetcher.layersOf(pictures) > 0;
   }
@@ -226,6 +244,7 @@ export class Textures implements LaneHost {
     if (this.rendition === null) return this.#choices.length > 0 ? "slow" : "unsupported";
     if (shown === null || shown.backgroundImage !== null || shown.images.some((image) => image !== null)) return "shown";
     if (this.#isLate(shown)) return "late";
+    if (shown.groups.some((group) => group !== null && this.#far.has(group.track))) return "far";
     const chunks = [...shown.groups, shown.background].map((packed) => packed && this.#head.chunks[packed.chunk]);
     const failed = chunks.some((chunk) => chunk && this.#head.companionsOf(chunk).some((other) => isVideo(other) && this.#decoding.isFailed(other)));
     return failed ? "damaged" : "left out";
@@ -245,6 +264,7 @@ export class Textures implements LaneHost {
     this.#retryAt = Infinity;
     this.#retryIn = Math.min(2 * this.#retryIn, RETRY_MS[1]);
     this.#choice = Math.min(this.#choice, this.#choices.length - 1);
+    for (const track of this.#head.tracks.keys()) this.#early.add(track);
     this.#switch();
   }
 
@@ -263,7 +283,7 @@ export class Textures implements LaneHost {
   /** The pictures that a chunk is shown with; null where it is not at hand, or is shown without. */
   #picturesOf(chunk: Chunk): CompanionChunk | null {
     const packed = this.#decoding.packedOf(chunk);
-    if (packed === null || packed.places === null || (chunk.kind === "group" && chunk.track >= MOST_LANES)) return null;
+    if (packed === null || packed.places === null || (chunk.kind === "group" && chunk.track >= MOST_LANES) || this.isFar(chunk)) return null;
     return this.#decoding.picturesOf(chunk, packed.kind === "group" ? packed.layers : chunk.layers.length - 1);
   }
 
