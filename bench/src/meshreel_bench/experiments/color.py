@@ -30,7 +30,7 @@ MEASURES = (
     Measure("texture_mbps.120", "textures alone, a key in 120", " Mbps", -1),
     Measure("texture_mbps.32", "a key in 32", " Mbps", -1),
 )
-BOTH = {"quality": (20.0, *(50.0,) * 4, 80.0), "color_quality": (20.0, 28.0, 50.0, 64.0, 70.0, 80.0)}
+BOTH = {"quality": (20.0, 50.0, 50.0, 60.0, 50.0, 80.0), "color_quality": (20.0, 28.0, 50.0, 62.0, 70.0, 80.0)}
 
 PROMISES: tuple[Promise, ...] = (
     *(
