@@ -142,7 +142,7 @@ def run(
     common.warn(tuple(describe(row) for row in failed))
     found = verdicts(find_experiment(experiment), measured_rows(rows))
     counts = {"output": str(output), "rows": len(rows), "failed": len(failed)}
-    common.result(counts | _promised(found), verdict_table(found))
+    common.result(counts | {"promises": [asdict(verdict) for verdict in found]}, verdict_table(found))
     if len(failed) == len(rows):
         raise InputError(f"{output}: all {len(rows)} points failed; mend what they report, and run again with --retry")
 
@@ -174,7 +174,8 @@ def report(
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
     written = [str(path) for path in write_report(joined, output)]
     found = [verdict for part in parts_of(joined) for verdict in verdicts(part.study, part.rows)]
-    common.result({"files": written} | _promised(found), verdict_table(found), *written)
+    record = {"files": written, "promises": [asdict(verdict) for verdict in found]}
+    common.result(record, verdict_table(found), *written)
 
 
 @command.command
@@ -247,10 +248,6 @@ def verdict_table(found: Sequence[Verdict]) -> Table:
     for verdict in [each for each in found if each.value is not None] or found:
         table.add_row(verdict.text, verdict.bound, verdict.value or "", verdict.word)
     return table
-
-
-def _promised(found: Sequence[Verdict]) -> dict[str, object]:
-    return {"promises": [asdict(verdict) for verdict in found]}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
