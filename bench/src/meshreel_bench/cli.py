@@ -178,15 +178,6 @@ def report(
     common.result(record, verdict_table(found), *written)
 
 
-@command.command
-def compare(before: Path, after: Path, /, *, common: Common = Common()) -> None:
-    """Print what points cost before and after a change, from two files of rows that `run` wrote."""
-    from .report.tables import change_table
-
-    lines = change_table(*(measured_rows(_some_rows(path)) for path in (before, after)))
-    common.result({"table": lines}, *(lines or [f"{before} and {after} have no point in common"]))
-
-
 @command.command(name="list")
 def list_experiments(*, common: Common = Common()) -> None:
     """List the experiments, their sequences, and how many points each has."""
@@ -260,7 +251,6 @@ def make_app() -> App:
     app = App(name="meshreel-bench", help=HELP, suppress_keyboard_interrupt=False)
     app.command(run)
     app.command(report)
-    app.command(compare)
     app.command(list_experiments, name="list")
     app.command(codecs)
     return app
