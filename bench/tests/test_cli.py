@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from meshreel_bench.cli import describe, main, make_app, operating_point
-from meshreel_bench.rows import Point, append_row
+from meshreel_bench.rows import append_row
 from msgspec.structs import replace
 
 from bench.tests.made_up import failed, row
@@ -67,15 +67,6 @@ def test_what_cannot_be_done_is_refused_in_a_line(bench, tmp_path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     code, _, said = bench(*arguments)
     assert code != 0 and reason in " ".join(said.split())
-
-
-def test_two_files_of_rows_are_compared(bench, tmp_path):
-    for name, rate in (("before", 2.0), ("after", 1.0)):
-        append_row(tmp_path / name, replace(row("own", "best", rate, 60.0), point=Point("own", "best")))
-    code, said, _ = bench("compare", tmp_path / "before", tmp_path / "after")
-    assert code == 0 and "| 2 → 1 | 60 → 60 |" in said
-    append_row(tmp_path / "other", row("own", "draco", 1.0, 60.0))
-    assert "no point in common" in bench("compare", tmp_path / "before", tmp_path / "other")[1]
 
 
 def test_rows_of_one_name_and_different_content_make_no_report(bench, tmp_path):

@@ -142,7 +142,7 @@ def run(
     common.warn(tuple(describe(row) for row in failed))
     found = verdicts(find_experiment(experiment), measured_rows(rows))
     counts = {"output": str(output), "rows": len(rows), "failed": len(failed)}
-    common.result(counts | _promised(found), verdict_table(found))
+    common.result(counts | {"promises": [asdict(verdict) for verdict in found]}, verdict_table(found))
     if len(failed) == len(rows):
         raise InputError(f"{output}: all {len(rows)} points failed; mend what they report, and run again with --retry")
 
@@ -174,16 +174,8 @@ def report(
     common.warn(tuple(describe(row) for row in failed_rows(joined)))
     written = [str(path) for path in write_report(joined, output)]
     found = [verdict for part in parts_of(joined) for verdict in verdicts(part.study, part.rows)]
-    common.result({"files": written} | _promised(found), verdict_table(found), *written)
-
-
-@command.command
-def compare(before: Path, after: Path, /, *, common: Common = Common()) -> None:
-    """Print what points cost before and after a change, from two files of rows that `run` wrote."""
-    from .report.tables import change_table
-
-    lines = change_table(*(measured_rows(_some_rows(path)) for path in (before, after)))
-    common.result({"table": lines}, *(lines or [f"{before} and {after} have no point in common"]))
+    record = {"files": written, "promises": [asdict(verdict) for verdict in found]}
+    common.result(record, verdict_table(found), *written)
 
 
 @command.command(name="list")
@@ -249,10 +241,6 @@ def verdict_table(found: Sequence[Verdict]) -> Table:
     return table
 
 
-def _promised(found: Sequence[Verdict]) -> dict[str, object]:
-    return {"promises": [asdict(verdict) for verdict in found]}
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the program `meshreel-bench`; exit codes are those of `meshreel`."""
     return run_app(make_app, arguments)
@@ -263,7 +251,6 @@ def make_app() -> App:
     app = App(name="meshreel-bench", help=HELP, suppress_keyboard_interrupt=False)
     app.command(run)
     app.command(report)
-    app.command(compare)
     app.command(list_experiments, name="list")
     app.command(codecs)
     return app

@@ -9,7 +9,6 @@ from meshreel_bench.report.equal import rate_ratio, rate_table
 from meshreel_bench.report.tables import (
     DAGGER,
     bd_table,
-    change_table,
     comparable_table,
     failure_table,
     maker_table,
@@ -51,14 +50,6 @@ def test_points_are_listed_curve_by_curve_from_the_lowest_rate_on():
     lines = point_table(ROWS, (D2, NORMALS))
     assert [line.split(" | ")[0] for line in lines[2:]] == ["| draco"] * 3 + ["| best"] * 3
     assert lines[5].startswith("| best | quality 0.5 | 0.5 | 62.5 | 5.5 | 61.5 | 10 | 7 | code 7 | 1.5 |")
-
-
-def test_points_of_two_files_are_shown_before_and_after():
-    after = [msgspec.structs.replace(BEST[0], metrics={"d2_psnr_paper": 63.0}), row("ball", "new", 1.0, 60.0)]
-    head, _, line = change_table(ROWS, after)
-    assert head == "| sequence | codec | point | peak (MB) | Mbps | D2 (dB) |"
-    assert line == "| ball | best | quality 0.5 | 100 → 100 | 0.5 → 0.5 | 62.5 → 63 |"
-    assert change_table(BEST, DRACO) == []
 
 
 def test_a_codec_that_is_given_some_frames_says_so():

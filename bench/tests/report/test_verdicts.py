@@ -14,6 +14,7 @@ from meshreel_bench.experiments.study import (
     Flat,
     Gains,
     LeastRate,
+    Needs,
     NoMore,
     Reaches,
     Rises,
@@ -95,6 +96,19 @@ def test_a_value_is_compared_with_the_sum_of_others():
     assert found.met is False and found.value == "2 against 1.5: 1.33 times" and found.bound == "<= 1.2 times"
     assert judged(replace(promise, factor=1.4))[0].met is True
     assert judged(promise, BEST[1:])[0].word == "not measured"
+
+
+def test_a_rate_for_a_quality_is_that_of_the_curve():
+    low, high = (row("ball", "best", rate, db) for rate, db in ((1.0, 50.0), (4.0, 60.0)))
+    promise = Needs("cheap", Which("ball", "best"), Bound("d2_psnr_paper", 55.0, "dB"), "mbps", 2.1, aim="1")
+    [found] = judged(promise, [low, high])
+    assert found.met is True and found.value == "2 Mbps" and found.bound == ">= 55 dB at <= 2.1 Mbps (aim 1)"
+    assert judged(replace(promise, most=1.9), [low, high])[0].met is False
+    assert judged(replace(promise, bound=Bound("d2_psnr_paper", 61.0)), [low, high])[0].met is False
+    others = [row("ball", "other", 40.0, 55.0), row("ball", "other", 50.0, 70.0)]
+    [share] = judged(replace(promise, most=0.06, than=Which("ball", "other")), [low, high, *others])
+    assert share.met is True and share.value == "2 Mbps against 40: 5 %"
+    assert judged(promise, others)[0].word == "not measured"
 
 
 def test_what_no_row_decides_is_not_measured():

@@ -17,7 +17,7 @@ from meshreel.types import Frames, Mesh, Up
 
 FRAMES = 300
 CAMERAS = corner_cameras(np.array([-1.1, 0.0, -1.1]), np.array([1.1, 1.5, 1.1]), 6)  # some 3 mm a pixel
-SENSOR = ColorSensorOptions(scale=1.0, gain=0.06, pose_error=0.2)  # degrees
+SENSOR = ColorSensorOptions(scale=1.0, gain=0.06, blur=1.0, pose_error=0.2)  # degrees; blurred, for grain is finer
 PERFECT = replace(SENSOR, gain=0.0, noise=0.0)
 
 

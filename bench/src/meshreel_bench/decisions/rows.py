@@ -94,11 +94,6 @@ def replace_rows(file: Path, decision: str, measured: Iterable[Row]) -> None:
     before = read(file)
     at = next((n for n, row in enumerate(before) if row["decision"] == decision), len(before))
     first, last = ([row for row in some if row["decision"] != decision] for some in (before[:at], before[at:]))
-    write(file, [*first, *rows, *last])
-
-
-def write(file: Path, rows: Sequence[Row]) -> None:
-    """Replace a file by these rows."""
     new = file.with_suffix(".new")
-    new.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    new.write_text("".join(json.dumps(row) + "\n" for row in [*first, *rows, *last]), encoding="utf-8")
     new.replace(file)

@@ -80,6 +80,19 @@ class Reaches:
 
 
 @dataclass(frozen=True, slots=True)
+class Needs:
+    """Promise that a curve, interpolated, has a quality at a rate, Mbps, or at a share of what another one needs."""
+
+    text: str
+    which: Which
+    bound: Bound  # of the quality
+    rate: str  # name of a row's value
+    most: float
+    than: Which | None = None
+    aim: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Always:
     """Promise that every row keeps a bound; on every sequence where `which.sequence` is empty."""
 
@@ -136,7 +149,7 @@ class NoMore:
     than: tuple[Which, ...]
 
 
-Promise = Reaches | Always | Gains | LeastRate | Rises | Flat | NoMore
+Promise = Reaches | Needs | Always | Gains | LeastRate | Rises | Flat | NoMore
 
 
 @dataclass(frozen=True, slots=True)

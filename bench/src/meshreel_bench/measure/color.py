@@ -28,10 +28,7 @@ PARTS = ("picture_y_psnr", "picture_still_y_psnr", "picture_moving_y_psnr")  # a
 
 
 def picture_squares(picture: ColorPicture, original: Mesh, decoded: Mesh, still: int) -> Float64[np.ndarray, "3 2"]:
-    """Return squared differences of luma and pixels, summed for each of `PARTS`, where a camera sees both frames.
-
-    The first `still` faces of the decoded frame stand still. The camera's lens must not bend.
-    """
+    """Return sums of squared differences of luma and of pixels for each of `PARTS`; the first `still` faces stand."""
     from scipy.ndimage import binary_erosion
 
     camera = picture.camera

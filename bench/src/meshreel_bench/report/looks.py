@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..names import BEST, DECIMATED, DRACO, KLT, NECGS, ONCE, ONCE_SUBDIVIDED, SUBDIVIDED, TSMC, TVMC
+from ..names import BEST, DECIMATED, DRACO, KLT, NECGS, ONCE, ONCE_SUBDIVIDED, PAINTED, SUBDIVIDED, TEXTURED, TSMC, TVMC
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +22,8 @@ class Look:
 # never in one plot may share one.
 KNOWN: dict[str, Look] = {
     BEST: Look("#D55E00", "o", 2.2, 4.4),
+    TEXTURED: Look("#D55E00", "o", 2.2, 4.4),
+    PAINTED: Look("#E69F00", "s"),
     "meshreel paper": Look("#E69F00", "s"),
     TSMC: Look("#A6761D", "d"),
     TVMC: Look("#009E73", "P", size=4.2),
@@ -32,6 +34,9 @@ KNOWN: dict[str, Look] = {
     SUBDIVIDED: Look("#1B3A5C", "D", size=2.8),
     ONCE: Look("#000000", "<"),
     ONCE_SUBDIVIDED: Look("#777777", "H"),
+    "Draco with colours, avif": Look("#0072B2", "^"),
+    "Draco with colours, av1": Look("#009E73", "P", size=4.2),
+    "Draco with colours, vertices": Look("#CC79A7", "X", size=4.2),
     "a: decimated Draco": Look("#56B4E9", "v"),
     "a: decimated Draco, subdivided": Look("#1B3A5C", "D", size=2.8),
     "b: background once, decimated Draco": Look("#000000", "<"),

@@ -78,30 +78,6 @@ def point_table(rows: Sequence[Row], measures: Sequence[Measure]) -> list[str]:
     return markdown(pd.DataFrame(records))
 
 
-def change_table(before: Sequence[Row], after: Sequence[Row]) -> list[str]:
-    """Return what the points that both have cost before and after a change, as `before → after`."""
-    known, records = {row.point.key: row for row in before}, list[dict[str, object]]()
-    for row in [row for row in after if row.point.key in known]:
-        records.append({"sequence": text(row.point.sequence), "codec": text(row.name), "point": text(_point(row))})
-        for label, key in _COSTS.items():
-            pair = [_cell(value(each, key)) for each in (known[row.point.key], row)]
-            records[-1][label] = " → ".join(pair) if any(pair) else None
-    return markdown(pd.DataFrame(records)) if records else []
-
-
-_COSTS = {
-    "encode at rest (CPU s/frame)": "encode_s_at_rest",
-    "peak (MB)": "encode_mb",
-    "Mbps": "mbps",
-    "D2 (dB)": "d2_psnr_paper",
-    "decode at rest (ms)": "decode_ms_at_rest",
-    **{
-        f"{kind} a frame": f"work.{kind}"
-        for kind in ("frames read", "frames tracked", "frames fitted", "closest points")
-    },
-}
-
-
 def value_table(rows: Sequence[Row]) -> list[str]:
     """Return the values of rows that have no rate: noise floors, segmentations, memory of encodes."""
     records = []

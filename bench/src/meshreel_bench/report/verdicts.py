@@ -8,8 +8,27 @@ from functools import singledispatch
 from itertools import pairwise
 from math import inf
 
+<<<<<<< HEAD
 from ..bd_rate import BdRate, bd_bound, beats, gain_end
 from ..experiments.study import Always, Bound, Flat, Gains, LeastRate, NoMore, Promise, Reaches, Rises, Study, Which
+=======
+from meshreel.metrics.bd_rate import BdRate, Curve, bd_bound, beats, gain_end, rate_at
+
+from ..experiments.study import (
+    Always,
+    Bound,
+    Flat,
+    Gains,
+    LeastRate,
+    Needs,
+    NoMore,
+    Promise,
+    Reaches,
+    Rises,
+    Study,
+    Which,
+)
+>>>>>>> f82bf9722e1b1a599d57179a2f20c029d3eeb39f
 from ..rows import Row
 from .values import curve, curve_of, floors, hull_of, rated, sequences, value
 
@@ -59,6 +78,24 @@ def _(promise: Reaches, rows: Sequence[Row]) -> list[Verdict]:
         row = min(own, key=lambda row: sum(_miss(row, bound) for bound in bounds))
     found = [_number(value(row, b.key), b.unit) + (" (short)" if _miss(row, b) else "") for b in bounds]
     return [Verdict(promise.text, limit, ", ".join(found) + _where(row), bool(good))]
+
+
+@_judged.register
+def _(promise: Needs, rows: Sequence[Row]) -> list[Verdict]:
+    most = f"{100 * promise.most:g} % of the other's" if promise.than else f"{promise.most:g} Mbps"
+    limit = f"{_text(promise.bound)} at <= {most}" + (f" (aim {promise.aim})" if promise.aim else "")
+    rates = list[float | None]()
+    for which in (promise.which, promise.than) if promise.than else (promise.which,):
+        pairs = [(value(row, promise.rate), value(row, promise.bound.key)) for row in _chosen(rows, which)]
+        known = [(rate, quality) for rate, quality in pairs if rate is not None and quality is not None]
+        if not known:
+            return [Verdict(promise.text, limit)]
+        rates.append(rate_at(Curve(which.curve, *map(list, zip(*known, strict=True))), promise.bound.limit).rate)
+    own, other = rates[0], rates[-1] if promise.than else 1.0
+    if own is None or other is None:
+        return [Verdict(promise.text, limit, "a quality that is not reached", False)]
+    shown = f"{own:.4g} Mbps" + (f" against {other:.4g}: {100 * own / other:.3g} %" if promise.than else "")
+    return [Verdict(promise.text, limit, shown, own / other <= promise.most)]
 
 
 @_judged.register
