@@ -98,7 +98,8 @@ def bodies_of(frames: Sequence[tuple[Piece, ...]]) -> list[Int64[np.ndarray, " P
     counts = [len(pieces) for pieces in frames]
     if min(counts, default=0) < 2:
         return None
-    starts, boxes, links = np.cumsum([0, *counts]), [_boxes(pieces) for pieces in frames], list[tuple[int, int]]()
+    starts, links = np.cumsum([0, *counts]), list[tuple[int, int]]()
+    boxes = [np.array([piece.box for piece in pieces]) for pieces in frames]
     for number in range(len(frames) - 1):
         apart = unlike(boxes[number], boxes[number + 1])
         here, there = starts[number], starts[number + 1]
@@ -118,7 +119,3 @@ def unlike(some: Float64[np.ndarray, "P 6"], others: Float64[np.ndarray, "Q 6"])
 def around(boxes: Float64[np.ndarray, "P 6"]) -> Float64[np.ndarray, "6"]:
     """Return the box around some boxes."""
     return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
-
-
-def _boxes(pieces: Sequence[Piece]) -> Float64[np.ndarray, "P 6"]:
-    return np.array([piece.box for piece in pieces])

@@ -312,15 +312,12 @@ def _describe_scene(row: dict[str, Any]) -> str:
 def describe(row: dict[str, Any]) -> str:
     """Describe a row in one line: frames, bytes, rate and forms."""
     forms = [group["form"] for group in row["groups"]]
-    counted = ", ".join(_count_groups(forms.count(form), form) for form in sorted(set(forms)))
+    counts = [(forms.count(form), form) for form in sorted(set(forms))]
+    counted = ", ".join(f"{count} {'group' if count == 1 else 'groups'} of form {form}" for count, form in counts)
     tracks = 1 + max(group["track"] for group in row["groups"])
     scene = ("" if tracks == 1 else f"{tracks} tracks, ") if row["scene"] is None else _describe_scene(row["scene"])
     before = f", {row['continued']} intervals from before" if row["continued"] else ""
     return f"{row['frames']} frames, {row['bytes']} bytes, {row['mbps']:.3f} Mbps, {scene}{counted}{before}"
-
-
-def _count_groups(count: int, form: str) -> str:
-    return f"{count} {'group' if count == 1 else 'groups'} of form {form}"
 
 
 def _reached(row: dict[str, Any]) -> str:

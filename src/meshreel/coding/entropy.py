@@ -43,7 +43,8 @@ def causal_neighbours(faces: Int32[np.ndarray, "F 3"], count: int) -> Neighbours
 
 def encode_weights(symbols: Int32[np.ndarray, "N M"], neighbours: Neighbours) -> list[bytes]:
     """Encode one stream per column; column c decodes with the columns before it, and without those after."""
-    return list(_core.encode_weights(_columns(symbols), neighbours.indptr, neighbours.indices))
+    columns = np.array(symbols.T, dtype=np.int32, order="C")  # a copy: the core takes writable arrays
+    return list(_core.encode_weights(columns, neighbours.indptr, neighbours.indices))
 
 
 def decode_weights(streams: Sequence[bytes], count: int, neighbours: Neighbours) -> Int32[np.ndarray, "N M"]:
@@ -81,7 +82,3 @@ def check_plausible(count: int, size: int, what: str) -> None:
     """Raise FormatError if `size` bytes cannot contain `count` symbols, before memory is allocated."""
     if not 0 <= count <= SYMBOLS_PER_BYTE * (size + 4) or (count > 0) != (size > 0):
         raise FormatError(f"{what}: {count} symbols cannot come from {size} bytes; the stream is damaged")
-
-
-def _columns(symbols: Int32[np.ndarray, "N M"]) -> Int32[np.ndarray, "M N"]:
-    return np.array(symbols.T, dtype=np.int32, order="C")  # a copy: the core takes writable arrays

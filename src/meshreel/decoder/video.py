@@ -34,20 +34,16 @@ def open(source: str | Path | bytes | Stream | Source) -> Video:
     Raises InputError if it cannot be read, and FormatError if the header or the index are damaged or of a version that
     this reader does not know.
     """
+    if isinstance(source, bytes):
+        source = BytesSource(source)
     if not isinstance(source, str | Path):
-        return Video(ReelReader(_source_of(source)))
+        return Video(ReelReader(source if isinstance(source, Source) else StreamSource(source)))
     ranges = _source_at(source)
     try:
         return Video(ReelReader(ranges), close=ranges.close)
     except FormatError as error:
         ranges.close()
         raise FormatError(f"{source}: {error}") from error
-
-
-def _source_of(source: bytes | Stream | Source) -> Source:
-    if isinstance(source, bytes):
-        return BytesSource(source)
-    return source if isinstance(source, Source) else StreamSource(source)
 
 
 def _source_at(place: str | Path) -> StreamSource | HttpSource:

@@ -156,7 +156,10 @@ def _measured(
         mesh = sequence[number]
         moves = segmentation.moving(number, mesh)
         if moves.any():
-            sizes.append(_largest(part_of(mesh, moves)))
+            moving = part_of(mesh, moves)
+            label = components(moving.faces, len(moving.vertices))
+            largest = moving.vertices[label == np.bincount(label).argmax()]
+            sizes.append(Mesh(largest, moving.faces[:0]).diagonal)
         still = part_of(mesh, ~moves)
         areas = face_normals(still)[1]
         whole += float(face_normals(mesh)[1].sum())
@@ -172,9 +175,3 @@ def _measured(
     if not squares:
         return _Measured(0.0, 0.0, sizes, astray)
     return _Measured(math.sqrt(float(np.mean(squares))), float(np.mean(deviations)), sizes, astray)
-
-
-def _largest(mesh: Mesh) -> float:
-    """The diagonal of the connected piece with most vertices, m."""
-    label = components(mesh.faces, len(mesh.vertices))
-    return Mesh(mesh.vertices[label == np.bincount(label).argmax()], mesh.faces[:0]).diagonal

@@ -97,7 +97,10 @@ def layers_options(quality: float = 50.0, effort: str = "normal") -> LayersOptio
     )
     if effort == "fast":
         return _fast(options)
-    return _thorough(options) if effort == "thorough" else options
+    if effort == "thorough":  # more keys, tried also where a plan is good already, and more templates (decision 24)
+        plan = replace(options.plan, keys=8, misses=3, settled=0.25, gain=0.05)
+        return replace(options, plan=plan, errors=(0.8, 1.25))
+    return options
 
 
 def _fast(options: LayersOptions) -> LayersOptions:
@@ -114,11 +117,6 @@ def _fast(options: LayersOptions) -> LayersOptions:
         measured=4,
         floor=False,
     )
-
-
-def _thorough(options: LayersOptions) -> LayersOptions:
-    """Return options with more keys, tried also where a plan is good already, and more templates (decision 24)."""
-    return replace(options, plan=replace(options.plan, keys=8, misses=3, settled=0.25, gain=0.05), errors=(0.8, 1.25))
 
 
 def motion_step(quality: float) -> float:

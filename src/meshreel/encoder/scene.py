@@ -75,7 +75,8 @@ def track_intervals(job: Job, parts: Parts, frames: range, tracks: Tracks) -> li
 
     Frames can where all have a surface or none has, and where they are of about one scale.
     """
-    moving, found = [_moving(job.sequence[number], parts, number) for number in frames], list[Interval]()
+    loaded, by, found = ((k, job.sequence[k]) for k in frames), parts.segmentation, list[Interval]()
+    moving = [with_ring(mesh, by.moving(k, mesh), by.cell, parts.surface) for k, mesh in loaded]
     longest = longest_interval(job.options, job.sequence.frame_rate)
     for track, meshes in tracks.of(moving):
         normalised = [parts.seen.normalise(mesh) for mesh in meshes]
@@ -145,7 +146,3 @@ class Tracks:
             for group in empty_groups(began):
                 yield TrackGroup(track, first, group)
                 first += group.frame_count
-
-
-def _moving(mesh: Mesh, parts: Parts, number: int) -> Mesh:
-    return with_ring(mesh, parts.segmentation.moving(number, mesh), parts.segmentation.cell, parts.surface)

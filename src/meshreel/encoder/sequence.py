@@ -160,9 +160,10 @@ class Encoder:
         seen = parts.seen if parts is not None else surveyed(job) if excerpt is None else excerpt.surveyed.seen
         made = made_of(self.sequence, options, self._masker)
         journal.begin(made if excerpt is None else made | {"part": str(excerpt.frames)})
-        summary = _encode_tracked(job, file, seen) if parts is None else _encode_scene(job, file, parts)
-        colored = any(group.colors for group in summary.groups)
-        return replace(summary, work=since(before), warnings=summary.warnings + (lacking if colored else ()))
+        name = str(journal.output)
+        summary = _encode_tracked(job, file, name, seen) if parts is None else _encode_scene(job, file, name, parts)
+        texts = summary.warnings + (lacking if any(group.colors for group in summary.groups) else ())
+        return replace(summary, work=since(before), warnings=texts, continued=journal.continued)
 
     def survey(self, path: Path) -> Survey:
         """Survey the sequence, and write a file of it for encodes of its parts."""
@@ -193,12 +194,12 @@ class Encoder:
         return self._scene[2]
 
 
-def _encode_tracked(job: Job, file: BinaryIO, seen: Survey) -> Summary:
-    """Encode a sequence in which everything may move."""
+def _encode_tracked(job: Job, file: BinaryIO, name: str, seen: Survey) -> Summary:
+    """Encode a sequence in which everything may move; errors call the output `name`."""
     sequence, options = job.sequence, job.options
     groups: list[GroupSummary] = []
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.dropped, seen.pieces)
-    with _writer(job, file, seen) as writer:
+    with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name) as writer:
         for encoded in encode_tracked(job, seen):
             groups += [_added(writer, each, [], seen.diagonal) for each in encoded]
         excerpt = job.excerpt
@@ -206,17 +207,17 @@ def _encode_tracked(job: Job, file: BinaryIO, seen: Survey) -> Summary:
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), (*texts, *_bare(job, groups)), continued=_continued(job))
+    return Summary(writer.size, tuple(groups), (*texts, *_bare(job, groups)))
 
 
-def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
-    """Encode a scene with a background."""
+def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts) -> Summary:
+    """Encode a scene with a background; errors call the output `name`."""
     sequence, options, seen = job.sequence, job.options, parts.seen
     job.note("survey", seen.low, seen.high, seen.diagonals, seen.unit)
     job.note("background and noise", parts.background.vertices, parts.background.faces, parts.noise, parts.deviation)
     states = colored_states(sequence, parts, job.scene.background, options.appearance)
     job.note("background, coded", *(state.payload for state in states))
-    with _writer(job, file, seen) as writer:
+    with ReelWriter(file, make_header(sequence.frame_rate, seen, {}), name) as writer:
         coded = encode_bodies(job, parts)
         groups = _added_in_order(writer, coded.groups, states, seen)
         metadata = {"preset": options.preset, "quality": rounded(options.quality), "noise_m": rounded(parts.noise)}
@@ -228,17 +229,7 @@ def _encode_scene(job: Job, file: BinaryIO, parts: Parts) -> Summary:
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
     texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped), *_bare(job, groups, states))
-    return Summary(writer.size, tuple(groups), texts, scene, _continued(job))
-
-
-def _writer(job: Job, file: BinaryIO, seen: Survey) -> ReelWriter:
-    """Return a writer to a file, which errors call by the name of the output."""
-    name = "the output" if job.journal is None else str(job.journal.output)
-    return ReelWriter(file, make_header(job.sequence.frame_rate, seen, {}), name)
-
-
-def _continued(job: Job) -> int:
-    return 0 if job.journal is None else job.journal.continued
+    return Summary(writer.size, tuple(groups), texts, scene)
 
 
 def _added_in_order(

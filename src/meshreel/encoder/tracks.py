@@ -69,10 +69,12 @@ def tracked_bodies(job: Job, seen: Survey) -> TrackedBodies:
     tracks = 1 + max(body.track for _, bodies in whole for body in bodies)
     if job.excerpt is None:
         return TrackedBodies(whole, tracks)
-    cut = [(frames, some, bodies) for frames, bodies in whole for some in job.excerpt.of([frames])]
-    return TrackedBodies(
-        [(some, [_only(body, frames, some) for body in bodies]) for frames, some, bodies in cut], tracks
-    )
+    cut = list[tuple[range, list[Body]]]()
+    for frames, bodies in whole:
+        for some in job.excerpt.of([frames]):
+            at = slice(some.start - frames.start, some.stop - frames.start)
+            cut.append((some, [replace(b, bodies=b.bodies[at], diagonals=b.diagonals[at]) for b in bodies]))
+    return TrackedBodies(cut, tracks)
 
 
 def intervals_of(job: Job, seen: Survey, planned: TrackedBodies) -> Iterator[Interval]:
@@ -132,12 +134,6 @@ def _psnrs(
         squares += body.share * np.array(of_peak) * np.square(body.diagonals)
     peaks = seen.diagonals[frames.start : frames.stop]
     return np.array([min(psnr(*both), PSNR_CEILING) for both in zip(squares.tolist(), peaks, strict=True)])
-
-
-def _only(body: Body, frames: range, some: range) -> Body:
-    """Return a body with only some of its frames."""
-    cut = slice(some.start - frames.start, some.stop - frames.start)
-    return replace(body, bodies=body.bodies[cut], diagonals=body.diagonals[cut])
 
 
 def _tracked(seen: Survey, numbered: Sequence[range]) -> Iterator[list[Body]]:

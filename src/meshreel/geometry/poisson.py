@@ -69,7 +69,9 @@ def reconstruct(
     whole = Mesh.of(np.asarray(solid.vertices), np.asarray(solid.triangles))
     mesh = decimate(whole, options.vertices)
     gaps = cKDTree(points).query(mesh.vertices)[0]  # to the nearest point
-    trusted = _dense(mesh, whole, np.asarray(density), options.trim) & (gaps <= options.reach)
+    levels, nearest = np.asarray(density), cKDTree(whole.vertices).query(mesh.vertices)[1]
+    dense = levels[nearest] >= np.median(levels) - options.trim  # the points are not much sparser than in the median
+    trusted = dense & (gaps <= options.reach)
     kept = trusted[mesh.faces].all(axis=1)
     kept |= _holes(mesh, ~kept, options.hole) & (gaps <= 3 * options.reach)[mesh.faces].all(axis=1)
     return drop_small(clean(Mesh.of(mesh.vertices, mesh.faces[kept])), options.smallest)
@@ -122,11 +124,6 @@ def thin_out(
     mean = [np.stack([np.bincount(group, a[:, d], len(count)) for d in range(3)], axis=1) for a in (points, normals)]
     length = np.linalg.norm(mean[1], axis=1, keepdims=True)
     return mean[0] / count[:, None], mean[1] / np.where(length > 0, length, 1.0)
-
-
-def _dense(mesh: Mesh, whole: Mesh, levels: Float64[np.ndarray, " W"], trim: float) -> Bool[np.ndarray, " V"]:
-    """Return which vertices of the decimated mesh lie where the points are not much sparser than in the median."""
-    return levels[cKDTree(whole.vertices).query(mesh.vertices)[1]] >= np.median(levels) - trim
 
 
 def _holes(mesh: Mesh, cut: Bool[np.ndarray, " F"], share: float) -> Bool[np.ndarray, " F"]:

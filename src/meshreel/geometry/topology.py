@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from .. import _core
-from ..shapes import Bool, Float32, Float64, Int32, Int64
+from ..shapes import Bool, Float64, Int32, Int64
 from ..types import GREY, Mesh
 
 
@@ -133,18 +133,14 @@ def concatenate(meshes: Sequence[Mesh]) -> Mesh:
     colors = [np.full(mesh.vertices.shape, GREY, np.uint8) if mesh.colors is None else mesh.colors for mesh in meshes]
     textures = {mesh.texture for mesh in meshes if mesh.uv is not None and mesh.texture is not None}
     has_one = len(textures) == 1
+    places = (np.full((len(m.faces), 3, 2), np.nan, np.float32) if m.uv is None else m.uv for m in meshes)
     return Mesh(
         vertices,
         faces,
         None if all(mesh.colors is None for mesh in meshes) else np.concatenate(colors),
-        np.concatenate([_places(mesh) for mesh in meshes]) if has_one else None,
+        np.concatenate([*places]) if has_one else None,
         textures.pop() if has_one else None,
     )
-
-
-def _places(mesh: Mesh) -> Float32[np.ndarray, "F 3 2"]:
-    """Return the places of a mesh's corners in its texture, NaN where it has none."""
-    return np.full((len(mesh.faces), 3, 2), np.nan, np.float32) if mesh.uv is None else mesh.uv
 
 
 def components(faces: Int32[np.ndarray, "F 3"], count: int) -> Int64[np.ndarray, " V"]:

@@ -89,7 +89,8 @@ def compare_sequences(
         if other is None:
             raise InputError(f"the decoded sequence ends after {len(rows)} frames and the original does not")
         rows.append(frame_row(mesh, other, cameras))
-        empty.append(_is_nothing(rows[-1]))
+        # Vertices alone and faces without area are no surface.
+        empty.append(bool(rows[-1]["diagonal_m"] == rows[-1]["rms_forward_m"] == 0))
     if next(others, None) is not None:
         raise InputError(f"the original sequence ends after {len(rows)} frames and the decoded one does not")
     if any(key >= len(rows) for key in options.keys):
@@ -110,11 +111,6 @@ def frame_row(original: Mesh, decoded: Mesh, cameras: Sequence[Camera]) -> Row:
         ssim = ssim_normals(original, decoded, cameras)
         row |= {"ssim": ssim.whole, "ssim_masked": ssim.masked}
     return row
-
-
-def _is_nothing(row: Row) -> bool:
-    """Return whether both meshes of a frame lack surface; vertices alone and faces without area are no surface."""
-    return bool(row["diagonal_m"] == row["rms_forward_m"] == 0)
 
 
 def aggregate(frames: Sequence[Row]) -> Row:

@@ -151,21 +151,18 @@ _WORST = OneWayErrors(math.inf, math.inf, math.inf, math.inf, math.inf, WORST_AN
 def _one_way(source: Samples, found: Matches) -> OneWayErrors:
     vertices = len(source.mesh.vertices)
     squared = found.distances**2
+    along = np.einsum("nd,nd->n", found.offsets, found.normals) ** 2
+    along = np.where(found.normals.any(axis=1), along, squared)  # without a normal the whole distance counts
     turned = angles(source.normals, found.normals)
     return OneWayErrors(
         point_mse=float(squared[:vertices].mean()),
-        plane_mse=float(_plane_squared(found, squared)[:vertices].mean()),
+        plane_mse=float(along[:vertices].mean()),
         rms=float(np.sqrt(dot(source.weights, squared))),
         hausdorff95=quantile(found.distances, source.weights, 0.95),
         maximum=float(found.distances.max()),
         angle=dot(source.weights, turned),
         vertex_angle=float(turned[:vertices].mean()),
     )
-
-
-def _plane_squared(found: Matches, squared: Float64[np.ndarray, " N"]) -> Float64[np.ndarray, " N"]:
-    along = np.einsum("nd,nd->n", found.offsets, found.normals) ** 2
-    return np.where(found.normals.any(axis=1), along, squared)  # without a normal the whole distance counts
 
 
 def quantile(values: Float64[np.ndarray, " N"], weights: Float64[np.ndarray, " N"], share: float) -> float:

@@ -125,7 +125,8 @@ def _draw(rows: list[SheetRow], options: SheetOptions) -> Any:
 
     height, width = rows[0].original.crop.shape
     size = np.array([_LEFT + 3 * (width + _GAP) + _RIGHT, _TOP + len(rows) * (height + _GAP)])
-    limit = options.limit or _limit(rows)
+    errors = np.concatenate([row.errors[np.isfinite(row.errors)] for row in rows])
+    limit = options.limit or (max(float(np.quantile(errors, 0.99)), _LEAST_LIMIT) if len(errors) else 1.0)
     figure = Figure(figsize=tuple(size / _DPI), dpi=_DPI)
     FigureCanvasAgg(figure)
 
@@ -155,8 +156,3 @@ def _heat_map(axis: Any, row: SheetRow, limit: float) -> Any:
     errors = np.ma.masked_array(np.zeros(row.original.covered.shape), mask=~row.original.covered)
     errors[row.original.covered] = np.minimum(row.errors, 2 * limit)
     return axis.imshow(errors, cmap="viridis", vmin=0, vmax=limit, interpolation="nearest")
-
-
-def _limit(rows: list[SheetRow]) -> float:
-    errors = np.concatenate([row.errors[np.isfinite(row.errors)] for row in rows])
-    return max(float(np.quantile(errors, 0.99)), _LEAST_LIMIT) if len(errors) else 1.0

@@ -105,16 +105,12 @@ def answer(opened: OpenFile, asked: Headers, is_head: bool) -> Response:
         opened.file.close()
         return NotModifiedResponse(headers)
     is_current = asked.get("if-range") in (None, opened.tag, headers.get("last-modified"))
-    ranges = None if is_head or not is_current else _asked_ranges(asked, size)
+    stated = asked.getlist("range") if is_current and not is_head else []
+    ranges = parse_ranges(stated[0], size) if len(stated) == 1 else None
     if ranges == []:
         opened.file.close()
         return Response(status_code=416, headers={**headers, "Content-Range": f"bytes */{size}"})
     return _FileResponse(opened, dict(headers), ranges, is_head)
-
-
-def _asked_ranges(asked: Headers, size: int) -> list[range] | None:
-    stated = asked.getlist("range")
-    return parse_ranges(stated[0], size) if len(stated) == 1 else None
 
 
 def parse_ranges(text: str, size: int) -> list[range] | None:

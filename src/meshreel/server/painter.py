@@ -19,7 +19,6 @@ from threading import Thread
 
 import numpy as np
 
-from ..decoder.video import Video
 from ..decoder.video import open as open_video
 from ..encoder.worker import die_with_parent
 from ..errors import MeshreelError
@@ -84,16 +83,11 @@ def poster(path: Path) -> bytes | None:
     """Return a PNG, None for damaged and empty files and without the renderer (extra `encode`)."""
     try:
         with open_video(path) as video:
-            mesh = _first(video)
+            frames = (video[index] for index in range(min(len(video), LOOKED_AT)))
+            mesh = next((mesh for mesh in frames if not mesh.is_empty), None)
             return None if mesh is None else picture(mesh, video.reader.up)
     except (MeshreelError, OSError, ModuleNotFoundError):
         return None
-
-
-def _first(video: Video) -> Mesh | None:
-    """Return the first frame with a surface, None if the first LOOKED_AT have none."""
-    frames = (video[index] for index in range(min(len(video), LOOKED_AT)))
-    return next((mesh for mesh in frames if not mesh.is_empty), None)
 
 
 def picture(mesh: Mesh, up: str) -> bytes:

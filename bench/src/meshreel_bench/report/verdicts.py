@@ -8,12 +8,7 @@ from functools import singledispatch
 from itertools import pairwise
 from math import inf
 
-<<<<<<< HEAD
-from ..bd_rate import BdRate, bd_bound, beats, gain_end
-from ..experiments.study import Always, Bound, Flat, Gains, LeastRate, NoMore, Promise, Reaches, Rises, Study, Which
-=======
-from meshreel.metrics.bd_rate import BdRate, Curve, bd_bound, beats, gain_end, rate_at
-
+from ..bd_rate import BdRate, Curve, bd_bound, beats, gain_end, rate_at
 from ..experiments.study import (
     Always,
     Bound,
@@ -28,7 +23,6 @@ from ..experiments.study import (
     Study,
     Which,
 )
->>>>>>> f82bf9722e1b1a599d57179a2f20c029d3eeb39f
 from ..rows import Row
 from .values import curve, curve_of, floors, hull_of, rated, sequences, value
 

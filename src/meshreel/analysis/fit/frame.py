@@ -8,7 +8,7 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 
 from ... import _core
 from ...geometry.closest_points import Hits, Surface, area_samples
@@ -26,7 +26,8 @@ class FrameSurface:
         self.mesh = mesh
         self.surface = Surface(mesh)
         self.normals = vertex_normals(mesh)
-        self.inside = _inside(mesh)
+        self.inside = np.ones(len(mesh.vertices), bool)
+        self.inside[border_edges(mesh).reshape(-1)] = False
         self._samples, self._sampled = dict[int, Int64[np.ndarray, " S"]](), dict[int, _core.DeformTarget]()
 
     def normals_at(self, hits: Hits) -> Float64[np.ndarray, "N 3"]:
@@ -66,9 +67,3 @@ def interpolated(values: Float64[np.ndarray, "V 3"], faces: np.ndarray, hits: Hi
     n = np.einsum("nk,nkd->nd", hits.barycentric, values[faces[hits.faces]])
     length = np.linalg.norm(n, axis=1)
     return n / np.where(length > 0, length, 1.0)[:, None]
-
-
-def _inside(mesh: Mesh) -> Bool[np.ndarray, " V"]:
-    inside = np.ones(len(mesh.vertices), bool)
-    inside[border_edges(mesh).reshape(-1)] = False
-    return inside

@@ -159,7 +159,10 @@ def fit_surfaces(
 ) -> Float64[np.ndarray, "T V 3"]:
     """Fit a template to prepared frames (None: an empty one); return its positions without residuals."""
     positions = predictions.copy()
-    key, fitting = _key(surfaces, guides.key), Fitting(faces, predictions.shape[1], options, guides.noise)
+    fitting = Fitting(faces, predictions.shape[1], options, guides.noise)
+    middle = len(surfaces) // 2 if guides.key is None else guides.key
+    there = [t for t, surface in enumerate(surfaces) if surface is not None]
+    key = min(there, key=lambda t: (abs(t - middle), t), default=middle)  # the nearest to the middle
     for at in [key] + [t for t in range(len(surfaces)) if t != key]:
         own = predictions if at == key else positions  # until the key is fitted, its prediction
         rest = own[key] if guides.rest is None else guides.rest
@@ -185,13 +188,6 @@ def strongest_components(positions: Float64[np.ndarray, "T V 3"], key: int, coun
     basis = vectors[:, ::-1][:, :count]
     kept = products(products(centered, basis), basis.T) + mean
     return positions[key] + kept.reshape(vertices, frames, 3).transpose(1, 0, 2)
-
-
-def _key(surfaces: Sequence[FrameSurface | None], key: int | None) -> int:
-    """Return the frame nearest to the requested key, or to the middle, that is not empty."""
-    middle = len(surfaces) // 2 if key is None else key
-    there = [t for t, surface in enumerate(surfaces) if surface is not None]
-    return min(there, key=lambda t: (abs(t - middle), t), default=middle)
 
 
 class Fitting:

@@ -55,7 +55,8 @@ def fused_mesh(
     work.count("surfaces fused")
     carried = [FrameSurface(motion.back(at, frame.mesh)) for at, frame in enumerate(frames)]
     points = np.concatenate([one.mesh.vertices for one in carried])
-    cell = max(options.noise * noise, options.spacing * _spacing(frames))
+    spacing = float(np.median([np.median(edge_lengths(frame.mesh)) for frame in frames]))
+    cell = max(options.noise * noise, options.spacing * spacing)
     if len(points) < 10 or cell == 0:
         return Mesh.empty()
     extent = ROOM * float(np.ptp(points, axis=0).max())
@@ -84,8 +85,3 @@ def _agreeing(surface: Mesh, frames: Sequence[FrameSurface], reach: float) -> In
         within = frame.inside_at(hits) > ON_BORDER
         count += near & within & (np.einsum("nd,nd->n", frame.surface.normals[hits.faces], normals) > 0)
     return count
-
-
-def _spacing(frames: Sequence[FrameSurface]) -> float:
-    """Return the median over the frames of their median edge length."""
-    return float(np.median([np.median(edge_lengths(frame.mesh)) for frame in frames]))

@@ -56,7 +56,9 @@ def moving_places(places: Places, options: CutOptions = CutOptions()) -> Bool[np
     if not seeds.any():
         return moving
     middles = places.middles
-    near = np.flatnonzero(_within(middles, middles[seeds], options.reach))
+    bound = np.nextafter(options.reach, np.inf)  # makes the search ten times as fast
+    gaps = cKDTree(middles[seeds]).query(middles, distance_upper_bound=bound)[0]
+    near = np.flatnonzero(gaps <= options.reach)
     moves = np.where(share >= options.share / 2, options.evidence * share, 0.0)[near]
     always, around = options.still
     rests = always + around * _around(middles[near], middles[seeds], share[seeds])
@@ -98,13 +100,6 @@ def _links(places: Places, chosen: Int64[np.ndarray, " C"]) -> tuple[Int64[np.nd
     second = number[places.beside[chosen]].reshape(-1)
     once = second > first
     return first[once], second[once]
-
-
-def _within(
-    points: Float64[np.ndarray, "N 3"], others: Float64[np.ndarray, "M 3"], reach: float
-) -> Bool[np.ndarray, " N"]:
-    """Return which points have one of the others within reach; bounding the search makes it ten times as fast."""
-    return cKDTree(others).query(points, distance_upper_bound=np.nextafter(reach, np.inf))[0] <= reach
 
 
 def _around(

@@ -56,7 +56,9 @@ class ImageMasks(Masker):
         for view, files in zip(self.views, self._files, strict=True):
             for frame, path in enumerate(files):
                 height, width = read_mask(path).shape  # reads all of it, so that damage is found before encoding starts
-                _check_size(path, frame, (width, height), view)
+                if (width, height) != (view.width, view.height):
+                    text = f"{width} x {height} pixels where its camera has {view.width} x {view.height}"
+                    raise InputError(f"{path} (frame {frame}): {text}; make masks of the camera's size")
         others = len([path for path in self._files[0][0].parent.iterdir() if path.suffix.lower() == ".png"]) - frames
         text = f"{folder}: has masks for {others} more frames than the {frames} of the sequence: the first are used"
         self.remarks = (f"{text}, beginning with frame 0",) if others > 0 else ()
@@ -97,9 +99,3 @@ def one_size(views: Sequence[PinholeCamera], name: str) -> tuple[PinholeCamera, 
         two = " and ".join(f"{width} x {height}" for width, height in sizes[:2])
         raise InputError(f"{name}: cameras of {two} pixels; give cameras of one size")
     return tuple(views)
-
-
-def _check_size(path: Path, frame: int, size: tuple[int, int], view: PinholeCamera) -> None:
-    if size != (view.width, view.height):
-        text = f"{path} (frame {frame}): {size[0]} x {size[1]} pixels where its camera has {view.width} x {view.height}"
-        raise InputError(f"{text}; make masks of the camera's size")

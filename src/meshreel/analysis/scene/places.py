@@ -240,14 +240,10 @@ def _sensed(
                 found = picture.depth.reshape(-1)[pixels] * picture.unit
                 expected[inside[found > 0]] = True
                 past[inside[found > depth + reach]] = True
-                least = _least_around(picture.depth).reshape(-1)[pixels] * picture.unit
+                around = minimum_filter(picture.depth, 3)  # 0 where one of the nine pixels measured nothing
+                least = around.reshape(-1)[pixels] * picture.unit
                 clear[inside[least > depth + reach]] = True
         yield expected & ~past, clear
-
-
-def _least_around(depth: np.ndarray) -> np.ndarray:
-    """Return the smallest depth of each pixel and its eight neighbours; 0 where one of the nine measured nothing."""
-    return np.asarray(minimum_filter(depth, 3))
 
 
 class _Cameras:

@@ -7,7 +7,6 @@ that stands as still as a room would gain nothing.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Int64
 
 from ...geometry.topology import border_edges, drop_unreferenced, edge_lengths
 from ...geometry.voxels import Lattice, around, distinct, spread
@@ -41,7 +40,7 @@ def is_scene(frames: Frames) -> bool:
     lattice = Lattice.near(meshes[0], meshes[0].diagonal / CELLS)
     cells = [distinct(lattice.keys(spread(mesh, lattice.size)[0])) for mesh in meshes]
     wide = [around(own) for own in cells]
-    still = [np.mean([_shared(own, other) for other in wide]) for own in cells]
+    still = [np.mean([np.isin(own, other).mean() for other in wide]) for own in cells]
     return float(np.median(still)) >= SHARE
 
 
@@ -50,9 +49,3 @@ def _is_open(mesh: Mesh) -> bool:
     border = border_edges(mesh)
     length = np.linalg.norm(mesh.vertices[border[:, 0]] - mesh.vertices[border[:, 1]], axis=1).sum()
     return bool(length > BORDER * mesh.diagonal)
-
-
-def _shared(own: Int64[np.ndarray, " C"], other: Int64[np.ndarray, " D"]) -> float:
-    """Return the share of `own` cells that are among `other` cells; both are sorted."""
-    at = np.minimum(np.searchsorted(other, own), len(other) - 1)
-    return float((other[at] == own).mean())

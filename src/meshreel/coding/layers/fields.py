@@ -67,7 +67,7 @@ def encode_field(
     """Encode the columns that pay, quantised in a closed loop; `surface` marks positions, which also have a mean."""
     width = trajectories.shape[1]
     mean = trajectories.mean(axis=0) if surface is not None and len(trajectories) else np.zeros(width)
-    bits = _mean_bits(rate.step)
+    bits = min(max(strict.ceil_log2(8.0 / rate.step), 0), MOST_BITS)  # rounds the mean to a sixteenth of a step
     mean = np.rint(np.ldexp(mean, bits))
     worth = rate.price * rate.step**2 * strict.log2(2 * np.abs(mean) + 1).sum()
     has_mean = bool(len(trajectories) * (np.ldexp(mean, -bits) ** 2).sum() > worth)
@@ -130,8 +130,3 @@ class _Columns:
         bits = 8.0 * self.sizes + np.bincount(rows, basis_bits, count)
         saved = (self.weights**2).sum(axis=1) - ((self.weights - self.decoded) ** 2).sum(axis=1)
         return saved > self.rate.price * self.rate.step**2 * bits
-
-
-def _mean_bits(step: float) -> int:
-    """Return the fraction bits, at most 30, at which the mean's rounding error is at most a sixteenth of a step."""
-    return min(max(strict.ceil_log2(8.0 / step), 0), MOST_BITS)

@@ -24,7 +24,8 @@ def forward(
     """
     if not 0.5 <= dead_zone < 1:
         raise InputError(f"dead zone {dead_zone}: give a fraction of a step in [0.5, 1)")
-    _check_steps(steps)
+    if not np.all((steps > 0) & np.isfinite(steps)):
+        raise InputError(f"steps {steps.tolist()}: every step must be positive and finite")
     scaled = values / steps
     magnitudes = np.floor(np.abs(scaled) + (1 - dead_zone))
     if not np.all(magnitudes <= LARGEST):  # false for NaN, too
@@ -37,8 +38,3 @@ def forward(
 def inverse(symbols: Int32[np.ndarray, "N M"], steps: Float64[np.ndarray, " M"]) -> Float64[np.ndarray, "N M"]:
     """Return the multiples of the steps; one multiplication, so the bits are the same on every platform."""
     return symbols * steps
-
-
-def _check_steps(steps: Float64[np.ndarray, " M"]) -> None:
-    if not np.all((steps > 0) & np.isfinite(steps)):
-        raise InputError(f"steps {steps.tolist()}: every step must be positive and finite")
