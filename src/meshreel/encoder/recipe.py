@@ -147,7 +147,7 @@ def encode_sent(interval: Interval, options: EncoderOptions, number: int) -> tup
     stages = IntervalStages(Stages(partial(tell, number), count), count, options.method.group_size)
     with threadpool_limits(1), heard(stages.hear):
         before = so_far()
-        *others, last = encode_interval(interval, options.method, stages, appearance=options.appearance)
+        *others, last = encode_interval(interval, options.method, stages, None, options.appearance)
         return [*others, replace(last, work=since(before))], interval.observed
 
 
