@@ -7,11 +7,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import format_tables
+import format_typescript
 import reliability
 
-from meshreel.format.describe import fill_tables
 from meshreel.format.layout import PAYLOADS, RECORDS
-from meshreel.format.typescript import typescript
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENT = ROOT / "FORMAT.md"
@@ -21,8 +21,8 @@ MODULE = ROOT / "web/player-core/src/format/layout.gen.ts"
 def made() -> dict[Path, str]:
     """Each generated file as it should be."""
     return {
-        DOCUMENT: fill_tables(DOCUMENT.read_text(encoding="utf-8"), RECORDS + PAYLOADS),
-        MODULE: typescript(RECORDS + PAYLOADS),
+        DOCUMENT: format_tables.fill_tables(DOCUMENT.read_text(encoding="utf-8"), RECORDS + PAYLOADS),
+        MODULE: format_typescript.typescript(RECORDS + PAYLOADS),
         reliability.PAGE: reliability.filled(),
     }
 

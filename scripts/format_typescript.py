@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from enum import IntEnum
 
-from .budget import LIMITS
-from .kinds import Array, Blob, Bytes, Choice, Kind, List, Number, Rest, Text, Varint
-from .layout import MAGIC, VERSION
-from .records import Nested, record_fields
+from meshreel.format.budget import LIMITS
+from meshreel.format.kinds import Array, Blob, Bytes, Choice, Kind, List, Number, Rest, Text, Varint
+from meshreel.format.layout import MAGIC, VERSION
+from meshreel.format.records import Nested, record_fields
 
 HEAD = """\
 // Made from src/meshreel/format/layout.py and budget.py by scripts/generate. Do not edit.

@@ -8,9 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from ..errors import InputError
-from .kinds import Array, Bytes, Choice, Kind, Number
-from .records import record_fields
+from meshreel.errors import InputError
+from meshreel.format.kinds import Array, Bytes, Choice, Kind, Number
+from meshreel.format.records import record_fields
 
 MARKED = re.compile(r"(<!-- table (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
