@@ -5,7 +5,7 @@ import { describe, expect, test, vi } from "vitest";
 import { hasPython, runPython } from "../../test/python.ts";
 import { Video } from "../src/decode/decoder.ts";
 import { FormatError } from "../src/errors.ts";
-import { allowance, changeCost, checkCost, checkFrames, dracoCost, led, together } from "../src/format/budget.ts";
+import { allowance, changeCost, checkCost, checkFrames, checkPictures, dracoCost, led, together } from "../src/format/budget.ts";
 import type { Led } from "../src/format/budget.ts";
 import { Form, LIMITS } from "../src/format/layout.gen.ts";
 import { EMPTY } from "../src/mesh.ts";
@@ -34,6 +34,10 @@ test("what costs more than its bytes may is refused", () => {
   checkCost(dracoCost([Math.ceil(count)]), 1, "draco");
   checkFrames(LIMITS.frames, 0);
   expect(() => checkFrames(LIMITS.frames + 1, 0)).toThrow(FormatError);
+  const texels = LIMITS.pictures / LIMITS.texel;
+  checkPictures(texels, 0);
+  expect(() => checkPictures(texels + 1, 0)).toThrow(/pictures: 0 bytes that cost 80530/);
+  checkPictures(texels + 1, 1);
   expect(together(10) - together(0)).toBe(10 * LIMITS.perByte);
 });
 

@@ -25,11 +25,12 @@ export function configFor(kind: Rendition, packet: Uint8Array): VideoDecoderConf
   return configOf(kind, header?.codec ?? LARGEST[kind]);
 }
 
-/** FormatError where a packet says that its pictures are larger than a texture may be. */
-export function checkSize(kind: Rendition, packet: Uint8Array): void {
-  for (const { width, height } of headersOf(kind, packet)) {
+/** Texels of a picture as a packet says, 0 where it does not. FormatError where they are more than those of a texture. */
+export function texelsOf(kind: Rendition, packet: Uint8Array): number {
+  return headersOf(kind, packet).reduce((most, { width, height }) => {
     if (Math.max(width, height) > MOST_SIDE) throw new FormatError(`a picture of ${width} x ${height}, over ${MOST_SIDE}`);
-  }
+    return Math.max(most, width * height);
+  }, 0);
 }
 
 function configOf(kind: Rendition, codec: string): VideoDecoderConfig {

@@ -77,6 +77,12 @@ export function checkColors(meshes: readonly { readonly vertices: number; readon
   if (cost > LIMITS.colors + LIMITS.perByte * size) throw new FormatError(`colours: ${size} bytes that cost ${cost} to decode`);
 }
 
+/** FormatError where a video of so many texels, of all pictures of a chunk or layer together, costs more than `size` bytes may. */
+export function checkPictures(texels: number, size: number): void {
+  const cost = LIMITS.texel * texels;
+  if (cost > LIMITS.pictures + LIMITS.perByte * size) throw new FormatError(`pictures: ${size} bytes that cost ${cost} to decode`);
+}
+
 /** FormatError where decoding costs more than `size` bytes may. */
 export function checkCost(cost: number, size: number, what: string): void {
   if (cost > allowance(size)) throw new FormatError(`${what}: ${size} bytes that cost ${cost} to decode, over ${allowance(size)}`);

@@ -4,12 +4,13 @@ import type { Decoding } from "./decoding.ts";
 import { FormatError } from "../errors.ts";
 import type { Fetcher } from "../net/fetcher.ts";
 import { Form, Pictures, VideoCodec } from "../format/layout.gen.ts";
+import { checkPictures } from "../format/budget.ts";
 import { checkPayload } from "../format/payload.ts";
 import { RENDITIONS, describe, isVideo } from "../format/reader.ts";
 import type { Chunk, CompanionChunk, Head } from "../format/reader.ts";
 import { unpackAll } from "../format/records.ts";
 import type { Rendition, Shown, TextureImage, TextureState, TextureStats } from "../types.ts";
-import { CODECS, checkSize, configFor } from "../decode/renditions.ts";
+import { CODECS, configFor, texelsOf } from "../decode/renditions.ts";
 import { SlowVideo } from "./slow_video.ts";
 import { VideoLane, countOf } from "./video_lane.ts";
 import type { LaneHost, Place } from "./video_lane.ts";
@@ -43,6 +44,7 @@ export class Textures implements LaneHost {
   readonly #lanes = new Map<number, VideoLane>(); // by track; -1: of the background
   readonly #chains = new Map<number, readonly CompanionChunk[]>(); // the chunks of each video, by each of them
   readonly #slow = new Map<number, SlowVideo>(); // by the chunk with a background's pictures
+  readonly #texels = new Map<number, number>(); // of a picture of each video, by the offset of its first chunk
   readonly #late: number[] = []; // ms
   readonly #far = new Set<number>(); // tracks that are seen too small for textures
   readonly #early = new Set<number>(); // tracks that are shown without until their first picture is there
@@ -208,7 +210,10 @@ export class Textures implements LaneHost {
     const isRight = this.#slow.get(pictures.number)?.read(pictures, interval, packets.length) ?? (interval === 1 && packets.length === countOf(pictures));
     const isWhole = form === Form.VIDEO && kind === pictures.kind && packets.every((packet) => packet.length > 0);
     if (!isRight || !isWhole) throw new FormatError(`${packets.length} pictures of codec ${codec}, one each ${interval} frames, for ${countOf(pictures)}`);
-    for (const packet of packets) checkSize(kind, packet);
+    const video = this.chainOf(pictures)[0].offset;
+    const texels = packets.reduce((most, packet) => Math.max(most, texelsOf(kind, packet)), this.#texels.get(video) ?? 0);
+    this.#texels.set(video, texels);
+    checkPictures(texels * packets.length, data.length);
     return packets;
   }
 
