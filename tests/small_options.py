@@ -27,9 +27,10 @@ def quick(
     color: str = "auto",
     color_quality: float | None = None,
     texture: int | None = None,
+    compatible: bool = False,
 ) -> EncoderOptions:
     """The preset's options made small; takes what `preset_options` takes."""
-    colors = {"color": color, "color_quality": color_quality, "texture": texture}
+    colors = {"color": color, "color_quality": color_quality, "texture": texture, "compatible": compatible}
     options = preset_options(preset, quality, basis_size, group_size, centers, key_interval, effort, **colors)  # type: ignore[arg-type]
     method = options.method
     method = _quick_layers(method) if isinstance(method, LayersOptions) else _quick_paper(method)

@@ -149,7 +149,7 @@ def test_flags_default_to_the_defaults_of_the_options():
     assert replace(defaults["reading"].options(), weld=None) == SequenceOptions()
     coding = asdict(defaults["coding"])
     assert coding.pop("preset") == code.preset == "best" and coding.pop("effort") == "normal"
-    assert coding.pop("color") == "auto"
+    assert coding.pop("color") == "auto" and coding.pop("compatible") is False
     assert set(coding.values()) == {None}  # chosen by the preset
     assert defaults["coding"].options(code.quality) == code
 

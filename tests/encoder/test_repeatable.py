@@ -18,7 +18,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 import meshreel
-from meshreel.encoder.digests import Digests, line_of
+from meshreel.encoder.digests import Digests, line_of, note
 from meshreel.encoder.presets import appearance_options
 from meshreel.encoder.sequence import Encoder
 from meshreel.format.layout import ChunkKind
@@ -144,6 +144,6 @@ def test_a_digest_tells_values_shapes_and_types_apart():
     kinds = [zeros, zeros.T, zeros.astype(np.float32), zeros + 1, b"\0" * 48, 0.0, None, "0.0"]
     assert len({line_of("stage", kind) for kind in kinds}) == len(kinds)
     digests = Digests(1, 20)
-    digests.add("stage", zeros)
+    note(digests, "stage", zeros)
     assert [json.loads(line)["frame"] for line in digests.take()] == [20]
     assert digests.take() == ()

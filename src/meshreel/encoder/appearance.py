@@ -66,7 +66,7 @@ def colored_groups(
         if not group.predicted:
             yield from chain.done()
             state, chain = None, _Chain()
-        paints = [interval.paint(number) for number in numbers]
+        paints = [interval.paint(number, interval.frames[number]) for number in numbers]
         if any(paint is not None for paint in paints):
             state = chain.add(group, paints, options, state, has_pictures(interval, numbers, options))
         else:

@@ -41,7 +41,7 @@ class Ahead:
     noise: float  # RMS distance of the frames from the truth, normalised
     target: Fidelity  # that the frames should reach, normalised
     digests: Digests | None = None
-    paint: Callable[[int], Paint | None] = lambda _: None  # what knows the colours of the frame with a number
+    paint: Callable[[int, Mesh], Paint | None] = lambda *_: None  # as `Interval.paint`
 
     def __len__(self) -> int:
         return len(self.surfaces)
@@ -147,11 +147,11 @@ class Candidate:
         options, faces = self._options.slide, self.reference.base.faces
         if options is None:
             return positions
-        if self.slide is None and (paint := ahead.paint(self.key)) is not None:
+        if self.slide is None and (paint := ahead.paint(self.key, ahead.at(self.key).mesh)) is not None:
             self.slide = Slide(faces, self._fits[self.key], paint, options)
         if self.slide is None:
             return positions
-        pairs = [(number, ahead.paint(number)) for number in numbers if number != self.key]
+        pairs = [(number, ahead.paint(number, ahead.at(number).mesh)) for number in numbers if number != self.key]
         found = positions.copy()
         for number, paint in pairs:
             if paint is not None:

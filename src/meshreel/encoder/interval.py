@@ -46,9 +46,8 @@ class Interval:
         views = None if self.views is None else self.views.only(range(self.first_frame, self.stop))
         return replace(self, frames=frames, views=views)
 
-    def paint(self, number: int) -> Paint | None:
-        """Return what knows the colours of a frame, counted from the first; None where nothing does."""
-        mesh = self.frames[number]
+    def paint(self, number: int, mesh: Mesh) -> Paint | None:
+        """Return what knows the colours of a frame, counted from the first, whose mesh this is; None: nothing does."""
         if mesh.is_empty or not (mesh.is_colored or self.views is not None):
             return None
         return Painted(mesh) if self.views is None else self.views.at(self.first_frame + number)
