@@ -110,8 +110,8 @@ class _Chain:
         colors = [_vertex_colors(paint, mesh) for paint, mesh in zip(paints, meshes, strict=True)]
         try:
             encoded = encode_group_colors(canvas, colors, options.colors, None if before is None else before.colors)
-        except CostlyError:  # the summary tells of a group without colours
-            self.pass_on(group)
+        except CostlyError:  # the summary tells of it
+            self.pass_on(replace(group, is_bare=True))
             return after
         companions = [Companion(ChunkKind.COLORS, encoded.payload, encoded.layers)]
         if pictured and not self._groups and group.form == Form.LAYERS and options.texture is not None:

@@ -49,7 +49,7 @@ from .parts import Parts, take_apart
 from .presets import preset_options
 from .progress import Progress, Stages
 from .scene import Tracks, encode_bodies, scene_intervals
-from .static import Static, colored_states, is_colored
+from .static import Static, colored_states
 from .summary import GroupSummary, SceneSummary, Summary
 from .surveying import surveyed
 from .tracks import TrackGroup, encode_tracked, intervals_of, tracked_bodies
@@ -207,7 +207,7 @@ def _encode_tracked(job: Job, file: BinaryIO, name: str, seen: Survey) -> Summar
         metadata = metadata_of(options, groups, sequence.up, part)
         writer.header = make_header(sequence.frame_rate, seen, metadata)
     texts = warnings_of(seen) if job.excerpt is None else ()  # the survey told of them
-    return Summary(writer.size, tuple(groups), (*texts, *_bare(job, groups)))
+    return Summary(writer.size, tuple(groups), (*texts, *_bare(groups)))
 
 
 def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts) -> Summary:
@@ -228,7 +228,7 @@ def _encode_scene(job: Job, file: BinaryIO, name: str, parts: Parts) -> Summary:
     faces = len(decode_background(states[0].payload).faces) if states else 0
     scene = SceneSummary(size, faces, parts.noise, psnr, tuple(measured), tracks)
     moves = any(group.form != Form.EMPTY for group in groups)
-    texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped), *_bare(job, groups, states))
+    texts = (*warnings_of(seen), *_warnings_of_scene(parts, moves, coded.dropped), *_bare(groups, states))
     return Summary(writer.size, tuple(groups), texts, scene)
 
 
@@ -257,7 +257,7 @@ def _added(writer: ReelWriter, each: TrackGroup, static: list[int], unit: float)
     fidelity = group.fidelity.scaled(unit)
     colors = sum(map(len, group.companions))
     facts = (group.form, group.frame_count, len(payload), fidelity, group.predicted)
-    return GroupSummary(*facts, key, track, each.share, colors)
+    return GroupSummary(*facts, key, track, each.share, colors, group.is_bare)
 
 
 def _add_companions(writer: ReelWriter, of: int, companions: Sequence[Companion], before: int | None) -> None:
@@ -309,12 +309,12 @@ def _warnings_of_scene(parts: Parts, moves: bool, dropped: int) -> Iterator[str]
         yield f"{dropped} faces of bits that move, far from all bodies and there only for a moment, are not kept"
 
 
-def _bare(job: Job, groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:
-    """Yield a warning of what the file has without colours, though the sequence has some."""
-    frames = sum(group.frame_count for group in groups if group.form != Form.EMPTY and not group.colors)
-    bare = [f"{frames} frames"] * (frames > 0) + ["the background"] * any(not state.companions for state in states)
-    if job.options.appearance is not None and bare and is_colored(job.sequence):
-        yield f"no colours of {' and of '.join(bare)}: there are none, or they would cost a reader too much"
+def _bare(groups: Sequence[GroupSummary], states: Sequence[Static] = ()) -> Iterator[str]:
+    """Yield a warning of what has colours that the file has not."""
+    frames = sum(group.frame_count for group in groups if group.is_bare)
+    bare = [f"{frames} frames"] * (frames > 0) + ["the background"] * any(state.is_bare for state in states)
+    if bare:
+        yield f"no colours of {' and of '.join(bare)}: they would cost a reader too much"
 
 
 def make_header(frame_rate: float, seen: Survey, metadata: dict[str, Any]) -> Header:

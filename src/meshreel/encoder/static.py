@@ -53,6 +53,7 @@ class Static:
     payload: bytes
     is_patch: bool
     companions: tuple[Companion, ...] = ()  # the colours of its vertices, or of those that the patch adds
+    is_bare: bool = False  # it has colours that a reader would refuse
 
     def __len__(self) -> int:
         return len(self.payload) + sum(map(len, self.companions))
@@ -152,7 +153,7 @@ def colored_states(
         except CostlyError:  # the summary tells of it
             bare = True
         if bare:
-            found.append(state)
+            found.append(replace(state, is_bare=True))
             continue
         companions = [Companion(ChunkKind.COLORS, encoded.payload)]
         if texture is not None and not state.is_patch:
