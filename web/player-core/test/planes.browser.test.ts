@@ -8,7 +8,7 @@ import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 
 import { describeInBrowser, launchBrowser, serveFolder, type Served } from "../../test/browser.ts";
-import { configFor } from "../src/decode/renditions.ts";
+import { configFor } from "../src/format/renditions.ts";
 import { Pictures } from "../src/format/layout.gen.ts";
 import { Head, isVideo } from "../src/format/reader.ts";
 import { unpackAll } from "../src/format/records.ts";

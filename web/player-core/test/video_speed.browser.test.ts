@@ -10,7 +10,7 @@ import { afterAll, beforeAll, expect } from "vitest";
 import { describeInBrowser, launchBrowser, serveFolder, type Served } from "../../test/browser.ts";
 import { runPython } from "../../test/python.ts";
 import { slowTest } from "../../test/slow.ts";
-import { CODECS, configFor } from "../src/decode/renditions.ts";
+import { CODECS, configFor } from "../src/format/renditions.ts";
 import type { Rendition } from "../src/types.ts";
 
 const [FRAMES, SIDE] = [60, 1024];

@@ -3,12 +3,12 @@
 import { FormatError } from "../errors.ts";
 import { Atlas, Form } from "../format/layout.gen.ts";
 import { unpackAll } from "../format/records.ts";
+import { MOST_SIDE } from "../format/renditions.ts";
 import type { Mesh } from "../mesh.ts";
 import { decodePlaces } from "../wasm/places.ts";
 import type { Core } from "../wasm/memory.ts";
 import { decodeIntegers } from "./entropy.ts";
 
-export const MOST_SIDE = 2048; // texels, as in geometry/atlas.py
 
 /** A texture's size, and the places of the corners of a mesh's faces in it, from its upper left corner. */
 export interface Layout {

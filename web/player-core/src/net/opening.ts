@@ -1,7 +1,7 @@
 // Reading the head of a file, in one request where it is short.
 
 import { joined } from "../bytes.ts";
-import { decodable } from "../decode/renditions.ts";
+import { decodable } from "../format/renditions.ts";
 import { FormatError } from "../errors.ts";
 import { FIRST_REQUEST, Head } from "../format/reader.ts";
 import type { Rendition } from "../types.ts";

@@ -10,7 +10,7 @@ import { RENDITIONS, describe, isVideo } from "../format/reader.ts";
 import type { Chunk, CompanionChunk, Head } from "../format/reader.ts";
 import { unpackAll } from "../format/records.ts";
 import type { Rendition, Shown, TextureImage, TextureState, TextureStats } from "../types.ts";
-import { CODECS, configFor, texelsOf } from "../decode/renditions.ts";
+import { CODECS, configFor, texelsOf } from "../format/renditions.ts";
 import { SlowVideo } from "./slow_video.ts";
 import { VideoLane, countOf } from "./video_lane.ts";
 import type { LaneHost, Place } from "./video_lane.ts";

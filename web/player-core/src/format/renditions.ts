@@ -1,10 +1,12 @@
 // Videos of textures: which of them this browser decodes, and how its decoder is set up for one.
 
-import { MOST_SIDE } from "./atlas.ts";
 import { headersOf } from "./video_headers.ts";
 import { FormatError } from "../errors.ts";
-import { RENDITIONS } from "../format/reader.ts";
+import { RENDITIONS } from "./reader.ts";
 import type { Rendition } from "../types.ts";
+
+/** Texels, of the side of a texture, as in geometry/atlas.py. */
+export const MOST_SIDE = 2048;
 
 export const CODECS: Readonly<Record<Rendition, "AV1" | "H.264">> = { pictures: "AV1", compatible: "H.264" };
 
