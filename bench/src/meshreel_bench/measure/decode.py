@@ -12,7 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from meshreel.decoder.video import Video
 from meshreel.errors import InputError
+from meshreel.export.frames import joined
 from meshreel.types import Mesh, Texture
 
 from ..rows import Decoding
@@ -40,9 +42,12 @@ def _decode(decoder: bytes, data: bytes, numbers: Sequence[int], frames: int) ->
         passes.append(_pass_ms(decode, data))
     peak_mb, vertices, kept = peak_rss_mb(), list[int](), dict[int, Mesh]()
     reference = min(reference_s() for _ in range(PASSES))  # the best, as of the passes
-    for number, mesh in enumerate(decode(data)):
+    shown = decode(data)
+    for number, mesh in enumerate(shown):
         vertices.append(len(_checked(mesh, number).vertices))
         if number in numbers:  # textures are decoded when they are asked for: here
+            if isinstance(shown, Video):  # its parts have textures of their own
+                mesh = joined(list(shown.parts(number).values()))
             kept[number] = mesh if mesh.texture is None else replace(mesh, texture=Texture.of(mesh.texture.pixels))
     if len(vertices) != frames:
         raise InputError(f"decodes {len(vertices)} frames of {frames}")
