@@ -132,6 +132,8 @@ def colored(tmp_path_factory):
 
 
 def test_textures_are_kept_or_named_in_one_line(run, tmp_path, monkeypatch, colored):
+    for name in ("av", "xatlas"):
+        pytest.importorskip(name)
     said = run("decode", colored, "-o", tmp_path / "ply")
     assert said.code == 0 and said.err.count("\n") == 1 and "PLY has no textures" in said.err
     assert open_sequence(tmp_path / "ply")[0].colors is not None

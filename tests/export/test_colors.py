@@ -24,6 +24,9 @@ from tests.export.test_animated_file import play, seen, times
 from tests.gltf_validator import validate
 from tests.metrics.shapes import sphere
 
+for name in ("av", "xatlas"):
+    pytest.importorskip(name)
+
 EXTENSIONS = ("glb", "usdc", "usda", "usdz")
 BRIGHTER = [replace(mesh, colors=np.minimum(mesh.colors + np.uint8(6 * t), 255)) for t, mesh in enumerate(COLORED)]
 BALL = sphere(levels=1)
