@@ -15,7 +15,6 @@ from ..decoder.tracks import moving_of_frame
 from ..decoder.video import open as open_video
 from ..errors import FormatError, InputError
 from ..export.frames import Part, check_part, joined, write_frames
-from ..format.layout import ChunkKind
 from ..io.write import frame_names, left_over, make_folder
 from ..types import Mesh
 from .console import Common
@@ -78,7 +77,7 @@ def command(
 
 def _not_kept(reader: ReelReader, format: str) -> tuple[str, ...]:
     """Return a warning of what files of a format do not keep of the colours of a video."""
-    if all(chunk.kind != ChunkKind.PICTURES for chunk in reader.chunks):
+    if not reader.has_textures:
         return ()
     if format == "ply":
         return ("PLY has no textures, colours of vertices are kept: give --format obj or glb for textures",)

@@ -12,7 +12,6 @@ from ..errors import FormatError, InputError
 from ..export.animated_file import ExportOptions, export
 from ..export.animated_usd import EXTENSIONS
 from ..export.frames import Part, check_part
-from ..format.layout import ChunkKind
 from ..io.sequence import SequenceOptions
 from ..types import Up
 from .console import Common
@@ -74,7 +73,7 @@ def command(
             raise FormatError(f"{file}: {error}; nothing is written, copy the file again") from error
     if count == 0:
         common.warn([f"{target}: no frame has a surface, so it shows nothing"])
-    if texture and all(chunk.kind != ChunkKind.PICTURES for chunk in video.reader.chunks):
+    if texture and not video.reader.has_textures:
         common.warn([f"{file}: has no textures to export"])
     elif texture and target.suffix.lower() == ".glb":
         common.warn([f"{target}: glTF cannot change a picture in time: each mesh has the texture of its first frame"])

@@ -111,6 +111,11 @@ class ReelReader:
         """Whether the file has colours."""
         return bool(self._companions)
 
+    @property
+    def has_textures(self) -> bool:
+        """Whether the file has pictures, in any coding."""
+        return any(chunk.form == Form.VIDEO for chunk in self._companions.values())
+
     def companion_of(self, chunk: Chunk, kind: ChunkKind) -> Chunk | None:
         """Return the chunk of a kind that belongs to a chunk, or None."""
         return self._companions.get((chunk.number, kind))

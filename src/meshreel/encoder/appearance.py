@@ -66,21 +66,22 @@ def colored_groups(
         if not group.predicted:
             yield from chain.done()
             state, chain = None, _Chain()
-        paints = [interval.paint(number, interval.frames[number]) for number in numbers]
+        meshes = [interval.frames[number] for number in numbers]
+        paints = [interval.paint(number, mesh) for number, mesh in zip(numbers, meshes, strict=True)]
         if any(paint is not None for paint in paints):
-            state = chain.add(group, paints, options, state, has_pictures(interval, numbers, options))
+            state = chain.add(group, paints, options, state, has_pictures(interval, meshes, options))
         else:
             chain.pass_on(group)
     yield from chain.done()
 
 
-def has_pictures(interval: Interval, numbers: range, options: AppearanceOptions | None) -> bool:
+def has_pictures(interval: Interval, meshes: Iterable[Mesh], options: AppearanceOptions | None) -> bool:
     """Return whether these frames of an interval are to have textures, where their form allows it."""
     if options is None or options.texture is None:
         return False
     if options.texture.always or interval.views is not None:
         return True
-    return any(interval.frames[number].texture is not None for number in numbers)
+    return any(mesh.texture is not None for mesh in meshes)
 
 
 class _Chain:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -127,7 +128,7 @@ def encode_interval(
     if isinstance(options, LayersOptions):
         if appearance is None:  # what is not kept does not tell where the surface is, either
             options = replace(options, slide=None)
-        if has_pictures(interval, range(1), appearance):  # a frame in the `draco` form has none
+        if has_pictures(interval, islice(interval.frames, 1), appearance):  # a frame in the `draco` form has none
             options = replace(options, floor=False)
         groups = layers.encode_interval(interval, options, stages)
     else:

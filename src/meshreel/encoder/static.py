@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, UInt8
 
 from ..analysis.appearance.background import median_colors
-from ..analysis.appearance.bake import picture, texels_of
+from ..analysis.appearance.bake import Texels, picture, texels_of
 from ..analysis.appearance.unwrap import projected, unwrap
 from ..analysis.scene.background import BackgroundOptions
 from ..analysis.survey import Survey
@@ -39,7 +39,7 @@ FRACTIONS = (0.75, 0.5, 0.35, 0.22, 0.15, 0.1, 0.07, 0.045, 0.03, 0.02)  # of th
 HALVINGS = 2  # of the factor between two fractions, in search for a smaller mesh that is near enough (guess)
 LEAST_NOISE = 1e-4  # of the unit: the noise that a background is coded for, at least (guess)
 STILL_FRAMES = 16  # in which a background is looked at for its colours, at most (guess)
-PICTURES_A_SECOND = 8  # of a background: shadows move slowly (shared study of colour)
+PICTURES_A_SECOND = 8  # of a background: shadows move slowly (guess)
 FINER = 2  # of the rate factor of a background's pictures than of a body's: 38 dB of living_room at quality 50
 NEAR = 3.0  # times the noise, within which a frame shows a place of the background (guess)
 LEAST_NEAR = 0.01  # m, the same at least (guess)
@@ -145,9 +145,15 @@ def colored_states(
         mesh = decode_change(state.payload, mesh) if state.is_patch else decode_background(state.payload)
         canvas, bare = background_canvas(state.payload), bare and state.is_patch  # what changes it has no colours, too
         [coded] = canvas.meshes
-        frames = range(state.frame, end)
-        colors, seen = looks.colors(frames, mesh.vertices, vertex_normals(mesh))
-        shown = spread_colors(mesh, colors.astype(np.float64), seen)[len(mesh.vertices) - coded.vertices :]
+        frames, count = range(state.frame, end), len(mesh.vertices)
+        surface = (
+            None if texture is None or state.is_patch else _Unwrapped.of(mesh, looks.layout(mesh, frames, texture.size))
+        )
+        points, normals = [mesh.vertices], [vertex_normals(mesh)]
+        if surface is not None:
+            points, normals = [*points, surface.places], [*normals, surface.normals]
+        colors, seen = looks.colors(frames, np.concatenate(points), np.concatenate(normals))
+        shown = spread_colors(mesh, colors[:count].astype(np.float64), seen[:count])[count - coded.vertices :]
         try:
             encoded = encode_group_colors(canvas, [shown], options.colors, None)
         except CostlyError:  # the summary tells of it
@@ -156,8 +162,9 @@ def colored_states(
             found.append(replace(state, is_bare=True))
             continue
         companions = [Companion(ChunkKind.COLORS, encoded.payload)]
-        if texture is not None and not state.is_patch:
-            companions += _pictured(mesh, frames, looks, texture)
+        if surface is not None and texture is not None:
+            companions.append(Companion(ChunkKind.ATLAS, encode_atlas(mesh, surface.layout)))
+            companions += _pictured(surface, (colors[count:], seen[count:]), frames, looks, texture)
         found.append(replace(state, companions=tuple(companions)))
     return found
 
@@ -167,21 +174,37 @@ def is_colored(sequence: MeshSequence) -> bool:
     return any(sequence[number].is_colored for number in evenly(len(sequence), 3))
 
 
-def _pictured(mesh: Mesh, frames: range, looks: _Looks, options: TextureOptions) -> list[Companion]:
-    """Return the atlas of a background, and a slow video of what it looks like: shadows move over it."""
+@dataclass(frozen=True, slots=True)
+class _Unwrapped:
+    """The texels of a background, and where they are."""
+
+    layout: Layout
+    texels: Texels
+    places: Float64[np.ndarray, "N 3"]
+    normals: Float64[np.ndarray, "N 3"]
+
+    @staticmethod
+    def of(mesh: Mesh, layout: Layout) -> _Unwrapped:
+        texels = texels_of(layout, 0)
+        return _Unwrapped(layout, texels, texels.places(mesh), face_normals(mesh)[0][texels.faces])
+
+
+def _pictured(
+    surface: _Unwrapped,
+    usual: tuple[UInt8[np.ndarray, "N 3"], Bool[np.ndarray, " N"]],
+    frames: range,
+    looks: _Looks,
+    options: TextureOptions,
+) -> list[Companion]:
+    """Return a slow video of what a background looks like, where shadows move: what a frame hides is as usual."""
     finer = replace(options.video, crf=max(1, options.video.crf - FINER))
-    layout = looks.layout(mesh, frames, options.size)
-    texels = texels_of(layout, 0)
-    places, normals = texels.places(mesh), face_normals(mesh)[0][texels.faces]
-    usual, known = looks.colors(frames, places, normals)
 
     def picture_of(frame: int) -> UInt8[np.ndarray, "H W 3"]:
-        colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), places, normals)
-        return picture(texels, np.where(seen[:, None], colors, usual), known | seen)
+        colors, seen = looks.moment(min(frame + some.step // 2, frames[-1]), surface.places, surface.normals)
+        return picture(surface.texels, np.where(seen[:, None], colors, usual[0]), usual[1] | seen)
 
     some = frames[:: max(1, round(looks.frame_rate / PICTURES_A_SECOND))]
-    atlas = Companion(ChunkKind.ATLAS, encode_atlas(mesh, layout))
-    return [atlas, *layered_pictures(layout, some, picture_of, replace(options, video=finer))]
+    return layered_pictures(surface.layout, some, picture_of, replace(options, video=finer))
 
 
 class _Looks:

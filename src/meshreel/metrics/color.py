@@ -14,16 +14,14 @@ import numpy as np
 from jaxtyping import Float64
 
 from ..geometry.painted import Painted
-from ..types import Mesh
+from ..types import LUMA, Mesh
 from .even_points import scatter
 
 POINTS = 60_000  # on each surface: those of a person's texture of 1024 texels are seven times as many (guess)
 PEAK = 255.0
 LEAST = 1e-12  # squared difference: below are roundings of equal colours
 SHARES = np.array([6.0, 1.0, 1.0]) / 8  # of luma and of colour differences in one number, as MPEG weighs PSNRs
-TO_YUV = np.array(
-    [[0.2126, 0.7152, 0.0722], [-0.2126 / 1.8556, -0.7152 / 1.8556, 0.5], [0.5, -0.7152 / 1.5748, -0.0722 / 1.5748]]
-)
+TO_YUV = np.array([LUMA, (-LUMA[0] / 1.8556, -LUMA[1] / 1.8556, 0.5), (0.5, -LUMA[1] / 1.5748, -LUMA[2] / 1.5748)])
 
 
 @dataclass(frozen=True, slots=True)

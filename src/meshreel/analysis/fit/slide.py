@@ -18,9 +18,8 @@ from jaxtyping import Bool, Float64, Int32
 from ...errors import InputError
 from ...geometry.painted import Paint
 from ...geometry.topology import face_normals, unique_edges, vertex_normals
-from ...types import Mesh
+from ...types import LUMA, Mesh
 
-LUMA = np.array([0.2126, 0.7152, 0.0722])  # of red, green and blue (ITU-R BT.709)
 ITERATIONS = 60  # of the flow in each round: 60 edges far (guess)
 LIGHT = 12  # blurs whose result is light, not texture (guess)
 
@@ -68,7 +67,7 @@ class Slide:
         normals = face_normals(mesh)[0]
         places = np.concatenate([mesh.vertices, mesh.vertices[mesh.faces].mean(axis=1)])
         colors, known = paint.at(places, np.concatenate([vertex_normals(mesh), normals]))
-        count, luma = len(mesh.vertices), (colors * LUMA).sum(axis=1)
+        count, luma = len(mesh.vertices), (colors * np.array(LUMA)).sum(axis=1)
         sums, weights = luma * known, known.astype(np.float64)
         corners = mesh.faces.reshape(-1)
         whole, some = (

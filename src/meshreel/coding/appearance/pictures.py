@@ -20,6 +20,7 @@ from ...format.budget import check_pictures
 from ...format.layout import LAYER_PICTURES, Form, Pictures, VideoCodec
 from ...format.records import pack, unpack_all
 from ...shapes import UInt8
+from ...types import LUMA
 from .packets import coded_pictures
 
 PRESET = 6  # of SVT: 4 takes 2.5 times as long for 3 % fewer bytes
@@ -33,7 +34,6 @@ H264_SCALE, H264_OFFSET = 0.375, 7.75  # from SVT's rate factor to that of x264 
 COMMENT = 6  # type of a NAL unit: supplemental enhancement information
 H264_BORDER = 128  # pixels that FFmpeg's decoder counts beside a picture, at most
 LOW_DELAY = 0x80000  # FFmpeg's flag AV_CODEC_FLAG_LOW_DELAY: a picture is shown when its packet is decoded
-LUMA = (0.2126, 0.7152, 0.0722)  # of red, green and blue
 BAND = 64  # rows that become sRGB together: their floats take some MiB
 BLUE, RED = 1.8556, 1.5748  # what a full colour difference is of blue and of red
 
