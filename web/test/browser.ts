@@ -123,7 +123,17 @@ export interface OpenPage {
 
 /** Bundles, serves and opens a module's page in a Chromium of its own. */
 export async function openPage(entry: string, flags: readonly string[] = []): Promise<OpenPage> {
-  const folder = await bundlePage(entry);
+  return openFolder(await bundlePage(entry), flags);
+}
+
+/** Opens an empty page in a Chromium of its own: a page that this machine serves has WebCodecs. */
+export async function openEmptyPage(): Promise<OpenPage> {
+  const folder = mkdtempSync(join(tmpdir(), "meshreel-page-"));
+  writeFileSync(join(folder, "index.html"), '<!doctype html><link rel="icon" href="data:,">');
+  return openFolder(folder, []);
+}
+
+async function openFolder(folder: string, flags: readonly string[]): Promise<OpenPage> {
   const served = await serveFolder(folder, ISOLATED);
   const browser = await launchBrowser(flags);
   const page = await browser.newPage();

@@ -1,13 +1,10 @@
 // Chromium decodes the pictures of the golden files to the planes that Python has, from AV1 and from H.264.
 
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { readFileSync } from "node:fs";
 
-import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 
-import { describeInBrowser, launchBrowser, serveFolder, type Served } from "../../test/browser.ts";
+import { describeInBrowser, openEmptyPage, type OpenPage } from "../../test/browser.ts";
 import { configFor } from "../src/format/renditions.ts";
 import { Pictures } from "../src/format/layout.gen.ts";
 import { Head, isVideo } from "../src/format/reader.ts";
@@ -42,24 +39,15 @@ function videosOf(name: string): Video[] {
 }
 
 describeInBrowser("pictures in Chromium", () => {
-  const folder = mkdtempSync(join(tmpdir(), "meshreel-planes-"));
-  let [served, browser, page]: [Served?, Browser?, Page?] = [];
+  let opened: OpenPage;
   beforeAll(async () => {
-    writeFileSync(join(folder, "index.html"), "<!doctype html>"); // a page of this machine has WebCodecs
-    served = await serveFolder(folder);
-    browser = await launchBrowser();
-    page = await browser.newPage();
-    await page.goto(served.url);
+    opened = await openEmptyPage();
   });
-  afterAll(async () => {
-    await browser?.close();
-    await served?.close();
-    rmSync(folder, { recursive: true });
-  });
+  afterAll(() => opened.close());
 
   test.each(["textures", "scene"])("of colored/%s.reel are the same planes", async (name) => {
     for (const { kind, packets, planes } of videosOf(name)) {
-      const found = await page!.evaluate(async ([config, packets]) => {
+      const found = await opened.page.evaluate(async ([config, packets]) => {
         const pictures: Promise<string>[] = [];
         const digest = async (image: VideoFrame): Promise<string> => {
           const { width, height } = image.visibleRect!;

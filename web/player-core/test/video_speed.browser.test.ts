@@ -1,13 +1,8 @@
 // Chromium decodes textures by software in time. `MESHREEL_ALL=1 npx vitest run video_speed` prints how many pictures a second.
 
-import { mkdtempSync, rmSync, writeFileSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
-
-import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, expect } from "vitest";
 
-import { describeInBrowser, launchBrowser, serveFolder, type Served } from "../../test/browser.ts";
+import { describeInBrowser, openEmptyPage, type OpenPage } from "../../test/browser.ts";
 import { runPython } from "../../test/python.ts";
 import { slowTest } from "../../test/slow.ts";
 import { CODECS, configFor } from "../src/format/renditions.ts";
@@ -18,24 +13,15 @@ const LEAST = 60; // pictures a second
 const PASSES = 3; // the best counts: the machine of a test is shared
 
 describeInBrowser("a video of textures", () => {
-  const folder = mkdtempSync(join(tmpdir(), "meshreel-video-"));
-  let [served, browser, page]: [Served?, Browser?, Page?] = [];
+  let opened: OpenPage;
   beforeAll(async () => {
-    writeFileSync(join(folder, "index.html"), "<!doctype html>"); // a page of this machine has WebCodecs
-    served = await serveFolder(folder);
-    browser = await launchBrowser();
-    page = await browser.newPage();
-    await page.goto(served.url);
+    opened = await openEmptyPage();
   });
-  afterAll(async () => {
-    await browser?.close();
-    await served?.close();
-    rmSync(folder, { recursive: true });
-  });
+  afterAll(() => opened.close());
 
   /** Pictures a second of a decoder without hardware, from the first packet to the last picture; none is drawn. */
   const rateOf = (config: VideoDecoderConfig, packets: readonly string[]): Promise<number> =>
-    page!.evaluate(async ([config, packets]) => {
+    opened.page.evaluate(async ([config, packets]) => {
       const chunks = packets.map((text, k) => {
         const data = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
         return new EncodedVideoChunk({ type: k === 0 ? "key" : "delta", timestamp: k, data });
